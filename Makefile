@@ -1,0 +1,44 @@
+# Every target does its own set-up: python3 >= 3.11, make and a package index are all it needs.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check bench lock clean
+
+help:            ## list the targets
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
+
+demo: $(STAMP)   ## 60 s of a moving office, SLAM against odometry, a map and a film in out/demo/
+	@$(BIN)/mobilia demo
+
+test: $(STAMP)   ## the whole test suite
+	@$(BIN)/python -m pytest
+
+check: $(STAMP)  ## lint, format and strict types
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+
+bench: $(STAMP)  ## speed figures of this machine, as a table
+	@$(BIN)/mobilia bench
+
+lock: $(STAMP)   ## resolve requirements.lock anew (versions and hashes, Python 3.11 to 3.14, no index address)
+	@$(BIN)/python -m pip install --quiet uv
+	@$(BIN)/uv pip compile --universal --python-version 3.11 --group dev --generate-hashes \
+	  --no-header --no-annotate --upgrade --quiet pyproject.toml -o requirements.lock
+
+clean:           ## remove the virtual environment, caches and outputs
+	@rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(STAMP): requirements.lock pyproject.toml
+	@command -v $(PYTHON) >/dev/null 2>&1 || { echo "mobilia needs python3 (3.11 or newer): '$(PYTHON)' was not found. Set PYTHON=/path/to/python3."; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "mobilia needs Python 3.11 or newer, '$(PYTHON)' is $$($(PYTHON) -V 2>&1). Set PYTHON=/path/to/python3."; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "'$(PYTHON)' has no venv module: install it (Debian and Ubuntu: apt-get install python3-venv)."; exit 1; }
+	@echo "Setting up $(VENV) (once) ..."
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $(STAMP)

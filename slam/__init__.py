@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""SLAM on a stream of frames. Works without a simulator: never imports mujoco, gymnasium or sim."""
+
+from slam import odometry as _odometry  # noqa: F401  (registers itself)
+from slam.frames import (
+    BeamClass,
+    BeamLabels,
+    Features,
+    Frame,
+    LaserSpec,
+    Odometry,
+    Scan,
+    Stream,
+    StreamMetadata,
+)
+from slam.system import Estimate, Raster, SlamSystem, create, names, register
+from slam.trajectory import Trajectory
+
+__all__ = [
+    "BeamClass",
+    "BeamLabels",
+    "Estimate",
+    "Features",
+    "Frame",
+    "LaserSpec",
+    "Odometry",
+    "Raster",
+    "Scan",
+    "SlamSystem",
+    "Stream",
+    "StreamMetadata",
+    "Trajectory",
+    "create",
+    "names",
+    "register",
+]

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What can go wrong, by cause.
+
+Every message names the file or field, the value, and what was expected.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class MobiliaError(Exception):
+    """Base of every error raised on purpose; the command line prints it as one line."""
+
+
+class InvalidValueError(MobiliaError, ValueError):
+    """A field, argument or option has a value it cannot have."""
+
+
+class UnknownNameError(MobiliaError, LookupError):
+    """A scene, SLAM or preset of that name is not registered."""
+
+    def __str__(self) -> str:  # LookupError subclasses such as KeyError would quote the message
+        return str(self.args[0]) if self.args else ""
+
+
+class LogFormatError(MobiliaError):
+    """A log or recording cannot be read: which file, which line, what was expected there."""
+
+    def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
+        self.path = Path(path)
+        self.line = line
+        where = f"{path}:{line}" if line is not None else f"{path}"
+        super().__init__(f"{where}: {message}")
+
+
+class OutputError(MobiliaError, OSError):
+    """An output file or folder cannot be written."""
+
+
+class MissingDependencyError(MobiliaError, ImportError):
+    """An optional part is needed and not installed; the message says how to get it."""

@@ -1,0 +1,381 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The types that flow: a producer makes ``Frame``s, every SLAM takes them one at a time.
+
+Plain frozen dataclasses over read-only NumPy arrays, validated at birth. Units are metres, radians
+and seconds. Time stamps are integer nanoseconds from birth, so that a frame seen live and the same
+frame read back from a recording are equal. Frames follow REP 103 (x forward, y left, angles
+counter-clockwise) and REP 105 (map, odom, robot = base_link, laser); ``T_a_b`` maps b to a.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from slam.errors import InvalidValueError
+
+Float = NDArray[np.float64]
+NS_PER_S = 1_000_000_000
+
+
+def to_ns(seconds: float) -> int:
+    """Seconds as the nearest whole nanosecond."""
+    return round(seconds * NS_PER_S)
+
+
+def to_s(nanoseconds: int) -> float:
+    """Nanoseconds as seconds; exact only to about 1e-7 s for Unix times."""
+    return nanoseconds / NS_PER_S
+
+
+def frozen(
+    owner: str, name: str, value: ArrayLike, shape: tuple[int | None, ...], dtype: Any = np.float64
+) -> NDArray[Any]:
+    """A read-only copy of ``value`` with the given shape (None: any length) and type.
+
+    Raises ``InvalidValueError`` that names owner and field when it cannot be one.
+    """
+    try:
+        array = np.array(value, dtype=dtype)
+    except (TypeError, ValueError) as error:
+        raise InvalidValueError(f"{owner}.{name} must be numeric: {error}") from error
+    if array.ndim != len(shape) or any(
+        want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
+    ):
+        wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
+        raise InvalidValueError(f"{owner}.{name} must have shape {wanted}, got {array.shape}")
+    array.setflags(write=False)
+    return array
+
+
+def finite(owner: str, name: str, array: NDArray[Any]) -> None:
+    """Raise ``InvalidValueError`` when any entry is NaN or infinite."""
+    if not np.isfinite(array).all():
+        raise InvalidValueError(f"{owner}.{name} must be finite, got {array.tolist()!r:.200}")
+
+
+def pose(owner: str, name: str, value: ArrayLike) -> Float:
+    """A frozen, finite ``(x, y, theta)``."""
+    array = frozen(owner, name, value, (3,))
+    finite(owner, name, array)
+    return array
+
+
+def covariance(owner: str, name: str, value: ArrayLike) -> Float:
+    """A frozen, finite, symmetric (3, 3) covariance without a negative variance."""
+    array = frozen(owner, name, value, (3, 3))
+    finite(owner, name, array)
+    if np.any(np.diag(array) < 0.0) or not np.allclose(array, array.T, atol=1e-9, rtol=1e-6):
+        raise InvalidValueError(
+            f"{owner}.{name} must be symmetric with variances >= 0, got {array.tolist()}"
+        )
+    return array
+
+
+def _stamp(owner: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise InvalidValueError(
+            f"{owner}.stamp_ns must be an integer number of nanoseconds, got {value!r}"
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LaserSpec:
+    """Geometry and timing of a planar scanner; one object shared by all its scans.
+
+    n_beams            number of beams, counted counter-clockwise (right to left)
+    angle_min          rad, direction of beam 0 in the laser frame
+    angle_increment    rad between neighbouring beams, > 0
+    range_min/max      m; a return outside is no valid measurement
+    beam_time_offsets  (n_beams,) s after the scan's stamp at which each beam was measured, whole
+                       nanoseconds. The LMS-221 interlaces: in a 0.5 degree scan neighbours are
+                       one mirror turn (13.3 ms) apart. All zero where a log does not say.
+    T_robot_laser      (3,) pose of the laser on the robot (m, m, rad)
+    """
+
+    n_beams: int
+    angle_min: float
+    angle_increment: float
+    range_min: float = 0.0
+    range_max: float = 80.0
+    beam_time_offsets: Float = field(default_factory=lambda: np.zeros(0))
+    T_robot_laser: Float = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        if self.n_beams < 1:
+            raise InvalidValueError(f"LaserSpec.n_beams must be >= 1, got {self.n_beams}")
+        if not (math.isfinite(self.angle_min) and math.isfinite(self.angle_increment)):
+            raise InvalidValueError("LaserSpec.angle_min and angle_increment must be finite")
+        if self.angle_increment <= 0.0:
+            raise InvalidValueError(
+                f"LaserSpec.angle_increment must be > 0 rad, got {self.angle_increment}"
+            )
+        if not 0.0 <= self.range_min < self.range_max < math.inf:
+            raise InvalidValueError(
+                "LaserSpec needs 0 <= range_min < range_max < inf, "
+                f"got {self.range_min} and {self.range_max} m"
+            )
+        raw = np.asarray(self.beam_time_offsets, dtype=np.float64)
+        offsets = frozen(
+            "LaserSpec",
+            "beam_time_offsets",
+            np.zeros(self.n_beams) if raw.size == 0 else np.round(raw * NS_PER_S) / NS_PER_S,
+            (self.n_beams,),
+        )
+        finite("LaserSpec", "beam_time_offsets", offsets)
+        object.__setattr__(self, "beam_time_offsets", offsets)
+        object.__setattr__(
+            self, "T_robot_laser", pose("LaserSpec", "T_robot_laser", self.T_robot_laser)
+        )
+        angles = self.angle_min + np.arange(self.n_beams) * self.angle_increment
+        angles.setflags(write=False)
+        object.__setattr__(self, "_angles", angles)
+
+    @property
+    def angles(self) -> Float:
+        """(n_beams,) rad, beam directions in the laser frame."""
+        angles: Float = self._angles  # type: ignore[attr-defined]
+        return angles
+
+    @property
+    def sweep_duration(self) -> float:
+        """Seconds from the stamp to the last beam."""
+        return float(self.beam_time_offsets.max())
+
+    def same_as(self, other: LaserSpec) -> bool:
+        """True when every field is equal."""
+        return self is other or (
+            self.n_beams == other.n_beams
+            and self.angle_min == other.angle_min
+            and self.angle_increment == other.angle_increment
+            and self.range_min == other.range_min
+            and self.range_max == other.range_max
+            and np.array_equal(self.beam_time_offsets, other.beam_time_offsets)
+            and np.array_equal(self.T_robot_laser, other.T_robot_laser)
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scan:
+    """One laser scan.
+
+    stamp_ns     time of the earliest beam, ns
+    ranges       (n_beams,) float32 m; REP 117: +inf no return, NaN an error code, never -inf
+    intensities  optional (n_beams,) float32
+    """
+
+    stamp_ns: int
+    ranges: NDArray[np.float32]
+    spec: LaserSpec
+    intensities: NDArray[np.float32] | None = None
+
+    def __post_init__(self) -> None:
+        _stamp("Scan", self.stamp_ns)
+        n = self.spec.n_beams
+        ranges = frozen("Scan", "ranges", self.ranges, (n,), np.float32)
+        if np.any(ranges < 0.0):
+            bad = int(np.flatnonzero(ranges < 0.0)[0])
+            raise InvalidValueError(
+                f"Scan.ranges[{bad}] must be >= 0 m, inf (no return) or NaN (error), "
+                f"got {ranges[bad]}"
+            )
+        object.__setattr__(self, "ranges", ranges)
+        if self.intensities is not None:
+            object.__setattr__(
+                self,
+                "intensities",
+                frozen("Scan", "intensities", self.intensities, (n,), np.float32),
+            )
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """(n_beams,) True where the range is finite and within the scanner's limits."""
+        r = self.ranges
+        return np.isfinite(r) & (r >= self.spec.range_min) & (r <= self.spec.range_max)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Features:
+    """Point features with uncertainty: landmarks, tree trunks, extracted corners.
+
+    stamp_ns      ns
+    points_robot  (k, 2) m
+    covariances   (k, 2, 2) m^2, in the robot frame
+    ids           optional (k,) int64, true identities: for evaluation only, no SLAM may read them
+    """
+
+    stamp_ns: int
+    points_robot: Float
+    covariances: Float
+    ids: NDArray[np.int64] | None = None
+
+    def __post_init__(self) -> None:
+        _stamp("Features", self.stamp_ns)
+        points = frozen("Features", "points_robot", self.points_robot, (None, 2))
+        finite("Features", "points_robot", points)
+        k = len(points)
+        covariances = frozen("Features", "covariances", self.covariances, (k, 2, 2))
+        finite("Features", "covariances", covariances)
+        object.__setattr__(self, "points_robot", points)
+        object.__setattr__(self, "covariances", covariances)
+        if self.ids is not None:
+            object.__setattr__(self, "ids", frozen("Features", "ids", self.ids, (k,), np.int64))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Odometry:
+    """Where the wheels say the robot is, at the frame's stamp.
+
+    stamp_ns              ns
+    T_odom_robot          (3,) m, m, rad
+    increment_covariance  optional (3, 3): of the motion since the previous frame, in the previous
+                          robot frame. A bag's accumulated covariance is converted by its reader.
+    twist                 optional (3,) vx m/s, vy m/s, omega rad/s: mean body velocity over the
+                          sweep of the frame's scan, for de-skewing
+    """
+
+    stamp_ns: int
+    T_odom_robot: Float
+    increment_covariance: Float | None = None
+    twist: Float | None = None
+
+    def __post_init__(self) -> None:
+        _stamp("Odometry", self.stamp_ns)
+        object.__setattr__(
+            self, "T_odom_robot", pose("Odometry", "T_odom_robot", self.T_odom_robot)
+        )
+        if self.increment_covariance is not None:
+            object.__setattr__(
+                self,
+                "increment_covariance",
+                covariance("Odometry", "increment_covariance", self.increment_covariance),
+            )
+        if self.twist is not None:
+            object.__setattr__(self, "twist", pose("Odometry", "twist", self.twist))
+
+
+class BeamClass(IntEnum):
+    """What a beam hit, by how the thing behaves, not by what it is called."""
+
+    NONE = 0
+    STATIC = 1
+    SEMI_STATIC = 2
+    MOVING = 3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BeamLabels:
+    """Truth per beam; for evaluation only.
+
+    body          (n,) int32 body id in the simulated model, -1 where nothing was hit
+    kind          (n,) uint8, a ``BeamClass``: SEMI_STATIC can move but rests now, MOVING moves now
+    displacement  (n,) float32 m that body moved since the robot last saw it
+    incidence     (n,) float32 rad between beam and surface normal, NaN where nothing was hit
+    mixed         (n,) bool, the range blends two surfaces
+    """
+
+    body: NDArray[np.int32]
+    kind: NDArray[np.uint8]
+    displacement: NDArray[np.float32]
+    incidence: NDArray[np.float32]
+    mixed: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        n = len(self.body)
+        for name, dtype in (
+            ("body", np.int32),
+            ("kind", np.uint8),
+            ("displacement", np.float32),
+            ("incidence", np.float32),
+            ("mixed", np.bool_),
+        ):
+            value = frozen("BeamLabels", name, getattr(self, name), (n,), dtype)
+            object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Frame:
+    """Everything a robot knows at one moment, and (apart) what only the ceiling tags know.
+
+    stamp_ns  ns; the scan's or the features' stamp, to which odometry and truth are interpolated
+    odometry  ``Odometry``
+    scan      ``Scan`` and / or
+    features  ``Features``
+    truth     optional (3,) T_world_robot, for evaluation only
+    labels    optional ``BeamLabels``, for evaluation only
+    """
+
+    stamp_ns: int
+    odometry: Odometry
+    scan: Scan | None = None
+    features: Features | None = None
+    truth: Float | None = None
+    labels: BeamLabels | None = None
+
+    def __post_init__(self) -> None:
+        _stamp("Frame", self.stamp_ns)
+        if self.truth is not None:
+            object.__setattr__(self, "truth", pose("Frame", "truth", self.truth))
+        if self.labels is not None and (
+            self.scan is None or len(self.labels.body) != self.scan.spec.n_beams
+        ):
+            raise InvalidValueError("Frame.labels must have one entry per beam of Frame.scan")
+
+    @property
+    def stamp(self) -> float:
+        """Seconds."""
+        return to_s(self.stamp_ns)
+
+    def without_truth(self) -> Frame:
+        """The same frame as a robot would get it: no truth, no labels, no feature identities."""
+        features = self.features
+        if features is not None and features.ids is not None:
+            features = Features(
+                stamp_ns=features.stamp_ns,
+                points_robot=features.points_robot,
+                covariances=features.covariances,
+            )
+        return Frame(
+            stamp_ns=self.stamp_ns, odometry=self.odometry, scan=self.scan, features=features
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StreamMetadata:
+    """Where frames come from.
+
+    source  "simulation", "carmen", "rosbag2", ...; ``scene`` and ``seed`` for simulations
+    laser   the scanner, None for feature streams; ``robot`` its name or preset
+    truth   what ``Frame.truth`` is: "simulator", "corrected poses of the log", "" for none
+    extra   JSON-serialisable facts (path, counts of repaired lines, ...)
+    """
+
+    source: str
+    scene: str | None = None
+    seed: int | None = None
+    laser: LaserSpec | None = None
+    robot: str | None = None
+    truth: str = ""
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stream:
+    """An iterable of ``Frame`` with ``metadata``; iterating again replays it from the start.
+
+    ``frames`` is called at each iteration and returns a fresh iterator; ``length`` is the number of
+    frames where known beforehand.
+    """
+
+    metadata: StreamMetadata
+    frames: Callable[[], Iterable[Frame]]
+    length: int | None = None
+
+    def __iter__(self) -> Iterator[Frame]:
+        return iter(self.frames())

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The null system: believe the wheels. Every other SLAM is measured against it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float, Frame
+from slam.system import Estimate, Raster, register
+from slam.trajectory import Trajectory
+
+
+@register("odometry")
+class OdometrySlam:
+    """Chains odometry from the first frame; no map.
+
+    The covariance is the propagated sum of the increments' own covariances, or, where a stream
+    carries none, stays zero with ``converged`` still True: the null system makes no claim.
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything; the next frame is the origin."""
+        self._T_odom_first: Float | None = None
+        self._T_map_robot: Float = np.zeros(3)
+        self._covariance: Float = np.zeros((3, 3))
+        self._stamps: list[int] = []
+        self._poses: list[Float] = []
+
+    def update(self, frame: Frame) -> Estimate:
+        """The odometry pose relative to the first frame."""
+        T_odom_robot = frame.odometry.T_odom_robot
+        if self._T_odom_first is None:
+            self._T_odom_first = T_odom_robot
+        T_map_robot = se2.between(self._T_odom_first, T_odom_robot)
+        increment_covariance = frame.odometry.increment_covariance
+        if increment_covariance is not None and self._stamps:
+            T_before_now = se2.between(self._T_map_robot, T_map_robot)
+            self._covariance = se2.propagate(
+                self._covariance, self._T_map_robot, T_before_now, increment_covariance
+            )
+        self._T_map_robot = T_map_robot
+        self._stamps.append(frame.stamp_ns)
+        self._poses.append(T_map_robot)
+        return Estimate(
+            stamp_ns=frame.stamp_ns, T_map_robot=T_map_robot, covariance=self._covariance
+        )
+
+    def map(self) -> Raster | None:
+        """None: odometry has no map."""
+        return None
+
+    def trajectory(self) -> Trajectory:
+        """The online poses."""
+        return Trajectory(
+            stamps_ns=np.array(self._stamps, dtype=np.int64),
+            poses=np.array(self._poses).reshape(-1, 3),
+        )

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a SLAM is to this project: a protocol of five methods, and the names it can be asked for by.
+
+    class MySlam:
+        def reset(self) -> None: ...
+        def update(self, frame: Frame) -> Estimate: ...
+        def map(self) -> Raster | None: ...
+        def trajectory(self) -> Trajectory: ...
+
+``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam.errors import InvalidValueError, UnknownNameError
+from slam.frames import Float, Frame, covariance, frozen, pose
+from slam.trajectory import Trajectory
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimate:
+    """Where a SLAM believes the robot is.
+
+    stamp_ns     the frame's stamp
+    T_map_robot  (3,) m, m, rad; the map frame is the robot's frame at the first update
+    covariance   (3, 3) of (x, y, theta) in the map frame
+    converged    False when the system does not trust this estimate; never a plausible stand-in
+    diagnostics  JSON-serialisable numbers and words, e.g. {"state": "tracking", "matched": 0.97}
+    """
+
+    stamp_ns: int
+    T_map_robot: Float
+    covariance: Float
+    converged: bool = True
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_map_robot", pose("Estimate", "T_map_robot", self.T_map_robot))
+        object.__setattr__(
+            self, "covariance", covariance("Estimate", "covariance", self.covariance)
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Raster:
+    """A map as an image of existence.
+
+    values        (height, width) float32 in [0, 1], NaN unknown; row 0 is the lowest y
+    resolution_m  edge of a cell, m
+    T_map_origin  (3,) pose of the outer corner of values[0, 0] in the map frame
+    """
+
+    values: NDArray[np.float32]
+    resolution_m: float
+    T_map_origin: Float
+
+    def __post_init__(self) -> None:
+        values = frozen("Raster", "values", self.values, (None, None), np.float32)
+        known = values[~np.isnan(values)]
+        if known.size and (known.min() < 0.0 or known.max() > 1.0):
+            raise InvalidValueError(
+                f"Raster.values must lie in [0, 1] or be NaN, got {known.min()}..{known.max()}"
+            )
+        if not self.resolution_m > 0.0:
+            raise InvalidValueError(f"Raster.resolution_m must be > 0 m, got {self.resolution_m}")
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "T_map_origin", pose("Raster", "T_map_origin", self.T_map_origin))
+
+
+@runtime_checkable
+class SlamSystem(Protocol):
+    """One SLAM. ``update`` gets frames in the order of their stamps, the first at the origin."""
+
+    def reset(self) -> None:
+        """Forget everything; the next frame is the first."""
+
+    def update(self, frame: Frame) -> Estimate:
+        """Take a frame in, say where the robot is. Must not read ``frame.truth`` or ``labels``."""
+
+    def map(self) -> Raster | None:
+        """The map now, or None for a system without one."""
+
+    def trajectory(self) -> Trajectory:
+        """Final poses of all frames so far; the online ones where nothing better exists."""
+
+
+Factory = Callable[..., SlamSystem]
+F = TypeVar("F", bound=Callable[..., Any])
+_registry: dict[str, Factory] = {}
+
+
+def register(name: str) -> Callable[[F], F]:
+    """Class or factory decorator: make it available as ``create(name)``."""
+
+    def add(factory: F) -> F:
+        _registry[name] = factory
+        return factory
+
+    return add
+
+
+def names() -> list[str]:
+    """Registered names, sorted."""
+    return sorted(_registry)
+
+
+def create(name: str, **config: Any) -> SlamSystem:
+    """A fresh SLAM by registered name or by ``module:Class``; ``config`` goes to its constructor.
+
+    Raises ``UnknownNameError`` with the nearest known name, or what is wrong with the entry.
+    """
+    if ":" in name:
+        factory = _load(name)
+    elif name in _registry:
+        factory = _registry[name]
+    else:
+        near = difflib.get_close_matches(name, _registry, n=1)
+        hint = f" Did you mean '{near[0]}'?" if near else ""
+        raise UnknownNameError(
+            f"no SLAM is called '{name}'.{hint} Known: {', '.join(names())}, or module:Class."
+        )
+    system = factory(**config)
+    if not isinstance(system, SlamSystem):
+        missing = [m for m in ("reset", "update", "map", "trajectory") if not hasattr(system, m)]
+        raise UnknownNameError(f"'{name}' is no SlamSystem: it has no {', '.join(missing)}()")
+    return system
+
+
+def _load(entry: str) -> Factory:
+    module_name, _, attribute = entry.partition(":")
+    try:
+        module = importlib.import_module(module_name)
+    except ImportError as error:
+        raise UnknownNameError(f"'{entry}': cannot import '{module_name}' ({error})") from error
+    try:
+        factory: Factory = getattr(module, attribute)
+    except AttributeError:
+        raise UnknownNameError(f"'{entry}': module '{module_name}' has no '{attribute}'") from None
+    return factory
