@@ -93,7 +93,7 @@ class SlamSystem(Protocol):
         """Final poses of all frames so far; the online ones where nothing better exists."""
 
 
-Factory = Callable[..., SlamSystem]
+Factory = Callable[..., object]
 F = TypeVar("F", bound=Callable[..., Any])
 _registry: dict[str, Factory] = {}
 

@@ -41,7 +41,7 @@ class Trajectory:
 
 
 def write_tum(path: Path, trajectory: Trajectory) -> None:
-    """``t x y z qx qy qz qw``, one pose a line (the TUM RGB-D format that ``evo_ape tum`` reads)."""
+    """``t x y z qx qy qz qw``, one pose a line (TUM RGB-D format, as evo reads)."""
     lines = []
     for stamp_ns, (x, y, theta) in zip(
         trajectory.stamps_ns.tolist(), trajectory.poses.tolist(), strict=True
