@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The console command ``mobilia``: parse, call, print. Each verb lives in a module of its own."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import sys
+from types import FrameType
+
+import typer
+from rich.logging import RichHandler
+
+from scripts import bench, demo, listing, run
+from scripts.console import console, fail
+from slam.errors import MobiliaError
+
+app = typer.Typer(
+    name="mobilia",
+    help=(
+        "A testbed where rooms do not sit still, and the SLAM that copes with it.\n\n"
+        "Start with [bold]mobilia demo[/bold]; every verb explains itself with --help."
+    ),
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("demo")(demo.demo)
+app.command("run")(run.run)
+app.command("list")(listing.listing)
+app.command("bench")(bench.bench)
+
+
+@app.callback()
+def options(
+    verbose: bool = typer.Option(False, "--verbose", "-v", help="Also print what is going on."),
+) -> None:
+    """Options of every verb."""
+    logging.basicConfig(
+        level=logging.INFO if verbose else logging.WARNING,
+        format="%(message)s",
+        handlers=[RichHandler(console=console, show_path=False, show_time=False)],
+    )
+
+
+def _terminate(_signal: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt  # so that a kill by SIGTERM also removes what is half-written
+
+
+def main() -> None:
+    """Entry point: every failure we foresee is one clear line and a non-zero exit status."""
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        app()
+    except MobiliaError as error:
+        fail(str(error))
+        sys.exit(1)
+    except KeyboardInterrupt:
+        fail("interrupted; nothing half-written was left behind")
+        sys.exit(130)
+    except BrokenPipeError:
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the verbs print: a rich console for results, one for errors, one progress bar."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+console = Console()
+_errors = Console(stderr=True)
+
+
+def fail(message: str) -> None:
+    """One line on stderr."""
+    _errors.print(f"[bold red]mobilia:[/bold red] {message}", highlight=False, soft_wrap=True)
+
+
+def note(message: str) -> None:
+    """One line that the user should see but that is no error."""
+    console.print(f"[yellow]note:[/yellow] {message}", highlight=False, soft_wrap=True)
+
+
+def progress() -> Progress:
+    """A progress bar with time left; silent when the output is no terminal."""
+    return Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[unit]}"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        transient=False,
+    )

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small drawing helpers on RGB uint8 images: crisp text, pasting, a running line chart."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+Picture = NDArray[np.uint8]
+Color = tuple[int, int, int]
+
+INK: Color = (32, 36, 44)
+MUTED: Color = (120, 126, 138)
+PAPER: Color = (250, 250, 248)
+GRID: Color = (226, 228, 232)
+BLUE: Color = (31, 97, 190)  # the paper's raw LIDAR
+ORANGE: Color = (222, 110, 24)  # odometry
+GREEN: Color = (22, 140, 90)  # truth
+RED: Color = (206, 44, 60)  # the SLAM's estimate
+
+
+@lru_cache(maxsize=8)
+def _font(size: int, bold: bool) -> ImageFont.FreeTypeFont:
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name), size)
+
+
+@lru_cache(maxsize=512)
+def _glyphs(words: str, size: int, bold: bool) -> Picture:
+    font = _font(size, bold)
+    _, _, right, bottom = font.getbbox(words)
+    image = Image.new("L", (max(int(right), 1) + 1, max(int(bottom), 1) + 1), 0)
+    ImageDraw.Draw(image).text((0, 0), words, fill=255, font=font)
+    return np.asarray(image, dtype=np.uint8)
+
+
+def text(
+    image: Picture,
+    words: str,
+    at: tuple[int, int],
+    size: int = 14,
+    color: Color = INK,
+    bold: bool = False,
+) -> int:
+    """Write ``words`` with its top left corner at ``at``; returns the x after it."""
+    mask = _glyphs(words, size, bold)
+    x, y = at
+    height = min(mask.shape[0], image.shape[0] - y)
+    width = min(mask.shape[1], image.shape[1] - x)
+    if height <= 0 or width <= 0:
+        return x
+    alpha = mask[:height, :width, None].astype(np.float32) / 255.0
+    patch = image[y : y + height, x : x + width]
+    patch[:] = (patch * (1.0 - alpha) + np.array(color, np.float32) * alpha).astype(np.uint8)
+    return x + mask.shape[1]
+
+
+def paste(image: Picture, part: Picture, at: tuple[int, int], size: tuple[int, int]) -> None:
+    """Put ``part`` into the box ``at`` + ``size`` (x, y; width, height), letterboxed on paper."""
+    (x, y), (width, height) = at, size
+    scale = min(width / part.shape[1], height / part.shape[0])
+    if abs(scale - 1.0) > 1e-3:
+        shape = (max(1, round(part.shape[1] * scale)), max(1, round(part.shape[0] * scale)))
+        how = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
+        part = cv2.resize(part, shape, interpolation=how)
+    h, w = part.shape[:2]
+    left, top = x + (width - w) // 2, y + (height - h) // 2
+    image[top : top + h, left : left + w] = part
+
+
+def polyline(image: Picture, pixels: NDArray[Any], color: Color, thickness: int = 1) -> None:
+    """An antialiased line through ``pixels`` (n, 2) float, sub-pixel exact."""
+    if len(pixels) >= 2:
+        fixed = np.round(np.asarray(pixels) * 16.0).astype(np.int32)
+        cv2.polylines(image, [fixed], False, color, thickness, cv2.LINE_AA, shift=4)

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Still figures of a finished run: trajectories, errors, and the map in the paper's style."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from slam import se2
+from slam.files import replacing
+from slam.frames import NS_PER_S, Float
+from slam.system import Raster
+from slam.trajectory import Trajectory
+
+COLORS = {"shunting": "#ce2c3c", "odometry": "#de6e18", "truth": "#168c5a"}
+_SPARE = ("#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f")
+
+
+def color_of(name: str, order: Sequence[str]) -> str:
+    """One colour per system, the same in every figure of a run."""
+    if name in COLORS:
+        return COLORS[name]
+    others = [other for other in order if other not in COLORS]
+    return _SPARE[others.index(name) % len(_SPARE)]
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure whole or not at all; PNG by suffix, 150 dpi."""
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=150, metadata={"Software": None})
+
+
+def _axes(width: float, height: float, rows: int = 1) -> tuple[Figure, NDArray[np.object_]]:
+    mpl.rcParams.update(
+        {"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
+         "axes.spines.right": False, "figure.constrained_layout.use": True}
+    )  # fmt: skip
+    figure = Figure(figsize=(width, height))
+    axes = np.atleast_1d(figure.subplots(rows, 1, sharex=rows > 1))
+    return figure, axes
+
+
+def trajectories(
+    path: Path,
+    tracks: Mapping[str, Trajectory],
+    truth: Trajectory | None,
+    raster: Raster | None,
+    truth_name: str,
+) -> None:
+    """``tracks`` over the map, all in the frame of the first pose (``truth`` already in it)."""
+    figure, axes = _axes(9.0, 6.0)
+    ax: Axes = axes[0]
+    if raster is not None:
+        draw_raster(ax, raster)
+    for name, track in tracks.items():
+        color = color_of(name, list(tracks))
+        ax.plot(track.poses[:, 0], track.poses[:, 1], color=color, lw=1.4, label=name)
+        ax.plot(*track.poses[-1, :2], "o", color=color, ms=5)
+    if truth is not None:
+        ax.plot(truth.poses[:, 0], truth.poses[:, 1], "--", color=COLORS["truth"], lw=1.2,
+                label=truth_name)  # fmt: skip
+    ax.plot(0.0, 0.0, "k+", ms=9, label="start")
+    ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title="Trajectories, online")
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    save(figure, path)
+
+
+def draw_raster(ax: Axes, raster: Raster) -> None:
+    """A raster as grey values under a plot (axis-aligned origins only, as all of ours are)."""
+    height, width = raster.values.shape
+    x, y, _ = raster.T_map_origin
+    extent = (x, x + width * raster.resolution_m, y, y + height * raster.resolution_m)
+    ax.imshow(np.nan_to_num(raster.values), origin="lower", extent=extent, cmap="Greys",
+              vmin=0.0, vmax=1.0, interpolation="antialiased")  # fmt: skip
+
+
+def errors(path: Path, tracks: Mapping[str, Trajectory], truth: Trajectory) -> None:
+    """Position and heading error over time, unaligned: in the frame of the known first pose."""
+    figure, axes = _axes(9.0, 5.0, rows=2)
+    for name, track in tracks.items():
+        stamps, offset, turned = error_series(track, truth)
+        color = color_of(name, list(tracks))
+        axes[0].plot(stamps, offset, color=color, lw=1.3, label=name)
+        axes[1].plot(stamps, np.degrees(np.abs(turned)), color=color, lw=1.3, label=name)
+    axes[0].set(ylabel="position error in m", yscale="log", title="Error over time, unaligned")
+    axes[1].set(ylabel="heading error in degrees", yscale="log", xlabel="time in s")
+    axes[0].legend(frameon=False)
+    save(figure, path)
+
+
+def error_series(track: Trajectory, truth: Trajectory) -> tuple[Float, Float, Float]:
+    """Seconds, distance (m) and heading difference (rad) where both have the same stamp."""
+    stamps, mine, theirs = np.intersect1d(
+        track.stamps_ns, truth.stamps_ns, assume_unique=True, return_indices=True
+    )
+    delta = track.poses[mine] - truth.poses[theirs]
+    offset = np.sqrt(delta[:, 0] ** 2 + delta[:, 1] ** 2)
+    seconds = (stamps - truth.stamps_ns[0]) / NS_PER_S
+    return seconds, np.maximum(offset, 1e-5), se2.wrap_array(delta[:, 2])
+
+
+def in_first_frame(truth: Trajectory) -> Trajectory:
+    """The truth as seen from its own first pose, the frame in which a SLAM starts."""
+    T_first_world = se2.inverse(truth.poses[0])
+    return Trajectory(
+        stamps_ns=truth.stamps_ns,
+        poses=np.array(
+            [se2.compose(T_first_world, T_world_robot) for T_world_robot in truth.poses]
+        ),
+    )

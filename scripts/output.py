@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Output folders that appear whole or not at all, and the recipe that says what made them."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shutil
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from slam.errors import OutputError
+from slam.files import write_text
+
+RECIPE = "recipe.json"
+
+
+@contextmanager
+def whole_folder(path: Path, *, overwrite: bool) -> Iterator[Path]:
+    """Yield a temporary folder beside ``path``; it takes the name ``path`` when the block succeeds.
+
+    Raises ``OutputError`` when ``path`` exists and ``overwrite`` is off, when it exists and holds
+    no recipe of ours (then it is somebody else's and never replaced), or cannot be written. On any
+    failure, Ctrl-C included, the temporary folder is removed and an earlier run stays as it was.
+    """
+    path = path.absolute()
+    _refuse(path, overwrite)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        temporary.mkdir(parents=True)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+    try:
+        yield temporary
+        _take_place(temporary, path)
+    except OSError as error:
+        if isinstance(error, OutputError):
+            raise
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _refuse(path: Path, overwrite: bool) -> None:
+    if not path.exists():
+        return
+    if not path.is_dir():
+        raise OutputError(f"{path} is a file; --out needs a folder")
+    if not any(path.iterdir()):
+        return
+    if not (path / RECIPE).exists():
+        raise OutputError(f"{path} holds files that mobilia did not write: choose another --out")
+    if not overwrite:
+        raise OutputError(
+            f"{path} holds an earlier run: pass --overwrite to replace it, or another --out"
+        )
+
+
+def _take_place(temporary: Path, path: Path) -> None:
+    """Move the new folder in and the old one out; the old one comes back if that fails."""
+    if not path.exists():
+        temporary.rename(path)
+        return
+    aside = path.with_name(f".{path.name}.{os.getpid()}.old")
+    path.rename(aside)
+    try:
+        temporary.rename(path)
+    except OSError:
+        aside.rename(path)
+        raise
+    shutil.rmtree(aside, ignore_errors=True)
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that can change a number."""
+    wanted = ("mobilia", "mujoco", "gymnasium", "numpy", "scipy", "numba", "opencv-python-headless")
+    found = {}
+    for name in wanted:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return {"python": platform.python_version(), **found}
+
+
+def machine() -> dict[str, Any]:
+    """The machine a figure was measured on."""
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "system": platform.platform(),
+        "python": sys.version.split()[0],
+    }
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> None:
+    """``recipe.json``: the command, its settings and the versions it ran with."""
+    recipe = {"schema": 1, "command": command, "settings": settings, "versions": versions()}
+    write_text(folder / RECIPE, json.dumps(recipe, indent=2, sort_keys=True) + "\n")

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Driving: a tour of a scene's rooms, local avoidance by the dynamic window approach.
+
+(Fox, Burgard, Thrun 1997.) The planner sees what it is given: a static layout, a pose and the discs
+around it. Recorded episodes give it the truth, a closed loop gives it a SLAM's estimate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.navgrid import NavGrid
+from slam._jit import njit
+from slam.errors import InvalidValueError
+from slam.frames import Float
+
+_FAR = 1e6
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveConfig:
+    """Limits of a tour.
+
+    v_max_mps, omega_max_radps  speed limits; an indoor Pioneer's usual pace, not its maximum
+    robot_radius_m              clearance kept to walls and discs (Pioneer 3-DX: 0.26 m + margin)
+    goal_radius_m               a goal counts as visited within this distance
+    patience_s                  without progress for this long, the next goal is tried
+    """
+
+    v_max_mps: float = 0.7
+    omega_max_radps: float = 1.4
+    robot_radius_m: float = 0.30
+    goal_radius_m: float = 0.5
+    patience_s: float = 6.0
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            if not getattr(self, name) > 0.0:
+                raise InvalidValueError(
+                    f"DriveConfig.{name} must be > 0, got {getattr(self, name)}"
+                )
+
+
+@njit
+def _field_at(
+    field: NDArray[np.float64], x0: float, y0: float, cell: float, x: float, y: float
+) -> float:
+    i = math.floor((y - y0) / cell)
+    j = math.floor((x - x0) / cell)
+    if i < 0 or j < 0 or i >= field.shape[0] or j >= field.shape[1]:
+        return _FAR
+    return float(field[i, j])
+
+
+@njit
+def _nearest_disc(discs: NDArray[np.float64], x: float, y: float, t: float) -> float:
+    """Distance to the edge of the nearest disc, each moved on by its velocity for ``t`` s."""
+    nearest = _FAR
+    for k in range(discs.shape[0]):
+        dx = discs[k, 0] + t * discs[k, 3] - x
+        dy = discs[k, 1] + t * discs[k, 4] - y
+        nearest = min(nearest, math.sqrt(dx * dx + dy * dy) - discs[k, 2])
+    return nearest
+
+
+@njit
+def _score(
+    pose: NDArray[np.float64],
+    v: float,
+    omega: float,
+    discs: NDArray[np.float64],
+    grid: tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, float],
+) -> float:
+    """How good 1.65 s of driving at (v, omega) would be; minus ``_FAR`` when it would collide."""
+    clearance, cost_to_go, x0, y0, cell, radius = grid
+    x, y, theta = pose[0], pose[1], pose[2]
+    run_over = 0.0
+    start = min(_field_at(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, 0.0)) - radius
+    closest = _FAR
+    for step in range(1, 12):
+        t = 0.15 * step
+        x += 0.15 * v * math.cos(theta + 0.075 * omega)
+        y += 0.15 * v * math.sin(theta + 0.075 * omega)
+        theta += 0.15 * omega
+        free = min(_field_at(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, t)) - radius
+        if free < 0.0 and free <= start + 0.02:  # an overlap at the start may be driven out of
+            if v != 0.0:
+                return -_FAR
+            run_over = 3.0
+        closest = min(closest, free)
+    here = _field_at(cost_to_go, x0, y0, cell, x, y)
+    ahead = _field_at(
+        cost_to_go, x0, y0, cell, x + 0.35 * math.cos(theta), y + 0.35 * math.sin(theta)
+    )
+    if here >= _FAR:
+        here = 50.0
+    ahead = min(ahead, here + 0.5)
+    return -here - 1.5 * ahead + 0.5 * min(closest, 0.35) - 0.02 * abs(omega) - run_over
+
+
+@njit
+def _choose(
+    pose: NDArray[np.float64],
+    now: NDArray[np.float64],
+    limits: tuple[float, float],
+    discs: NDArray[np.float64],
+    grid: tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, float],
+) -> tuple[float, float, float]:
+    """The best (v, omega) of the window, and its score."""
+    v_max, omega_max = limits
+    best_v, best_omega, best = 0.0, 0.0, -_FAR
+    for a in range(-1, 5):
+        v = v_max * a / 4.0
+        if a < 0:
+            v = -0.3 * v_max
+        if v - now[0] > 0.35:
+            continue
+        for b in range(-6, 7):
+            omega = omega_max * b / 6.0
+            if a < 0 and abs(b) > 3:
+                continue
+            score = _score(pose, v, omega, discs, grid)
+            if a <= 0:
+                score -= 0.25
+            if score > best:
+                best_v, best_omega, best = v, omega, score
+    return best_v, best_omega, best
+
+
+class Driver:
+    """Steers to one goal after another; remembers only its own progress.
+
+    goals  (n, 2) m, visited in order and again from the start
+    """
+
+    def __init__(self, grid: NavGrid, goals: NDArray[np.float64], config: DriveConfig) -> None:
+        if len(goals) == 0:
+            raise InvalidValueError("a tour needs at least one goal")
+        self.config = config
+        self.goals = np.asarray(goals, dtype=np.float64)
+        self.visited = 0
+        self._grid = grid
+        self._index = 0
+        self._best = math.inf
+        self._idle_s = 0.0
+
+    @property
+    def goal(self) -> Float:
+        """(2,) m, where it is driving now."""
+        return self.goals[self._index % len(self.goals)]
+
+    def command(
+        self, T_world_robot: Float, velocity: Sequence[float], discs: Float, dt: float
+    ) -> tuple[float, float]:
+        """(v m/s, omega rad/s) for the next ``dt`` s.
+
+        velocity  (v, omega) the robot has now
+        discs     (k, 5): x, y, radius (m) and velocity (m/s) of what must not be hit
+        """
+        offset = T_world_robot[:2] - self.goal
+        distance = math.hypot(offset[0], offset[1])
+        if distance < self.config.goal_radius_m:
+            self.visited += 1
+            self._next()
+        to_go = self._grid.cost_to(self.goal)
+        left = self._grid.lookup(to_go, T_world_robot[0], T_world_robot[1])
+        if left < self._best - 0.1:
+            self._best, self._idle_s = left, 0.0
+        else:
+            self._idle_s += dt
+            if self._idle_s > self.config.patience_s:
+                self._next()
+        grid = self._grid
+        v, omega, _ = _choose(
+            np.asarray(T_world_robot, dtype=np.float64),
+            np.asarray(velocity, dtype=np.float64),
+            (self.config.v_max_mps, self.config.omega_max_radps),
+            np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 5),
+            (grid.clearance, to_go, grid.x0, grid.y0, grid.cell, self.config.robot_radius_m),
+        )
+        return v, omega
+
+    def _next(self) -> None:
+        self._index += 1
+        self._best, self._idle_s = math.inf, 0.0
+
+
+def tour(
+    goals: dict[str, tuple[float, float]] | Sequence[tuple[str, tuple[float, float]]],
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """All goals in an order drawn from ``rng``: (n, 2) m."""
+    named = sorted(dict(goals).items())
+    order = rng.permutation(len(named))
+    return np.array([named[k][1] for k in order], dtype=np.float64)

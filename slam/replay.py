@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Feed one stream to several SLAMs, frame by frame, and keep what each of them said."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from slam.frames import Float, Frame
+from slam.system import Estimate, SlamSystem
+from slam.trajectory import Trajectory
+
+
+@dataclass(eq=False)
+class Track:
+    """One SLAM's run: every online estimate and what it cost.
+
+    durations_s  processor time of each ``update`` (all threads), s; a figure about the machine,
+                 never part of a result that must repeat
+    """
+
+    name: str
+    system: SlamSystem
+    estimates: list[Estimate] = field(default_factory=list)
+    durations_s: list[float] = field(default_factory=list)
+
+    def online(self) -> Trajectory:
+        """The poses as they were believed at the time."""
+        return Trajectory(
+            stamps_ns=np.array([e.stamp_ns for e in self.estimates], dtype=np.int64),
+            poses=np.array([e.T_map_robot for e in self.estimates]).reshape(-1, 3),
+        )
+
+    def final(self) -> Trajectory | None:
+        """The poses as the system sees them now, None where they are the online ones."""
+        final, online = self.system.trajectory(), self.online()
+        same = np.array_equal(final.stamps_ns, online.stamps_ns) and np.array_equal(
+            final.poses, online.poses
+        )
+        return None if same else final
+
+    def covariances(self) -> Float:
+        """(n, 3, 3) online covariances in the map frame."""
+        return np.array([e.covariance for e in self.estimates]).reshape(-1, 3, 3)
+
+    def take(self, frame: Frame) -> Estimate:
+        """One update, timed."""
+        start = time.process_time()
+        estimate = self.system.update(frame)
+        self.durations_s.append(time.process_time() - start)
+        self.estimates.append(estimate)
+        return estimate
+
+
+@dataclass(eq=False)
+class Replay:
+    """Several SLAMs on one stream. ``truth()`` is None until a frame carried one."""
+
+    tracks: dict[str, Track]
+    _stamps: list[int] = field(default_factory=list)
+    _poses: list[Float] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, systems: Mapping[str, SlamSystem]) -> Replay:
+        """A replay with one track per named system."""
+        return cls({name: Track(name, system) for name, system in systems.items()})
+
+    def run(self, frames: Iterable[Frame]) -> Iterator[Frame]:
+        """Give each frame, stripped of truth, to every system; yield it back with its truth."""
+        for frame in frames:
+            blind = frame.without_truth()
+            for track in self.tracks.values():
+                track.take(blind)
+            if frame.truth is not None:
+                self._stamps.append(frame.stamp_ns)
+                self._poses.append(frame.truth)
+            yield frame
+
+    def truth(self) -> Trajectory | None:
+        """The true poses seen so far, in the world frame."""
+        if not self._stamps:
+            return None
+        return Trajectory(
+            stamps_ns=np.array(self._stamps, dtype=np.int64), poses=np.array(self._poses)
+        )

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Output folders appear whole or not at all, and nobody's files are ever replaced."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scripts.output import whole_folder, write_recipe
+from slam.errors import OutputError
+
+
+def make(path: Path, text: str, *, overwrite: bool = False) -> None:
+    with whole_folder(path, overwrite=overwrite) as folder:
+        (folder / "data.txt").write_text(text)
+        write_recipe(folder, "test", {"text": text})
+
+
+def test_a_folder_appears_whole(tmp_path: Path):
+    make(tmp_path / "run", "one")
+    assert (tmp_path / "run" / "data.txt").read_text() == "one"
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_an_earlier_run_is_refused_and_replaced_only_when_asked(tmp_path: Path):
+    make(tmp_path / "run", "one")
+    with pytest.raises(OutputError, match="holds an earlier run: pass --overwrite"):
+        make(tmp_path / "run", "two")
+    make(tmp_path / "run", "two", overwrite=True)
+    assert (tmp_path / "run" / "data.txt").read_text() == "two"
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_somebody_elses_files_are_never_replaced(tmp_path: Path):
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "cat.jpg").write_text("cat")
+    with pytest.raises(OutputError, match="did not write"):
+        make(tmp_path / "photos", "one", overwrite=True)
+    assert (tmp_path / "photos" / "cat.jpg").read_text() == "cat"
+
+
+@pytest.mark.parametrize("failure", [KeyboardInterrupt, RuntimeError])
+def test_a_failure_leaves_nothing_and_keeps_the_earlier_run(tmp_path: Path, failure: type):
+    make(tmp_path / "run", "one")
+    with pytest.raises(failure), whole_folder(tmp_path / "run", overwrite=True) as folder:
+        (folder / "data.txt").write_text("half")
+        raise failure
+    assert (tmp_path / "run" / "data.txt").read_text() == "one"
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_file_in_the_way_and_an_unwritable_parent_are_named(tmp_path: Path):
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(OutputError, match="is a file"):
+        make(tmp_path / "file", "one")
+    with pytest.raises(OutputError, match="cannot write"):
+        make(tmp_path / "file" / "below", "one")

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A replay gives every SLAM the same frames and never the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slam.frames import Frame, Odometry
+from slam.replay import Replay
+from slam.system import Estimate, Raster, create
+from slam.trajectory import Trajectory
+
+
+def frames(n: int = 5) -> list[Frame]:
+    return [
+        Frame(
+            stamp_ns=k,
+            odometry=Odometry(stamp_ns=k, T_odom_robot=np.array([0.1 * k, 0.0, 0.0])),
+            truth=np.array([0.2 * k, 1.0, 0.0]),
+        )
+        for k in range(n)
+    ]
+
+
+class Peeping:
+    """Records whether it ever saw the truth; its final poses differ from its online ones."""
+
+    def __init__(self) -> None:
+        self.saw_truth = False
+        self.stamps: list[int] = []
+
+    def reset(self) -> None:
+        self.stamps = []
+
+    def update(self, frame: Frame) -> Estimate:
+        self.saw_truth |= frame.truth is not None or frame.labels is not None
+        self.stamps.append(frame.stamp_ns)
+        return Estimate(
+            stamp_ns=frame.stamp_ns, T_map_robot=np.zeros(3), covariance=np.zeros((3, 3))
+        )
+
+    def map(self) -> Raster | None:
+        return None
+
+    def trajectory(self) -> Trajectory:
+        return Trajectory(
+            stamps_ns=np.array(self.stamps, dtype=np.int64), poses=np.ones((len(self.stamps), 3))
+        )
+
+
+def test_no_system_sees_the_truth_and_the_caller_does():
+    replay = Replay.of({"odometry": create("odometry"), "peeping": Peeping()})
+    seen = list(replay.run(frames()))
+    peeping = replay.tracks["peeping"].system
+    assert isinstance(peeping, Peeping)
+    assert not peeping.saw_truth
+    assert all(frame.truth is not None for frame in seen)
+    truth = replay.truth()
+    assert truth is not None
+    np.testing.assert_array_equal(truth.poses[:, 0], [0.2 * k for k in range(5)])
+
+
+def test_online_and_final_poses_are_kept_apart():
+    replay = Replay.of({"odometry": create("odometry"), "peeping": Peeping()})
+    for _ in replay.run(frames()):
+        pass
+    assert replay.tracks["odometry"].final() is None
+    final = replay.tracks["peeping"].final()
+    assert final is not None
+    np.testing.assert_array_equal(final.poses, 1.0)
+    np.testing.assert_array_equal(replay.tracks["peeping"].online().poses, 0.0)
+    assert len(replay.tracks["odometry"].durations_s) == 5
