@@ -31,6 +31,10 @@ MAX_RANGE_M = 1e4
 MAX_COORDINATE = 1e6
 MAX_STAMP_S = 10_000_000_000  # year 2286
 NAME = re.compile(r"[A-Za-z][\w-]*")
+KNOWN_NAMES = tuple(
+    [name]
+    for name in ("PARAM", "ODOM", "FLASER", "ROBOTLASER1", "RAWLASER1", "RLASER", "TRUEPOS", "SYNC")
+)
 
 Pose = tuple[float, float, float]
 

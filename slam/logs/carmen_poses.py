@@ -73,8 +73,12 @@ def scan_poses(
         truth_source = "corrected poses of the log"
     if fixed is not None and np.abs(fixed).max() > 1e-9:
         mount = fixed
-    return _Poses(
-        [np.array(p) for p in robot], truth, mount, "robot pose of the scan", truth_source
+    return ScanPoses(
+        odometry=[np.array(p) for p in robot],
+        truth=truth,
+        T_robot_laser=mount,
+        odometry_source="robot pose of the scan",
+        truth_source=truth_source,
     )
 
 
