@@ -23,7 +23,7 @@ _FAR = 1e6
 
 
 @dataclass(frozen=True, kw_only=True)
-class DriveConfig:
+class TourConfig:
     """Limits of a tour.
 
     v_max_mps, omega_max_radps  speed limits; an indoor Pioneer's usual pace, not its maximum
@@ -41,9 +41,7 @@ class DriveConfig:
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             if not getattr(self, name) > 0.0:
-                raise InvalidValueError(
-                    f"DriveConfig.{name} must be > 0, got {getattr(self, name)}"
-                )
+                raise InvalidValueError(f"TourConfig.{name} must be > 0, got {getattr(self, name)}")
 
 
 @njit
@@ -138,7 +136,7 @@ class Driver:
     goals  (n, 2) m, visited in order and again from the start
     """
 
-    def __init__(self, grid: NavGrid, goals: NDArray[np.float64], config: DriveConfig) -> None:
+    def __init__(self, grid: NavGrid, goals: NDArray[np.float64], config: TourConfig) -> None:
         if len(goals) == 0:
             raise InvalidValueError("a tour needs at least one goal")
         self.config = config

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.drive import DriveConfig, Driver, tour
+from sim.drive import TourConfig, Driver, tour
 from sim.navgrid import NavGrid
 from slam.errors import InvalidValueError
 
@@ -51,7 +51,7 @@ def test_a_wall_thinner_than_a_cell_has_no_holes():
 
 def test_it_drives_round_the_wall_without_touching_it():
     grid = NavGrid(ROOM, WALL, 0.3)
-    driver = Driver(grid, np.array([[5.0, 0.8]]), DriveConfig())
+    driver = Driver(grid, np.array([[5.0, 0.8]]), TourConfig())
     path = drive(driver, (1.0, 0.8, 0.0), 30.0)
     assert driver.visited >= 1
     clear = [grid.lookup(grid.clearance, x, y) for x, y, _ in path]
@@ -60,7 +60,7 @@ def test_it_drives_round_the_wall_without_touching_it():
 
 def test_it_lets_a_walker_pass():
     grid = NavGrid(ROOM, np.zeros((0, 5)), 0.3)
-    driver = Driver(grid, np.array([[5.0, 2.0]]), DriveConfig())
+    driver = Driver(grid, np.array([[5.0, 2.0]]), TourConfig())
 
     def walker(t: float):
         return np.array([[4.5 - 0.8 * t, 2.0, 0.25, -0.8, 0.0]])
@@ -74,7 +74,7 @@ def test_it_lets_a_walker_pass():
 def test_a_goal_out_of_reach_is_given_up_for_the_next():
     closed = np.array([[3.0, 2.0, 0.1, 2.0, 0.0]])
     driver = Driver(
-        NavGrid(ROOM, closed, 0.3), np.array([[5.0, 2.0], [1.0, 3.2]]), DriveConfig(patience_s=2.0)
+        NavGrid(ROOM, closed, 0.3), np.array([[5.0, 2.0], [1.0, 3.2]]), TourConfig(patience_s=2.0)
     )
     drive(driver, (1.0, 0.8, 0.0), 15.0)
     assert driver.visited >= 1
@@ -89,7 +89,7 @@ def test_a_tour_visits_every_goal_in_an_order_of_its_own_seed():
 
 
 def test_wrong_limits_and_an_empty_tour_are_refused():
-    with pytest.raises(InvalidValueError, match=r"DriveConfig\.v_max_mps"):
-        DriveConfig(v_max_mps=0.0)
+    with pytest.raises(InvalidValueError, match=r"TourConfig\.v_max_mps"):
+        TourConfig(v_max_mps=0.0)
     with pytest.raises(InvalidValueError, match="at least one goal"):
-        Driver(NavGrid(ROOM, WALL, 0.3), np.zeros((0, 2)), DriveConfig())
+        Driver(NavGrid(ROOM, WALL, 0.3), np.zeros((0, 2)), TourConfig())
