@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which geoms of a model a planar scanner can see, and how it casts on them.
+
+The candidates are chosen once: visible geoms (alpha above 0, not in the group of the collision
+hulls, not on the scanner's own robot) whose height can meet the scan plane. Everything in a world
+of planar movers keeps its height, so the list holds for the whole run; what can change height
+(limbs, free bodies) is always kept.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim import raycast
+from slam.errors import InvalidValueError
+
+Float = NDArray[np.float64]
+
+HULL_GROUP = 3  # collision hulls: never seen by rays or cameras
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spot:
+    """The disc a beam lights: ``aperture`` radius m at the window, ``divergence`` half angle rad.
+
+    ``offsets`` (k, 2): places of the k rays on the unit disc, (left, up). An ideal beam is the
+    default: one ray in the middle.
+    """
+
+    aperture: float = 0.0
+    divergence: float = 0.0
+    offsets: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+
+    def rays(self) -> Float:
+        """(k, 5): left, up, and the unit direction (forward, left, up) in the beam's frame."""
+        out = np.empty((len(self.offsets), 5))
+        for k, (u, v) in enumerate(self.offsets):
+            left, up = self.divergence * u, self.divergence * v
+            length = math.sqrt(1.0 + left * left + up * up)
+            out[k] = u, v, 1.0 / length, left / length, up / length
+        return out
+
+
+def _name(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
+    return mujoco.mj_id2name(model, kind, index) or f"#{index}"
+
+
+def subtree(model: mujoco.MjModel, root: int) -> NDArray[np.bool_]:
+    """(nbody,) True for a body and all its descendants."""
+    inside = np.zeros(model.nbody, dtype=np.bool_)
+    inside[root] = True
+    for body in range(root + 1, model.nbody):
+        inside[body] = inside[model.body_parentid[body]]
+    return inside
+
+
+def _changes_height(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.bool_]:
+    """(nbody,) True where a joint or a mocap parent can lift or tip the body."""
+    out = np.zeros(model.nbody, dtype=np.bool_)
+    for body in range(1, model.nbody):
+        out[body] = out[model.body_parentid[body]] or model.body_mocapid[body] >= 0
+        first = model.body_jntadr[body]
+        for joint in range(first, first + model.body_jntnum[body]):
+            kind, vertical = model.jnt_type[joint], abs(data.xaxis[joint][2])
+            planar = (kind == mujoco.mjtJoint.mjJNT_SLIDE and vertical < 1e-9) or (
+                kind == mujoco.mjtJoint.mjJNT_HINGE and vertical > 1.0 - 1e-9
+            )
+            out[body] |= not planar
+    return out
+
+
+def _half_height(kind: int, size: Float, mat: Float) -> float:
+    """Half the vertical extent of a primitive with the given orientation, m."""
+    up = np.abs(mat[6:9])  # world z of the geom's own axes
+    if kind == raycast.PLANE:
+        return math.inf
+    if kind == raycast.SPHERE:
+        return float(size[0])
+    if kind == raycast.CAPSULE:
+        return float(size[0] + size[1] * up[2])
+    if kind == raycast.CYLINDER:
+        return float(size[1] * up[2] + size[0] * math.sqrt(max(0.0, 1.0 - up[2] * up[2])))
+    if kind == raycast.ELLIPSOID:
+        return float(math.sqrt(float(((up * size) ** 2).sum())))
+    return float((up * size).sum())
+
+
+class Raycaster:
+    """Casts fans of beams on the geoms of one model.
+
+    height     m, of the scan plane
+    robot      name of the scanner's own body; it and its children are not seen
+    spot       the rays of each beam
+    range_max  m, bounds how far the spot spreads up and down
+
+    Raises ``InvalidValueError`` for a mesh, height field or SDF that could meet the scan plane:
+    the formulas cover primitives only.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        *,
+        height: float,
+        robot: str | None = "robot/base",
+        spot: Spot | None = None,
+        range_max: float = 80.0,
+    ) -> None:
+        self.spot = Spot() if spot is None else spot
+        self.height = height
+        self.ids = self._candidates(model, robot, range_max)
+        self._table = self._geom_table
+        self._rays = self.spot.rays()
+        self._optics = (self.spot.aperture, self.spot.divergence)
+        self._before = np.zeros((self.ids.size, 12))
+        self._laser = np.zeros(7)
+        self._laser[6] = height
+
+    @property
+    def rays_per_beam(self) -> int:
+        """Number of rays cast for each beam."""
+        return len(self.spot.offsets)
+
+    def _candidates(
+        self, model: mujoco.MjModel, robot: str | None, range_max: float
+    ) -> NDArray[np.int64]:
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        lifts = _changes_height(model, data)
+        own = np.zeros(model.nbody, dtype=np.bool_)
+        if robot is not None:
+            body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, robot)
+            if body < 0:
+                raise InvalidValueError(f"Raycaster.robot: the model has no body {robot!r}")
+            own = subtree(model, body)
+        reach = self.spot.aperture + self.spot.divergence * range_max
+        ids, rows = [], []
+        for geom in range(model.ngeom):
+            body = model.geom_bodyid[geom]
+            if own[body] or not _visible(model, geom):
+                continue
+            half, upright = _vertical_extent(model, data, geom, bool(lifts[body]))
+            meets = abs(data.geom_xpos[geom][2] - self.height) <= half + reach
+            if not (lifts[body] or meets):
+                continue
+            kind = int(model.geom_type[geom])
+            if kind not in raycast.PRIMITIVES:
+                raise InvalidValueError(
+                    f"geom {_name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)!r} is a "
+                    f"{mujoco.mjtGeom(kind).name[7:].lower()} at the height of the scanner "
+                    f"({self.height:g} m), expected a primitive (sphere, capsule, ellipsoid, "
+                    "cylinder, box or plane): put it in group "
+                    f"{HULL_GROUP} and add primitives for the laser to see"
+                )
+            ids.append(geom)
+            rows.append((kind, *model.geom_size[geom], half, float(upright)))
+        self._geom_table = np.array(rows, dtype=np.float64).reshape(-1, 6)
+        return np.array(ids, dtype=np.int64)
+
+    def start(self, data: mujoco.MjData) -> None:
+        """Note where everything is at the start of a physics step; needs fresh kinematics."""
+        raycast.remember(self.ids, data.geom_xpos, data.geom_xmat, self._before)
+
+    def cast(
+        self,
+        data: mujoco.MjData,
+        fan: tuple[NDArray[np.int64], Float, Float],
+        laser: tuple[Float, Float],
+        out: tuple[Float, NDArray[np.int64], Float],
+    ) -> None:
+        """Cast the beams measured during the physics step that ended in ``data``.
+
+        fan    beams (m,) rows of ``out``, angles (m,) rad in the laser frame at even ascending
+               steps, taus (m,) time of each beam within the step, 0..1
+        laser  pose (x, y, yaw) of the laser at the start and at the end of the step
+        out    ranges (n, k) m, inf for a miss; geom ids (n, k), -1; |cos| of the incidence (n, k)
+
+        ``out`` must come in as misses. The end of this step becomes the start of the next.
+        """
+        self._laser[0:3] = laser[0]
+        self._laser[3:6] = laser[1]
+        raycast.cast_fan(
+            self._table, self.ids, self._before, data.geom_xpos, data.geom_xmat, *fan,
+            self._laser, self._rays, self._optics, *out,
+        )  # fmt: skip
+
+
+def _visible(model: mujoco.MjModel, geom: int) -> bool:
+    """Rays see it: MuJoCo's own rule, and not a collision hull."""
+    material = model.geom_matid[geom]
+    rgba = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
+    return bool(rgba[3] != 0.0) and model.geom_group[geom] != HULL_GROUP
+
+
+def _vertical_extent(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, lifts: bool
+) -> tuple[float, bool]:
+    """(half the height m, whether it is a box that stands upright for good)."""
+    kind, mat = int(model.geom_type[geom]), data.geom_xmat[geom]
+    bound = float(model.geom_rbound[geom])
+    if kind not in raycast.PRIMITIVES:
+        # A mesh frame sits at its centre of mass; its bounding sphere is about its box's centre.
+        bound += float(np.abs(model.geom_aabb[geom][:3]).sum())
+        return bound, False
+    if lifts:
+        return (math.inf if kind == raycast.PLANE else bound), False
+    return _half_height(kind, model.geom_size[geom], mat), bool(mat[8] > 1.0 - 1e-12)
