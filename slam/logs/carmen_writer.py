@@ -64,14 +64,14 @@ def _robotlaser(frame: Frame, scan: Scan) -> str:
     spec = scan.spec
     fov = (spec.n_beams - 1) * spec.angle_increment
     ranges = np.where(np.isnan(scan.ranges), np.float32(0.0), scan.ranges)
-    written = [repr(r) if math.isfinite(r) else repr(spec.range_max) for r in ranges.tolist()]
-    intensities = [] if scan.intensities is None else scan.intensities.tolist()
+    written = [str(r) if math.isfinite(r) else repr(spec.range_max) for r in ranges]
+    intensities = () if scan.intensities is None else np.nan_to_num(scan.intensities)
     T_odom_robot = frame.odometry.T_odom_robot
     words = [
         f"ROBOTLASER1 {_SICK_LMS} {spec.angle_min!r} {fov!r} {spec.angle_increment!r}",
         f"{spec.range_max!r} 0.01 0",
         f"{spec.n_beams} {' '.join(written)}",
-        " ".join([str(len(intensities)), *map(repr, intensities)]),
+        " ".join([str(len(intensities)), *map(str, intensities)]),
         _words(se2.compose(T_odom_robot, spec.T_robot_laser)),
         _words(T_odom_robot),
         "0 0 0 0 0",
