@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where things are: the movers of a scene found in its compiled model, placed, read, saved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.flow import box_clearance
+from slam.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from scenes.scene import Mover, Scene
+
+Float = NDArray[np.float64]
+STATIC = -1  # mover index of everything that cannot move
+
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+# Sleep is no part of mjSTATE_INTEGRATION (mj_setState wakes every sleeper), so it is saved beside
+# it: what sleeps, and the lists MuJoCo derives from that.
+_SLEEP_ARRAYS = (
+    "tree_asleep",
+    "tree_awake",
+    "body_awake",
+    "body_awake_ind",
+    "parent_awake_ind",
+    "dof_awake_ind",
+)
+_SLEEP_COUNTS = ("ntree_awake", "nbody_awake", "nparent_awake", "nv_awake")
+
+
+class Bodies:
+    """Addresses of the movers of ``scene`` in ``model``.
+
+    mover_of_body  (nbody,) index into ``scene.movers``, ``STATIC`` for the room itself
+    robot          index of the robot, None in a scene without one
+    """
+
+    def __init__(self, model: mujoco.MjModel, scene: Scene) -> None:
+        self.model = model
+        self.scene = scene
+        self.robot: int | None = next(
+            (i for i, m in enumerate(scene.movers) if m.kind == "robot"), None
+        )
+        self.radius = np.array([m.radius for m in scene.movers])
+        self.mover_of_body = self._owners()
+        n = len(scene.movers)
+        self._qpos, self._dof = np.full(n, -1), np.full(n, -1)
+        self._hinge = np.zeros((n, 4))  # doors: hinge x, y m; heading rad when closed; sign
+        for i, mover in enumerate(scene.movers):
+            if mover.kind == "door":
+                self._add_door(i, mover)
+            else:
+                self._add_planar(i, mover)
+        kinds = np.array([m.kind == "door" for m in scene.movers], dtype=bool)
+        self._planar, self._doors = np.nonzero(~kinds)[0], np.nonzero(kinds)[0]
+
+    def _owners(self) -> NDArray[np.int64]:
+        index = {m.name: i for i, m in enumerate(self.scene.movers)}
+        names = (self.model.body(b).name for b in range(self.model.nbody))
+        return np.array([index.get(n.partition("/")[0], STATIC) for n in names], dtype=np.int64)
+
+    def _add_planar(self, i: int, mover: Mover) -> None:
+        joints = [self.model.joint(f"{mover.name}/{axis}") for axis in ("x", "y", "yaw")]
+        addresses = [int(j.qposadr[0]) for j in joints]
+        if addresses != list(range(addresses[0], addresses[0] + 3)):
+            raise InvalidValueError(
+                f"{mover.name}: joints x, y, yaw must be declared in this order, one body"
+            )
+        self._qpos[i], self._dof[i] = addresses[0], int(joints[0].dofadr[0])
+
+    def _add_door(self, i: int, mover: Mover) -> None:
+        joint = self.model.joint(f"{mover.name}/hinge")
+        self._qpos[i], self._dof[i] = int(joint.qposadr[0]), int(joint.dofadr[0])
+        data = mujoco.MjData(self.model)
+        mujoco.mj_kinematics(self.model, data)
+        x, y = data.xanchor[joint.id][:2].tolist()
+        centre = data.xipos[int(joint.bodyid[0])]
+        heading = math.atan2(float(centre[1]) - y, float(centre[0]) - x)
+        self._hinge[i] = x, y, heading, math.copysign(1.0, data.xaxis[joint.id][2])
+
+    def place(self, data: mujoco.MjData) -> None:
+        """Put every planar mover where the scene wants it at the start."""
+        initial: Mapping[str, tuple[float, float, float]] = self.scene.initial
+        for i in self._planar.tolist():
+            name = self.scene.movers[i].name
+            pose = self.scene.start if i == self.robot else initial.get(name)
+            if pose is not None:
+                data.qpos[self._qpos[i] : self._qpos[i] + 3] = pose
+
+    def addresses(self, names: list[str]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """First qpos and first dof address of each named mover."""
+        index = {m.name: i for i, m in enumerate(self.scene.movers)}
+        rows = np.array([index[name] for name in names], dtype=np.int64)
+        return self._qpos[rows].astype(np.int64), self._dof[rows].astype(np.int64)
+
+    def hinges(self, names: list[str]) -> Float:
+        """(n, 4) hinge x, y m, heading of the closed leaf rad, sign of opening, by door name."""
+        index = {m.name: i for i, m in enumerate(self.scene.movers)}
+        return self._hinge[np.array([index[name] for name in names], dtype=np.int64)]
+
+    def robot_pose(self, data: mujoco.MjData) -> Float:
+        """(3,) x m, y m, heading rad."""
+        if self.robot is None:
+            raise InvalidValueError(f"scene '{self.scene.name}' has no robot")
+        at = int(self._qpos[self.robot])
+        pose: Float = data.qpos[at : at + 3].copy()
+        return pose
+
+    def poses(self, data: mujoco.MjData) -> Float:
+        """(n, 3) pose of each mover; a door at its hinge, heading along the leaf."""
+        out = np.zeros((len(self.radius), 3))
+        first = self._qpos[self._planar]
+        out[self._planar] = data.qpos[first[:, None] + np.arange(3)]
+        hinge = self._hinge[self._doors]
+        out[self._doors, :2] = hinge[:, :2]
+        out[self._doors, 2] = hinge[:, 2] + hinge[:, 3] * data.qpos[self._qpos[self._doors]]
+        return out
+
+    def speeds(self, data: mujoco.MjData) -> Float:
+        """(n,) m/s, the greater of the centre's speed and the rim's by turning."""
+        out = np.zeros(len(self.radius))
+        first = self._dof[self._planar]
+        v = data.qvel[first[:, None] + np.arange(3)]
+        rim = np.abs(v[:, 2]) * self.radius[self._planar]
+        out[self._planar] = np.maximum(np.sqrt(v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1]), rim)
+        turning = np.abs(data.qvel[self._dof[self._doors]])
+        out[self._doors] = turning * self.radius[self._doors]
+        return out
+
+    def clearance(self, data: mujoco.MjData) -> float:
+        """m from the robot's rim to the nearest static box or the edge of the floor."""
+        x, y, _ = self.robot_pose(data).tolist()
+        xmin, ymin, xmax, ymax = self.scene.bounds
+        edge = min(x - xmin, xmax - x, y - ymin, ymax - y)
+        boxes = np.ascontiguousarray(self.scene.obstacles, dtype=np.float64)
+        nearest = float(min(edge, box_clearance(x, y, boxes)))
+        return nearest - float(self.radius[self.robot])
+
+    def physics_state(self, data: mujoco.MjData) -> dict[str, NDArray[Any]]:
+        """Integration state and sleep of ``data``, by name."""
+        integration = np.zeros(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, data, integration, _STATE)
+        counts = np.array([getattr(data, name) for name in _SLEEP_COUNTS], dtype=np.int64)
+        arrays = {f"sleep.{name}": getattr(data, name).copy() for name in _SLEEP_ARRAYS}
+        return {"integration": integration, "sleep.counts": counts, **arrays}
+
+    def restore_physics(self, data: mujoco.MjData, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Inverse of ``physics_state``; leaves all derived poses fresh."""
+        if arrays["integration"].size != mujoco.mj_stateSize(self.model, _STATE):
+            raise InvalidValueError("the state is of another model: its size differs")
+        mujoco.mj_resetData(self.model, data)
+        mujoco.mj_setState(self.model, data, arrays["integration"], _STATE)
+        mujoco.mj_forward(self.model, data)  # while all are awake: sleepers need their poses too
+        mujoco.mj_setState(self.model, data, arrays["integration"], _STATE)
+        mujoco.mj_kinematics(self.model, data)
+        for name in _SLEEP_ARRAYS:
+            getattr(data, name)[...] = arrays[f"sleep.{name}"]
+        for name, count in zip(_SLEEP_COUNTS, arrays["sleep.counts"].tolist(), strict=True):
+            setattr(data, name, count)

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One number in [0, 1] for how much a room moves, and the table of what it means.
+
+| rate                                   | at knob d        | d = 0 | 0.25  | 0.5   | 1     |
+|----------------------------------------|------------------|-------|-------|-------|-------|
+| shoves of each chair, 1/s              | 0.05 d           | 0     | 0.013 | 0.025 | 0.05  |
+| kicks of each bin, 1/s                 | 0.02 d           | 0     | 0.005 | 0.010 | 0.02  |
+| each door moved without a person, 1/s  | 0.02 d           | 0     | 0.005 | 0.010 | 0.02  |
+| mean stay of a person at a goal, s     | 4 / d - 2        | never | 14    | 6     | 2     |
+| walking pace, share of a person's own  | 0.7 + 0.3 d      | -     | 0.775 | 0.85  | 1     |
+
+At 0 nothing moves by itself: people are present and stand perfectly still, chairs and bins are
+never pushed and doors stay at their angle of rest (a door still gives way to the robot). How hard
+a shove is does not depend on the knob: 0.25 to 1.5 m/s, which for a 13 kg chair is 3 to 20 N s
+(design range for invisible shoves; a person at a desk rolls a chair at walking speed at most).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from slam.errors import InvalidValueError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dynamism:
+    """All rates of a moving room. ``Dynamism.from_knob`` fills them from the table above.
+
+    chair_push_rate  1/s for each chair          bin_kick_rate  1/s for each bin
+    door_rate        1/s for each door           stay_mean      s, infinite: nobody ever leaves
+    pace             factor on each person's preferred speed
+    push_speed_min/max  m/s a shove gives a chair
+    kick_speed_min/max  m/s a kick gives a bin
+    push_spin_max       rad/s a shove adds in yaw, either way
+    """
+
+    chair_push_rate: float = 0.0
+    bin_kick_rate: float = 0.0
+    door_rate: float = 0.0
+    stay_mean: float = math.inf
+    pace: float = 1.0
+    push_speed_min: float = 0.25
+    push_speed_max: float = 1.5
+    kick_speed_min: float = 0.4
+    kick_speed_max: float = 2.0
+    push_spin_max: float = math.pi
+
+    def __post_init__(self) -> None:
+        for name in ("chair_push_rate", "bin_kick_rate", "door_rate", "push_spin_max"):
+            value = getattr(self, name)
+            if not 0.0 <= value < math.inf:
+                raise InvalidValueError(f"Dynamism.{name} must be >= 0 and finite, got {value}")
+        for name in ("stay_mean", "pace"):
+            if not getattr(self, name) > 0.0:
+                raise InvalidValueError(f"Dynamism.{name} must be > 0, got {getattr(self, name)}")
+        for what in ("push", "kick"):
+            low, high = getattr(self, f"{what}_speed_min"), getattr(self, f"{what}_speed_max")
+            if not 0.0 <= low <= high < math.inf:
+                raise InvalidValueError(
+                    f"Dynamism.{what}_speed_min/max must satisfy 0 <= min <= max, got {low}, {high}"
+                )
+
+    @classmethod
+    def from_knob(cls, dynamism: float) -> Dynamism:
+        """Rates at a knob in [0, 1]; ``InvalidValueError`` outside."""
+        if isinstance(dynamism, bool) or not isinstance(dynamism, (int, float)):
+            raise InvalidValueError(f"dynamism must be a number in [0, 1], got {dynamism!r}")
+        d = float(dynamism)
+        if not 0.0 <= d <= 1.0:
+            raise InvalidValueError(f"dynamism must lie in [0, 1], got {dynamism}")
+        return cls(
+            chair_push_rate=0.05 * d,
+            bin_kick_rate=0.02 * d,
+            door_rate=0.02 * d,
+            stay_mean=4.0 / d - 2.0 if d > 0.0 else math.inf,
+            pace=0.7 + 0.3 * d,
+        )

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The differential drive: commanded twist, ramped wheel speeds, true rolled wheel travel.
+
+Wheels turn exactly as commanded (a stiff motor loop) and pull the robot through tyre servos whose
+force is limited by grip. So ``travel_m`` is what a perfect encoder counts, and it parts from the
+true path when the robot pushes something or slips, as on a real floor. Encoder errors are the
+business of ``sim.odometry``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from slam.errors import InvalidValueError
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveConfig:
+    """Limits of a Pioneer 3-DX class robot indoors (design range: usual speed below 1.2 m/s).
+
+    v_max, omega_max  m/s, rad/s; commands beyond are clipped
+    accel, alpha      m/s2, rad/s2 of the ramp
+    track             m between the wheels
+    """
+
+    v_max: float = 1.0
+    omega_max: float = 1.5
+    accel: float = 1.0
+    alpha: float = 3.0
+    track: float = 0.33
+
+    def __post_init__(self) -> None:
+        for name in ("v_max", "omega_max", "accel", "alpha", "track"):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise InvalidValueError(f"DriveConfig.{name} must be > 0, got {value}")
+
+
+class Drive:
+    """Ramp and wheels of the body ``robot/base``. State: ``state`` (6,) float64.
+
+    ``state`` = commanded v, omega, ramped v, omega, left travel m, right travel m.
+    """
+
+    def __init__(self, model: mujoco.MjModel, config: DriveConfig) -> None:
+        self.config = config
+        self.state = np.zeros(6)
+        self._left = int(model.actuator("robot/tyre_l").id)
+        self._right = int(model.actuator("robot/tyre_r").id)
+
+    def command(self, v: float, omega: float) -> None:
+        """Ask for a twist, m/s and rad/s; clipped to the limits, reached by the ramp."""
+        if not (math.isfinite(v) and math.isfinite(omega)):
+            raise InvalidValueError(f"the drive command must be finite, got v={v}, omega={omega}")
+        c = self.config
+        self.state[0] = min(max(v, -c.v_max), c.v_max)
+        self.state[1] = min(max(omega, -c.omega_max), c.omega_max)
+
+    def control(self, tick: float, ctrl: NDArray[np.float64]) -> None:
+        """Ramp for ``tick`` s and write the wheel surface speeds into ``ctrl``."""
+        v_asked, omega_asked, v, omega = self.state[:4].tolist()
+        v = _toward(v, v_asked, self.config.accel * tick)
+        omega = _toward(omega, omega_asked, self.config.alpha * tick)
+        half = 0.5 * self.config.track * omega
+        self.state[2:4] = v, omega
+        ctrl[self._left] = v - half
+        ctrl[self._right] = v + half
+
+    def roll(self, duration: float) -> None:
+        """Let the wheels turn for ``duration`` s at their present speed."""
+        _, _, v, omega, left, right = self.state.tolist()
+        half = 0.5 * self.config.track * omega
+        self.state[4:6] = left + (v - half) * duration, right + (v + half) * duration
+
+    @property
+    def travel_m(self) -> NDArray[np.float64]:
+        """(2,) m rolled by the left and the right wheel since the start, backwards negative."""
+        return self.state[4:6].copy()
+
+
+def _toward(value: float, target: float, step: float) -> float:
+    return value + min(max(target - value, -step), step)

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The room that moves: one MuJoCo model, its actors, and one substep of 1/300 s at a time.
+
+Order of a substep: at every fourth one the actors decide (people, doors, shoves, drive), then one
+``mj_step``, then the limbs are posed and the kinematics made fresh, so that whoever looks between
+two substeps (a scanner, a film, ``save_state``) sees poses of that very instant.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes import registry
+from sim import state
+from sim.bodies import Bodies
+from sim.chairs import Shoves
+from sim.contacts import Contact, RobotContacts
+from sim.dynamism import Dynamism
+from sim.robot import Drive, DriveConfig
+from sim.seeds import Seeds
+from slam.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from scenes.scene import Scene
+
+Float = NDArray[np.float64]
+SUBSTEPS_PER_S = 300
+SUBSTEPS_PER_TICK = 4  # one mirror turn of the LMS-221: 13.33 ms
+MOVING_SPEED = 0.02  # m/s; a mover faster than this counts as moving
+
+
+class World:
+    """A scene brought to life.
+
+    scene     a built ``Scene``, or the name of one; a name is built from the "layout" stream
+    seed      whole number or ``Seeds``
+    dynamism  knob in [0, 1] (see ``sim.dynamism``), or the rates themselves
+    drive     limits of the robot
+    options   passed on to the scene when it is given by name, e.g. ``n_chairs=10``
+
+    Raises ``InvalidValueError`` for a dynamism outside [0, 1], ``UnknownNameError`` for a scene.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str,
+        *,
+        seed: int | Seeds = 0,
+        dynamism: float | Dynamism = 0.5,
+        drive: DriveConfig | None = None,
+        **options: Any,
+    ) -> None:
+        self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
+        self.rates = dynamism if isinstance(dynamism, Dynamism) else Dynamism.from_knob(dynamism)
+        if isinstance(scene, str):
+            scene = registry.build(scene, seed=self.seeds.integer("layout"), **options)
+        elif options:
+            raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")
+        self.scene = scene
+        self.model: mujoco.MjModel = scene.spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.step_count = 0
+        self.bodies = Bodies(self.model, scene)
+        self._contacts = RobotContacts(self.model, self.bodies)
+        self._drive = Drive(self.model, drive or DriveConfig())
+        self._shoves = {
+            kind: Shoves(
+                self.model,
+                [m.name for m in scene.movers if m.kind.startswith(kind)],
+                rates=rates,
+                counters=self.seeds.counters(stream, len(scene.movers)),
+            )
+            for kind, stream, rates in self._shove_kinds()
+        }
+        self.bodies.place(self.data)
+        mujoco.mj_forward(self.model, self.data)
+
+    def _shove_kinds(self) -> tuple[tuple[str, str, tuple[float, float, float, float]], ...]:
+        r = self.rates
+        chair = (r.chair_push_rate, r.push_speed_min, r.push_speed_max, r.push_spin_max)
+        bin_ = (r.bin_kick_rate, r.kick_speed_min, r.kick_speed_max, r.push_spin_max)
+        return ("chair", "chairs", chair), ("bin", "bins", bin_)
+
+    # -- time -------------------------------------------------------------------------------
+
+    @property
+    def time_ns(self) -> int:
+        """Time since the start, ns: step k is k * 1e9 / 300, rounded to the nearest."""
+        return (self.step_count * 10_000_000 + 1) // 3
+
+    def substep(self) -> None:
+        """Advance by 1/300 s and leave poses (``xpos``, ``geom_xpos``, ...) of the new instant."""
+        if self.step_count % SUBSTEPS_PER_TICK == 0:
+            self._control()
+        mujoco.mj_step(self.model, self.data)
+        self.step_count += 1
+        self._drive.roll(1.0 / SUBSTEPS_PER_S)
+        mujoco.mj_kinematics(self.model, self.data)
+        self._contacts.watch(self.data)
+
+    def _control(self) -> None:
+        time, tick = self.step_count / SUBSTEPS_PER_S, SUBSTEPS_PER_TICK / SUBSTEPS_PER_S
+        for shoves in self._shoves.values():
+            shoves.control(time, tick, self.data.qfrc_applied)
+        self._drive.control(tick, self.data.ctrl)
+
+    # -- the robot --------------------------------------------------------------------------
+
+    def set_command(self, v: float, omega: float) -> None:
+        """Ask the robot for a twist, m/s and rad/s; it is clipped and ramped (``DriveConfig``)."""
+        self._drive.command(v, omega)
+
+    def robot_pose(self) -> Float:
+        """(3,) ``T_world_robot``: x m, y m, heading rad (not wrapped)."""
+        return self.bodies.robot_pose(self.data)
+
+    def wheel_angles(self) -> Float:
+        """(2,) m truly rolled by the left and the right wheel since the start."""
+        return self._drive.travel_m
+
+    def take_contacts(self) -> list[Contact]:
+        """What the robot has touched since the last call, hardest first (``Contact.hard``)."""
+        return self._contacts.take()
+
+    def robot_clearance(self) -> float:
+        """m from the robot's rim to the nearest static obstacle or floor edge; < 0: inside."""
+        return self.bodies.clearance(self.data)
+
+    # -- everything that moves --------------------------------------------------------------
+
+    def mover_poses(self) -> Float:
+        """(n, 3) x m, y m, heading rad of each of ``scene.movers``, in that order.
+
+        A door stands at its hinge and heads along its leaf.
+        """
+        return self.bodies.poses(self.data)
+
+    def mover_speeds(self) -> Float:
+        """(n,) m/s of each mover: its centre's speed or its rim's by turning, the greater."""
+        return self.bodies.speeds(self.data)
+
+    def movers_moving(self) -> NDArray[np.bool_]:
+        """(n,) True for each of ``scene.movers`` faster than ``MOVING_SPEED``."""
+        return self.mover_speeds() > MOVING_SPEED
+
+    def moving_bodies(self) -> NDArray[np.bool_]:
+        """(nbody,) True for each body of the model that belongs to a moving mover."""
+        moving = np.append(self.movers_moving(), False)
+        return moving[self.bodies.mover_of_body]
+
+    def is_moving(self, body: int) -> bool:
+        """Whether body ``body`` of the model moves right now."""
+        return bool(self.moving_bodies()[body])
+
+    # -- state ------------------------------------------------------------------------------
+
+    def _actor_arrays(self) -> dict[str, NDArray[Any]]:
+        arrays: dict[str, NDArray[Any]] = {"drive": self._drive.state}
+        for kind, shoves in self._shoves.items():
+            arrays |= {f"{kind}.{name}": a for name, a in shoves.arrays().items()}
+        return arrays
+
+    def _fingerprint(self) -> dict[str, Any]:
+        m = self.model
+        return {"scene": self.scene.name, "size": [m.nq, m.nv, m.nu, m.nbody, m.ngeom]}
+
+    def save_state(self) -> bytes:
+        """Everything that decides the future of this world, bit for bit.
+
+        Load it into a world built with the same arguments, in this or another process.
+        """
+        physics = self.bodies.physics_state(self.data)
+        words = {"steps": self.step_count, **self._fingerprint()}
+        return state.pack({**physics, **self._actor_arrays()}, words)
+
+    def load_state(self, block: bytes) -> None:
+        """Go on from ``save_state``; ``InvalidValueError`` if it is of another kind of world."""
+        arrays, words = state.unpack(block)
+        steps = words.pop("steps", None)
+        if words != self._fingerprint():
+            raise InvalidValueError(f"the state is of {words}, this world is {self._fingerprint()}")
+        live = self._actor_arrays()
+        for name, array in live.items():
+            if name not in arrays or arrays[name].shape != array.shape:
+                raise InvalidValueError(f"the state has no '{name}' of shape {array.shape}")
+        for name, array in live.items():
+            array[...] = arrays[name]
+        self.step_count = int(steps)
+        self.bodies.restore_physics(self.data, arrays)
+        self._contacts.take()
