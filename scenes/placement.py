@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where there is room for a disc: static boxes, discs already placed, doorways to keep clear."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Rect = tuple[float, float, float, float]
+
+MAX_BATCHES = 200
+BATCH = 32
+
+
+def gap_to_boxes(points: Float, boxes: Float) -> Float:
+    """(n,) m from each point (n, 2) to the nearest of the boxes (m, 5), 0 inside, inf without boxes.
+
+    Only elementwise + - * / sqrt on arrays, so that a layout is the same on every CPU.
+    """
+    if not len(boxes):
+        return np.full(len(points), np.inf)
+    cos = np.array([math.cos(yaw) for yaw in boxes[:, 4].tolist()])
+    sin = np.array([math.sin(yaw) for yaw in boxes[:, 4].tolist()])
+    dx = points[:, None, 0] - boxes[None, :, 0]
+    dy = points[:, None, 1] - boxes[None, :, 1]
+    out_x = np.maximum(np.abs(dx * cos + dy * sin) - boxes[None, :, 2], 0.0)
+    out_y = np.maximum(np.abs(dy * cos - dx * sin) - boxes[None, :, 3], 0.0)
+    gaps: Float = np.sqrt(out_x * out_x + out_y * out_y).min(axis=1)
+    return gaps
+
+
+class Floor:
+    """Free floor inside ``rects``, shrinking as things are placed."""
+
+    def __init__(self, rects: Sequence[Rect], boxes: Float) -> None:
+        self.rects = tuple(rects)
+        self._areas = np.cumsum([(r[2] - r[0]) * (r[3] - r[1]) for r in self.rects])
+        self._boxes = boxes
+        self._discs = np.empty((0, 3))
+
+    def block(self, x: float, y: float, radius: float) -> None:
+        """Nothing may be placed over this disc any more."""
+        self._discs = np.vstack([self._discs, [x, y, radius]])
+
+    def clearance(self, points: Float) -> Float:
+        """(n,) m from each point (n, 2) to the nearest thing, negative inside a disc."""
+        gaps = gap_to_boxes(points, self._boxes)
+        if len(self._discs):
+            dx = points[:, None, 0] - self._discs[None, :, 0]
+            dy = points[:, None, 1] - self._discs[None, :, 1]
+            discs = (np.sqrt(dx * dx + dy * dy) - self._discs[None, :, 2]).min(axis=1)
+            gaps = np.minimum(gaps, discs)
+        return gaps
+
+    def fits(self, x: float, y: float, radius: float) -> bool:
+        """Whether a disc has room here."""
+        return bool(self.clearance(np.array([[x, y]]))[0] >= radius)
+
+    def find(self, rng: np.random.Generator, radius: float) -> tuple[float, float] | None:
+        """A random free place for a disc, evenly over the floor; None when there seems to be none."""
+        for _ in range(MAX_BATCHES):
+            draws = rng.random((BATCH, 3))
+            which = np.searchsorted(self._areas, draws[:, 0] * self._areas[-1], side="right")
+            low = np.array([self.rects[i][:2] for i in which])
+            high = np.array([self.rects[i][2:] for i in which])
+            points = low + draws[:, 1:] * (high - low)
+            free = np.flatnonzero(self.clearance(points) >= radius)
+            if len(free):
+                x, y = points[free[0]].tolist()
+                return x, y
+        return None

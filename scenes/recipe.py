@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Steps the recipes share: seeded streams, counts, chairs, people, doors, and the finished Scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from scenes import look
+from scenes.builder import Builder, Mark, hull_radius
+from scenes.footprint import static_raster
+from scenes.placement import Floor
+from scenes.scene import Kind, Pose, Scene
+from slam.errors import InvalidValueError
+
+MARGIN = 0.03  # m between things at the start
+DOORWAY_RADIUS = 0.65  # m kept clear around the middle of a doorway
+GOAL_RADIUS = 0.45  # m of free floor around a goal
+START_RADIUS = 0.7  # m of free floor around the robot
+REST_ANGLES = (1.25, 1.75)  # rad; doors rest open, so that every room can be reached at dynamism 0
+MAX_COUNT = 400
+
+_STREAMS = ("chairs", "people", "doors", "bins", "colours")
+
+
+class Draws:
+    """One generator per subject, so that one more person does not move the chairs."""
+
+    def __init__(self, seed: int) -> None:
+        self.chairs, self.people, self.doors, self.bins, self.colours = (
+            np.random.default_rng([seed, index]) for index in range(len(_STREAMS))
+        )
+
+
+def count(field: str, value: int | None, default: int) -> int:
+    """An option that counts things, or its default for None."""
+    if value is None:
+        return default
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise InvalidValueError(f"{field} must be a whole number, got {value!r}")
+    if not 0 <= value <= MAX_COUNT:
+        raise InvalidValueError(f"{field} must lie in 0..{MAX_COUNT}, got {value}")
+    return int(value)
+
+
+def free_floor(builder: Builder, start: Pose) -> Floor:
+    """The rooms' floor less furniture, doorways, open leaves and the robot's start."""
+    leaves = [builder.leaf_box(name) for name in builder.door_angles]
+    boxes = np.vstack([builder.boxes, np.reshape(leaves, (-1, 5))])
+    floor = Floor([mark.rect for mark in builder.find("room")], boxes)
+    for name in builder.door_angles:
+        x, y, _ = builder.doorway(name)
+        floor.block(x, y, DOORWAY_RADIUS)
+    floor.block(start[0], start[1], START_RADIUS)
+    for goal in builder.find("goal"):
+        floor.block(goal.pose[0], goal.pose[1], GOAL_RADIUS)
+    return floor
+
+
+def hang_doors(builder: Builder, rng: np.random.Generator) -> None:
+    """A door at each ``door:ROOM:left|right`` mark, at rest at a seeded angle."""
+    for index, mark in enumerate(builder.find("door")):
+        angle = float(rng.uniform(*REST_ANGLES))
+        builder.add_door(
+            f"door{index}", mark.pose, clockwise=mark.words[2] == "right", angle=round(angle, 3)
+        )
+
+
+def seat_chairs(
+    builder: Builder, floor: Floor, seats: Sequence[Mark], n: int, draws: Draws
+) -> None:
+    """``n`` chairs: a seeded choice of the seats, a little pulled out and turned; the rest anywhere."""
+    order = draws.chairs.permutation(len(seats))[:n]
+    for index in sorted(order.tolist()):
+        kind: Kind = "chair_visitor" if seats[index].words[1] == "chair_visitor" else "chair_swivel"
+        pose = _pulled_out(floor, seats[index].pose, hull_radius(kind) + MARGIN, draws.chairs)
+        if pose is not None:
+            _add_chair(builder, floor, kind, pose, draws)
+    while sum(m.kind.startswith("chair") for m in builder.movers) < n:
+        extra: Kind = "chair_swivel" if draws.chairs.random() < 0.75 else "chair_visitor"
+        _add_chair(
+            builder, floor, extra, _anywhere(floor, extra, "n_chairs", n, draws.chairs), draws
+        )
+
+
+def scatter(
+    builder: Builder, floor: Floor, kind: Kind, n: int, draws: Draws, rng: np.random.Generator
+) -> None:
+    """``n`` people (or others) on free floor anywhere."""
+    for index in range(n):
+        pose = _anywhere(floor, kind, f"n_{kind}", n, rng)
+        paint = look.dress(draws.colours) if kind == "person" else None
+        builder.add(kind, f"{kind}{index}", pose, paint=paint)
+        floor.block(pose[0], pose[1], hull_radius(kind))
+
+
+def finish(
+    builder: Builder, name: str, seed: int, start: Pose, options: Mapping[str, int]
+) -> Scene:
+    """Robot, surfaces and facts."""
+    builder.add("robot", "robot", start)
+    look.finish(builder.spec)
+    rects = [mark.rect for mark in builder.find("room")]
+    bounds = (
+        min(r[0] for r in rects),
+        min(r[1] for r in rects),
+        max(r[2] for r in rects),
+        max(r[3] for r in rects),
+    )
+    obstacles = builder.boxes
+    obstacles.setflags(write=False)
+    return Scene(
+        name=name,
+        seed=seed,
+        spec=builder.spec,
+        movers=tuple(builder.movers),
+        initial=dict(builder.initial),
+        door_angles=dict(builder.door_angles),
+        goals={mark.words[1]: (mark.pose[0], mark.pose[1]) for mark in builder.find("goal")},
+        rooms={mark.words[1]: mark.rect for mark in builder.find("room")},
+        bounds=bounds,
+        obstacles=obstacles,
+        static_map=static_raster(builder.spec.compile(), bounds),
+        start=start,
+        options=dict(options),
+    )
+
+
+def _add_chair(builder: Builder, floor: Floor, kind: Kind, pose: Pose, draws: Draws) -> None:
+    index = sum(m.kind.startswith("chair") for m in builder.movers)
+    paint = look.upholster(draws.colours) if kind == "chair_swivel" else None
+    builder.add(kind, f"chair{index}", pose, paint=paint)
+    floor.block(pose[0], pose[1], hull_radius(kind))
+
+
+def _pulled_out(floor: Floor, seat: Pose, radius: float, rng: np.random.Generator) -> Pose | None:
+    """The seat, shifted back and sideways and turned, where that has room; else as it is, or None."""
+    x, y, yaw = seat
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    for _ in range(8):
+        back, side, turn = rng.uniform([0.0, -0.12, -0.5], [0.25, 0.12, 0.5]).tolist()
+        place = (x - cos * back - sin * side, y - sin * back + cos * side, yaw + turn)
+        if floor.fits(place[0], place[1], radius):
+            return place
+    return seat if floor.fits(x, y, radius) else None
+
+
+def _anywhere(floor: Floor, kind: Kind, field: str, n: int, rng: np.random.Generator) -> Pose:
+    place = floor.find(rng, hull_radius(kind) + MARGIN)
+    if place is None:
+        raise InvalidValueError(f"{field} = {n} does not fit on the floor of this scene")
+    return place[0], place[1], float(rng.uniform(-math.pi, math.pi))

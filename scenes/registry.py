@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes by name: ``build("office", seed=3, n_people=0)``."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import inspect
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from scenes.scene import Scene
+from slam.errors import InvalidValueError, UnknownNameError
+
+Recipe = Callable[..., Scene]
+F = TypeVar("F", bound=Recipe)
+_recipes: dict[str, Recipe] = {}
+
+
+def register(name: str) -> Callable[[F], F]:
+    """Function decorator: make a recipe ``(seed, **options) -> Scene`` available as ``build(name)``."""
+
+    def add(recipe: F) -> F:
+        _recipes[name] = recipe
+        return recipe
+
+    return add
+
+
+def names() -> list[str]:
+    """Registered names, sorted."""
+    return sorted(_recipes)
+
+
+def build(name: str, seed: int = 0, **options: Any) -> Scene:
+    """The scene of that name and seed; ``module:function`` names any recipe.
+
+    Raises ``UnknownNameError`` with the nearest known name, ``InvalidValueError`` for an option the
+    recipe does not know or a value it cannot have.
+    """
+    recipe = _load(name) if ":" in name else _find(name)
+    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
+        raise InvalidValueError(f"seed must be a whole number >= 0, got {seed!r}")
+    try:
+        inspect.signature(recipe).bind(seed, **options)
+    except TypeError as error:
+        raise InvalidValueError(f"scene '{name}' cannot take these options: {error}") from None
+    scene = recipe(seed, **options)
+    if not isinstance(scene, Scene):
+        raise UnknownNameError(f"'{name}' is no recipe: it returned {type(scene).__name__}")
+    return scene
+
+
+def _find(name: str) -> Recipe:
+    if name in _recipes:
+        return _recipes[name]
+    near = difflib.get_close_matches(name, _recipes, n=1)
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    raise UnknownNameError(
+        f"no scene is called '{name}'.{hint} Known: {', '.join(names())}, or module:function."
+    )
+
+
+def _load(entry: str) -> Recipe:
+    module_name, _, attribute = entry.partition(":")
+    try:
+        module = importlib.import_module(module_name)
+    except (ImportError, ValueError) as error:  # ValueError: an empty module name
+        raise UnknownNameError(f"'{entry}': cannot import '{module_name}' ({error})") from error
+    recipe = getattr(module, attribute, None)
+    if not callable(recipe):
+        raise UnknownNameError(f"'{entry}': module '{module_name}' has no function '{attribute}'")
+    return recipe  # type: ignore[no-any-return]

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a recipe hands to the world: a model to compile and the facts a simulator needs about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from slam.system import Raster
+
+SCAN_HEIGHT = 0.36
+"""Height of the laser's scan plane above the floor, m (parts/robot.xml puts `robot/laser` there)."""
+
+Kind = Literal["chair_swivel", "chair_visitor", "bin", "person", "door", "robot"]
+Pose = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mover:
+    """Something that can move.
+
+    name    prefix of its names in the model: body "<name>/base", joints "<name>/x|y|yaw"; for a door
+            body "<name>/leaf", joint "<name>/hinge"
+    kind    which part it is
+    radius  m, footprint disc of its hull; for a door the width of its leaf
+    """
+
+    name: str
+    kind: Kind
+    radius: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """One built room or building, the same for the same name, seed and options.
+
+    spec         uncompiled; ``compile()`` gives the model
+    movers       every movable thing, the robot last
+    initial      world pose (x m, y m, yaw rad) of each mover at reset. For the planar ones this is the
+                 qpos of "<name>/x|y|yaw"; for a door it is hinge and leaf direction when closed
+    door_angles  rad, angle of each door at rest: qpos of "<name>/hinge" at reset, and the closer's
+                 ``springref``, so that nothing moves by itself
+    goals        room or spot -> (x, y) m, free floor at least 1.2 m from any door
+    rooms        room -> (xmin, ymin, xmax, ymax) m of its floor
+    bounds       xmin, ymin, xmax, ymax of the whole floor, m
+    obstacles    (n, 5) static boxes a walker avoids: cx, cy, half_x, half_y m, yaw rad; desk tops count
+    static_map   truth at the scan plane from what never moves: 1 occupied, 0 free
+    start        the robot's pose at reset, equal to ``initial["robot"]``
+    """
+
+    name: str
+    seed: int
+    spec: mujoco.MjSpec
+    movers: tuple[Mover, ...]
+    initial: Mapping[str, Pose]
+    door_angles: Mapping[str, float]
+    goals: Mapping[str, tuple[float, float]]
+    rooms: Mapping[str, tuple[float, float, float, float]]
+    bounds: tuple[float, float, float, float]
+    obstacles: NDArray[np.float64]
+    static_map: Raster
+    start: Pose
+    options: Mapping[str, int] = field(default_factory=dict)
+
+    def compile(self) -> mujoco.MjModel:
+        """The model with every mover at its initial pose in ``qpos0``-free form.
+
+        qpos0 is zero by construction (a planar joint's qpos *is* the world pose), so a fresh ``MjData``
+        needs ``place``.
+        """
+        return self.spec.compile()
+
+    def place(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Write ``initial`` and ``door_angles`` into ``data.qpos`` (velocities stay untouched)."""
+        for mover in self.movers:
+            if mover.kind == "door":
+                data.qpos[_address(model, f"{mover.name}/hinge")] = self.door_angles[mover.name]
+                continue
+            for joint, value in zip(("x", "y", "yaw"), self.initial[mover.name], strict=True):
+                data.qpos[_address(model, f"{mover.name}/{joint}")] = value
+
+
+def _address(model: mujoco.MjModel, joint: str) -> int:
+    return int(model.joint(joint).qposadr[0])
