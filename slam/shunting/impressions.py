@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Observations as Gaussians, and the inspiration I they give to neurons.
+
+Beams and point features enter through one type. I of a neuron is the largest of the Gaussians
+around the observed points there; each has the analytic peak 1 (not the largest sampled value), as
+everything else makes structure creep towards neuron centres (pixel locking).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam import se2
+from slam._jit import njit
+from slam.frames import Features, Float, Scan
+from slam.shunting.config import ShuntingConfig
+from slam.shunting.network import FREE_COUNT, MASK, SHIFT, TOUCHED_COUNT, Cells, Network
+from slam.shunting.visibility import FREE_WITHOUT_RETURN_M, View, view_of_beams, view_of_features
+
+SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
+SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Observations:
+    """What one frame shows, in the robot frame at the frame's stamp.
+
+    points_robot  (n, 2) m
+    covariances   (n, 3) m^2: xx, xy, yy; at least (0.8 cell)^2 along every axis
+    view          what is seen to be empty
+    T_robot_laser (3,) origin of ``view``
+    """
+
+    points_robot: Float
+    covariances: Float
+    view: View
+    T_robot_laser: Float
+
+
+@njit
+def _deskew(
+    ranges: NDArray[np.float32],
+    angles: NDArray[np.float64],
+    offsets: NDArray[np.float64],
+    T_robot_laser: NDArray[np.float64],
+    twist: NDArray[np.float64],
+    limits: tuple[float, float, float, float],
+    points: NDArray[np.float64],
+    bearings: NDArray[np.float64],
+    free: NDArray[np.float64],
+) -> int:
+    """End points in the robot frame of the stamp; bearings and free ranges about that laser.
+
+    ``limits``: range_min, range_max, range of use, free range without a return. Returns how many
+    points were written.
+    """
+    low, high, use, silent = limits
+    lx, ly = T_robot_laser[0], T_robot_laser[1]
+    lc, ls = math.cos(T_robot_laser[2]), math.sin(T_robot_laser[2])
+    count = 0
+    for k in range(len(ranges)):
+        r = float(ranges[k])
+        hit = low <= r <= high
+        free[k] = 0.0
+        bearings[k] = angles[k]
+        if math.isnan(r) or r < low:
+            continue
+        reach = min(r, use) if hit else silent
+        px = lx + reach * math.cos(angles[k] + T_robot_laser[2])
+        py = ly + reach * math.sin(angles[k] + T_robot_laser[2])
+        turn = twist[2] * offsets[k]
+        if offsets[k] != 0.0:
+            # Motion since the stamp: mid-point rule, exact to third order in the turned angle.
+            c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
+            mx = (c * twist[0] - s * twist[1]) * offsets[k]
+            my = (s * twist[0] + c * twist[1]) * offsets[k]
+            c, s = math.cos(turn), math.sin(turn)
+            px, py = c * px - s * py + mx, s * px + c * py + my
+        dx, dy = px - lx, py - ly
+        bearings[k] = math.atan2(lc * dy - ls * dx, lc * dx + ls * dy)
+        free[k] = math.sqrt(dx * dx + dy * dy)
+        if hit and r <= use:
+            points[count, 0] = px
+            points[count, 1] = py
+            count += 1
+    return count
+
+
+def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
+    """Beams, moved to where the robot was at the scan's stamp.
+
+    ``twist`` is the body velocity (vx, vy, omega) over the sweep.
+    """
+    spec = scan.spec
+    n = spec.n_beams
+    points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
+    use = min(config.range_m, spec.range_max)
+    count = _deskew(
+        scan.ranges,
+        spec.angles,
+        spec.beam_time_offsets,
+        spec.T_robot_laser,
+        twist,
+        (spec.range_min, spec.range_max, use, min(use, FREE_WITHOUT_RETURN_M)),
+        points,
+        bearings,
+        free,
+    )
+    variance = max(SIGMA_CELLS * config.cell_m, SENSOR_SIGMA_M) ** 2
+    covariances = np.zeros((count, 3))
+    covariances[:, 0] = covariances[:, 2] = variance
+    view = view_of_beams(bearings, free, spec.angle_increment, config.cell_m)
+    return Observations(
+        points_robot=points[:count],
+        covariances=covariances,
+        view=view,
+        T_robot_laser=spec.T_robot_laser,
+    )
+
+
+def from_features(features: Features, config: ShuntingConfig) -> Observations:
+    """Point features within range; their covariance widened to what the lattice can carry."""
+    points = features.points_robot
+    near = (points * points).sum(axis=1) <= config.range_m**2
+    floor = (SIGMA_CELLS * config.cell_m) ** 2
+    given = features.covariances[near]
+    covariances = np.stack([given[:, 0, 0] + floor, given[:, 0, 1], given[:, 1, 1] + floor], axis=1)
+    return Observations(
+        points_robot=points[near].copy(),
+        covariances=covariances,
+        view=view_of_features(points[near], config.cell_m),
+        T_robot_laser=np.zeros(3),
+    )
+
+
+def joined(first: Observations, second: Observations) -> Observations:
+    """Both, seen with the view of the first."""
+    return Observations(
+        points_robot=np.concatenate([first.points_robot, second.points_robot]),
+        covariances=np.concatenate([first.covariances, second.covariances]),
+        view=first.view,
+        T_robot_laser=first.T_robot_laser,
+    )
+
+
+@njit
+def _stamp(
+    cells: Cells,
+    points: NDArray[np.float64],
+    covariances: NDArray[np.float64],
+    theta: float,
+    cell: float,
+    start: int,
+) -> int:
+    """Raise I around the points (map frame) from ``start`` on; the index where room ran out, or n.
+
+    ``covariances`` are in the robot frame, which is turned by ``theta``. Blocks are born here.
+    """
+    c, s = math.cos(theta), math.sin(theta)
+    for k in range(start, len(points)):
+        xx, xy, yy = covariances[k, 0], covariances[k, 1], covariances[k, 2]
+        a = (c * c * xx - 2.0 * c * s * xy + s * s * yy) / (cell * cell)
+        b = (c * s * (xx - yy) + (c * c - s * s) * xy) / (cell * cell)
+        d = (s * s * xx + 2.0 * c * s * xy + c * c * yy) / (cell * cell)
+        det = a * d - b * b
+        u, v = points[k, 0] / cell - 0.5, points[k, 1] / cell - 0.5
+        wide = max(3.0, 3.3 * math.sqrt(max(a, d)))
+        for j in range(math.ceil(v - wide), math.floor(v + wide) + 1):
+            for i in range(math.ceil(u - wide), math.floor(u + wide) + 1):
+                du, dv = i - u, j - v
+                m = (d * du * du - 2.0 * b * du * dv + a * dv * dv) / det
+                if m > 12.0:  # below 0.0025
+                    continue
+                row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
+                slot = cells.directory[row, column]
+                if slot < 0:
+                    if cells.counts[FREE_COUNT] == 0:
+                        return k
+                    cells.counts[FREE_COUNT] -= 1
+                    slot = cells.free[cells.counts[FREE_COUNT]]
+                    cells.directory[row, column] = slot
+                    cells.x[slot] = 0.0
+                    cells.y[slot] = 0.0
+                    cells.age[slot] = 0.0
+                    cells.scratch_of[slot] = -1
+                scratch = cells.scratch_of[slot]
+                if scratch < 0:
+                    scratch = cells.counts[TOUCHED_COUNT]
+                    if scratch == len(cells.touched):
+                        return k
+                    cells.counts[TOUCHED_COUNT] += 1
+                    cells.touched[scratch] = slot
+                    cells.scratch_of[slot] = scratch
+                    cells.impression[scratch] = 0.0
+                value = np.float32(math.exp(-0.5 * m))
+                if value > cells.impression[scratch, j & MASK, i & MASK]:
+                    cells.impression[scratch, j & MASK, i & MASK] = value
+    return len(points)
+
+
+def stamp(network: Network, observations: Observations, T_map_robot: Float) -> None:
+    """Write the impressions of ``observations`` seen from ``T_map_robot`` onto the network."""
+    points_map = se2.transform(T_map_robot, observations.points_robot)
+    if len(points_map) == 0:
+        return
+    largest = float(observations.covariances[:, [0, 2]].max())
+    edge = max(3.0 * network.cell, 4.0 * math.sqrt(largest)) + network.cell
+    low, high = points_map.min(axis=0) - edge, points_map.max(axis=0) + edge
+    network.cover(float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+    done = 0
+    while done < len(points_map):
+        done = _stamp(
+            network.cells,
+            points_map,
+            observations.covariances,
+            float(T_map_robot[2]),
+            network.cell,
+            done,
+        )
+        if done < len(points_map):
+            network.grow()

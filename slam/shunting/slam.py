@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The shunting SLAM: a short-term-memory map that forgets what moved, and scan matching on it."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam import se2
+from slam.errors import InvalidValueError
+from slam.frames import Float, Frame, Odometry
+from slam.shunting.config import ShuntingConfig
+from slam.shunting.impressions import (
+    Observations,
+    from_features,
+    from_scan,
+    joined,
+    stamp,
+)
+from slam.shunting.matching import Match, Matcher
+from slam.shunting.motion import WIDEN, Prediction, inverted, predict
+from slam.shunting.network import Network
+from slam.shunting.search import SearchWindow
+from slam.system import Estimate, Raster, register
+from slam.trajectory import Trajectory
+
+FIRST_LOOK_S = 1.0  # the first frame acts this long, so that the map is usable at once
+LONGEST_LOOK_S = 3.0  # however long ago the previous frame was
+WIDEST = SearchWindow(reach_m=0.6, turn_rad=0.5)
+GOOD_SHARE = 0.85  # of the usual matched fraction: below it the neighbourhood is searched
+VAGUE_CELLS = 1.0  # a prior wider than this may leave the basin of the right optimum
+LOST_AFTER, PATIENCE = 3, 30  # doubtful frames in a row: then lost; then the map is written anew
+INFORMATION_SHARE = 0.02  # of the data's curvature that is independent from frame to frame
+DRIFT_SHARE = 0.5
+
+
+@register("shunting")
+class ShuntingSlam:
+    """Localise on the network, then let the network see the frame (Eqs. 8 and 13).
+
+    ``config`` is a ``ShuntingConfig`` or the name of a preset, "robust" (default) or "paper".
+    Raises ``InvalidValueError`` for frames without observations or out of order.
+    """
+
+    def __init__(self, config: ShuntingConfig | str = "robust") -> None:
+        if isinstance(config, str):
+            if config not in ("robust", "paper"):
+                raise InvalidValueError(
+                    f"ShuntingSlam config must be 'robust' or 'paper', got {config!r}"
+                )
+            config = ShuntingConfig.paper() if config == "paper" else ShuntingConfig.robust()
+        self.config: ShuntingConfig = config
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything; the next frame is the origin of the map."""
+        self.network = Network(self.config)
+        self._matcher = Matcher(self.config)
+        self._before: Odometry | None = None
+        self._T_map_robot: Float = np.zeros(3)
+        self._covariance: Float = np.zeros((3, 3))
+        self._relative: Float = np.zeros((3, 3))
+        self._drift: Float = np.zeros((3, 3))
+        self._usual: deque[float] = deque(maxlen=50)
+        self._doubts = 0
+        self._stamps: list[int] = []
+        self._poses: list[Float] = []
+
+    def update(self, frame: Frame) -> Estimate:
+        """Predict, look, match, integrate."""
+        if self._before is None:
+            return self._first(frame)
+        if frame.stamp_ns <= self._stamps[-1]:
+            raise InvalidValueError(
+                f"frames must come in order: {frame.stamp_ns} ns after {self._stamps[-1]} ns"
+            )
+        prediction = predict(self._T_map_robot, self._before, frame.odometry)
+        observations = self._observe(frame, prediction.twist)
+        match = self._match(observations, prediction)
+        state = self._integrate(observations, match, prediction.elapsed)
+        self._believe(match, prediction)
+        return self._report(frame, match, state)
+
+    def _first(self, frame: Frame) -> Estimate:
+        twist = frame.odometry.twist
+        observations = self._observe(frame, np.zeros(3) if twist is None else np.asarray(twist))
+        stamp(self.network, observations, self._T_map_robot)
+        self.network.integrate(
+            observations.view, observations.T_robot_laser, FIRST_LOOK_S, write=True
+        )
+        match = Match(
+            T_map_robot=np.zeros(3), information=np.zeros((3, 3)), matched=1.0, score=0.0, tau=0.0
+        )
+        return self._report(frame, match, "tracking")
+
+    def _observe(self, frame: Frame, twist: Float) -> Observations:
+        if frame.scan is None and frame.features is None:
+            raise InvalidValueError("the shunting SLAM needs a scan or features in every frame")
+        if frame.scan is None:
+            return from_features(frame.features, self.config)  # type: ignore[arg-type]
+        beams = from_scan(frame.scan, twist, self.config)
+        if frame.features is None:
+            return beams
+        return joined(beams, from_features(frame.features, self.config))
+
+    def _match(self, observations: Observations, prediction: Prediction) -> Match:
+        """Climb from the prediction; search around it when that is vague or finds too little."""
+        predicted = prediction.T_map_robot
+        precision = inverted(prediction.covariance)
+        match = self._matcher.climb(self.network, observations, predicted, predicted, precision)
+        sd = [math.sqrt(prediction.covariance[k, k]) for k in range(3)]
+        spread = max(sd[0], sd[1])
+        near = SearchWindow(
+            reach_m=min(max(3.0 * spread, 0.1), WIDEST.reach_m),
+            turn_rad=min(max(3.0 * sd[2], 0.05), WIDEST.turn_rad),
+        )
+        good = GOOD_SHARE * self._usual_match()
+        vague = spread > VAGUE_CELLS * self.config.cell_m
+        for window, wanted in ((near, vague or match.matched < good), (WIDEST, True)):
+            if not wanted or (window is WIDEST and match.matched >= 0.7 * good):
+                break
+            found = self._matcher.search(self.network, observations, predicted, precision, window)
+            if found.score > match.score:
+                match = found
+        return match
+
+    def _usual_match(self) -> float:
+        return float(np.median(self._usual)) if self._usual else 1.0
+
+    def _integrate(self, observations: Observations, match: Match, elapsed: float) -> str:
+        """Let the network see the frame, unless the map in view contradicts it; the state."""
+        stamp(self.network, observations, match.T_map_robot)
+        T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
+        step = min(elapsed, LONGEST_LOOK_S)
+        usual = self._usual_match()
+        doubtful = False
+        if match.matched < self.config.freeze_below * usual:
+            confirmed, contradicted, _ = self.network.integrate(
+                observations.view, T_map_laser, step, write=False
+            )
+            doubtful = contradicted > confirmed
+        self._doubts = self._doubts + 1 if doubtful else 0
+        if doubtful and self._doubts <= PATIENCE:
+            self.network.release()
+            return "lost" if self._doubts > LOST_AFTER else "frozen"
+        if not doubtful:
+            self._usual.append(match.matched)
+        self.network.integrate(observations.view, T_map_laser, step, write=True)
+        return "lost" if doubtful else "tracking"
+
+    def _believe(self, match: Match, prediction: Prediction) -> None:
+        """Fuse odometry and match into the covariance of the pose in the map of the start."""
+        before = se2.propagate(
+            self._relative, self._T_map_robot, prediction.increment, np.zeros((3, 3))
+        )
+        spread = before + prediction.covariance / WIDEN**2
+        share = INFORMATION_SHARE * match.tau
+        self._relative = inverted(inverted(spread) + share * match.information)
+        # What is new is mapped with the pose's present error, which then stays in the map.
+        self._drift = self._drift + DRIFT_SHARE * (1.0 - match.matched) * self._relative
+        self._covariance = self._relative + self._drift
+
+    def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
+        self._before = frame.odometry
+        self._T_map_robot = match.T_map_robot
+        self._stamps.append(frame.stamp_ns)
+        self._poses.append(match.T_map_robot)
+        return Estimate(
+            stamp_ns=frame.stamp_ns,
+            T_map_robot=match.T_map_robot,
+            covariance=self._covariance,
+            converged=state == "tracking",
+            diagnostics={
+                "state": state,
+                "matched": match.matched,
+                "searched": match.searched,
+                "evaluations": match.evaluations,
+            },
+        )
+
+    def map(self) -> Raster | None:
+        """The larger of trace and short-term activity relative to saturation; NaN where no neuron
+        lives (never seen, or seen empty: the network does not tell these apart).
+        """
+        extent = self.network.extent()
+        if extent is None:
+            return None
+        cell = self.config.cell_m
+        i0, j0, i1, j1 = extent
+        x, y = self.window(
+            (i0 + 0.5) * cell, (j0 + 0.5) * cell, (i1 - 0.5) * cell, (j1 - 0.5) * cell
+        )
+        values = np.minimum(np.maximum(y, x / np.float32(self.config.saturation)), np.float32(1.0))
+        values[values == 0.0] = np.nan
+        return Raster(
+            values=values, resolution_m=cell, T_map_origin=np.array([i0 * cell, j0 * cell, 0.0])
+        )
+
+    def window(
+        self, xmin: float, ymin: float, xmax: float, ymax: float
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Dense short-term x and long-term y of the neurons centred in the rectangle (map, m)."""
+        return self.network.window(xmin, ymin, xmax, ymax)
+
+    def trajectory(self) -> Trajectory:
+        """The online poses; final ones differ only once loops are closed."""
+        return Trajectory(
+            stamps_ns=np.array(self._stamps, dtype=np.int64),
+            poses=np.array(self._poses).reshape(-1, 3),
+        )

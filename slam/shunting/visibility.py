@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the present scan can see of the map (section 3.3): how far each direction is free.
+
+A neuron is hidden when the line from the laser to it passes through an observation. De-skewed beams
+of an interlaced scanner are not in order of bearing, so they are sorted into bins round the circle.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import njit
+
+FREE_WITHOUT_RETURN_M = 30.0  # black or slanted surfaces give no return either, from there on
+MARGIN_CELLS = 1.5
+GATE_CELLS = 0.6
+FEATURE_BIN = math.radians(1.0)
+FEATURE_GAP = math.radians(60.0)  # between two features no wider apart nothing else was there
+
+
+class View(NamedTuple):
+    """Free range by bearing about the laser, in laser axes.
+
+    step      rad between bins; bin k is centred at k * step
+    limit     (bins,) m: least range of the bin and its two neighbours, 0 where none was measured;
+              three, so that a wall seen at a grazing angle is not worn away
+    offset    (bins,) bearing of the bin's nearest beam minus the bin's centre, in bins
+    farthest  m, largest limit
+    margin    m a neuron must be nearer than the limit to be seen empty
+    gate      m a neuron may lie beside the nearest beam to be seen by it
+    """
+
+    step: float
+    limit: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    farthest: float
+    margin: float
+    gate: float
+
+
+@njit
+def _fill(
+    bearings: NDArray[np.float64],
+    ranges: NDArray[np.float64],
+    step: float,
+    limit: NDArray[np.float64],
+    offset: NDArray[np.float64],
+) -> float:
+    bins = len(limit)
+    least = np.full(bins, np.inf)
+    offset[:] = np.inf
+    for beam in range(len(bearings)):
+        if ranges[beam] <= 0.0:
+            continue
+        turns = bearings[beam] / step
+        k = math.floor(turns + 0.5)
+        off = turns - k
+        k %= bins
+        least[k] = min(least[k], ranges[beam])
+        if abs(off) < abs(offset[k]):
+            offset[k] = off
+    farthest = 0.0
+    for k in range(bins):
+        nearest = min(least[k - 1], least[k], least[(k + 1) % bins])
+        limit[k] = nearest if nearest < math.inf else 0.0
+        farthest = max(farthest, limit[k])
+    return farthest
+
+
+def view_of_beams(
+    bearings: NDArray[np.float64],
+    free_ranges: NDArray[np.float64],
+    increment: float,
+    cell: float,
+) -> View:
+    """Sort beams (bearing rad, free range m; 0: not measured) into bins of about ``increment``."""
+    bins = max(8, math.floor(math.tau / increment + 1e-6))
+    step = math.tau / bins
+    limit, offset = np.empty(bins), np.empty(bins)
+    farthest = _fill(bearings, free_ranges, step, limit, offset)
+    return View(step, limit, offset, farthest, MARGIN_CELLS * cell, GATE_CELLS * cell)
+
+
+def view_of_features(points: NDArray[np.float64], cell: float) -> View:
+    """What a frame of point features (n, 2) m sees: the sectors between neighbours, as far as the
+    farther of the two, and nothing behind a feature.
+    """
+    order = sorted((math.atan2(y, x), math.hypot(x, y)) for x, y in points.tolist())
+    bearings: list[float] = []
+    ranges: list[float] = []
+    for (b0, r0), (b1, r1) in zip(order, order[1:] + order[:1], strict=True):
+        gap = (b1 - b0) % math.tau
+        bearings.append(b0)
+        ranges.append(r0)
+        if gap <= FEATURE_GAP:
+            between = np.arange(FEATURE_BIN, gap, FEATURE_BIN)
+            bearings += (b0 + between).tolist()
+            ranges += [max(r0, r1)] * len(between)
+    view = view_of_beams(np.array(bearings), np.array(ranges), FEATURE_BIN, cell)
+    return view._replace(gate=math.inf)
