@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """From hand-written MJCF to one model: a plan, parts attached to it, one copy of each material.
 
-A part is attached under a prefix ("chair3/"), which MuJoCo also puts before the part's references to
-materials; so a part's own materials are dropped and the prefix is stripped from the reference.
+A part is attached under a prefix ("chair3/"), which MuJoCo also puts before the part's references
+to materials; so a part's own materials are dropped and the prefix is stripped from the reference.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scenes.scene import SCAN_HEIGHT
 from slam.system import Raster
 
+Float = NDArray[np.float64]
 GEOM = mujoco.mjtGeom
 HULL_GROUP = 3
 RESOLUTION_M = 0.02
@@ -33,37 +34,33 @@ def static_raster(
     n_x = round((bounds[2] + MARGIN_M - xmin) / RESOLUTION_M)
     n_y = round((bounds[3] + MARGIN_M - ymin) / RESOLUTION_M)
     values = np.zeros((n_y, n_x), dtype=np.float32)
+    origin = np.array([xmin, ymin])
     for geom in static_geoms(model):
-        centre, reach = data.geom_xpos[geom], model.geom_rbound[geom]
-        if (
-            reach == 0.0 or abs(centre[2] - height) > reach
-        ):  # planes have no bound, floors no height
-            continue
-        low = np.floor((centre[:2] - reach - (xmin, ymin)) / RESOLUTION_M).astype(int)
-        high = np.ceil((centre[:2] + reach - (xmin, ymin)) / RESOLUTION_M).astype(int)
+        turn = data.geom_xmat[geom].reshape(3, 3)
+        centre = data.geom_xpos[geom] + (turn * model.geom_aabb[geom, :3]).sum(axis=1)
+        half = (np.abs(turn) * model.geom_aabb[geom, 3:]).sum(axis=1)
+        if model.geom_rbound[geom] == 0.0 or abs(centre[2] - height) > half[2]:
+            continue  # a plane (floor), or above or below
+        low = np.floor((centre[:2] - half[:2] - origin) / RESOLUTION_M).astype(int)
+        high = np.ceil((centre[:2] + half[:2] - origin) / RESOLUTION_M).astype(int)
         rows = slice(max(low[1], 0), min(high[1], n_y))
         columns = slice(max(low[0], 0), min(high[0], n_x))
-        y, x = np.mgrid[rows, columns]
-        offset = np.stack(
-            [
-                xmin + (x + 0.5) * RESOLUTION_M - centre[0],
-                ymin + (y + 0.5) * RESOLUTION_M - centre[1],
-                np.full(x.shape, height - centre[2]),
-            ],
-            axis=-1,
+        y, x = np.ogrid[rows, columns]
+        offset = (
+            xmin + (x + 0.5) * RESOLUTION_M - data.geom_xpos[geom, 0],
+            ymin + (y + 0.5) * RESOLUTION_M - data.geom_xpos[geom, 1],
+            height - float(data.geom_xpos[geom, 2]),
         )
-        # np.einsum without optimize is a plain loop: no BLAS, the same bits on every CPU
-        local = np.einsum("yxj,jk->yxk", offset, data.geom_xmat[geom].reshape(3, 3))
-        inside = _inside(int(model.geom_type[geom]), model.geom_size[geom], local)
+        local = [sum(offset[i] * turn[i, axis] for i in range(3)) for axis in range(3)]
+        inside = _inside(int(model.geom_type[geom]), model.geom_size[geom], *local)
         values[rows, columns][inside] = 1.0
     return Raster(
         values=values, resolution_m=RESOLUTION_M, T_map_origin=np.array([xmin, ymin, 0.0])
     )
 
 
-def _inside(kind: int, size: NDArray[np.float64], local: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which points (..., 3), in the geom's frame, lie in the primitive."""
-    x, y, z = local[..., 0], local[..., 1], local[..., 2]
+def _inside(kind: int, size: Float, x: Float, y: Float, z: Float) -> NDArray[np.bool_]:
+    """Which points, in the geom's frame, lie in the primitive."""
     inside: NDArray[np.bool_]
     if kind == GEOM.mjGEOM_BOX:
         inside = (abs(x) <= size[0]) & (abs(y) <= size[1]) & (abs(z) <= size[2])

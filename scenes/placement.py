@@ -17,7 +17,7 @@ BATCH = 32
 
 
 def gap_to_boxes(points: Float, boxes: Float) -> Float:
-    """(n,) m from each point (n, 2) to the nearest of the boxes (m, 5), 0 inside, inf without boxes.
+    """(n,) m from each point (n, 2) to the nearest box (m, 5); 0 inside, inf without boxes.
 
     Only elementwise + - * / sqrt on arrays, so that a layout is the same on every CPU.
     """
@@ -61,7 +61,7 @@ class Floor:
         return bool(self.clearance(np.array([[x, y]]))[0] >= radius)
 
     def find(self, rng: np.random.Generator, radius: float) -> tuple[float, float] | None:
-        """A random free place for a disc, evenly over the floor; None when there seems to be none."""
+        """A random free place for a disc, evenly over the floor; None when none is found."""
         for _ in range(MAX_BATCHES):
             draws = rng.random((BATCH, 3))
             which = np.searchsorted(self._areas, draws[:, 0] * self._areas[-1], side="right")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steps the recipes share: seeded streams, counts, chairs, people, doors, and the finished Scene."""
+"""Steps the recipes share: seeded streams, counts, chairs, people, doors, the finished Scene."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def hang_doors(builder: Builder, rng: np.random.Generator) -> None:
 def seat_chairs(
     builder: Builder, floor: Floor, seats: Sequence[Mark], n: int, draws: Draws
 ) -> None:
-    """``n`` chairs: a seeded choice of the seats, a little pulled out and turned; the rest anywhere."""
+    """``n`` chairs: a seeded choice of seats, pulled out a little and turned; the rest anywhere."""
     order = draws.chairs.permutation(len(seats))[:n]
     for index in sorted(order.tolist()):
         kind: Kind = "chair_visitor" if seats[index].words[1] == "chair_visitor" else "chair_swivel"
@@ -136,7 +136,7 @@ def _add_chair(builder: Builder, floor: Floor, kind: Kind, pose: Pose, draws: Dr
 
 
 def _pulled_out(floor: Floor, seat: Pose, radius: float, rng: np.random.Generator) -> Pose | None:
-    """The seat, shifted back and sideways and turned, where that has room; else as it is, or None."""
+    """The seat, shifted back and sideways and turned, where there is room; else as is, or None."""
     x, y, yaw = seat
     cos, sin = math.cos(yaw), math.sin(yaw)
     for _ in range(8):

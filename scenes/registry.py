@@ -18,7 +18,7 @@ _recipes: dict[str, Recipe] = {}
 
 
 def register(name: str) -> Callable[[F], F]:
-    """Function decorator: make a recipe ``(seed, **options) -> Scene`` available as ``build(name)``."""
+    """Function decorator: make ``(seed, **options) -> Scene`` available as ``build(name)``."""
 
     def add(recipe: F) -> F:
         _recipes[name] = recipe

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from slam.system import Raster
 
 SCAN_HEIGHT = 0.36
-"""Height of the laser's scan plane above the floor, m (parts/robot.xml puts `robot/laser` there)."""
+"""Height of the laser's scan plane above the floor, m (where parts/robot.xml has its laser)."""
 
 Kind = Literal["chair_swivel", "chair_visitor", "bin", "person", "door", "robot"]
 Pose = tuple[float, float, float]
@@ -24,8 +24,8 @@ Pose = tuple[float, float, float]
 class Mover:
     """Something that can move.
 
-    name    prefix of its names in the model: body "<name>/base", joints "<name>/x|y|yaw"; for a door
-            body "<name>/leaf", joint "<name>/hinge"
+    name    prefix of its names in the model: body "<name>/base", joints "<name>/x|y|yaw"; for a
+            door body "<name>/leaf", joint "<name>/hinge"
     kind    which part it is
     radius  m, footprint disc of its hull; for a door the width of its leaf
     """
@@ -41,14 +41,15 @@ class Scene:
 
     spec         uncompiled; ``compile()`` gives the model
     movers       every movable thing, the robot last
-    initial      world pose (x m, y m, yaw rad) of each mover at reset. For the planar ones this is the
-                 qpos of "<name>/x|y|yaw"; for a door it is hinge and leaf direction when closed
+    initial      world pose (x m, y m, yaw rad) of each mover at reset. For the planar ones this is
+                 the qpos of "<name>/x|y|yaw"; for a door its hinge and the closed leaf's direction
     door_angles  rad, angle of each door at rest: qpos of "<name>/hinge" at reset, and the closer's
                  ``springref``, so that nothing moves by itself
     goals        room or spot -> (x, y) m, free floor at least 1.2 m from any door
     rooms        room -> (xmin, ymin, xmax, ymax) m of its floor
     bounds       xmin, ymin, xmax, ymax of the whole floor, m
-    obstacles    (n, 5) static boxes a walker avoids: cx, cy, half_x, half_y m, yaw rad; desk tops count
+    obstacles    (n, 5) static boxes a walker avoids: cx, cy, half_x, half_y m, yaw rad; desk tops
+                 count
     static_map   truth at the scan plane from what never moves: 1 occupied, 0 free
     start        the robot's pose at reset, equal to ``initial["robot"]``
     """
@@ -68,11 +69,7 @@ class Scene:
     options: Mapping[str, int] = field(default_factory=dict)
 
     def compile(self) -> mujoco.MjModel:
-        """The model with every mover at its initial pose in ``qpos0``-free form.
-
-        qpos0 is zero by construction (a planar joint's qpos *is* the world pose), so a fresh ``MjData``
-        needs ``place``.
-        """
+        """The model; its qpos0 is zero, as a planar qpos *is* the world pose: see ``place``."""
         return self.spec.compile()
 
     def place(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
