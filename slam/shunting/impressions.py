@@ -23,6 +23,10 @@ from slam.shunting.visibility import FREE_WITHOUT_RETURN_M, View, view_of_beams,
 
 SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
 SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
+FAINT = 12.0  # squared Mahalanobis distance of I = 0.0025, where an impression ends
+NEAR_JOIN_CELLS = 3.0
+LONGEST_JOIN_M = 1.0
+STRAIGHT = math.cos(math.radians(12.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,12 +35,15 @@ class Observations:
 
     points_robot  (n, 2) m
     covariances   (n, 3) m^2: xx, xy, yy; at least (0.8 cell)^2 along every axis
+    joined        (n,) bool: the surface goes on to the next point. Without it the dots of a wall
+                  seen at a grazing angle match themselves where the robot stood before
     view          what is seen to be empty
     T_robot_laser (3,) origin of ``view``
     """
 
     points_robot: Float
     covariances: Float
+    joined: NDArray[np.bool_]
     view: View
     T_robot_laser: Float
 
@@ -50,6 +57,7 @@ def _deskew(
     twist: NDArray[np.float64],
     limits: tuple[float, float, float, float],
     points: NDArray[np.float64],
+    beams: NDArray[np.int64],
     bearings: NDArray[np.float64],
     free: NDArray[np.float64],
 ) -> int:
@@ -86,6 +94,7 @@ def _deskew(
         if hit and r <= use:
             points[count, 0] = px
             points[count, 1] = py
+            beams[count] = k
             count += 1
     return count
 
@@ -98,6 +107,7 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
     spec = scan.spec
     n = spec.n_beams
     points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
+    beams = np.empty(n, np.int64)
     use = min(config.range_m, spec.range_max)
     count = _deskew(
         scan.ranges,
@@ -107,16 +117,20 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
         twist,
         (spec.range_min, spec.range_max, use, min(use, FREE_WITHOUT_RETURN_M)),
         points,
+        beams,
         bearings,
         free,
     )
     variance = max(SIGMA_CELLS * config.cell_m, SENSOR_SIGMA_M) ** 2
     covariances = np.zeros((count, 3))
     covariances[:, 0] = covariances[:, 2] = variance
+    onward = np.zeros(count, np.bool_)
+    join(points[:count], beams[:count], NEAR_JOIN_CELLS * config.cell_m, onward)
     view = view_of_beams(bearings, free, spec.angle_increment, config.cell_m)
     return Observations(
         points_robot=points[:count],
         covariances=covariances,
+        joined=onward,
         view=view,
         T_robot_laser=spec.T_robot_laser,
     )
@@ -132,6 +146,7 @@ def from_features(features: Features, config: ShuntingConfig) -> Observations:
     return Observations(
         points_robot=points[near].copy(),
         covariances=covariances,
+        joined=np.zeros(len(covariances), np.bool_),
         view=view_of_features(points[near], config.cell_m),
         T_robot_laser=np.zeros(3),
     )
@@ -142,9 +157,103 @@ def joined(first: Observations, second: Observations) -> Observations:
     return Observations(
         points_robot=np.concatenate([first.points_robot, second.points_robot]),
         covariances=np.concatenate([first.covariances, second.covariances]),
+        joined=np.concatenate([first.joined, second.joined]),
         view=first.view,
         T_robot_laser=first.T_robot_laser,
     )
+
+
+@njit
+def join(
+    points: NDArray[np.float64], beams: NDArray[np.int64], near: float, out: NDArray[np.bool_]
+) -> None:
+    """Mark the points whose surface goes on to the next one.
+
+    Hits of neighbouring beams (of index ``beams``) are joined when they are within ``near`` m, or
+    when the stretch between them goes on straight, in like steps, before or behind.
+    """
+    n = len(points)
+    for k in range(n):
+        out[k] = False
+        if k + 1 >= n or beams[k + 1] != beams[k] + 1:
+            continue
+        dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
+        d = math.sqrt(dx * dx + dy * dy)
+        if d <= near:
+            out[k] = True
+        elif d <= LONGEST_JOIN_M:
+            for a in (k - 1, k + 1):
+                if a < 0 or a + 1 >= n or beams[a + 1] != beams[a] + 1:
+                    continue
+                ex, ey = points[a + 1, 0] - points[a, 0], points[a + 1, 1] - points[a, 1]
+                e = math.sqrt(ex * ex + ey * ey)
+                if 0.4 * d < e < 2.5 * d and dx * ex + dy * ey > STRAIGHT * d * e:
+                    out[k] = True
+
+
+@njit
+def _raise(cells: Cells, i: int, j: int, value: float) -> bool:
+    """I of neuron (i, j) becomes at least ``value``; its block is born. False: no room is left."""
+    row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
+    slot = cells.directory[row, column]
+    if slot < 0:
+        if cells.counts[FREE_COUNT] == 0:
+            return False
+        cells.counts[FREE_COUNT] -= 1
+        slot = cells.free[cells.counts[FREE_COUNT]]
+        cells.directory[row, column] = slot
+        cells.x[slot] = 0.0
+        cells.y[slot] = 0.0
+        cells.age[slot] = 0.0
+        cells.scratch_of[slot] = -1
+    scratch = cells.scratch_of[slot]
+    if scratch < 0:
+        scratch = cells.counts[TOUCHED_COUNT]
+        if scratch == len(cells.touched):
+            return False
+        cells.counts[TOUCHED_COUNT] += 1
+        cells.touched[scratch] = slot
+        cells.scratch_of[slot] = scratch
+        cells.impression[scratch] = 0.0
+    if value > cells.impression[scratch, j & MASK, i & MASK]:
+        cells.impression[scratch, j & MASK, i & MASK] = value
+    return True
+
+
+@njit
+def _stamp_point(cells: Cells, u: float, v: float, a: float, b: float, d: float) -> bool:
+    """Gaussian with covariance [[a, b], [b, d]] about (u, v), in cells."""
+    det = a * d - b * b
+    wide = max(3.0, 3.3 * math.sqrt(max(a, d)))
+    for j in range(math.ceil(v - wide), math.floor(v + wide) + 1):
+        for i in range(math.ceil(u - wide), math.floor(u + wide) + 1):
+            du, dv = i - u, j - v
+            m = (d * du * du - 2.0 * b * du * dv + a * dv * dv) / det
+            if m < FAINT and not _raise(cells, i, j, math.exp(-0.5 * m)):
+                return False
+    return True
+
+
+@njit
+def _stamp_stretch(
+    cells: Cells, u: float, v: float, du: float, dv: float, variance: float
+) -> bool:
+    """Gaussian ridge about the stretch from (u, v) to (u + du, v + dv), in cells."""
+    square = du * du + dv * dv
+    flat = abs(du) >= abs(dv)
+    slope = dv / du if flat else du / dv
+    wide = math.sqrt(FAINT * variance)
+    across = wide * math.sqrt(1.0 + slope * slope)
+    start, end = (min(u, u + du), max(u, u + du)) if flat else (min(v, v + dv), max(v, v + dv))
+    for along in range(math.ceil(start), math.floor(end) + 1):
+        centre = v + slope * (along - u) if flat else u + slope * (along - v)
+        for aside in range(math.ceil(centre - across), math.floor(centre + across) + 1):
+            i, j = (along, aside) if flat else (aside, along)
+            cross = (i - u) * dv - (j - v) * du
+            m = cross * cross / (square * variance)
+            if m < FAINT and not _raise(cells, i, j, math.exp(-0.5 * m)):
+                return False
+    return True
 
 
 @njit
@@ -152,53 +261,29 @@ def _stamp(
     cells: Cells,
     points: NDArray[np.float64],
     covariances: NDArray[np.float64],
+    joined: NDArray[np.bool_],
     theta: float,
     cell: float,
     start: int,
 ) -> int:
     """Raise I around the points (map frame) from ``start`` on; the index where room ran out, or n.
 
-    ``covariances`` are in the robot frame, which is turned by ``theta``. Blocks are born here.
+    ``covariances`` are in the robot frame, which is turned by ``theta``.
     """
     c, s = math.cos(theta), math.sin(theta)
+    scale = 1.0 / (cell * cell)
     for k in range(start, len(points)):
         xx, xy, yy = covariances[k, 0], covariances[k, 1], covariances[k, 2]
-        a = (c * c * xx - 2.0 * c * s * xy + s * s * yy) / (cell * cell)
-        b = (c * s * (xx - yy) + (c * c - s * s) * xy) / (cell * cell)
-        d = (s * s * xx + 2.0 * c * s * xy + c * c * yy) / (cell * cell)
-        det = a * d - b * b
+        a = (c * c * xx - 2.0 * c * s * xy + s * s * yy) * scale
+        b = (c * s * (xx - yy) + (c * c - s * s) * xy) * scale
+        d = (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale
         u, v = points[k, 0] / cell - 0.5, points[k, 1] / cell - 0.5
-        wide = max(3.0, 3.3 * math.sqrt(max(a, d)))
-        for j in range(math.ceil(v - wide), math.floor(v + wide) + 1):
-            for i in range(math.ceil(u - wide), math.floor(u + wide) + 1):
-                du, dv = i - u, j - v
-                m = (d * du * du - 2.0 * b * du * dv + a * dv * dv) / det
-                if m > 12.0:  # below 0.0025
-                    continue
-                row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
-                slot = cells.directory[row, column]
-                if slot < 0:
-                    if cells.counts[FREE_COUNT] == 0:
-                        return k
-                    cells.counts[FREE_COUNT] -= 1
-                    slot = cells.free[cells.counts[FREE_COUNT]]
-                    cells.directory[row, column] = slot
-                    cells.x[slot] = 0.0
-                    cells.y[slot] = 0.0
-                    cells.age[slot] = 0.0
-                    cells.scratch_of[slot] = -1
-                scratch = cells.scratch_of[slot]
-                if scratch < 0:
-                    scratch = cells.counts[TOUCHED_COUNT]
-                    if scratch == len(cells.touched):
-                        return k
-                    cells.counts[TOUCHED_COUNT] += 1
-                    cells.touched[scratch] = slot
-                    cells.scratch_of[slot] = scratch
-                    cells.impression[scratch] = 0.0
-                value = np.float32(math.exp(-0.5 * m))
-                if value > cells.impression[scratch, j & MASK, i & MASK]:
-                    cells.impression[scratch, j & MASK, i & MASK] = value
+        if not _stamp_point(cells, u, v, a, b, d):
+            return k
+        if joined[k]:
+            du, dv = points[k + 1, 0] / cell - 0.5 - u, points[k + 1, 1] / cell - 0.5 - v
+            if du * du + dv * dv > 1.0 and not _stamp_stretch(cells, u, v, du, dv, a):
+                return k
     return len(points)
 
 
@@ -217,6 +302,7 @@ def stamp(network: Network, observations: Observations, T_map_robot: Float) -> N
             network.cells,
             points_map,
             observations.covariances,
+            observations.joined,
             float(T_map_robot[2]),
             network.cell,
             done,
