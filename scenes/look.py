@@ -8,6 +8,8 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
+from scenes import textures
+
 CAP_HEIGHT = 0.012
 SKIRTING = (0.008, 0.04)  # how far it stands out, half height, m
 PANE_HEIGHT = 0.28  # half height of a pane on a parapet, m
@@ -74,6 +76,23 @@ def finish(spec: mujoco.MjSpec) -> None:
         camera.name = camera.name.rpartition("/")[2]
     _trim_walls(spec)
     _make_wardrobe(spec)
+    _paint_floors(spec)
+
+
+def _paint_floors(spec: mujoco.MjSpec) -> None:
+    used = {geom.material for geom in spec.geoms}
+    for material in sorted(used & textures.PAINTERS.keys()):
+        data, n, size_m = textures.floor(material)
+        texture = spec.add_texture(
+            name=material, type=mujoco.mjtTexture.mjTEXTURE_2D, width=n, height=n, nchannel=3
+        )
+        texture.data = data
+        surface = spec.material(material)
+        surface.texuniform = True
+        surface.texrepeat = [1.0 / size_m, 1.0 / size_m]
+        roles = [""] * int(mujoco.mjtTextureRole.mjNTEXROLE)
+        roles[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = material
+        surface.textures = roles
 
 
 def _trim_walls(spec: mujoco.MjSpec) -> None:
@@ -107,6 +126,7 @@ def _trim(
         contype=0,
         conaffinity=0,
         group=0,
+        castshadow=False,
     )
 
 

@@ -32,6 +32,11 @@ def names() -> list[str]:
     return sorted(_recipes)
 
 
+def describe(name: str) -> str:
+    """The first line of the docstring of a registered recipe."""
+    return (inspect.getdoc(_find(name)) or "").partition("\n")[0]
+
+
 def build(name: str, seed: int = 0, **options: Any) -> Scene:
     """The scene of that name and seed; ``module:function`` names any recipe.
 

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Floors painted by numpy into textures that live in the model: no image files.
+
+Each painter returns an (n, n, 3) float image in [0, 1] that tiles seamlessly. Looks only: no
+recorded value depends on a pixel.
+"""
+
+from __future__ import annotations
+
+import itertools
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.float32]
+
+
+def _noise(rng: np.random.Generator, n: int, sigma_x: float, sigma_y: float) -> Image:
+    """(n, n) smooth noise of unit standard deviation that wraps round."""
+    pad = n // 4
+    raw = rng.standard_normal((n, n)).astype(np.float32)
+    wide = cv2.copyMakeBorder(raw, pad, pad, pad, pad, cv2.BORDER_WRAP)
+    smooth = cv2.GaussianBlur(wide, (0, 0), sigmaX=sigma_x, sigmaY=sigma_y)[pad:-pad, pad:-pad]
+    return np.asarray(smooth / smooth.std(), dtype=np.float32)
+
+
+def planks(size_m: float = 4.0, n: int = 1024) -> Image:
+    """Oak planks 0.2 m wide along x, of random lengths, with grain and fine joints."""
+    rng = np.random.default_rng(11)
+    tone = np.zeros((n, n), dtype=np.float32)
+    joint = np.zeros((n, n), dtype=np.float32)
+    rows = round(size_m / 0.2)
+    edges = np.linspace(0, n, rows + 1).round().astype(int)
+    for top, bottom in itertools.pairwise(edges):
+        cuts = _cuts(rng, n, shortest=round(0.9 / size_m * n), longest=round(1.9 / size_m * n))
+        shift = int(rng.integers(n))
+        row = np.zeros(n, dtype=np.float32)
+        for left, right in itertools.pairwise(cuts):
+            row[left:right] = rng.normal(0.0, 1.0)
+        ends = np.zeros(n, dtype=np.float32)
+        ends[np.asarray(cuts[:-1])] = 1.0
+        tone[top:bottom] = np.roll(row, shift)
+        joint[top:bottom] = np.maximum(joint[top:bottom], np.roll(ends, shift))
+        joint[top] = 1.0
+    grain = _noise(rng, n, 28.0, 0.9) + 0.6 * _noise(rng, n, 90.0, 3.0)
+    light = 1.0 + 0.055 * tone + 0.028 * grain
+    joint = cv2.GaussianBlur(joint, (0, 0), 0.55)
+    warm = np.array([0.83, 0.665, 0.475], dtype=np.float32)
+    image = warm * light[..., None] ** np.array([0.9, 1.0, 1.25], dtype=np.float32)
+    return _clip(image * (1.0 - 0.5 * joint[..., None]))
+
+
+def carpet(size_m: float = 2.0, n: int = 512) -> Image:
+    """Carpet tiles of 0.5 m, laid quarter-turned, blue-grey with a few lighter ones."""
+    rng = np.random.default_rng(12)
+    tiles = round(size_m / 0.5)
+    step = n // tiles
+    image = np.empty((n, n, 3), dtype=np.float32)
+    along, across = _noise(rng, n, 4.0, 0.7), _noise(rng, n, 0.7, 4.0)
+    for i in range(tiles):
+        for j in range(tiles):
+            box = np.s_[i * step : (i + 1) * step, j * step : (j + 1) * step]
+            pile = (along if (i + j) % 2 else across)[box]
+            base = np.array([0.44, 0.50, 0.565]) * rng.normal(1.0, 0.03)
+            image[box] = base * (1.0 + 0.05 * pile[..., None])
+            image[box][0] *= 0.93
+            image[box][:, 0] *= 0.93
+    speckle = rng.standard_normal((n, n, 1)).astype(np.float32)
+    return _clip(image * (1.0 + 0.06 * speckle))
+
+
+def felt(size_m: float = 2.0, n: int = 512) -> Image:
+    """Needle felt, one piece, warm grey-green."""
+    del size_m
+    rng = np.random.default_rng(13)
+    mottle = 0.035 * _noise(rng, n, 14.0, 14.0) + 0.05 * _noise(rng, n, 1.0, 1.0)
+    base = np.array([0.50, 0.53, 0.49], dtype=np.float32)
+    return _clip(base * (1.0 + mottle[..., None]))
+
+
+def vinyl(size_m: float = 1.2, n: int = 384) -> Image:
+    """Pale vinyl tiles of 0.6 m with thin joints."""
+    rng = np.random.default_rng(14)
+    step = round(0.6 / size_m * n)
+    image = np.empty((n, n, 3), dtype=np.float32)
+    image[:] = np.array([0.74, 0.74, 0.71], dtype=np.float32)
+    image *= (1.0 + 0.012 * _noise(rng, n, 9.0, 9.0) + 0.015 * _noise(rng, n, 1.0, 1.0))[..., None]
+    for line in range(0, n, step):
+        image[line : line + 2] *= 0.86
+        image[:, line : line + 2] *= 0.86
+    return _clip(image)
+
+
+PAINTERS = {
+    "floor_planks": (planks, 4.0),
+    "floor_carpet": (carpet, 2.0),
+    "floor_felt": (felt, 2.0),
+    "floor_vinyl": (vinyl, 1.2),
+}
+
+
+@cache
+def floor(material: str) -> tuple[bytes, int, float]:
+    """RGB bytes, width = height px and edge m of one floor material's tile."""
+    painter, size_m = PAINTERS[material]
+    image = painter(size_m)
+    return (image * 255.0 + 0.5).astype(np.uint8).tobytes(), image.shape[0], size_m
+
+
+def _cuts(rng: np.random.Generator, n: int, shortest: int, longest: int) -> list[int]:
+    """0 = first < ... < last = n, no piece shorter than ``shortest``."""
+    cuts = [0]
+    while n - cuts[-1] > longest:
+        cuts.append(min(cuts[-1] + int(rng.integers(shortest, longest)), n - shortest))
+    return [*cuts, n]
+
+
+def _clip(image: NDArray[np.floating[Any]]) -> Image:
+    return np.asarray(np.clip(image, 0.0, 1.0), dtype=np.float32)
