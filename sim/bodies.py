@@ -84,14 +84,9 @@ class Bodies:
         heading = math.atan2(float(centre[1]) - y, float(centre[0]) - x)
         self._hinge[i] = x, y, heading, math.copysign(1.0, data.xaxis[joint.id][2])
 
-    def place(self, data: mujoco.MjData) -> None:
-        """Put every planar mover where the scene wants it at the start."""
-        initial: Mapping[str, tuple[float, float, float]] = self.scene.initial
-        for i in self._planar.tolist():
-            name = self.scene.movers[i].name
-            pose = self.scene.start if i == self.robot else initial.get(name)
-            if pose is not None:
-                data.qpos[self._qpos[i] : self._qpos[i] + 3] = pose
+    def radius_of(self, name: str) -> float:
+        """m, footprint of a mover; for a door the width of its leaf."""
+        return next(m.radius for m in self.scene.movers if m.name == name)
 
     def addresses(self, names: list[str]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """First qpos and first dof address of each named mover."""

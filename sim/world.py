@@ -8,28 +8,29 @@ two substeps (a scanner, a film, ``save_state``) sees poses of that very instant
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes import registry
+from scenes import build
+from scenes.scene import Scene
 from sim import state
 from sim.bodies import Bodies
 from sim.chairs import Shoves
 from sim.contacts import Contact, RobotContacts
+from sim.doors import Doors
 from sim.dynamism import Dynamism
+from sim.people import People
 from sim.robot import Drive, DriveConfig
 from sim.seeds import Seeds
 from slam.errors import InvalidValueError
 
-if TYPE_CHECKING:
-    from scenes.scene import Scene
-
 Float = NDArray[np.float64]
 SUBSTEPS_PER_S = 300
 SUBSTEPS_PER_TICK = 4  # one mirror turn of the LMS-221: 13.33 ms
+_NOWHERE = np.array([1e9, 1e9, 0.0])
 MOVING_SPEED = 0.02  # m/s; a mover faster than this counts as moving
 
 
@@ -56,34 +57,55 @@ class World:
     ) -> None:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
         self.rates = dynamism if isinstance(dynamism, Dynamism) else Dynamism.from_knob(dynamism)
-        if isinstance(scene, str):
-            scene = registry.build(scene, seed=self.seeds.integer("layout"), **options)
-        elif options:
-            raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")
-        self.scene = scene
-        self.model: mujoco.MjModel = scene.spec.compile()
+        self.scene = self._built(scene, options)
+        self.model: mujoco.MjModel = self.scene.compile()
         self.data = mujoco.MjData(self.model)
         self.step_count = 0
-        self.bodies = Bodies(self.model, scene)
+        self.bodies = Bodies(self.model, self.scene)
         self._contacts = RobotContacts(self.model, self.bodies)
         self._drive = Drive(self.model, drive or DriveConfig())
-        self._shoves = {
-            kind: Shoves(
-                self.model,
-                [m.name for m in scene.movers if m.kind.startswith(kind)],
-                rates=rates,
-                counters=self.seeds.counters(stream, len(scene.movers)),
-            )
-            for kind, stream, rates in self._shove_kinds()
-        }
-        self.bodies.place(self.data)
+        self._shoves = {kind: self._make_shoves(kind) for kind in ("chair", "bin")}
+        self._doors = Doors(
+            self.model,
+            self.bodies,
+            self._named("door"),
+            rate=self.rates.door_rate,
+            counters=self._counters("doors"),
+        )
+        self.people = People(
+            self.model,
+            self.bodies,
+            self._doors,
+            stay_mean=self.rates.stay_mean,
+            pace=self.rates.pace,
+            counters=self._counters("people"),
+        )
+        self.scene.place(self.model, self.data)
+        self.people.start(self.data)
         mujoco.mj_forward(self.model, self.data)
 
-    def _shove_kinds(self) -> tuple[tuple[str, str, tuple[float, float, float, float]], ...]:
+    def _built(self, scene: Scene | str, options: dict[str, Any]) -> Scene:
+        if isinstance(scene, str):
+            return build(scene, seed=self.seeds.integer("layout"), **options)
+        if options:
+            raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")
+        return scene
+
+    def _named(self, kind: str) -> list[str]:
+        """Movers whose kind starts so: "chair" means both sorts."""
+        return [m.name for m in self.scene.movers if m.kind.startswith(kind)]
+
+    def _counters(self, stream: str) -> NDArray[np.uint64]:
+        return self.seeds.counters(stream, len(self.scene.movers))
+
+    def _make_shoves(self, kind: str) -> Shoves:
         r = self.rates
-        chair = (r.chair_push_rate, r.push_speed_min, r.push_speed_max, r.push_spin_max)
-        bin_ = (r.bin_kick_rate, r.kick_speed_min, r.kick_speed_max, r.push_spin_max)
-        return ("chair", "chairs", chair), ("bin", "bins", bin_)
+        if kind == "chair":
+            rates = (r.chair_push_rate, r.push_speed_min, r.push_speed_max, r.push_spin_max)
+        else:
+            rates = (r.bin_kick_rate, r.kick_speed_min, r.kick_speed_max, r.push_spin_max)
+        counters = self._counters("chairs" if kind == "chair" else "bins")
+        return Shoves(self.model, self._named(kind), rates=rates, counters=counters)
 
     # -- time -------------------------------------------------------------------------------
 
@@ -99,14 +121,20 @@ class World:
         mujoco.mj_step(self.model, self.data)
         self.step_count += 1
         self._drive.roll(1.0 / SUBSTEPS_PER_S)
+        self.people.pose_limbs(1.0 / SUBSTEPS_PER_S, self.data)
         mujoco.mj_kinematics(self.model, self.data)
         self._contacts.watch(self.data)
 
     def _control(self) -> None:
         time, tick = self.step_count / SUBSTEPS_PER_S, SUBSTEPS_PER_TICK / SUBSTEPS_PER_S
+        self.people.control(time, tick, self.data)
+        self._doors.control(time, self._robot_or_nowhere(), self.data)
         for shoves in self._shoves.values():
             shoves.control(time, tick, self.data.qfrc_applied)
         self._drive.control(tick, self.data.ctrl)
+
+    def _robot_or_nowhere(self) -> Float:
+        return _NOWHERE if self.bodies.robot is None else self.bodies.robot_pose(self.data)
 
     # -- the robot --------------------------------------------------------------------------
 
@@ -160,8 +188,9 @@ class World:
 
     def _actor_arrays(self) -> dict[str, NDArray[Any]]:
         arrays: dict[str, NDArray[Any]] = {"drive": self._drive.state}
-        for kind, shoves in self._shoves.items():
-            arrays |= {f"{kind}.{name}": a for name, a in shoves.arrays().items()}
+        actors = {**self._shoves, "doors": self._doors, "people": self.people}
+        for owner, actor in actors.items():
+            arrays |= {f"{owner}.{name}": a for name, a in actor.arrays().items()}
         return arrays
 
     def _fingerprint(self) -> dict[str, Any]:

@@ -1,0 +1,484 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How people decide, all of them in one compiled call per control tick.
+
+Each person stays somewhere, walks to the next goal down its flow field (``sim.flow``), gives way at
+doors, and picks the velocity that is nearest to the wanted one among those that hit nothing soon:
+reciprocal velocity obstacles by sampling (van den Berg, Lin, Manocha, ICRA 2008), with walls read
+from the clearance field. A person whose way is blocked by a chair loses patience and pushes it.
+
+All kernels that call one another stand in this one file (about 350 lines), because Numba's cache
+does not notice changes of a kernel in another one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.draws import between, uniform, waiting
+from slam._jit import njit
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+# columns of the people's state, (n, 12) float64
+SPEED, STAY_UNTIL, BLOCKED, ARRIVE, LOOK, LOOK_UNTIL = 0, 1, 2, 3, 4, 5
+VX, VY, BEST, BEST_AT, WALKED_S, BLOCKED_S = 6, 7, 8, 9, 10, 11
+# columns of their task, (n, 2) int64
+WALKING, GOAL = 0, 1
+# columns of a disc: everything with a round hull, people first, then (k, 6)
+X, Y, R, U, V, KIND = 0, 1, 2, 3, 4, 5
+PERSON, CHAIR, ROBOT, LEAF = 0.0, 1.0, 2.0, 10.0  # LEAF + d: part of the leaf of door d
+# columns of a door, (m, 8) float64: centre, normal to the side it swings to, along the leaf when
+# closed, width, angle; and of its passage, (m, 3): whose turn (side +1, -1, 0 none), asked for,
+# someone in it
+CX, CY, NX, NY, EX, EY, WIDTH, ANGLE = 0, 1, 2, 3, 4, 5, 6, 7
+TURN, ASKED, INSIDE = 0, 1, 2
+
+FAR = 1e6
+BODY = 0.27  # m of clearance a person keeps to walls
+OPEN = 1.15  # rad, a leaf this far open lets a person through
+HORIZON = 2.5  # s, collisions later than this do not matter
+STILL = 0.1  # m/s, a walker slower than this is blocked
+ACCEL = 3.0  # m/s2
+
+
+class Field(NamedTuple):
+    """Arrays of a ``FlowMap``: clearance (h, w), time (g, h, w), way (g, h, w, 2), grid."""
+
+    clearance: Float
+    times: Float
+    ways: Float
+    x0: float
+    y0: float
+    cell: float
+
+
+class Crowd(NamedTuple):
+    """The people and what is around them, in the columns named above.
+
+    discs (k, 6) people first; yaws (n,) rad; state (n, 12); task (n, 2); draws (n,) generators
+    """
+
+    discs: Float
+    yaws: Float
+    state: Float
+    task: Int
+    draws: NDArray[np.uint64]
+
+
+class Doors(NamedTuple):
+    """doors (m, 8), passage (m, 3), and from which side each person wants through, sides (n, m)."""
+
+    doors: Float
+    passage: Float
+    sides: Int
+
+
+class Addresses(NamedTuple):
+    """Where things stand in qpos and qvel.
+
+    discs (k, 2) first qpos and dof of each planar mover in the order of the disc rows;
+    doors (m, 2) of each hinge; hinges (m, 4) hinge x, y m, heading closed rad, sign of opening
+    """
+
+    discs: Int
+    doors: Int
+    hinges: Float
+
+
+@njit
+def clearance_at(field: Field, x: float, y: float) -> float:
+    """Clearance by bilinear interpolation, m; outside the floor -1."""
+    clearance, cell = field.clearance, field.cell
+    u, v = (x - field.x0) / cell, (y - field.y0) / cell
+    i, j = math.floor(v), math.floor(u)
+    if i < 0 or j < 0 or i + 1 >= clearance.shape[0] or j + 1 >= clearance.shape[1]:
+        return -1.0
+    a, b = v - i, u - j
+    low = clearance[i, j] * (1.0 - b) + clearance[i, j + 1] * b
+    high = clearance[i + 1, j] * (1.0 - b) + clearance[i + 1, j + 1] * b
+    return float(low * (1.0 - a) + high * a)
+
+
+@njit
+def time_at(field: Field, goal: int, x: float, y: float) -> float:
+    """Travel time to a goal (s at 1 m/s), the least of the four nodes around plus the way there."""
+    times, cell = field.times, field.cell
+    u, v = (x - field.x0) / cell, (y - field.y0) / cell
+    least = FAR
+    for i in range(math.floor(v), math.floor(v) + 2):
+        for j in range(math.floor(u), math.floor(u) + 2):
+            if 0 <= i < times.shape[1] and 0 <= j < times.shape[2]:
+                way = cell * math.sqrt((v - i) ** 2 + (u - j) ** 2)
+                least = min(least, times[goal, i, j] + way)
+    return least
+
+
+@njit
+def way_at(field: Field, goal: int, x: float, y: float) -> tuple[float, float]:
+    """Unit direction to walk in, (0, 0) outside the floor."""
+    ways, cell = field.ways, field.cell
+    u, v = (x - field.x0) / cell, (y - field.y0) / cell
+    i, j = math.floor(v), math.floor(u)
+    if i < 0 or j < 0 or i + 1 >= ways.shape[1] or j + 1 >= ways.shape[2]:
+        return 0.0, 0.0
+    a, b = v - i, u - j
+    dx, dy = 0.0, 0.0
+    for k in range(4):
+        p, q = k // 2, k % 2
+        weight = (a if p == 1 else 1.0 - a) * (b if q == 1 else 1.0 - b)
+        dx += weight * ways[goal, i + p, j + q, 0]
+        dy += weight * ways[goal, i + p, j + q, 1]
+    norm = math.sqrt(dx * dx + dy * dy)
+    if norm < 1e-9:
+        return 0.0, 0.0
+    return dx / norm, dy / norm
+
+
+@njit
+def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> float:
+    """s until a point moving at (wx, wy) is within ``reach`` of (dx, dy); HORIZON if later."""
+    c = dx * dx + dy * dy - reach * reach
+    b = dx * wx + dy * wy
+    if c <= 0.0:
+        return 0.0 if b > 0.0 else HORIZON
+    a = wx * wx + wy * wy
+    root = b * b - a * c
+    if b <= 0.0 or root <= 0.0:
+        return HORIZON
+    return min(c / (b + math.sqrt(root)), HORIZON)
+
+
+@njit
+def danger(i: int, vx: float, vy: float, near: Int, discs: Float, fade: float) -> float:
+    """Cost of what person ``i`` would run into at velocity (vx, vy)."""
+    x, y, r, ux, uy = discs[i, X], discs[i, Y], discs[i, R], discs[i, U], discs[i, V]
+    cost = 0.0
+    for k in range(len(near)):
+        other = discs[near[k]]
+        weight = fade if other[KIND] == CHAIR else 1.0
+        if weight <= 0.0:
+            continue
+        dx, dy, reach = other[X] - x, other[Y] - y, r + other[R] + 0.06
+        if other[KIND] == PERSON:  # each takes half of the evasion
+            wx, wy = 2.0 * vx - ux - other[U], 2.0 * vy - uy - other[V]
+        else:
+            wx, wy = vx - other[U], vy - other[V]
+        gap2 = dx * dx + dy * dy
+        if gap2 < reach * reach:
+            closing = (dx * vx + dy * vy) / math.sqrt(max(gap2, 1e-6))
+            cost += weight * 4.0 * max(closing, 0.0)
+        else:
+            when = impact_time(dx, dy, wx, wy, reach)
+            cost += weight * (1.0 / (when + 0.1) - 1.0 / (HORIZON + 0.1))
+    return cost
+
+
+@njit
+def choose(
+    i: int,
+    wanted: tuple[float, float],
+    near: Int,
+    fade: float,
+    field: Field,
+    crowd: Crowd,
+) -> tuple[float, float]:
+    """The best of 35 velocities for person ``i`` who would like to walk at ``wanted``."""
+    discs, state = crowd.discs, crowd.state
+    wx, wy = wanted
+    x, y = discs[i, X], discs[i, Y]
+    pace = max(math.sqrt(wx * wx + wy * wy), 0.5)
+    heading = math.atan2(wy, wx)
+    here = min(clearance_at(field, x, y), BODY)
+    best, best_x, best_y = math.inf, 0.0, 0.0
+    for k in range(35):
+        if k == 0:
+            vx, vy = wx, wy
+        elif k == 1:
+            vx, vy = 0.0, 0.0
+        elif k == 2:
+            vx, vy = state[i, VX], state[i, VY]
+        else:
+            angle = heading + (k - 3) // 2 * (math.pi / 8.0)
+            speed = pace if k % 2 == 0 else 0.5 * pace
+            vx, vy = speed * math.cos(angle), speed * math.sin(angle)
+        cost = math.sqrt((vx - wx) ** 2 + (vy - wy) ** 2)
+        cost += 0.15 * math.sqrt((vx - state[i, VX]) ** 2 + (vy - state[i, VY]) ** 2)
+        cost += 0.06 * max(0.0, wx * vy - wy * vx)  # people keep right
+        for step in range(1, 3):
+            c = clearance_at(field, x + 0.3 * step * vx, y + 0.3 * step * vy)
+            if c < here:
+                cost += 6.0 * (here - c)
+        if cost < best:
+            cost += danger(i, vx, vy, near, discs, fade)
+        if cost < best:
+            best, best_x, best_y = cost, vx, vy
+    return best_x, best_y
+
+
+@njit
+def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> None:
+    """Draw the next goal of person ``i`` (always four draws) and set off."""
+    discs, state, task, draws = crowd.discs, crowd.state, crowd.task, crowd.draws
+    n_goals = field.times.shape[0]
+    offset = 1 + int(uniform(draws, i) * (n_goals - 1))
+    goal = task[i, GOAL]
+    state[i, ARRIVE] = between(draws, i, 0.25, 0.8)
+    state[i, STAY_UNTIL] = waiting(draws, i, 1.0 / stay)  # a duration until the arrival
+    state[i, LOOK] = between(draws, i, -math.pi, math.pi)
+    for _ in range(n_goals):
+        goal = (task[i, GOAL] + offset) % n_goals
+        if time_at(field, goal, discs[i, X], discs[i, Y]) < FAR:
+            break
+        offset += 1
+    task[i, GOAL] = goal
+    task[i, WALKING] = 1
+    state[i, BLOCKED] = 0.0
+    state[i, BEST], state[i, BEST_AT] = FAR, time
+
+
+@njit
+def wants_through(i: int, door: Float, field: Field, crowd: Crowd) -> int:
+    """Side (+1 where the leaf swings to, -1) from which person ``i`` wants to pass; 0: none."""
+    discs, task = crowd.discs, crowd.task
+    dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+    distance = math.sqrt(dx * dx + dy * dy)
+    if task[i, WALKING] == 0 or distance > 2.2:
+        return 0
+    goal = task[i, GOAL]
+    normal = dx * door[NX] + dy * door[NY]
+    if distance < 0.35:
+        wx, wy = way_at(field, goal, discs[i, X], discs[i, Y])
+        return -1 if wx * door[NX] + wy * door[NY] > 0.0 else 1
+    there = time_at(field, goal, door[CX], door[CY])
+    if time_at(field, goal, discs[i, X], discs[i, Y]) - there < 0.8 * distance:
+        return 0
+    return 1 if normal > 0.0 else -1
+
+
+@njit
+def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:
+    """Who may pass each door, and whether it shall open. Fills ``ways.sides``."""
+    doors, passage, sides, discs = ways.doors, ways.passage, ways.sides, crowd.discs
+    for d in range(doors.shape[0]):
+        door = doors[d]
+        inside, nearest, turn = 0, math.inf, 0
+        kept, asked = False, False
+        passage[d, INSIDE] = 0.0
+        for i in range(sides.shape[0]):
+            side = wants_through(i, door, field, crowd)
+            sides[i, d] = side
+            dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+            distance = math.sqrt(dx * dx + dy * dy)
+            if distance < 0.95:  # nobody is hit by a leaf that falls shut
+                passage[d, INSIDE] = 1.0
+            if side == 0:
+                continue
+            if abs(dx * door[NX] + dy * door[NY]) < 0.4 and inside != int(passage[d, TURN]):
+                inside = side
+            if side == int(passage[d, TURN]) and distance < 1.4:
+                kept = True
+            if distance < nearest:
+                nearest, turn = distance, side
+        if inside != 0:
+            turn = inside
+        elif kept:
+            turn = int(passage[d, TURN])
+        passage[d, TURN] = turn
+        for i in range(sides.shape[0]):
+            if turn != 0 and sides[i, d] == turn:
+                dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+                reach = 2.1 if turn > 0 else 1.5  # who pulls a door starts earlier
+                asked = asked or dx * dx + dy * dy < reach * reach
+        passage[d, ASKED] = 1.0 if asked else 0.0
+
+
+@njit
+def at_door(
+    i: int, d: int, wanted: tuple[float, float], ways: Doors, field: Field, discs: Float
+) -> tuple[float, float]:
+    """The wanted velocity, changed by manners and by a leaf that is not open yet."""
+    door, side, turn = ways.doors[d], ways.sides[i, d], ways.passage[d, TURN]
+    wx, wy = wanted
+    dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+    normal = side * (dx * door[NX] + dy * door[NY])
+    if turn != 0.0 and side != turn and normal > 0.3:  # wait beside the way of those who come
+        along = dx * door[EX] + dy * door[EY]
+        beside = 0.8 if along >= 0.0 else -0.8
+        for _ in range(2):
+            tx = door[CX] + 1.2 * side * door[NX] + beside * door[EX]
+            ty = door[CY] + 1.2 * side * door[NY] + beside * door[EY]
+            if clearance_at(field, tx, ty) > BODY:
+                break
+            beside = -beside
+        gap = math.sqrt((tx - discs[i, X]) ** 2 + (ty - discs[i, Y]) ** 2)
+        speed = min(1.0, 1.5 * gap) / max(gap, 1e-6)
+        return speed * (tx - discs[i, X]), speed * (ty - discs[i, Y])
+    if door[ANGLE] < OPEN:
+        stop = 1.25 if side > 0 else 0.45
+        closing = -side * (wx * door[NX] + wy * door[NY])
+        excess = closing - 2.0 * (normal - stop)
+        if excess > 0.0:
+            wx += excess * side * door[NX]
+            wy += excess * side * door[NY]
+    return wx, wy
+
+
+@njit
+def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[float, float]:
+    """The velocity person ``i`` would like to have, other movers aside."""
+    discs, state, task = crowd.discs, crowd.state, crowd.task
+    if task[i, WALKING] == 0:
+        return 0.0, 0.0
+    goal = task[i, GOAL]
+    wx, wy = way_at(field, goal, discs[i, X], discs[i, Y])
+    left = time_at(field, goal, discs[i, X], discs[i, Y])
+    speed = min(pace * state[i, SPEED], 0.3 + 1.2 * left)
+    wx, wy = speed * wx, speed * wy
+    for d in range(ways.doors.shape[0]):
+        if ways.sides[i, d] != 0:
+            wx, wy = at_door(i, d, (wx, wy), ways, field, discs)
+    return wx, wy
+
+
+@njit
+def arrived(i: int, left: float, doors: Float, discs: Float, state: Float) -> bool:
+    """Near enough to the goal, or held up close to it, and not standing in a doorway."""
+    for d in range(doors.shape[0]):
+        dx, dy = discs[i, X] - doors[d, CX], discs[i, Y] - doors[d, CY]
+        if dx * dx + dy * dy < 1.44:
+            return False
+    return left < state[i, ARRIVE] or (left < 2.0 and state[i, BLOCKED] > 0.8)
+
+
+@njit
+def plan(
+    i: int, time: float, tick: float, stay: float, doors: Float, field: Field, crowd: Crowd
+) -> None:
+    """Stay, set off, arrive or give up; keeps the account of time walked and blocked."""
+    discs, state, task, draws = crowd.discs, crowd.state, crowd.task, crowd.draws
+    if task[i, WALKING] == 0:
+        if time >= state[i, STAY_UNTIL]:
+            new_trip(i, time, stay, field, crowd)
+        elif time >= state[i, LOOK_UNTIL]:
+            state[i, LOOK] = between(draws, i, -math.pi, math.pi)
+            state[i, LOOK_UNTIL] = time + between(draws, i, 4.0, 15.0)
+        return
+    left = time_at(field, task[i, GOAL], discs[i, X], discs[i, Y])
+    state[i, WALKED_S] += tick
+    if discs[i, U] ** 2 + discs[i, V] ** 2 < STILL * STILL:
+        state[i, BLOCKED] += tick
+        state[i, BLOCKED_S] += tick
+    else:
+        state[i, BLOCKED] = max(0.0, state[i, BLOCKED] - 2.0 * tick)
+    if left < state[i, BEST] - 0.3:
+        state[i, BEST], state[i, BEST_AT] = left, time
+    if arrived(i, left, doors, discs, state):
+        task[i, WALKING] = 0
+        state[i, STAY_UNTIL] += time
+        state[i, LOOK_UNTIL] = time + between(draws, i, 4.0, 15.0)
+    elif state[i, BLOCKED] > 5.0 or time - state[i, BEST_AT] > 12.0:
+        new_trip(i, time, stay, field, crowd)
+
+
+@njit
+def nearby(i: int, discs: Float, sides: Int, near: Int) -> int:
+    """Rows of ``discs`` within 3 m of person ``i``, into ``near``; returns how many.
+
+    The leaf of a door one wants to pass is no obstacle: ``at_door`` deals with it.
+    """
+    count = 0
+    for k in range(discs.shape[0]):
+        dx, dy = discs[k, X] - discs[i, X], discs[k, Y] - discs[i, Y]
+        if k == i or dx * dx + dy * dy > 9.0 or count == len(near):
+            continue
+        if discs[k, KIND] >= LEAF and sides[i, int(discs[k, KIND] - LEAF)] != 0:
+            continue
+        near[count] = k
+        count += 1
+    return count
+
+
+@njit
+def wrap(angle: float) -> float:
+    """The same angle in [-pi, pi)."""
+    return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
+
+
+@njit
+def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) -> None:
+    """Read discs, headings, door angles and the discs that stand for the leaves."""
+    discs, k = crowd.discs, at.discs.shape[0]
+    for row in range(k):
+        q, v = at.discs[row]
+        discs[row, X], discs[row, Y] = qpos[q], qpos[q + 1]
+        discs[row, U], discs[row, V] = qvel[v], qvel[v + 1]
+        if row < len(crowd.yaws):
+            crowd.yaws[row] = qpos[q + 2]
+    for d in range(at.doors.shape[0]):
+        q, v = at.doors[d]
+        x, y, closed, sign = at.hinges[d]
+        ways.doors[d, ANGLE] = qpos[q]
+        c, s = math.cos(closed + sign * qpos[q]), math.sin(closed + sign * qpos[q])
+        for part in range(3):
+            row = k + 3 * d + part
+            length = (0.35 + 0.3 * part) * ways.doors[d, WIDTH]
+            discs[row, X], discs[row, Y] = x + length * c, y + length * s
+            discs[row, U] = -length * s * sign * qvel[v]
+            discs[row, V] = length * c * sign * qvel[v]
+
+
+@njit
+def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -> None:
+    """Change towards (vx, vy) as fast as legs allow and face the way; servo targets to ``out``."""
+    state, yaw = crowd.state, crowd.yaws[i]
+    dvx, dvy = vx - state[i, VX], vy - state[i, VY]
+    change = math.sqrt(dvx * dvx + dvy * dvy)
+    share = min(1.0, ACCEL * tick / change) if change > 0.0 else 0.0
+    state[i, VX] += share * dvx
+    state[i, VY] += share * dvy
+    heading = yaw
+    if state[i, VX] ** 2 + state[i, VY] ** 2 > 0.04:
+        heading = math.atan2(state[i, VY], state[i, VX])
+    elif crowd.task[i, WALKING] == 0:
+        heading = state[i, LOOK]
+    out[0], out[1] = state[i, VX], state[i, VY]
+    out[2] = min(max(4.0 * wrap(heading - yaw), -3.0), 3.0)
+
+
+@njit
+def decide(
+    clock: tuple[float, float],
+    rates: tuple[float, float],
+    physics: tuple[Float, Float, Float],
+    at: Addresses,
+    field: Field,
+    ways: Doors,
+    crowd: Crowd,
+    servos: Int,
+) -> None:
+    """One tick of all people, from positions to the set points of their servos.
+
+    clock    time s, length of the tick s
+    rates    mean stay s, factor on each one's preferred speed
+    physics  qpos and qvel (read), ctrl (written)
+    servos   (n,) first of the actuators vx, vy, vyaw of each person
+    """
+    time, tick = clock
+    stay, pace = rates
+    qpos, qvel, ctrl = physics
+    near = np.zeros(24, dtype=np.int64)
+    sense(at, qpos, qvel, ways, crowd)
+    for i in range(len(servos)):
+        plan(i, time, tick, stay, ways.doors, field, crowd)
+    give_turns(ways, field, crowd)
+    for i in range(len(servos)):
+        wanted = want(i, pace, ways, field, crowd)
+        count = nearby(i, crowd.discs, ways.sides, near)
+        fade = min(max(1.0 - (crowd.state[i, BLOCKED] - 0.8) / 0.8, 0.0), 1.0)
+        vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
+        steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The people of a scene: arrays for the compiled kernels of ``sim.crowd`` and ``sim.gait``."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.scene import Scene
+from sim import crowd, gait
+from sim.bodies import Bodies
+from sim.crowd import Addresses, Crowd, Field
+from sim.doors import Doors
+from sim.draws import between, normal, uniform
+from sim.flow import FlowMap
+
+Float = NDArray[np.float64]
+_LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
+_FIRST_STAY_MAX = 8.0  # s, so that a short run of a calm room sees someone set off
+
+
+@functools.lru_cache(maxsize=4)
+def _flow(bounds: tuple[float, float, float, float], boxes: bytes, goals: bytes) -> FlowMap:
+    """Flow maps are the costly part of a reset and depend on the floor plan alone."""
+    return FlowMap(
+        bounds,
+        np.frombuffer(boxes, dtype=np.float64).reshape(-1, 5),
+        np.frombuffer(goals, dtype=np.float64).reshape(-1, 2),
+    )
+
+
+def floor_field(scene: Scene) -> Field:
+    """Clearance and ways to all goals of a scene, in the order of its ``goals``."""
+    goals = np.array([scene.goals[name] for name in scene.goals], dtype=np.float64)
+    xmin, ymin, xmax, ymax = (float(b) for b in scene.bounds)
+    boxes = np.ascontiguousarray(scene.obstacles, dtype=np.float64)
+    flow = _flow((xmin, ymin, xmax, ymax), boxes.tobytes(), goals.tobytes())
+    return Field(flow.clearance, flow.time, flow.direction, xmin, ymin, flow.cell)
+
+
+class People:
+    """Everybody in a room.
+
+    stay_mean  s at a goal; infinite: nobody moves at all
+    pace       factor on the preferred speeds, N(1.34, 0.26) m/s clipped to 0.8..1.9 (PedSim)
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        bodies: Bodies,
+        doors: Doors,
+        *,
+        stay_mean: float,
+        pace: float,
+        counters: NDArray[np.uint64],
+    ) -> None:
+        scene = bodies.scene
+        self.names = [m.name for m in scene.movers if m.kind == "person"]
+        n = len(self.names)
+        self.alive = n > 0 and math.isfinite(stay_mean) and len(scene.goals) > 0
+        self._rates = (stay_mean, pace)
+        self._servos = np.array([model.actuator(f"{p}/vx").id for p in self.names], dtype=np.int64)
+        self._limbs = np.array(
+            [[int(model.body(f"{p}/{limb}").mocapid[0]) for limb in _LIMBS] for p in self.names],
+            dtype=np.int64,
+        ).reshape(n, 4)
+        self.feet = np.zeros((n, gait.N_COLUMNS))
+        self._ways = _ways(doors, n)
+        self._at = _addresses(bodies, doors, self.names)
+        self._crowd = Crowd(
+            discs=_discs(bodies, doors, self.names),
+            yaws=np.zeros(n),
+            state=np.zeros((n, 12)),
+            task=np.zeros((n, 2), dtype=np.int64),
+            draws=counters[:n].copy(),
+        )
+        self._torsos = np.ascontiguousarray(self._at.discs[:n])
+        self._field = floor_field(scene) if self.alive else None
+
+    def start(self, data: mujoco.MjData) -> None:
+        """Draw who everyone is, and put their feet under them where ``data`` says they stand."""
+        state, task, draws = self._crowd.state, self._crowd.task, self._crowd.draws
+        for i in range(len(self.names)):
+            speed = 1.34 + 0.26 * normal(draws, i)
+            state[i, crowd.SPEED] = min(max(speed, 0.8), 1.9)
+            first = min(self._rates[0], _FIRST_STAY_MAX)
+            state[i, crowd.STAY_UNTIL] = first * uniform(draws, i)
+            state[i, crowd.LOOK] = data.qpos[self._torsos[i, 0] + 2]
+            state[i, crowd.LOOK_UNTIL] = between(draws, i, 4.0, 15.0)
+            n_goals = max(len(self._field.times), 1) if self._field is not None else 1
+            task[i, crowd.GOAL] = int(uniform(draws, i) * n_goals)
+        if self.names:
+            gait.stand(data.qpos, self._torsos, self.feet)
+            self.pose_limbs(0.0, data)
+
+    def control(self, time: float, tick: float, data: mujoco.MjData) -> None:
+        """Decide for ``tick`` s and write the set points of the torso servos."""
+        if self._field is not None:
+            crowd.decide(
+                (time, tick),
+                self._rates,
+                (data.qpos, data.qvel, data.ctrl),
+                self._at,
+                self._field,
+                self._ways,
+                self._crowd,
+                self._servos,
+            )
+
+    def pose_limbs(self, dt: float, data: mujoco.MjData) -> None:
+        """Let the feet step for ``dt`` s and write the mocap poses of all limbs."""
+        if self.alive or (self.names and dt == 0.0):
+            mocap = (data.mocap_pos, data.mocap_quat)
+            gait.walk(dt, (data.qpos, data.qvel), self._torsos, self._limbs, self.feet, mocap)
+
+    def swinging(self) -> NDArray[np.bool_]:
+        """(n,) True for those with a foot in the air."""
+        return self.feet[:, gait.SWING] >= 0.0
+
+    def walked_s(self) -> tuple[Float, Float]:
+        """(n,) s each has been on the way so far, and (n,) s of these standing still, blocked."""
+        state = self._crowd.state
+        return state[:, crowd.WALKED_S].copy(), state[:, crowd.BLOCKED_S].copy()
+
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        """The live arrays that are the state."""
+        c = self._crowd
+        return {"feet": self.feet, "state": c.state, "task": c.task, "draws": c.draws}
+
+
+def _ways(doors: Doors, n_people: int) -> crowd.Doors:
+    m = len(doors.names)
+    table = np.zeros((m, 8))
+    table[:, [crowd.CX, crowd.CY]] = doors.middles
+    table[:, [crowd.EX, crowd.EY]] = doors.along
+    sign = doors.hinges[:, 3]
+    table[:, crowd.NX], table[:, crowd.NY] = -sign * doors.along[:, 1], sign * doors.along[:, 0]
+    table[:, crowd.WIDTH] = doors.widths
+    sides = np.zeros((n_people, m), dtype=np.int64)
+    return crowd.Doors(doors=table, passage=doors.passage, sides=sides)
+
+
+def _planar(bodies: Bodies, people: Sequence[str]) -> list[str]:
+    """Names in the order of the disc rows: people first."""
+    kinds = ("person", "door")
+    return [*people, *(m.name for m in bodies.scene.movers if m.kind not in kinds)]
+
+
+def _addresses(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Addresses:
+    qpos, dof = bodies.addresses(_planar(bodies, people))
+    return Addresses(discs=np.column_stack([qpos, dof]), doors=doors.addresses, hinges=doors.hinges)
+
+
+def _discs(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Float:
+    planar = _planar(bodies, people)
+    discs = np.zeros((len(planar) + 3 * len(doors.names), 6))
+    for row, name in enumerate(planar):
+        kind = crowd.PERSON if row < len(people) else crowd.CHAIR
+        discs[row, crowd.KIND] = crowd.ROBOT if name == "robot" else kind
+        discs[row, crowd.R] = bodies.radius_of(name)
+    for row in range(len(planar), len(discs)):
+        discs[row, crowd.KIND] = crowd.LEAF + (row - len(planar)) // 3
+        discs[row, crowd.R] = 0.06
+    return discs
