@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
+"""What people run: ``mobilia <verb>``, one module a verb."""

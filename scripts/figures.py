@@ -114,3 +114,23 @@ def in_first_frame(truth: Trajectory) -> Trajectory:
             [se2.compose(T_first_world, T_world_robot) for T_world_robot in truth.poses]
         ),
     )
+
+
+def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float) -> None:
+    """The map in the paper's style (Fig. 13): activities coloured, last scan blue, path black."""
+    figure, axes = _axes(10.0, 6.5)
+    ax: Axes = axes[0]
+    ax.grid(visible=False)
+    height, width = raster.values.shape
+    x, y, _ = raster.T_map_origin
+    extent = (x, x + width * raster.resolution_m, y, y + height * raster.resolution_m)
+    faint = np.where(raster.values > 0.02, raster.values, np.nan)
+    image = ax.imshow(faint, origin="lower", extent=extent, cmap="YlOrRd", vmin=0.0, vmax=1.0,
+                      interpolation="nearest")  # fmt: skip
+    image.cmap.set_bad("#fafaf8")
+    ax.plot(points_map[:, 0], points_map[:, 1], ".", color="#1f61be", ms=1.5, label="last scan")
+    ax.plot(track.poses[:, 0], track.poses[:, 1], "k-", lw=0.9, label="trajectory")
+    ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title="Activities of the map")
+    figure.colorbar(image, ax=ax, shrink=0.6, label="activity")
+    ax.legend(loc="upper left", frameon=False)
+    save(figure, path)

@@ -8,7 +8,7 @@ around it. Recorded episodes give it the truth, a closed loop gives it a SLAM's 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -189,10 +189,9 @@ class Driver:
 
 
 def tour(
-    goals: dict[str, tuple[float, float]] | Sequence[tuple[str, tuple[float, float]]],
-    rng: np.random.Generator,
+    goals: Mapping[str, tuple[float, float]], rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """All goals in an order drawn from ``rng``: (n, 2) m."""
-    named = sorted(dict(goals).items())
+    named = sorted(goals.items())
     order = rng.permutation(len(named))
     return np.array([named[k][1] for k in order], dtype=np.float64)

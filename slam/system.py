@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar, runtime_checkable
@@ -111,6 +112,11 @@ def register(name: str) -> Callable[[F], F]:
 def names() -> list[str]:
     """Registered names, sorted."""
     return sorted(_registry)
+
+
+def describe(name: str) -> str:
+    """The first line of the docstring of a registered system."""
+    return (inspect.getdoc(_registry[name]) or "").partition("\n")[0]
 
 
 def create(name: str, **config: Any) -> SlamSystem:

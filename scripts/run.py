@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia run``: SLAMs on a recorded log or a simulated tour, scored, mapped and filmed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from scripts.session import Outputs, primary_of, run_session, systems_named
+from scripts.show import Show
+from slam.errors import InvalidValueError
+from slam.logs import open_log
+from slam.replay import Replay
+
+
+def run(
+    slam: Annotated[
+        list[str],
+        typer.Argument(
+            help="SLAMs to run, by name (see [bold]mobilia list[/bold]) or as module:Class. "
+            "Odometry always runs beside them.",
+            metavar="SLAM...",
+        ),
+    ],
+    log: Annotated[
+        Path | None, typer.Option(help="A recorded log: CARMEN, plain or .gz or .xz.")
+    ] = None,
+    scene: Annotated[
+        str | None, typer.Option(help="Or a simulated scene, driven on a tour of its rooms.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="Length of the simulated tour, s.")] = 60.0,
+    dynamism: Annotated[
+        float, typer.Option(help="How much the simulated room moves: 0 nothing, 1 most.")
+    ] = 0.5,
+    seed: Annotated[int, typer.Option(help="Seed of the simulated run, whole number >= 0.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default out/run-<log or scene>.")
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
+    ] = False,
+    film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
+) -> None:
+    """Run SLAMs on a log or on a simulated scene and write the same files as the demo.
+
+    [bold]mobilia run shunting --log intel.log.xz[/bold]
+
+    [bold]mobilia run shunting my_package.my_slam:MySlam --scene arena --dynamism 1[/bold]
+    """
+    if (log is None) == (scene is None):
+        raise InvalidValueError("name exactly one of --log and --scene")
+    if log is not None:
+        on_log(slam, log, out or Path("out") / f"run-{log.name.split('.')[0]}", overwrite, film)
+    elif scene is not None:
+        from scripts.live import on_scene
+
+        on_scene(
+            slam,
+            settings={"scene": scene, "seconds": seconds, "dynamism": dynamism, "seed": seed},
+            outputs=Outputs(
+                folder=out or Path("out") / f"run-{scene.replace(':', '-')}",
+                command="run",
+                settings={},
+                overwrite=overwrite,
+                film=film,
+            ),
+        )
+
+
+def on_log(names: list[str], path: Path, out: Path, overwrite: bool, film: bool) -> dict[str, Any]:
+    """Run SLAMs on a recorded log."""
+    replay = Replay.of(systems_named(names))
+    stream = open_log(path)
+    primary = primary_of(replay)
+    show = Show(
+        replay=replay,
+        primary=primary,
+        title=path.name,
+        duration_s=_duration_s(stream),
+        truth_name=stream.metadata.truth or "truth",
+    )
+    settings = {
+        "slams": list(replay.tracks),
+        "log": path.name,
+        "log_facts": dict(stream.metadata.extra),
+    }
+    return run_session(
+        stream,
+        replay,
+        show,
+        Outputs(folder=out, command="run", settings=settings, overwrite=overwrite, film=film),
+    )
+
+
+def _duration_s(stream: Any) -> float:
+    first = last = None
+    for frame in stream:
+        first = frame.stamp_ns if first is None else first
+        last = frame.stamp_ns
+    return (last - first) / 1e9 if first is not None and last is not None else 0.0

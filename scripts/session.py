@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One run from a stream to a folder: replay, film, figures, map, trajectories, scores, recipe."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from scripts import figures, score
+from scripts.console import console, progress
+from scripts.film import Film, film, require_ffmpeg
+from scripts.output import machine, whole_folder, write_recipe
+from scripts.show import Show
+from slam.errors import InvalidValueError
+from slam.files import write_text
+from slam.frames import Stream
+from slam.maps import write_map
+from slam.replay import Replay
+from slam.system import SlamSystem, create
+from slam.trajectory import write_tum
+
+FILM_FPS = 30
+FILM_S = 60.0  # longer runs are shown faster
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outputs:
+    """Where a run goes and what it leaves."""
+
+    folder: Path
+    command: str
+    settings: Mapping[str, Any]
+    overwrite: bool = False
+    film: bool = True
+    film_fps: int = FILM_FPS
+
+
+def systems_named(names: list[str]) -> dict[str, SlamSystem]:
+    """Fresh systems by name, odometry among them as the null system."""
+    if not names:
+        raise InvalidValueError("name at least one SLAM")
+    wanted = dict.fromkeys([*names, "odometry"])
+    return {name: create(name) for name in wanted}
+
+
+def primary_of(replay: Replay) -> str:
+    """The system a run is about: the first that is not odometry."""
+    return next((n for n in replay.tracks if n != "odometry"), "odometry")
+
+
+def run_session(stream: Stream, replay: Replay, show: Show, outputs: Outputs) -> dict[str, Any]:
+    """Replay ``stream``, write everything into ``outputs.folder``, print the table.
+
+    The folder appears when it is whole. Returns what ``results.json`` holds.
+    """
+    if outputs.film:
+        require_ffmpeg()
+    with whole_folder(outputs.folder, overwrite=outputs.overwrite) as folder:
+        reel = film(folder / "film.mp4", outputs.film_fps) if outputs.film else nullcontext()
+        started = time.perf_counter()
+        with reel as opened:
+            _replay(stream, replay, show, opened, outputs.film_fps)
+        wall_s = time.perf_counter() - started
+        results = score.results(replay, wall_s, machine())
+        _write(folder, replay, show, results)
+        write_recipe(folder, outputs.command, outputs.settings)
+    score.print_table(results, show.title)
+    _tell(outputs)
+    return results
+
+
+def _replay(stream: Stream, replay: Replay, show: Show, reel: Film | None, fps: int) -> None:
+    """Every frame through every SLAM; every so many frames a picture into the film."""
+    stride = max(1, round(stream.length / (FILM_S * fps))) if stream.length else 1
+    if show.duration_s > 0.0 and stream.length:
+        live = stream.length / show.duration_s / fps  # frames per picture in real time
+        stride = max(stride, round(live)) if show.duration_s <= FILM_S else stride
+    with progress() as bar:
+        task = bar.add_task(show.title, total=stream.length, unit="")
+        for count, frame in enumerate(replay.run(stream), 1):
+            show.note(frame)
+            if reel is not None and (count % stride == 0 or count == stream.length):
+                reel.add(show.paint(frame))
+            if count % 25 == 0 or count == stream.length:
+                bar.update(task, completed=count, unit=f"{count}/{stream.length} scans")
+
+
+def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any]) -> None:
+    online = {name: track.online() for name, track in replay.tracks.items()}
+    world_truth = replay.truth()
+    truth = figures.in_first_frame(world_truth) if world_truth is not None else None
+    raster = replay.tracks[show.primary].system.map()
+    truth_name = show.truth_name
+    for name, track in online.items():
+        write_tum(folder / f"trajectory_{file_name(name)}.tum", track)
+        final = replay.tracks[name].final()
+        if final is not None:
+            write_tum(folder / f"trajectory_{file_name(name)}_final.tum", final)
+    if truth is not None:
+        write_tum(folder / "trajectory_truth.tum", truth)
+        figures.errors(folder / "errors.png", online, truth)
+    figures.trajectories(folder / "trajectories.png", online, truth, raster, truth_name)
+    if raster is not None:
+        write_map(folder / "map", raster)
+        figures.map_picture(folder / "map.png", raster, online[show.primary], show.last_points_map)
+    write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
+
+
+def file_name(name: str) -> str:
+    """A system's name as part of a file name: ``my_pkg:MySlam`` becomes ``my_pkg-MySlam``."""
+    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
+
+
+def _tell(outputs: Outputs) -> None:
+    first = "film.mp4" if outputs.film else "map.png"
+    console.print(
+        f"Open [bold]{outputs.folder / first}[/bold] first, then map.png and errors.png beside it; "
+        "results.json has every number, trajectory_*.tum is for evo, map.yaml for map_server.",
+        soft_wrap=True,
+    )

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The moving rooms as a Gymnasium environment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from sim.lidar import Lms221Config
+from sim.seeds import Seeds
+from sim.simulation import Simulation
+from slam.errors import InvalidValueError
+from slam.frames import Frame
+
+V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
+GOAL_RADIUS_M = 0.4
+_MAX_TICKS = 2**40
+
+Observation = dict[str, NDArray[Any]]
+
+
+class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
+    """A robot with an LMS-221 in a room that does not sit still; a step is one whole scan.
+
+    ### Action space
+    ``Box(-1, 1, (2,), float32)``: forward speed (times 0.8 m/s) and turn rate (times 1.2 rad/s,
+    counter-clockwise), ramped by the robot.
+
+    ### Observation space
+    ``Dict`` of what the robot itself knows:
+
+    | key        | shape | type    | meaning                                                     |
+    |------------|-------|---------|-------------------------------------------------------------|
+    | `ranges`   | (n,)  | float32 | m, right to left; no return and error codes are `range_max` |
+    | `valid`    | (n,)  | uint8   | 1 where the range is a measurement                          |
+    | `encoders` | (2,)  | int64   | ticks of the left and the right wheel since the reset       |
+    | `time`     | ()    | float64 | s since the reset                                           |
+
+    ### Info
+    Truth, only here: `pose` (3,) m, m, rad of the robot in the world; `frame`, the ``slam`` frame
+    of the scan (with truth; give a SLAM ``frame.without_truth()``); `contacts`, names of what the
+    robot touched during the step; `hard_collision`; `beam_time` (n,) s of each beam since the
+    reset; `movers` name -> (x, y, heading) of everything that can move; `goal_distance` m or None.
+
+    ### Reward
+    Metres of progress towards the goal during the step when ``options["goal"]`` gave one, else 0.
+
+    ### Episode end
+    ``terminated`` within 0.4 m of the goal, or (``terminate_on_collision``) on a hard collision;
+    ``truncated`` after ``time_limit_s``.
+
+    ### Arguments
+    ``scene``, ``dynamism``, ``laser``, ``odometry``, ``labels`` as in ``sim.Simulation``;
+    ``render_mode`` "rgb_array" (3D, needs OpenGL), "map" (2D, needs nothing) or None; ``view``
+    "top", "follow" or "persp" for the former; ``render_size`` (width, height) px.
+
+    ### Reset options
+    ``goal`` (x, y) m, ``dynamism``, ``seeds`` (stream name -> seed, see ``sim.seeds``), ``scene``
+    (options of the scene recipe, e.g. ``{"n_chairs": 8}``). Unknown keys are refused. They hold for
+    one episode.
+
+    ### Version history
+    v0: first version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "map"], "render_fps": 37}
+
+    def __init__(
+        self,
+        scene: str = "office",
+        *,
+        dynamism: float = 0.5,
+        laser: Lms221Config | None = None,
+        odometry: str = "pioneer3dx",
+        time_limit_s: float = 60.0,
+        terminate_on_collision: bool = False,
+        labels: bool = False,
+        render_mode: str | None = None,
+        view: str = "top",
+        render_size: tuple[int, int] = (640, 480),
+    ) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise InvalidValueError(
+                f"render_mode must be 'rgb_array', 'map' or None, got {render_mode!r}"
+            )
+        if not (math.isfinite(time_limit_s) and time_limit_s > 0.0):
+            raise InvalidValueError(f"time_limit_s must be > 0, got {time_limit_s}")
+        self.render_mode = render_mode
+        self.time_limit_s = time_limit_s
+        self.terminate_on_collision = terminate_on_collision
+        self._settings: dict[str, Any] = {
+            "scene": scene,
+            "dynamism": dynamism,
+            "laser": laser or Lms221Config(),
+            "odometry": odometry,
+            "labels": labels,
+        }
+        self._view, self._size = view, render_size
+        self._renderer: Any = None
+        self._simulation: Simulation | None = None
+        self._goal: tuple[float, float] | None = None
+        self._distance: float | None = None
+        spec = self._settings["laser"].spec()
+        n = spec.n_beams
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.observation_space = spaces.Dict(
+            {
+                "ranges": spaces.Box(0.0, np.float32(spec.range_max), (n,), np.float32),
+                "valid": spaces.Box(0, 1, (n,), np.uint8),
+                "encoders": spaces.Box(-_MAX_TICKS, _MAX_TICKS, (2,), np.int64),
+                "time": spaces.Box(0.0, 1e9, (), np.float64),
+            }
+        )
+
+    @property
+    def simulation(self) -> Simulation:
+        """The running simulation; raises ``gymnasium.error.ResetNeeded`` before the first reset."""
+        if self._simulation is None:
+            raise gymnasium.error.ResetNeeded("call reset() before using the environment")
+        return self._simulation
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Build the scene anew and take a first scan standing still."""
+        super().reset(seed=seed)
+        settings, self._goal = self._with_options(options or {})
+        overrides = settings.pop("seeds")
+        episode_seed = int(self.np_random.integers(2**31))
+        self._close_renderer()
+        self._simulation = Simulation(seed=Seeds(episode_seed, **overrides), **settings)
+        frame = self._simulation.observe()
+        self._distance = self._goal_distance()
+        return self._observation(frame), self._info(frame)
+
+    def _with_options(
+        self, options: Mapping[str, Any]
+    ) -> tuple[dict[str, Any], tuple[float, float] | None]:
+        known = {"goal", "dynamism", "seeds", "scene"}
+        unknown = sorted(set(options) - known)
+        if unknown:
+            raise InvalidValueError(
+                f"unknown reset option {unknown[0]!r}; known: {', '.join(sorted(known))}"
+            )
+        settings = dict(self._settings)
+        if options.get("dynamism") is not None:
+            settings["dynamism"] = options["dynamism"]
+        settings["seeds"] = dict(options.get("seeds") or {})
+        settings |= dict(options.get("scene") or {})
+        goal = options.get("goal")
+        if goal is None:
+            return settings, None
+        try:
+            x, y = (float(v) for v in goal)
+        except (TypeError, ValueError):
+            raise InvalidValueError(f"option goal must be (x, y) in m, got {goal!r}") from None
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise InvalidValueError(f"option goal must be finite, got {goal!r}")
+        return settings, (x, y)
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """One scan under the given command."""
+        v, omega = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0).tolist()
+        simulation = self.simulation
+        simulation.world.set_command(v * V_MAX_MPS, omega * OMEGA_MAX_RADPS)
+        frame = simulation.observe()
+        before, self._distance = self._distance, self._goal_distance()
+        reward, terminated = 0.0, False
+        if before is not None and self._distance is not None:
+            reward = before - self._distance
+            terminated = self._distance < GOAL_RADIUS_M
+        info = self._info(frame)
+        if self.terminate_on_collision and info["hard_collision"]:
+            terminated = True
+        truncated = simulation.world.time_ns * 1e-9 >= self.time_limit_s
+        return self._observation(frame), reward, terminated, truncated, info
+
+    def _goal_distance(self) -> float | None:
+        if self._goal is None:
+            return None
+        x, y, _ = self.simulation.world.robot_pose().tolist()
+        return math.hypot(x - self._goal[0], y - self._goal[1])
+
+    def _observation(self, frame: Frame) -> Observation:
+        scan = frame.scan
+        assert scan is not None  # a simulation's frames always carry one
+        valid = scan.valid
+        return {
+            "ranges": np.where(valid, scan.ranges, np.float32(scan.spec.range_max)),
+            "valid": valid.astype(np.uint8),
+            "encoders": self.simulation.encoders.ticks,
+            "time": np.array(self.simulation.world.time_ns * 1e-9),
+        }
+
+    def _info(self, frame: Frame) -> dict[str, Any]:
+        world = self.simulation.world
+        contacts = self.simulation.contacts
+        poses = world.mover_poses()
+        return {
+            "pose": world.robot_pose(),
+            "frame": frame,
+            "beam_time": frame.stamp + self.simulation.spec.beam_time_offsets,
+            "contacts": tuple(contact.name for contact in contacts),
+            "hard_collision": any(contact.hard for contact in contacts),
+            "movers": {m.name: poses[k] for k, m in enumerate(world.scene.movers)},
+            "goal_distance": self._distance,
+        }
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """The picture of ``render_mode``, (height, width, 3) uint8 RGB; None without a mode."""
+        if self.render_mode is None:
+            return None
+        if self._renderer is None:
+            self._renderer = self._make_renderer()
+        picture: NDArray[np.uint8] = self._renderer(self.simulation)
+        return picture
+
+    def _make_renderer(self) -> Any:
+        if self.render_mode == "map":
+            from sim.pictures import MapPicture
+
+            return MapPicture(self.simulation, self._size)
+        from sim.pictures import CameraPicture
+
+        return CameraPicture(self.simulation, self._size, self._view)
+
+    def _close_renderer(self) -> None:
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def close(self) -> None:
+        """Free the renderer; the environment can be reset again."""
+        self._close_renderer()

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who drives in a recorded episode: a tour of the scene's rooms, avoiding what truly is there.
+
+Reactive avoidance on truth is what recording needs: the path must not depend on any SLAM. A closed
+loop steers ``sim.drive.Driver`` with an estimate instead.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.drive import Driver, TourConfig, tour
+from sim.navgrid import NavGrid
+from sim.world import World
+from slam import se2
+from slam.frames import Float
+
+SIGHT_M = 4.0  # discs further away than this do not matter within the driver's horizon
+
+
+class Pilot:
+    """Drives a world's robot round the scene's goals; draws only from the "driving" stream."""
+
+    def __init__(self, world: World, config: TourConfig | None = None) -> None:
+        self.world = world
+        config = config or TourConfig()
+        scene = world.scene
+        grid = NavGrid(scene.bounds, scene.obstacles, config.robot_radius_m)
+        self.driver = Driver(grid, tour(scene.goals, world.seeds.generator("driving")), config)
+        self._doors = np.array([m.kind == "door" for m in scene.movers], dtype=np.bool_)
+        self._others = np.array([m.kind not in ("door", "robot") for m in scene.movers])
+        self._radii = np.array([m.radius for m in scene.movers], dtype=np.float64)
+        self._last: Float | None = None
+        self._here: Float | None = None
+
+    def command(self, dt: float) -> tuple[float, float]:
+        """(v m/s, omega rad/s) for the next ``dt`` s, from where everything truly is now."""
+        poses = self.world.mover_poses()
+        velocities = np.zeros((len(poses), 2))
+        if self._last is not None:
+            velocities = (poses[:, :2] - self._last[:, :2]) / dt
+        self._last = poses
+        here = self.world.robot_pose()
+        velocity = self._velocity(here, dt)
+        discs = np.concatenate([self._bodies(poses, velocities), self._leaves(poses)])
+        gap = discs[:, :2] - here[:2]
+        near = gap[:, 0] * gap[:, 0] + gap[:, 1] * gap[:, 1] < SIGHT_M * SIGHT_M
+        return self.driver.command(here, velocity, discs[near], dt)
+
+    def _velocity(self, here: Float, dt: float) -> tuple[float, float]:
+        """(v m/s, omega rad/s) since the last call; at rest at the first."""
+        before, self._here = self._here, here
+        if before is None:
+            return 0.0, 0.0
+        x, y, turned = se2.between(before, here).tolist()
+        return math.copysign(math.hypot(x, y), x) / dt, turned / dt
+
+    def _bodies(self, poses: Float, velocities: Float) -> Float:
+        pick = self._others
+        return np.column_stack([poses[pick, :2], self._radii[pick], velocities[pick]])
+
+    def _leaves(self, poses: Float) -> NDArray[np.float64]:
+        """Three discs along each door leaf, taken as standing still."""
+        rows = []
+        for x, y, yaw, width in np.column_stack([poses, self._radii])[self._doors].tolist():
+            for share in (0.2, 0.55, 0.9):
+                reach = share * width
+                rows.append((x + reach * math.cos(yaw), y + reach * math.sin(yaw), 0.15, 0.0, 0.0))
+        return np.array(rows, dtype=np.float64).reshape(-1, 5)
