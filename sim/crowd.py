@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.draws import between, uniform, waiting
+from sim.flow import FAR, Field, clearance_at, time_at, way_at
 from slam._jit import njit
 
 Float = NDArray[np.float64]
@@ -38,23 +39,11 @@ PERSON, CHAIR, ROBOT, LEAF = 0.0, 1.0, 2.0, 10.0  # LEAF + d: part of the leaf o
 CX, CY, NX, NY, EX, EY, WIDTH, ANGLE = 0, 1, 2, 3, 4, 5, 6, 7
 TURN, ASKED, INSIDE = 0, 1, 2
 
-FAR = 1e6
 BODY = 0.27  # m of clearance a person keeps to walls
 OPEN = 1.15  # rad, a leaf this far open lets a person through
 HORIZON = 2.5  # s, collisions later than this do not matter
 STILL = 0.1  # m/s, a walker slower than this is blocked
 ACCEL = 3.0  # m/s2
-
-
-class Field(NamedTuple):
-    """Arrays of a ``FlowMap``: clearance (h, w), time (g, h, w), way (g, h, w, 2), grid."""
-
-    clearance: Float
-    times: Float
-    ways: Float
-    x0: float
-    y0: float
-    cell: float
 
 
 class Crowd(NamedTuple):
@@ -91,55 +80,6 @@ class Addresses(NamedTuple):
 
 
 @njit
-def clearance_at(field: Field, x: float, y: float) -> float:
-    """Clearance by bilinear interpolation, m; outside the floor -1."""
-    clearance, cell = field.clearance, field.cell
-    u, v = (x - field.x0) / cell, (y - field.y0) / cell
-    i, j = math.floor(v), math.floor(u)
-    if i < 0 or j < 0 or i + 1 >= clearance.shape[0] or j + 1 >= clearance.shape[1]:
-        return -1.0
-    a, b = v - i, u - j
-    low = clearance[i, j] * (1.0 - b) + clearance[i, j + 1] * b
-    high = clearance[i + 1, j] * (1.0 - b) + clearance[i + 1, j + 1] * b
-    return float(low * (1.0 - a) + high * a)
-
-
-@njit
-def time_at(field: Field, goal: int, x: float, y: float) -> float:
-    """Travel time to a goal (s at 1 m/s), the least of the four nodes around plus the way there."""
-    times, cell = field.times, field.cell
-    u, v = (x - field.x0) / cell, (y - field.y0) / cell
-    least = FAR
-    for i in range(math.floor(v), math.floor(v) + 2):
-        for j in range(math.floor(u), math.floor(u) + 2):
-            if 0 <= i < times.shape[1] and 0 <= j < times.shape[2]:
-                way = cell * math.sqrt((v - i) ** 2 + (u - j) ** 2)
-                least = min(least, times[goal, i, j] + way)
-    return least
-
-
-@njit
-def way_at(field: Field, goal: int, x: float, y: float) -> tuple[float, float]:
-    """Unit direction to walk in, (0, 0) outside the floor."""
-    ways, cell = field.ways, field.cell
-    u, v = (x - field.x0) / cell, (y - field.y0) / cell
-    i, j = math.floor(v), math.floor(u)
-    if i < 0 or j < 0 or i + 1 >= ways.shape[1] or j + 1 >= ways.shape[2]:
-        return 0.0, 0.0
-    a, b = v - i, u - j
-    dx, dy = 0.0, 0.0
-    for k in range(4):
-        p, q = k // 2, k % 2
-        weight = (a if p == 1 else 1.0 - a) * (b if q == 1 else 1.0 - b)
-        dx += weight * ways[goal, i + p, j + q, 0]
-        dy += weight * ways[goal, i + p, j + q, 1]
-    norm = math.sqrt(dx * dx + dy * dy)
-    if norm < 1e-9:
-        return 0.0, 0.0
-    return dx / norm, dy / norm
-
-
-@njit
 def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> float:
     """s until a point moving at (wx, wy) is within ``reach`` of (dx, dy); HORIZON if later."""
     c = dx * dx + dy * dy - reach * reach
@@ -160,7 +100,7 @@ def danger(i: int, vx: float, vy: float, near: Int, discs: Float, fade: float) -
     cost = 0.0
     for k in range(len(near)):
         other = discs[near[k]]
-        weight = fade if other[KIND] == CHAIR else 1.0
+        weight = 1.0 if other[KIND] == PERSON or other[KIND] == ROBOT else fade
         if weight <= 0.0:
             continue
         dx, dy, reach = other[X] - x, other[Y] - y, r + other[R] + 0.06
@@ -274,7 +214,10 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:
             sides[i, d] = side
             dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
             distance = math.sqrt(dx * dx + dy * dy)
-            if distance < 0.95:  # nobody is hit by a leaf that falls shut
+            hx = dx + 0.5 * door[WIDTH] * door[EX]
+            hy = dy + 0.5 * door[WIDTH] * door[EY]
+            swept = dx * door[NX] + dy * door[NY] > 0.0 and hx * hx + hy * hy < 1.6
+            if distance < 0.95 or swept:  # nobody is hit by a leaf that moves by itself
                 passage[d, INSIDE] = 1.0
             if side == 0:
                 continue
@@ -298,34 +241,49 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:
 
 
 @njit
-def at_door(
-    i: int, d: int, wanted: tuple[float, float], ways: Doors, field: Field, discs: Float
-) -> tuple[float, float]:
-    """The wanted velocity, changed by manners and by a leaf that is not open yet."""
-    door, side, turn = ways.doors[d], ways.sides[i, d], ways.passage[d, TURN]
-    wx, wy = wanted
+def wait_beside(i: int, door: Float, side: int, field: Field, discs: Float) -> tuple[float, float]:
+    """Velocity to a place on one's own side, out of the way of those who come through."""
     dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
-    normal = side * (dx * door[NX] + dy * door[NY])
-    if turn != 0.0 and side != turn and normal > 0.3:  # wait beside the way of those who come
-        along = dx * door[EX] + dy * door[EY]
-        beside = 0.8 if along >= 0.0 else -0.8
-        for _ in range(2):
-            tx = door[CX] + 1.2 * side * door[NX] + beside * door[EX]
-            ty = door[CY] + 1.2 * side * door[NY] + beside * door[EY]
-            if clearance_at(field, tx, ty) > BODY:
-                break
-            beside = -beside
-        gap = math.sqrt((tx - discs[i, X]) ** 2 + (ty - discs[i, Y]) ** 2)
-        speed = min(1.0, 1.5 * gap) / max(gap, 1e-6)
-        return speed * (tx - discs[i, X]), speed * (ty - discs[i, Y])
-    if door[ANGLE] < OPEN:
-        stop = 1.25 if side > 0 else 0.45
-        closing = -side * (wx * door[NX] + wy * door[NY])
-        excess = closing - 2.0 * (normal - stop)
-        if excess > 0.0:
-            wx += excess * side * door[NX]
-            wy += excess * side * door[NY]
-    return wx, wy
+    beside = 0.8 if dx * door[EX] + dy * door[EY] >= 0.0 else -0.8
+    for _ in range(2):
+        tx = door[CX] + 1.2 * side * door[NX] + beside * door[EX]
+        ty = door[CY] + 1.2 * side * door[NY] + beside * door[EY]
+        if clearance_at(field, tx, ty) > BODY:
+            break
+        beside = -beside
+    tx, ty = tx - discs[i, X], ty - discs[i, Y]
+    gap = math.sqrt(tx * tx + ty * ty)
+    speed = min(1.0, 1.5 * gap) / max(gap, 1e-6)
+    return speed * tx, speed * ty
+
+
+@njit
+def hold_off(
+    i: int, d: int, wanted: tuple[float, float], ways: Doors, discs: Float
+) -> tuple[float, float]:
+    """The wanted velocity less what would run into a leaf that is not open yet.
+
+    Who pushes comes up to the leaf; who pulls stays out of the circle it sweeps; who comes second
+    leaves room to the one in front.
+    """
+    door, side = ways.doors[d], ways.sides[i, d]
+    dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+    first = 0
+    for k in range(len(ways.sides)):
+        if k != i and ways.sides[k, d] == side:
+            kx, ky = discs[k, X] - door[CX], discs[k, Y] - door[CY]
+            first += kx * kx + ky * ky < dx * dx + dy * dy
+    if side > 0:
+        rx = dx + 0.5 * door[WIDTH] * door[EX]
+        ry = dy + 0.5 * door[WIDTH] * door[EY]
+        gap = math.sqrt(rx * rx + ry * ry)
+        rx, ry, stop = rx / gap, ry / gap, door[WIDTH] + 0.32
+    else:
+        rx, ry, stop = -door[NX], -door[NY], 0.45
+        gap = dx * rx + dy * ry
+    excess = -(wanted[0] * rx + wanted[1] * ry) - 2.0 * (gap - stop - 0.65 * first)
+    excess = min(max(excess, 0.0), 2.0)
+    return wanted[0] + excess * rx, wanted[1] + excess * ry
 
 
 @njit
@@ -340,8 +298,15 @@ def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[
     speed = min(pace * state[i, SPEED], 0.3 + 1.2 * left)
     wx, wy = speed * wx, speed * wy
     for d in range(ways.doors.shape[0]):
-        if ways.sides[i, d] != 0:
-            wx, wy = at_door(i, d, (wx, wy), ways, field, discs)
+        side, turn = ways.sides[i, d], ways.passage[d, TURN]
+        if side == 0:
+            continue
+        door = ways.doors[d]
+        normal = (discs[i, X] - door[CX]) * door[NX] + (discs[i, Y] - door[CY]) * door[NY]
+        if turn != 0.0 and side != turn and side * normal > 0.3:
+            wx, wy = wait_beside(i, door, side, field, discs)
+        elif door[ANGLE] < OPEN:
+            wx, wy = hold_off(i, d, (wx, wy), ways, discs)
     return wx, wy
 
 

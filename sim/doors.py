@@ -50,7 +50,8 @@ def torque_to(target: float, q: float, qd: float, closer: Float) -> float:
     rate = min(max(3.0 * (target - q), -RATE_MAX), RATE_MAX)
     friction = math.copysign(closer[2], rate) if abs(rate) > 0.02 else 0.0
     push = closer[0] * (q - closer[4]) + closer[1] * rate + friction
-    return min(max(push + 8.0 * closer[3] * (rate - qd), -TORQUE_MAX), TORQUE_MAX) + 0.0
+    torque = push + 8.0 * closer[3] * (rate - qd)
+    return float(min(max(torque, -TORQUE_MAX), TORQUE_MAX) + 0.0)
 
 
 @njit
@@ -142,6 +143,14 @@ class Doors:
                 self._draws,
                 (data.qpos, data.qvel, data.qfrc_applied),
             )
+
+    def boxes_at_rest(self) -> Float:
+        """(m, 5) leaves at their angle of rest: centre x, y, half sizes m, yaw rad."""
+        boxes = np.zeros((len(self.names), 5))
+        for d, (x, y, closed, sign) in enumerate(self.hinges.tolist()):
+            yaw, half = closed + sign * float(self._closers[d, 4]), 0.5 * float(self.widths[d])
+            boxes[d] = x + half * math.cos(yaw), y + half * math.sin(yaw), half, 0.03, yaw
+        return boxes
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""

@@ -11,6 +11,7 @@ sibling: a walker needs a smooth direction anywhere, a planner whether a cell ma
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,6 +164,66 @@ def directions(T: Float, clearance: Float) -> Float:
     return out
 
 
+class Field(NamedTuple):
+    """Arrays of a ``FlowMap``: clearance (h, w), time (g, h, w), way (g, h, w, 2), grid."""
+
+    clearance: Float
+    times: Float
+    ways: Float
+    x0: float
+    y0: float
+    cell: float
+
+
+@njit
+def clearance_at(field: Field, x: float, y: float) -> float:
+    """Clearance by bilinear interpolation, m; outside the floor -1."""
+    clearance, cell = field.clearance, field.cell
+    u, v = (x - field.x0) / cell, (y - field.y0) / cell
+    i, j = math.floor(v), math.floor(u)
+    if i < 0 or j < 0 or i + 1 >= clearance.shape[0] or j + 1 >= clearance.shape[1]:
+        return -1.0
+    a, b = v - i, u - j
+    low = clearance[i, j] * (1.0 - b) + clearance[i, j + 1] * b
+    high = clearance[i + 1, j] * (1.0 - b) + clearance[i + 1, j + 1] * b
+    return float(low * (1.0 - a) + high * a)
+
+
+@njit
+def time_at(field: Field, goal: int, x: float, y: float) -> float:
+    """Travel time to a goal (s at 1 m/s), the least of the four nodes around plus the way there."""
+    times, cell = field.times, field.cell
+    u, v = (x - field.x0) / cell, (y - field.y0) / cell
+    least = FAR
+    for i in range(math.floor(v), math.floor(v) + 2):
+        for j in range(math.floor(u), math.floor(u) + 2):
+            if 0 <= i < times.shape[1] and 0 <= j < times.shape[2]:
+                way = cell * math.sqrt((v - i) ** 2 + (u - j) ** 2)
+                least = min(least, times[goal, i, j] + way)
+    return least
+
+
+@njit
+def way_at(field: Field, goal: int, x: float, y: float) -> tuple[float, float]:
+    """Unit direction to walk in, (0, 0) outside the floor."""
+    ways, cell = field.ways, field.cell
+    u, v = (x - field.x0) / cell, (y - field.y0) / cell
+    i, j = math.floor(v), math.floor(u)
+    if i < 0 or j < 0 or i + 1 >= ways.shape[1] or j + 1 >= ways.shape[2]:
+        return 0.0, 0.0
+    a, b = v - i, u - j
+    dx, dy = 0.0, 0.0
+    for k in range(4):
+        p, q = k // 2, k % 2
+        weight = (a if p == 1 else 1.0 - a) * (b if q == 1 else 1.0 - b)
+        dx += weight * ways[goal, i + p, j + q, 0]
+        dy += weight * ways[goal, i + p, j + q, 1]
+    norm = math.sqrt(dx * dx + dy * dy)
+    if norm < 1e-9:
+        return 0.0, 0.0
+    return dx / norm, dy / norm
+
+
 class FlowMap:
     """Clearance of a floor and the ways to a set of goals.
 
@@ -170,6 +231,7 @@ class FlowMap:
     obstacles  (n, 5) boxes: centre x, y, half sizes m, yaw rad
     goals      (k, 2) m
     radius     m a walker needs around its centre
+    leaves     (m, 5) boxes that ways go around but that are no wall: doors that stand open
     """
 
     def __init__(
@@ -180,13 +242,18 @@ class FlowMap:
         *,
         radius: float = 0.27,
         cell: float = 0.1,
+        leaves: Float | None = None,
     ) -> None:
-        self.cell = cell
-        self.origin = np.array(bounds[:2], dtype=np.float64)
         boxes = np.ascontiguousarray(obstacles, dtype=np.float64).reshape(-1, 5)
         xmin, ymin, xmax, ymax = (float(b) for b in bounds)
-        self.clearance: Float = clearance_field(boxes, (xmin, ymin, xmax, ymax), cell, 1.0)
+        floor = (xmin, ymin, xmax, ymax)
+        self.clearance: Float = clearance_field(boxes, floor, cell, 1.0)
         slow = slowness(self.clearance, radius)
+        if leaves is not None and len(leaves) > 0:
+            beside = clearance_field(np.ascontiguousarray(leaves), floor, cell, 1.0)
+            slow = np.where(
+                slow < FAR, np.maximum(slow, slowness(np.maximum(beside, WALL), radius)), slow
+            )
         shape = (len(goals), *self.clearance.shape)
         self.time: Float = np.zeros(shape)
         self.direction: Float = np.zeros((*shape, 2))
@@ -194,3 +261,4 @@ class FlowMap:
             gi, gj = (y - ymin) / cell, (x - xmin) / cell
             self.time[k] = travel_time(slow, cell, gi, gj)
             self.direction[k] = directions(self.time[k], self.clearance)
+        self.field = Field(self.clearance, self.time, self.direction, xmin, ymin, cell)

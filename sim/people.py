@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scenes.scene import Scene
 from sim import crowd, gait
 from sim.bodies import Bodies
-from sim.crowd import Addresses, Crowd, Field
+from sim.crowd import Addresses, Crowd
 from sim.doors import Doors
 from sim.draws import between, normal, uniform
-from sim.flow import FlowMap
+from sim.flow import Field, FlowMap
 
 Float = NDArray[np.float64]
 _LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
@@ -25,22 +25,25 @@ _FIRST_STAY_MAX = 8.0  # s, so that a short run of a calm room sees someone set 
 
 
 @functools.lru_cache(maxsize=4)
-def _flow(bounds: tuple[float, float, float, float], boxes: bytes, goals: bytes) -> FlowMap:
+def _flow(
+    bounds: tuple[float, float, float, float], boxes: bytes, leaves: bytes, goals: bytes
+) -> FlowMap:
     """Flow maps are the costly part of a reset and depend on the floor plan alone."""
     return FlowMap(
         bounds,
         np.frombuffer(boxes, dtype=np.float64).reshape(-1, 5),
         np.frombuffer(goals, dtype=np.float64).reshape(-1, 2),
+        leaves=np.frombuffer(leaves, dtype=np.float64).reshape(-1, 5),
     )
 
 
-def floor_field(scene: Scene) -> Field:
+def floor_field(scene: Scene, leaves: Float) -> Field:
     """Clearance and ways to all goals of a scene, in the order of its ``goals``."""
     goals = np.array([scene.goals[name] for name in scene.goals], dtype=np.float64)
     xmin, ymin, xmax, ymax = (float(b) for b in scene.bounds)
     boxes = np.ascontiguousarray(scene.obstacles, dtype=np.float64)
-    flow = _flow((xmin, ymin, xmax, ymax), boxes.tobytes(), goals.tobytes())
-    return Field(flow.clearance, flow.time, flow.direction, xmin, ymin, flow.cell)
+    bounds = (xmin, ymin, xmax, ymax)
+    return _flow(bounds, boxes.tobytes(), leaves.tobytes(), goals.tobytes()).field
 
 
 class People:
@@ -81,7 +84,7 @@ class People:
             draws=counters[:n].copy(),
         )
         self._torsos = np.ascontiguousarray(self._at.discs[:n])
-        self._field = floor_field(scene) if self.alive else None
+        self._field = floor_field(scene, doors.boxes_at_rest()) if self.alive else None
 
     def start(self, data: mujoco.MjData) -> None:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand."""

@@ -188,9 +188,10 @@ class World:
 
     def _actor_arrays(self) -> dict[str, NDArray[Any]]:
         arrays: dict[str, NDArray[Any]] = {"drive": self._drive.state}
-        actors = {**self._shoves, "doors": self._doors, "people": self.people}
-        for owner, actor in actors.items():
-            arrays |= {f"{owner}.{name}": a for name, a in actor.arrays().items()}
+        parts = {kind: shoves.arrays() for kind, shoves in self._shoves.items()}
+        parts |= {"doors": self._doors.arrays(), "people": self.people.arrays()}
+        for owner, own in parts.items():
+            arrays |= {f"{owner}.{name}": a for name, a in own.items()}
         return arrays
 
     def _fingerprint(self) -> dict[str, Any]:
