@@ -11,8 +11,11 @@ from types import FrameType
 import typer
 from rich.logging import RichHandler
 
-from scripts import bench, demo, listing, run
+from scripts.bench import bench
 from scripts.console import console, fail
+from scripts.demo import demo
+from scripts.listing import listing
+from scripts.run import run
 from slam.errors import MobiliaError
 
 app = typer.Typer(
@@ -26,10 +29,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("demo")(demo.demo)
-app.command("run")(run.run)
-app.command("list")(listing.listing)
-app.command("bench")(bench.bench)
+app.command("demo")(demo)
+app.command("run")(run)
+app.command("list")(listing)
+app.command("bench")(bench)
 
 
 @app.callback()

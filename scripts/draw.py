@@ -59,7 +59,7 @@ def text(
     alpha = mask[:height, :width, None].astype(np.float32) / 255.0
     patch = image[y : y + height, x : x + width]
     patch[:] = (patch * (1.0 - alpha) + np.array(color, np.float32) * alpha).astype(np.uint8)
-    return x + mask.shape[1]
+    return x + int(mask.shape[1])
 
 
 def paste(image: Picture, part: Picture, at: tuple[int, int], size: tuple[int, int]) -> None:

@@ -12,7 +12,7 @@ from scripts.console import note
 from scripts.session import Outputs, primary_of, run_session, systems_named
 from scripts.show import Show
 from sim import gl
-from sim.pictures import CameraPicture
+from sim.pictures import CameraPicture, MapPicture
 from sim.simulation import Simulation, n_frames, tour
 from slam.frames import Stream
 from slam.replay import Replay
@@ -50,6 +50,8 @@ def on_scene(names: list[str], settings: Mapping[str, Any], outputs: Outputs) ->
 
 
 def _add_panes(show: Show, simulation: Simulation, stack: ExitStack) -> None:
+    plan = MapPicture(simulation, WORLD_SIZE)
+    show.world = lambda frame, size: plan(simulation)
     found = gl.find()
     if found.backend is None:
         note(f"the film has no 3D panel: {found.reason}")

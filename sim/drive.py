@@ -150,7 +150,8 @@ class Driver:
     @property
     def goal(self) -> Float:
         """(2,) m, where it is driving now."""
-        return self.goals[self._index % len(self.goals)]
+        goal: Float = self.goals[self._index % len(self.goals)]
+        return goal
 
     def command(
         self, T_world_robot: Float, velocity: Sequence[float], discs: Float, dt: float
@@ -188,9 +189,7 @@ class Driver:
         self._best, self._idle_s = math.inf, 0.0
 
 
-def tour(
-    goals: Mapping[str, tuple[float, float]], rng: np.random.Generator
-) -> NDArray[np.float64]:
+def tour(goals: Mapping[str, tuple[float, float]], rng: np.random.Generator) -> NDArray[np.float64]:
     """All goals in an order drawn from ``rng``: (n, 2) m."""
     named = sorted(goals.items())
     order = rng.permutation(len(named))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -22,7 +22,7 @@ V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
 GOAL_RADIUS_M = 0.4
 _MAX_TICKS = 2**40
 
-Observation = dict[str, NDArray[Any]]
+Observation = dict[str, Any]  # arrays by name; Gymnasium types Dict spaces so
 
 
 class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -69,7 +69,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "map"], "render_fps": 37}
+    metadata: dict[str, Any] = {  # noqa: RUF012  (Gymnasium's own class attribute)
+        "render_modes": ["rgb_array", "map"],
+        "render_fps": 37,
+    }
 
     def __init__(
         self,
@@ -214,7 +217,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "goal_distance": self._distance,
         }
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """The picture of ``render_mode``, (height, width, 3) uint8 RGB; None without a mode."""
         if self.render_mode is None:
             return None

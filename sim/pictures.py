@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.camera import Camera
+from sim.mapview import MapView
 from sim.simulation import Simulation
+from slam import se2
 
 VIEWS = ("top", "follow", "persp")
 
@@ -46,3 +48,25 @@ class CameraPicture:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class MapPicture:
+    """The room from above with the last scan, drawn without OpenGL: call it with the simulation."""
+
+    def __init__(self, simulation: Simulation, size: tuple[int, int]) -> None:
+        self._view = MapView(simulation.world.scene, *size)
+
+    def __call__(self, simulation: Simulation) -> NDArray[np.uint8]:
+        """(height, width, 3) uint8 RGB."""
+        frame = simulation.frame
+        scan = None
+        if frame is not None and frame.scan is not None and frame.truth is not None:
+            T_world_laser = se2.compose(frame.truth, frame.scan.spec.T_robot_laser)
+            ranges = np.where(frame.scan.valid, frame.scan.ranges, np.nan)[:, None]
+            angles = frame.scan.spec.angles
+            directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            scan = T_world_laser, se2.transform(T_world_laser, ranges * directions)
+        return self._view.draw(simulation.world.mover_poses(), scan=scan)
+
+    def close(self) -> None:
+        """Nothing to free; every picture maker has it."""

@@ -57,6 +57,7 @@ class Simulation:
         self.laser = Lms221(self.world.model, laser, seeds.generator("lidar"))
         self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=drive.track)
         self._labeller = BeamLabeller(self.world) if labels else None
+        self.frame: Frame | None = None  # the last one observed
         self.contacts: list[Contact] = []  # what the robot touched during the last scan
         self._travel: list[Float] = []
         self._poses: list[Float] = []
@@ -102,13 +103,14 @@ class Simulation:
             sweep_s=self.spec.sweep_duration,
             contact=touched,
         )
-        return Frame(
+        self.frame = Frame(
             stamp_ns=stamp_ns,
             odometry=odometry,
             scan=Scan(stamp_ns=stamp_ns, ranges=result.ranges, spec=self.spec),
             truth=self._pose_at(first),
             labels=self._labeller.label(result) if self._labeller else None,
         )
+        return self.frame
 
     def _travel_at(self, step: float) -> Float:
         """(2,) m rolled by the wheels, ``step`` physics steps after the scan's start."""
