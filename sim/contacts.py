@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.bodies import STATIC, Bodies
+from slam._jit import njit
 
 HARD_FORCE = 60.0  # N; a robot of 22 kg that brakes on something at more than a third of g
 
@@ -31,6 +33,15 @@ class Contact:
         return self.kind in ("static", "person") or self.force > HARD_FORCE
 
 
+@njit
+def touched(geoms: NDArray[np.int32], first: int, last: int) -> bool:
+    """Whether any of the pairs (n, 2) has a geom of the range; runs at every substep."""
+    for i in range(geoms.shape[0]):
+        if first <= geoms[i, 0] <= last or first <= geoms[i, 1] <= last:
+            return True
+    return False
+
+
 class RobotContacts:
     """Collects the robot's contacts over substeps until they are taken."""
 
@@ -50,11 +61,10 @@ class RobotContacts:
         if data.ncon == 0 or self._bodies.robot is None:
             return
         geoms = data.contact.geom
-        touching = (geoms >= self._first) & (geoms <= self._last)
-        if not touching.any():
+        if not touched(geoms, self._first, self._last):
             return
         movers = self._mover_of_geom[geoms]
-        for i in np.nonzero(touching.any(axis=1))[0].tolist():
+        for i in np.nonzero((movers == self._bodies.robot).any(axis=1))[0].tolist():
             mujoco.mj_contactForce(self._model, data, i, self._wrench)
             force = float(self._wrench[0])
             other = int(movers[i, 0] + movers[i, 1]) - self._bodies.robot
