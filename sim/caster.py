@@ -20,6 +20,7 @@ from sim import raycast
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
+Pose = tuple[float, float, float]
 
 HULL_GROUP = 3  # collision hulls: never seen by rays or cameras
 
@@ -78,7 +79,7 @@ def _half_height(kind: int, size: Float, mat: Float) -> float:
     """Half the vertical extent of a primitive with the given orientation, m."""
     up = np.abs(mat[6:9])  # world z of the geom's own axes
     if kind == raycast.PLANE:
-        return math.inf
+        return 0.0 if up[2] > 1.0 - 1e-12 else math.inf
     if kind == raycast.SPHERE:
         return float(size[0])
     if kind == raycast.CAPSULE:
@@ -115,9 +116,14 @@ class Raycaster:
         self.height = height
         self.ids = self._candidates(model, robot, range_max)
         self._table = self._geom_table
-        self._rays = self.spot.rays()
-        self._optics = (self.spot.aperture, self.spot.divergence)
-        self._before = np.zeros((self.ids.size, 12))
+        self._optics = (self.spot.rays(), (self.spot.aperture, self.spot.divergence))
+        n = self.ids.size
+        self._poses = (np.full((n, 12), np.nan), np.full((n, 12), np.nan))
+        self._bounds = np.zeros((n, 6))
+        self._movable = np.flatnonzero(
+            np.isin(model.geom_bodyid[self.ids], np.flatnonzero(model.body_weldid != 0))
+        )
+        self._seen: mujoco.MjData | None = None
         self._laser = np.zeros(7)
         self._laser[6] = height
 
@@ -145,6 +151,7 @@ class Raycaster:
             if own[body] or not _visible(model, geom):
                 continue
             half, upright = _vertical_extent(model, data, geom, bool(lifts[body]))
+            # A level plane has no height: only a spot that spreads downwards meets it.
             meets = abs(data.geom_xpos[geom][2] - self.height) <= half + reach
             if not (lifts[body] or meets):
                 continue
@@ -164,30 +171,38 @@ class Raycaster:
 
     def start(self, data: mujoco.MjData) -> None:
         """Note where everything is at the start of a physics step; needs fresh kinematics."""
-        raycast.remember(self.ids, data.geom_xpos, data.geom_xmat, self._before)
+        movable = self._movable
+        if data is not self._seen:
+            self._seen, movable = data, np.arange(self.ids.size)
+            self._views = (data.geom_xpos, data.geom_xmat)
+        self._follow(movable, restart=True)
+
+    def _follow(self, movable: NDArray[np.int64], *, restart: bool) -> None:
+        raycast.follow(
+            self._table, self.ids, movable, self._views, self._poses, self._bounds, restart
+        )
 
     def cast(
         self,
-        data: mujoco.MjData,
         fan: tuple[NDArray[np.int64], Float, Float],
-        laser: tuple[Float, Float],
+        laser: tuple[Pose, Pose],
         out: tuple[Float, NDArray[np.int64], Float],
     ) -> None:
-        """Cast the beams measured during the physics step that ended in ``data``.
+        """Cast the beams measured during the physics step that has just ended.
 
         fan    beams (m,) rows of ``out``, angles (m,) rad in the laser frame at even ascending
                steps, taus (m,) time of each beam within the step, 0..1
         laser  pose (x, y, yaw) of the laser at the start and at the end of the step
-        out    ranges (n, k) m, inf for a miss; geom ids (n, k), -1; |cos| of the incidence (n, k)
+        out    (n, k) each: ranges m, inf for a miss; index into ``ids``, -1; |cos| of the
+               incidence, NaN
 
         ``out`` must come in as misses. The end of this step becomes the start of the next.
         """
-        self._laser[0:3] = laser[0]
-        self._laser[3:6] = laser[1]
+        self._laser[0:6] = (*laser[0], *laser[1])
+        self._follow(self._movable, restart=False)
         raycast.cast_fan(
-            self._table, self.ids, self._before, data.geom_xpos, data.geom_xmat, *fan,
-            self._laser, self._rays, self._optics, *out,
-        )  # fmt: skip
+            self._table, self._poses, self._bounds, fan, self._laser, self._optics, out
+        )
 
 
 def _visible(model: mujoco.MjModel, geom: int) -> bool:

@@ -170,11 +170,11 @@ class ScanResult:
         return arccos(self.cosines).astype(np.float32)
 
 
-def laser_pose(data: mujoco.MjData, site: int) -> Float:
-    """(x m, y m, yaw rad) of a site in the world."""
-    x, y, _ = data.site_xpos[site].tolist()
-    mat = data.site_xmat[site]
-    return np.array([x, y, math.atan2(mat[3], mat[0])])
+def _planar(position: Float, matrix: Float) -> tuple[float, float, float]:
+    """(x m, y m, yaw rad) of a frame in the world; ``matrix`` (9,) by rows."""
+    rows = matrix.tolist()
+    x, y, _ = position.tolist()
+    return x, y, math.atan2(rows[3], rows[0])
 
 
 class Lms221:
@@ -206,6 +206,8 @@ class Lms221:
         self.caster = Raycaster(
             model, height=height, robot=robot, range_max=self.config.mode.range_max_m
         )
+        # The last entry, which index -1 takes, stands for no hit.
+        self._geom_of = np.append(self.caster.ids.astype(np.int32), np.int32(-1))
         self._body_of = np.append(model.geom_bodyid.astype(np.int32), np.int32(-1))
         self._fans = self._plan()
 
@@ -241,23 +243,29 @@ class Lms221:
             np.full((n, k), -1, dtype=np.int64),
             np.full((n, k), np.nan),
         )
+        views = (data.site_xpos[self._site], data.site_xmat[self._site])
+        after = None
         for step in range(self.config.steps):
             fan = self._fans.get(step)
             if fan is None:
                 advance()
+                after = None
                 continue
-            before = laser_pose(data, self._site)
-            self.caster.start(data)
+            if after is None:
+                self.caster.start(data)
+                after = _planar(*views)
+            before = after
             advance()
-            self.caster.cast(data, fan, (before, laser_pose(data, self._site)), hits)
+            after = _planar(*views)
+            self.caster.cast(fan, (before, after), hits)
         return self._result(hits)
 
     def _result(self, hits: tuple[Float, NDArray[np.int64], Float]) -> ScanResult:
-        true_ranges, geoms, cosines = hits[0][:, 0], hits[1][:, 0], hits[2][:, 0]
+        true_ranges, geoms, cosines = hits[0][:, 0], self._geom_of[hits[1][:, 0]], hits[2][:, 0]
         return ScanResult(
             ranges=self._measure(true_ranges),
             true_ranges=true_ranges,
-            geoms=geoms.astype(np.int32),
+            geoms=geoms,
             bodies=self._body_of[geoms],
             cosines=cosines,
         )
@@ -284,6 +292,5 @@ def _mounting(model: mujoco.MjModel, data: mujoco.MjData, site: int, robot: str)
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, robot)
     if body < 0:
         raise InvalidValueError(f"Lms221.robot: the model has no body {robot!r}")
-    x, y, _ = data.xpos[body].tolist()
-    mat = data.xmat[body]
-    return se2.between(np.array([x, y, math.atan2(mat[3], mat[0])]), laser_pose(data, site))
+    T_world_robot = _planar(data.xpos[body], data.xmat[body])
+    return se2.between(T_world_robot, _planar(data.site_xpos[site], data.site_xmat[site]))
