@@ -91,8 +91,29 @@ def _stamp(owner: str, value: object) -> None:
         )
 
 
+class ByContent:
+    """Equality of dataclasses that hold arrays: same type, equal fields, NaN equal to NaN."""
+
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        if type(self) is not type(other):
+            return NotImplemented
+        mine, theirs = vars(self), vars(other)
+        return all(_same(mine[name], theirs[name]) for name in mine)
+
+    __hash__ = None  # type: ignore[assignment]  # arrays have no hash
+
+
+def _same(a: object, b: object) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        floats = a.dtype.kind == "f"
+        return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=floats)
+    return bool(a == b)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LaserSpec:
+class LaserSpec(ByContent):
     """Geometry and timing of a planar scanner; one object shared by all its scans.
 
     n_beams            number of beams, counted counter-clockwise (right to left)
@@ -154,21 +175,9 @@ class LaserSpec:
         """Seconds from the stamp to the last beam."""
         return float(self.beam_time_offsets.max())
 
-    def same_as(self, other: LaserSpec) -> bool:
-        """True when every field is equal."""
-        return self is other or (
-            self.n_beams == other.n_beams
-            and self.angle_min == other.angle_min
-            and self.angle_increment == other.angle_increment
-            and self.range_min == other.range_min
-            and self.range_max == other.range_max
-            and np.array_equal(self.beam_time_offsets, other.beam_time_offsets)
-            and np.array_equal(self.T_robot_laser, other.T_robot_laser)
-        )
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Scan:
+class Scan(ByContent):
     """One laser scan.
 
     stamp_ns     time of the earliest beam, ns
@@ -207,7 +216,7 @@ class Scan:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Features:
+class Features(ByContent):
     """Point features with uncertainty: landmarks, tree trunks, extracted corners.
 
     stamp_ns      ns
@@ -235,7 +244,7 @@ class Features:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Odometry:
+class Odometry(ByContent):
     """Where the wheels say the robot is, at the frame's stamp.
 
     stamp_ns              ns
@@ -276,7 +285,7 @@ class BeamClass(IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class BeamLabels:
+class BeamLabels(ByContent):
     """Truth per beam; for evaluation only.
 
     body          (n,) int32 body id in the simulated model, -1 where nothing was hit
@@ -306,7 +315,7 @@ class BeamLabels:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Frame:
+class Frame(ByContent):
     """Everything a robot knows at one moment, and (apart) what only the ceiling tags know.
 
     stamp_ns  ns; the scan's or the features' stamp, to which odometry and truth are interpolated

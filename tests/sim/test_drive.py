@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.drive import TourConfig, Driver, tour
+from sim.drive import Driver, TourConfig, tour
 from sim.navgrid import NavGrid
 from slam.errors import InvalidValueError
 

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames from the moving world: one seed, same bytes, and what a frame says is when it says."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from sim.lidar import Lms221Config
+from sim.simulation import Simulation, stream, tour
+from slam import create, se2
+from slam.errors import InvalidValueError, UnknownNameError
+from slam.frames import BeamClass
+
+DIGEST = """
+import hashlib, sys
+from sim.simulation import stream
+from slam import create
+slam, digest = create("shunting"), hashlib.sha256()
+for frame in stream("office", seed=int(sys.argv[1]), dynamism=0.7, seconds=2.0):
+    estimate = slam.update(frame.without_truth())
+    for part in (frame.scan.ranges, frame.odometry.T_odom_robot,
+                 frame.odometry.increment_covariance, frame.truth,
+                 estimate.T_map_robot, estimate.covariance):
+        digest.update(part.tobytes())
+print(digest.hexdigest())
+"""
+
+
+def digest(seed: int) -> str:
+    command = [sys.executable, "-c", DIGEST, str(seed)]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_two_processes_agree_on_every_byte_and_another_seed_does_not():
+    first, again, other = digest(5), digest(5), digest(6)
+    assert first == again
+    assert first != other
+
+
+def test_a_stream_replays_from_the_start():
+    frames = stream("arena", seed=2, seconds=1.0)
+    once, twice = list(frames), list(frames)
+    assert len(once) == frames.length
+    for a, b in zip(once, twice, strict=True):
+        np.testing.assert_array_equal(a.scan.ranges, b.scan.ranges)
+        np.testing.assert_array_equal(a.truth, b.truth)
+
+
+def test_stamps_are_one_scan_period_apart_to_the_nanosecond():
+    frames = list(stream("arena", seed=0, seconds=0.4))
+    assert [f.stamp_ns for f in frames] == [round(k * 8e9 / 300) for k in range(len(frames))]
+    assert all(f.stamp_ns == f.scan.stamp_ns == f.odometry.stamp_ns for f in frames)
+
+
+@pytest.mark.parametrize(
+    ("resolution", "fov", "n"), [(1.0, 180, 181), (0.25, 180, 721), (0.5, 100, 201)]
+)
+def test_every_scan_mode_makes_frames(resolution, fov, n):
+    laser = Lms221Config(resolution_deg=resolution, fov_deg=fov)
+    frames = list(stream("arena", seed=0, seconds=0.3, laser=laser))
+    assert frames[0].scan.spec.n_beams == n
+    assert np.isfinite(frames[0].scan.ranges).all()
+
+
+def test_ideal_odometry_follows_the_truth():
+    simulation = Simulation("arena", seed=1, dynamism=0.0, odometry="ideal", n_chairs=0)
+    frames = list(tour(simulation, 6.0))
+    T_odom_world = se2.compose(frames[0].odometry.T_odom_robot, se2.inverse(frames[0].truth))
+    gaps = [se2.compose(T_odom_world, f.truth) - f.odometry.T_odom_robot for f in frames]
+    assert np.abs(np.array(gaps)[:, :2]).max() < 0.02
+    driven = np.linalg.norm(np.diff([f.truth[:2] for f in frames], axis=0), axis=1).sum()
+    assert driven > 1.0
+
+
+def test_the_twist_is_the_motion_over_the_sweep():
+    simulation = Simulation("arena", seed=1, dynamism=0.0, odometry="ideal", n_chairs=0)
+    simulation.world.set_command(0.4, 0.5)
+    for _ in range(60):
+        frame = simulation.observe()
+    np.testing.assert_allclose(frame.odometry.twist[[0, 2]], [0.4, 0.5], rtol=0.02)
+
+
+def test_ranges_end_on_the_walls_of_the_true_map():
+    simulation = Simulation("arena", seed=0, dynamism=0.0, n_chairs=0, laser=Lms221Config.ideal())
+    frame = simulation.observe()
+    angles = frame.scan.spec.angles
+    hits = frame.scan.ranges[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    T_world_laser = se2.compose(frame.truth, frame.scan.spec.T_robot_laser)
+    hits = se2.transform(T_world_laser, hits)
+    xmin, ymin, xmax, ymax = simulation.world.scene.bounds
+    to_wall = np.min(np.abs(np.stack([hits[:, 0] - xmin, hits[:, 0] - xmax,
+                                      hits[:, 1] - ymin, hits[:, 1] - ymax])), axis=0)  # fmt: skip
+    assert to_wall.max() < 0.15
+
+
+def test_labels_tell_static_resting_and_moving_things_apart():
+    simulation = Simulation("office", seed=1, dynamism=1.0, labels=True)
+    kinds = np.concatenate([f.labels.kind for f in tour(simulation, 4.0)])
+    for kind in (BeamClass.STATIC, BeamClass.SEMI_STATIC, BeamClass.MOVING):
+        assert (kinds == kind).any()
+    frozen = Simulation("office", seed=1, dynamism=0.0, labels=True)
+    labels = [frozen.observe().labels for _ in range(3)]
+    assert not any((label.kind == BeamClass.MOVING).any() for label in labels)
+    assert all((label.displacement == 0.0).all() for label in labels)
+
+
+def test_the_demo_scene_is_mapped_far_better_than_odometry():
+    replayed = create("shunting")
+    errors = []
+    for frame in stream("office", seed=11, seconds=12.0):
+        estimate = replayed.update(frame.without_truth())
+        if not errors:
+            first = frame.truth
+        errors.append(se2.between(first, frame.truth) - estimate.T_map_robot)
+    rmse = float(np.sqrt((np.array(errors)[:, :2] ** 2).sum(axis=1).mean()))
+    assert rmse < 0.05
+
+
+def test_wrong_settings_are_refused_by_name():
+    with pytest.raises(UnknownNameError, match="Did you mean 'office'"):
+        Simulation("ofice")
+    with pytest.raises(InvalidValueError, match="dynamism must lie in"):
+        Simulation("arena", dynamism=2.0)
+    with pytest.raises(InvalidValueError, match="seconds must be > 0"):
+        list(tour(Simulation("arena"), -1.0))
+    with pytest.raises(UnknownNameError, match="pioneer3dx"):
+        Simulation("arena", odometry="pioneer")
+
+
+def test_hashes_of_two_iterations_match():
+    def hashed(seed: int) -> str:
+        sha = hashlib.sha256()
+        for frame in stream("arena", seed=seed, seconds=0.5):
+            sha.update(frame.scan.ranges.tobytes())
+        return sha.hexdigest()
+
+    assert hashed(1) == hashed(1) != hashed(2)
