@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Maps as files: PGM + YAML as the map_server of ROS 1 and nav2 loads them, and as a picture."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from slam.errors import InvalidValueError, LogFormatError, OutputError
+from slam.files import replacing, write_bytes
+from slam.system import Raster
+
+OCCUPIED_THRESHOLD = 0.65
+# ROS 1's value. nav2's map_saver writes 0.25, with which a map_server takes the unknown gray 205
+# (1 - 205/255 = 0.19608) for free; 0.196 keeps it unknown in both.
+FREE_THRESHOLD = 0.196
+OCCUPIED, UNKNOWN, FREE = 0, 205, 254
+
+_UNKNOWN_RGB = (176, 180, 184)
+_STOPS = np.array([0.0, 0.5, 1.0])  # of existence: free paper, doubtful amber, solid ink
+_STOPS_RGB = np.array([[252, 250, 245], [233, 160, 76], [22, 33, 58]], dtype=np.float64)
+_GAP = rb"\s+(?:#[^\n]*\n\s*)*"  # PGM allows comments between the words of its header
+_PGM_HEADER = re.compile(rb"P5" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)" + _GAP + rb"255\s")
+_MAX_HEADER_BYTES = 4096
+_MAX_PIXELS = 1 << 30
+
+
+def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
+    """``<stem>.pgm`` and ``<stem>.yaml``; returns the two paths.
+
+    Values above 0.65 are occupied (black), below 0.196 free, all between and NaN unknown: what a
+    map_server in "trinary" mode makes of them. Raises ``OutputError`` when they cannot be written.
+    """
+    pgm, yaml = stem.with_name(stem.name + ".pgm"), stem.with_name(stem.name + ".yaml")
+    height, width = raster.values.shape
+    header = f"P5\n{width} {height}\n255\n".encode("ascii")
+    x, y, yaw = raster.T_map_origin.tolist()
+    lines = [
+        f"image: {pgm.name}",
+        "mode: trinary",
+        f"resolution: {_plain(raster.resolution_m)}",
+        f"origin: [{_plain(x)}, {_plain(y)}, {_plain(yaw)}]",
+        "negate: 0",
+        f"occupied_thresh: {OCCUPIED_THRESHOLD}",
+        f"free_thresh: {FREE_THRESHOLD}",
+    ]
+    with replacing(yaml) as new_yaml, replacing(pgm) as new_pgm:  # the image is in place first
+        new_pgm.write_bytes(header + _gray(raster)[::-1].tobytes())
+        new_yaml.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return pgm, yaml
+
+
+def read_map(yaml: Path) -> Raster:
+    """The raster of a map_server YAML file: 1 occupied, 0 free, NaN unknown.
+
+    Reads binary PGM images in mode trinary, the ones ``write_map`` and map_saver write.
+    Raises ``LogFormatError`` naming the file when one of the two is missing or wrong.
+    """
+    fields = _yaml_fields(yaml)
+    resolution = _numbers(yaml, fields, "resolution", 1)[0]
+    origin = _numbers(yaml, fields, "origin", 3)
+    negate = fields.get("negate", "0").lower() in ("1", "true")
+    if fields.get("mode", "trinary") != "trinary":
+        raise LogFormatError(yaml, f"mode must be trinary, got {fields['mode']!r}")
+    gray = _read_pgm(yaml.parent / _field(yaml, fields, "image"))
+    occupancy = gray / 255.0 if negate else (255 - gray.astype(np.int64)) / 255.0
+    values = np.full(gray.shape, np.nan, dtype=np.float32)
+    values[occupancy > _numbers(yaml, fields, "occupied_thresh", 1)[0]] = 1.0
+    values[occupancy < _numbers(yaml, fields, "free_thresh", 1)[0]] = 0.0
+    try:
+        return Raster(values=values[::-1], resolution_m=resolution, T_map_origin=np.array(origin))
+    except InvalidValueError as error:
+        raise LogFormatError(yaml, str(error)) from error
+
+
+def raster_image(raster: Raster) -> NDArray[np.uint8]:
+    """(height, width, 3) RGB picture, highest y on top: free light, solid dark, unknown gray."""
+    values = raster.values[::-1].astype(np.float64)
+    unknown = np.isnan(values)
+    values[unknown] = 0.0
+    channels = [np.interp(values, _STOPS, _STOPS_RGB[:, k]) for k in range(3)]
+    image = np.round(np.stack(channels, axis=-1)).astype(np.uint8)
+    image[unknown] = _UNKNOWN_RGB
+    return image
+
+
+def write_png(path: Path, raster: Raster, *, scale: int = 1) -> None:
+    """``raster_image`` as a PNG, each cell ``scale`` pixels wide.
+
+    Raises ``OutputError`` when it cannot be written.
+    """
+    if scale < 1:
+        raise InvalidValueError(f"scale must be >= 1 pixel per cell, got {scale}")
+    image = raster_image(raster).repeat(scale, axis=0).repeat(scale, axis=1)
+    ok, data = cv2.imencode(".png", np.ascontiguousarray(image[..., ::-1]))
+    if not ok:
+        raise OutputError(f"cannot write {path}: OpenCV could not encode {image.shape}")
+    write_bytes(path, data.tobytes())
+
+
+def _gray(raster: Raster) -> NDArray[np.uint8]:
+    gray = np.full(raster.values.shape, UNKNOWN, dtype=np.uint8)
+    gray[raster.values > OCCUPIED_THRESHOLD] = OCCUPIED  # false for NaN
+    gray[raster.values < FREE_THRESHOLD] = FREE
+    return gray
+
+
+def _plain(value: float) -> str:
+    """Shortest digits that read back the same, never like 1e-05, which YAML 1.1 takes for text."""
+    return np.format_float_positional(value, trim="0")
+
+
+def _yaml_fields(yaml: Path) -> dict[str, str]:
+    """``key: value`` lines; a map_server file has no deeper structure but one bracketed list."""
+    try:
+        text = yaml.read_text(encoding="utf-8")
+    except OSError as error:
+        raise LogFormatError(yaml, f"cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise LogFormatError(yaml, "not a text file") from error
+    fields: dict[str, str] = {}
+    for number, line in enumerate(text.splitlines(), 1):
+        content = re.sub(r"(^|\s)#.*", "", line).strip()
+        if not content or content == "---":
+            continue
+        key, colon, value = content.partition(":")
+        if not colon:
+            raise LogFormatError(yaml, f"expected 'key: value', got {content[:40]!r}", number)
+        fields[key.strip()] = value.strip().strip("'\"")
+    return fields
+
+
+def _field(yaml: Path, fields: dict[str, str], key: str) -> str:
+    if not fields.get(key):
+        raise LogFormatError(yaml, f"has no {key}")
+    return fields[key]
+
+
+def _numbers(yaml: Path, fields: dict[str, str], key: str, count: int) -> list[float]:
+    text = _field(yaml, fields, key)
+    try:
+        values = [float(word) for word in text.strip("[]").split(",")]
+    except ValueError as error:
+        raise LogFormatError(yaml, f"{key}: {error}") from error
+    if len(values) != count or not all(map(math.isfinite, values)):
+        raise LogFormatError(yaml, f"{key} must be {count} finite numbers, got {text!r}")
+    return values
+
+
+def _read_pgm(path: Path) -> NDArray[np.uint8]:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
+    header = _PGM_HEADER.match(data[:_MAX_HEADER_BYTES])
+    if header is None:
+        raise LogFormatError(path, "not a binary PGM image of 8 bits (P5, maximum 255)")
+    width, height = int(header[1][:9]), int(header[2][:9])
+    pixels: NDArray[Any] = np.frombuffer(data, dtype=np.uint8, offset=header.end())
+    if not 0 < width * height <= _MAX_PIXELS or len(pixels) != width * height:
+        raise LogFormatError(path, f"{width} x {height} pixels expected, found {len(pixels)}")
+    return pixels.reshape(height, width)

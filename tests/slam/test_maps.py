@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Map files: what ROS loads is what was meant."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from slam import Raster, maps
+from slam.errors import InvalidValueError, LogFormatError, OutputError
+
+
+def small_map():
+    """3 rows of 4: the lowest row is free, a wall on top, unknown between."""
+    values = np.array(
+        [[0.0, 0.1, 0.0, 0.19], [np.nan, 0.2, 0.5, 0.65], [1.0, 0.66, 0.9, 1.0]], dtype=np.float32
+    )
+    return Raster(values=values, resolution_m=0.05, T_map_origin=[-1.5, 1e-5, 0.25])
+
+
+def test_the_image_has_the_highest_row_first_and_the_three_grays(tmp_path):
+    pgm, yaml = maps.write_map(tmp_path / "map", small_map())
+    data = pgm.read_bytes()
+    assert data.startswith(b"P5\n4 3\n255\n")
+    assert list(data[-12:]) == [0, 0, 0, 0, 205, 205, 205, 205, 254, 254, 254, 254]
+    assert cv2.imread(str(pgm), cv2.IMREAD_UNCHANGED).shape == (3, 4)
+    assert yaml.read_text().splitlines() == [
+        "image: map.pgm",
+        "mode: trinary",
+        "resolution: 0.05",
+        "origin: [-1.5, 0.00001, 0.25]",
+        "negate: 0",
+        "occupied_thresh: 0.65",
+        "free_thresh: 0.196",
+    ]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["map.pgm", "map.yaml"]
+
+
+def test_map_server_reads_the_three_grays_as_they_were_meant():
+    def cell(gray):
+        """The rule of both map_servers, mode trinary, negate 0."""
+        occupancy = (255 - gray) / 255.0
+        if occupancy > maps.OCCUPIED_THRESHOLD:
+            return 100
+        return 0 if occupancy < maps.FREE_THRESHOLD else -1
+
+    assert [cell(g) for g in (maps.OCCUPIED, maps.UNKNOWN, maps.FREE)] == [100, -1, 0]
+
+
+def test_round_trip(tmp_path):
+    raster = small_map()
+    _, yaml = maps.write_map(tmp_path / "rooms.v2", raster)
+    assert yaml.name == "rooms.v2.yaml"
+    back = maps.read_map(yaml)
+    expected = np.array([[0.0] * 4, [np.nan] * 4, [1.0] * 4])
+    np.testing.assert_array_equal(back.values, expected)
+    np.testing.assert_array_equal(back.T_map_origin, raster.T_map_origin)
+    assert back.resolution_m == raster.resolution_m
+    maps.write_map(tmp_path / "again", back)
+    assert (tmp_path / "again.pgm").read_bytes() == (tmp_path / "rooms.v2.pgm").read_bytes()
+
+
+def test_maps_of_other_writers(tmp_path):
+    (tmp_path / "a.pgm").write_bytes(b"P5\n# CREATOR: map_saver 0.05 m/pix\n2 1\n255\n\x00\xfe")
+    (tmp_path / "a.yaml").write_text(
+        "---\nimage: 'a.pgm'  # the picture\nresolution: 5e-2\norigin: [1, 2, 0]\n"
+        "negate: false\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    back = maps.read_map(tmp_path / "a.yaml")
+    np.testing.assert_array_equal(back.values, [[1.0, 0.0]])
+    (tmp_path / "a.yaml").write_text(
+        (tmp_path / "a.yaml").read_text().replace("negate: false", "negate: 1")
+    )
+    np.testing.assert_array_equal(maps.read_map(tmp_path / "a.yaml").values, [[0.0, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        ("image: map.pgm", "image: gone.pgm", "gone.pgm: cannot be read"),
+        ("image: map.pgm", "image: map.yaml", "not a binary PGM"),
+        ("resolution: 0.05\n", "", "has no resolution"),
+        ("resolution: 0.05", "resolution: fine", "resolution"),
+        ("resolution: 0.05", "resolution: -1", "resolution_m must be > 0"),
+        ("origin: [", "origin: [7, ", "origin must be 3 finite numbers"),
+        ("mode: trinary", "mode: raw", "mode must be trinary"),
+        ("negate: 0", "negate 0", "map.yaml:5: expected 'key: value'"),
+    ],
+)
+def test_damaged_maps_are_refused(tmp_path, old, new, match):
+    _, yaml = maps.write_map(tmp_path / "map", small_map())
+    yaml.write_text(yaml.read_text().replace(old, new))
+    with pytest.raises(LogFormatError, match=match):
+        maps.read_map(yaml)
+
+
+def test_missing_and_truncated_files_are_refused(tmp_path):
+    with pytest.raises(LogFormatError, match="cannot be read"):
+        maps.read_map(tmp_path / "none.yaml")
+    pgm, yaml = maps.write_map(tmp_path / "map", small_map())
+    pgm.write_bytes(pgm.read_bytes()[:-1])
+    with pytest.raises(LogFormatError, match="4 x 3 pixels expected, found 11"):
+        maps.read_map(yaml)
+    pgm.write_bytes(b"P5" + b" " * 100_000 + b"x")
+    with pytest.raises(LogFormatError, match="not a binary PGM"):
+        maps.read_map(yaml)
+    yaml.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(LogFormatError, match="not a text file"):
+        maps.read_map(yaml)
+
+
+def test_an_unwritable_place_leaves_nothing(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="cannot write"):
+        maps.write_map(tmp_path / "file" / "map", small_map())
+    (tmp_path / "map.pgm").mkdir()
+    with pytest.raises(OutputError):
+        maps.write_map(tmp_path / "map", small_map())
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "map.pgm"]
+
+
+def test_the_picture_tells_unknown_from_known(tmp_path):
+    path = tmp_path / "map.png"
+    maps.write_png(path, small_map(), scale=3)
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)[..., ::-1]
+    assert picture.shape == (9, 12, 3)
+    free, unknown, solid = picture[8, 0], picture[4, 0], picture[0, 0]
+    assert free.min() > 240
+    assert solid.max() < 70
+    assert unknown.max() - unknown.min() < 12
+    np.testing.assert_array_equal(picture[3:6, 0:3], np.broadcast_to(unknown, (3, 3, 3)))
+    with pytest.raises(InvalidValueError, match="scale"):
+        maps.write_png(path, small_map(), scale=0)
