@@ -264,7 +264,7 @@ class WheelOdometry:
         dl, dr = left - self._true[0], right - self._true[1]
         self._true = [left, right]
         distance, angle = 0.5 * (dl + dr), (dr - dl) / self._track
-        variances, slip_variance, noise = self._draw(abs(distance), abs(angle), contact)
+        variances, noise = self._draw(abs(distance), abs(angle), contact)
         nominal_track = self._track / self.errors[1]
         half = 0.5 * nominal_track * noise[2]
         counted = [
@@ -276,7 +276,7 @@ class WheelOdometry:
         _step_pose(self.pose, 0.5 * (cl + cr), noise[1], (cr - cl) / nominal_track)
         _accumulate(
             self._increment, self._random, self._systematic, (distance, 0.0, angle),
-            (variances[0], variances[1], variances[2] + slip_variance), self._track,
+            variances, self._track,
         )  # fmt: skip
 
     def _count(self, wheel: int, reported: float) -> float:
@@ -287,24 +287,28 @@ class WheelOdometry:
             return self._reported[wheel]
         return math.floor(self._reported[wheel] * per_m + 0.5) / per_m
 
-    def _draw(self, distance: float, angle: float, contact: bool) -> tuple[Vec3, float, Vec3]:
-        """(variances, variance by slip, drawn errors) of distance, side and angle."""
+    def _draw(self, distance: float, angle: float, contact: bool) -> tuple[Vec3, Vec3]:
+        """(variances, drawn errors) of distance, side and angle."""
         c = self.config
-        variances = (
-            c.trans_std_per_m**2 * distance + c.trans_std_per_rad**2 * angle,
-            c.side_std_per_m**2 * distance,
-            c.rot_std_per_m**2 * distance + c.rot_std_per_rad**2 * angle,
-        )
+        trans = c.trans_std_per_m**2 * distance + c.trans_std_per_rad**2 * angle
+        rot = c.rot_std_per_m**2 * distance + c.rot_std_per_rad**2 * angle
+        side = c.side_std_per_m**2 * distance
         chance = 1.0 - math.exp(
             -(c.slip_per_m + (c.slip_per_contact_m if contact else 0.0)) * distance
         )
         normals, uniforms = self._rng.standard_normal(3).tolist(), self._rng.random(2).tolist()
-        slip = math.copysign(SLIP_MIN + (SLIP_MAX - SLIP_MIN) * abs(2.0 * uniforms[1] - 1.0),
-                             uniforms[1] - 0.5) if uniforms[0] < chance else 0.0  # fmt: skip
+        size = SLIP_MIN + (SLIP_MAX - SLIP_MIN) * abs(2.0 * uniforms[1] - 1.0)
+        slip = math.copysign(size, uniforms[1] - 0.5) if uniforms[0] < chance else 0.0
         mean_square = (SLIP_MIN**2 + SLIP_MIN * SLIP_MAX + SLIP_MAX**2) / 3.0
-        std = [math.sqrt(v) for v in variances]
-        noise = (std[0] * normals[0], std[1] * normals[1], std[2] * normals[2] + slip)
-        return variances, chance * mean_square, noise
+        noise = (
+            math.sqrt(trans) * normals[0],
+            math.sqrt(side) * normals[1],
+            math.sqrt(rot) * normals[2] + slip,
+        )
+        rot += chance * mean_square
+        # An extra length driven on an extra half turn: the one second-order term that matters,
+        # because nothing of first order is sideways but ``side``.
+        return (trans, side + 0.25 * trans * rot, rot), noise
 
     def begin_scan(self, travel: ArrayLike, *, contact: bool = False) -> None:
         """Advance to the stamp of a scan (its earliest beam); closes the motion increment."""
