@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -48,6 +48,7 @@ class Bodies:
             (i for i, m in enumerate(scene.movers) if m.kind == "robot"), None
         )
         self.radius = np.array([m.radius for m in scene.movers])
+        self._row = {m.name: i for i, m in enumerate(scene.movers)}
         self.mover_of_body = self._owners()
         n = len(scene.movers)
         self._qpos, self._dof = np.full(n, -1), np.full(n, -1)
@@ -61,9 +62,8 @@ class Bodies:
         self._planar, self._doors = np.nonzero(~kinds)[0], np.nonzero(kinds)[0]
 
     def _owners(self) -> NDArray[np.int64]:
-        index = {m.name: i for i, m in enumerate(self.scene.movers)}
         names = (self.model.body(b).name for b in range(self.model.nbody))
-        return np.array([index.get(n.partition("/")[0], STATIC) for n in names], dtype=np.int64)
+        return np.array([self._row.get(n.partition("/")[0], STATIC) for n in names], dtype=np.int64)
 
     def _add_planar(self, i: int, mover: Mover) -> None:
         joints = [self.model.joint(f"{mover.name}/{axis}") for axis in ("x", "y", "yaw")]
@@ -84,20 +84,22 @@ class Bodies:
         heading = math.atan2(float(centre[1]) - y, float(centre[0]) - x)
         self._hinge[i] = x, y, heading, math.copysign(1.0, data.xaxis[joint.id][2])
 
-    def radius_of(self, name: str) -> float:
-        """m, footprint of a mover; for a door the width of its leaf."""
-        return next(m.radius for m in self.scene.movers if m.name == name)
+    def rows(self, names: Sequence[str]) -> NDArray[np.int64]:
+        """Index into ``scene.movers`` of each name."""
+        return np.array([self._row[name] for name in names], dtype=np.int64)
 
-    def addresses(self, names: list[str]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def addresses(self, names: Sequence[str]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """First qpos and first dof address of each named mover."""
-        index = {m.name: i for i, m in enumerate(self.scene.movers)}
-        rows = np.array([index[name] for name in names], dtype=np.int64)
+        rows = self.rows(names)
         return self._qpos[rows].astype(np.int64), self._dof[rows].astype(np.int64)
 
-    def hinges(self, names: list[str]) -> Float:
+    def hinges(self, names: Sequence[str]) -> Float:
         """(n, 4) hinge x, y m, heading of the closed leaf rad, sign of opening, by door name."""
-        index = {m.name: i for i, m in enumerate(self.scene.movers)}
-        return self._hinge[np.array([index[name] for name in names], dtype=np.int64)]
+        return self._hinge[self.rows(names)]
+
+    def radii(self, names: Sequence[str]) -> Float:
+        """(n,) m, footprint of each named mover; for a door the width of its leaf."""
+        return self.radius[self.rows(names)]
 
     def robot_pose(self, data: mujoco.MjData) -> Float:
         """(3,) x m, y m, heading rad."""

@@ -152,7 +152,7 @@ def choose(
         for step in range(1, 3):
             c = clearance_at(field, x + 0.3 * step * vx, y + 0.3 * step * vy)
             if c < here:
-                cost += 6.0 * (here - c)
+                cost += 25.0 * (here - c)
         if cost < best:
             cost += danger(i, vx, vy, near, discs, fade)
         if cost < best:

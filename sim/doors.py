@@ -121,7 +121,7 @@ class Doors:
         qpos, dof = bodies.addresses(self.names)
         self.addresses = np.column_stack([qpos, dof])
         self.hinges = bodies.hinges(self.names)
-        self.widths = np.array([bodies.radius_of(name) for name in self.names])
+        self.widths = bodies.radii(self.names)
         heading = self.hinges[:, 2].tolist()
         self.along = np.array([[math.cos(a), math.sin(a)] for a in heading]).reshape(m, 2)
         self.middles = self.hinges[:, :2] + 0.5 * self.widths[:, None] * self.along

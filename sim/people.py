@@ -166,7 +166,7 @@ def _discs(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Float:
     for row, name in enumerate(planar):
         kind = crowd.PERSON if row < len(people) else crowd.CHAIR
         discs[row, crowd.KIND] = crowd.ROBOT if name == "robot" else kind
-        discs[row, crowd.R] = bodies.radius_of(name)
+    discs[: len(planar), crowd.R] = bodies.radii(planar)
     for row in range(len(planar), len(discs)):
         discs[row, crowd.KIND] = crowd.LEAF + (row - len(planar)) // 3
         discs[row, crowd.R] = 0.06

@@ -63,7 +63,8 @@ class World:
         self.step_count = 0
         self.bodies = Bodies(self.model, self.scene)
         self._contacts = RobotContacts(self.model, self.bodies)
-        self._drive = Drive(self.model, drive or DriveConfig())
+        self.drive_config = drive or DriveConfig()
+        self._drive = Drive(self.model, self.drive_config)
         self._shoves = {kind: self._make_shoves(kind) for kind in ("chair", "bin")}
         self._doors = Doors(
             self.model,
@@ -80,6 +81,7 @@ class World:
             pace=self.rates.pace,
             counters=self._counters("people"),
         )
+        self._people_rows = self.bodies.rows(self.people.names)
         self.scene.place(self.model, self.data)
         self.people.start(self.data)
         mujoco.mj_forward(self.model, self.data)
@@ -172,8 +174,13 @@ class World:
         return self.bodies.speeds(self.data)
 
     def movers_moving(self) -> NDArray[np.bool_]:
-        """(n,) True for each of ``scene.movers`` faster than ``MOVING_SPEED``."""
-        return self.mover_speeds() > MOVING_SPEED
+        """(n,) True for each of ``scene.movers`` faster than ``MOVING_SPEED``.
+
+        A person with a foot in the air moves, however still the torso.
+        """
+        moving = self.mover_speeds() > MOVING_SPEED
+        moving[self._people_rows] |= self.people.swinging()
+        return moving
 
     def moving_bodies(self) -> NDArray[np.bool_]:
         """(nbody,) True for each body of the model that belongs to a moving mover."""
