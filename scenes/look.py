@@ -117,7 +117,7 @@ def _trim(
     size: tuple[float, float, float],
     material: str,
 ) -> None:
-    spec.worldbody.add_geom(
+    (spec.body("trim") or spec.worldbody.add_body(name="trim")).add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_BOX,
         pos=pos,

@@ -22,9 +22,11 @@ from numpy.typing import NDArray
 from sim import gl
 from slam.errors import InvalidValueError, MissingDependencyError
 
-HIDDEN_GROUPS = (3, 4, 5)  # collision hulls, marks
+PAINT_GROUP = 5  # shadows painted under things
+HIDDEN_GROUPS = (3, 4)  # collision hulls, marks
 MAX_GEOMS = 20_000
 MAX_SIZE = 4096
+SMALL = 480  # px; up to this height, fewer facets do (a third of the cost)
 
 
 class Camera:
@@ -66,6 +68,7 @@ class Camera:
         for group in HIDDEN_GROUPS:
             self._option.geomgroup[group] = 0
             self._option.sitegroup[group] = 0
+        self._option.geomgroup[PAINT_GROUP] = 1
         self._view = mujoco.MjvCamera()
 
     def render(self, data: mujoco.MjData, camera: str = "persp") -> NDArray[np.uint8]:
@@ -117,14 +120,22 @@ def _make_context(
     model: mujoco.MjModel, width: int, height: int, shadows: bool, samples: int
 ) -> mujoco.MjrContext:
     """A render context with these qualities; the model is as before afterwards."""
-    screen, quality = model.vis.global_, model.vis.quality
-    before = screen.offwidth, screen.offheight, quality.offsamples, quality.shadowsize
-    screen.offwidth, screen.offheight, quality.offsamples = width, height, samples
+    changed: list[tuple[Any, str, int]] = [
+        (model.vis.global_, "offwidth", width),
+        (model.vis.global_, "offheight", height),
+        (model.vis.quality, "offsamples", samples),
+    ]
     if not shadows:
-        quality.shadowsize = 0
+        changed.append((model.vis.quality, "shadowsize", 0))
+    if height <= SMALL:
+        changed += [(model.vis.quality, "numslices", 8), (model.vis.quality, "numstacks", 5)]
+    before = [(owner, field, getattr(owner, field)) for owner, field, _ in changed]
+    for owner, field, value in changed:
+        setattr(owner, field, value)
     try:
         context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
     finally:
-        screen.offwidth, screen.offheight, quality.offsamples, quality.shadowsize = before
+        for owner, field, value in before:
+            setattr(owner, field, value)
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, context)
     return context

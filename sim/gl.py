@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether this machine can draw in 3-D, and by which library; found out without risking the process.
+"""Whether this machine can draw in 3-D, and by which library, without risking the process.
 
 MuJoCo picks its GL library from ``MUJOCO_GL`` while it is imported, and when that names a library
 that is not there the import itself dies with an AttributeError. So nothing here sets the variable,

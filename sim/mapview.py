@@ -235,9 +235,7 @@ def _cloths(scene: Scene) -> dict[str, dict[str, Any]]:
     }
     worn: dict[str, dict[str, Any]] = {}
     for body in scene.spec.bodies:
-        owner, _, part = body.name.rpartition("/")
-        if part != "base":
-            continue
+        owner = body.name.partition("/")[0]
         for geom in body.geoms:
             slot = geom.material.partition("_")[0]
             if slot in ("shirt", "hair", "skin", "fabric") and geom.material in colours:

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts open alone, and painted floors tile."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import scenes.builder
+from scenes import textures
+from scenes.placement import Floor, gap_to_boxes
+
+PARTS = sorted((Path(scenes.builder.__file__).parent / "parts").glob("*.xml"))
+
+
+@pytest.mark.parametrize("path", PARTS, ids=lambda path: path.stem)
+def test_a_part_is_a_model_of_its_own(path):
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert 'angle="radian"' in (path.parent / "common.xml").read_text()
+    assert path.stem == "common" or 'include file="common.xml"' in path.read_text()
+    for body in range(1, model.nbody):
+        assert model.body(body).name
+
+
+@pytest.mark.parametrize("kind", ["chair_swivel", "chair_visitor", "bin", "person", "robot"])
+def test_a_planar_part_collides_with_one_sphere(kind):
+    model = mujoco.MjModel.from_xml_path(str(PARTS[0].parent / f"{kind}.xml"))
+    solid = np.flatnonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+    assert [model.geom(int(g)).name for g in solid] == ["hull"]
+    assert model.geom_type[solid[0]] == mujoco.mjtGeom.mjGEOM_SPHERE
+
+
+def test_a_chair_shows_its_column_or_its_legs_to_the_laser():
+    for kind, wanted in (("chair_swivel", 1), ("chair_visitor", 4)):
+        model = mujoco.MjModel.from_xml_path(str(PARTS[0].parent / f"{kind}.xml"))
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        offsets = np.arange(-0.4, 0.4, 0.005)
+        groups = np.array([1, 1, 1, 0, 0, 0], dtype=np.uint8)
+        seen = set()
+        for offset in offsets.tolist():
+            for origin, way in (((-1.0, offset), (1.0, 0.0)), ((1.0, offset), (-1.0, 0.0))):
+                hit = np.zeros(1, dtype=np.int32)
+                point = np.array([*origin, scenes.SCAN_HEIGHT])
+                mujoco.mj_ray(model, data, point, np.array([*way, 0.0]), groups, 1, -1, hit, None)
+                seen.add(int(hit[0]))
+        assert len(seen - {-1}) == wanted
+
+
+@pytest.mark.parametrize("material", sorted(textures.PAINTERS))
+def test_a_floor_tile_wraps_round_without_a_seam(material):
+    data, n, size_m = textures.floor(material)
+    image = np.frombuffer(data, np.uint8).reshape(n, n, 3).astype(float)
+    assert size_m > 0
+    assert image.std() > 1.0
+    for axis in (0, 1):
+        steps = np.abs(image - np.roll(image, 1, axis=axis)).mean(axis=(1 - axis, 2))
+        assert steps[0] <= 1.2 * steps[1:].max()  # no step at the rim that is not inside too
+
+
+def test_the_gap_to_a_turned_box_is_euclidean():
+    boxes = np.array([[1.0, 0.0, 0.5, 0.25, np.pi / 2]])
+    points = np.array([[1.0, 0.0], [1.25, 0.5], [1.0, 1.5], [1.25 + 0.3, 0.5 + 0.4]])
+    np.testing.assert_allclose(gap_to_boxes(points, boxes), [0.0, 0.0, 1.0, 0.5], atol=1e-12)
+
+
+def test_a_floor_offers_only_free_places_and_says_when_it_is_full():
+    rng = np.random.default_rng(5)
+    floor = Floor([(0.0, 0.0, 2.0, 1.0)], np.array([[0.5, 0.5, 0.5, 0.5, 0.0]]))
+    for _ in range(20):
+        x, y = floor.find(rng, 0.2)
+        assert 1.2 <= x <= 2.0
+        assert 0.0 <= y <= 1.0
+    floor.block(1.5, 0.5, 1.0)
+    assert floor.find(rng, 0.2) is None
