@@ -48,7 +48,7 @@ class ShuntingConfig:
     threshold: float = 0.01
     trace_s: float = 3.0
     short_term_weight: float = 0.3
-    reward: float = 3.0
+    reward: float = 5.0
     reward_exponent: float = 1.0
     objective: Objective = "sum"
     range_m: float = 40.0

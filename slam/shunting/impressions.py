@@ -26,6 +26,7 @@ SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
 FAINT = 12.0  # squared Mahalanobis distance of I = 0.0025, where an impression ends
 NEAR_JOIN_CELLS = 3.0
 LONGEST_JOIN_M = 1.0
+SPACING_M, LEAST_WEIGHT = 0.1, 0.3  # beams closer than this share one observation's weight
 STRAIGHT = math.cos(math.radians(12.0))
 
 
@@ -35,6 +36,8 @@ class Observations:
 
     points_robot  (n, 2) m
     covariances   (n, 3) m^2: xx, xy, yy; at least (0.8 cell)^2 along every axis
+    weights       (n,) share of a full observation
+    tangents      (n, 2) unit direction of the surface where it goes on both ways, else 0
     joined        (n,) bool: the surface goes on to the next point. Without it the dots of a wall
                   seen at a grazing angle match themselves where the robot stood before
     view          what is seen to be empty
@@ -43,6 +46,8 @@ class Observations:
 
     points_robot: Float
     covariances: Float
+    weights: Float
+    tangents: Float
     joined: NDArray[np.bool_]
     view: View
     T_robot_laser: Float
@@ -124,12 +129,16 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
     variance = max(SIGMA_CELLS * config.cell_m, SENSOR_SIGMA_M) ** 2
     covariances = np.zeros((count, 3))
     covariances[:, 0] = covariances[:, 2] = variance
-    onward = np.zeros(count, np.bool_)
-    join(points[:count], beams[:count], NEAR_JOIN_CELLS * config.cell_m, onward)
+    onward, tangents = np.zeros(count, np.bool_), np.zeros((count, 2))
+    join(points[:count], beams[:count], NEAR_JOIN_CELLS * config.cell_m, onward, tangents)
+    distances = np.sqrt((points[:count] * points[:count]).sum(axis=1))
+    weights = np.clip(distances * spec.angle_increment / SPACING_M, LEAST_WEIGHT, 1.0)
     view = view_of_beams(bearings, free, spec.angle_increment, config.cell_m)
     return Observations(
         points_robot=points[:count],
         covariances=covariances,
+        weights=weights,
+        tangents=tangents,
         joined=onward,
         view=view,
         T_robot_laser=spec.T_robot_laser,
@@ -146,6 +155,8 @@ def from_features(features: Features, config: ShuntingConfig) -> Observations:
     return Observations(
         points_robot=points[near].copy(),
         covariances=covariances,
+        weights=np.ones(len(covariances)),
+        tangents=np.zeros((len(covariances), 2)),
         joined=np.zeros(len(covariances), np.bool_),
         view=view_of_features(points[near], config.cell_m),
         T_robot_laser=np.zeros(3),
@@ -157,6 +168,8 @@ def joined(first: Observations, second: Observations) -> Observations:
     return Observations(
         points_robot=np.concatenate([first.points_robot, second.points_robot]),
         covariances=np.concatenate([first.covariances, second.covariances]),
+        weights=np.concatenate([first.weights, second.weights]),
+        tangents=np.concatenate([first.tangents, second.tangents]),
         joined=np.concatenate([first.joined, second.joined]),
         view=first.view,
         T_robot_laser=first.T_robot_laser,
@@ -165,9 +178,13 @@ def joined(first: Observations, second: Observations) -> Observations:
 
 @njit
 def join(
-    points: NDArray[np.float64], beams: NDArray[np.int64], near: float, out: NDArray[np.bool_]
+    points: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    near: float,
+    out: NDArray[np.bool_],
+    tangents: NDArray[np.float64],
 ) -> None:
-    """Mark the points whose surface goes on to the next one.
+    """Mark the points whose surface goes on to the next one; fill the tangents.
 
     Hits of neighbouring beams (of index ``beams``) are joined when they are within ``near`` m, or
     when the stretch between them goes on straight, in like steps, before or behind.
@@ -189,6 +206,12 @@ def join(
                 e = math.sqrt(ex * ex + ey * ey)
                 if 0.4 * d < e < 2.5 * d and dx * ex + dy * ey > STRAIGHT * d * e:
                     out[k] = True
+    for k in range(n):
+        tangents[k] = 0.0
+        if k > 0 and out[k - 1] and out[k]:
+            dx, dy = points[k + 1, 0] - points[k - 1, 0], points[k + 1, 1] - points[k - 1, 1]
+            d = math.sqrt(dx * dx + dy * dy)
+            tangents[k, 0], tangents[k, 1] = dx / d, dy / d
 
 
 @njit
@@ -235,9 +258,7 @@ def _stamp_point(cells: Cells, u: float, v: float, a: float, b: float, d: float)
 
 
 @njit
-def _stamp_stretch(
-    cells: Cells, u: float, v: float, du: float, dv: float, variance: float
-) -> bool:
+def _stamp_stretch(cells: Cells, u: float, v: float, du: float, dv: float, variance: float) -> bool:
     """Gaussian ridge about the stretch from (u, v) to (u + du, v + dv), in cells."""
     square = du * du + dv * dv
     flat = abs(du) >= abs(dv)

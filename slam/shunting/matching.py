@@ -24,6 +24,7 @@ from slam.shunting.network import MASK, SHIFT, Cells, Network
 from slam.shunting.search import SearchWindow, search
 
 MATCHED_OVERLAP = 0.15  # an observation that overlaps the map less is not matched
+ENOUGH = 1e-4  # expected rise of the score below which climbing ends
 LOG_FLOOR = 0.1  # added to an overlap before its logarithm is taken
 
 
@@ -106,18 +107,23 @@ def evaluate(
     reward: Reward,
     points: NDArray[np.float64],
     covariances: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    tangents: NDArray[np.float64],
     pose: NDArray[np.float64],
     gradient: NDArray[np.float64],
+    along: NDArray[np.float64],
     information: NDArray[np.float64],
-) -> tuple[float, int]:
-    """Sum of rewards of the observations seen from ``pose``, and how many are matched.
+) -> tuple[float, float]:
+    """Sum of rewards of the observations seen from ``pose``, and the weight of those matched.
 
-    Fills the gradient (3,) by (x, y, theta) and the information (3, 3): the negative curvature, of
-    each observation only where it is positive, so that Newton's step goes uphill.
+    Fills the gradient (3,) by (x, y, theta), the part of it ``along`` the observed surfaces, and
+    the information (3, 3): the negative curvature, of each observation only where it is positive,
+    so that Newton's step goes uphill.
     """
     gradient[:] = 0.0
+    along[:] = 0.0
     information[:] = 0.0
-    score, matched = 0.0, 0
+    score, matched = 0.0, 0.0
     out = np.empty(6)
     scale = 1.0 / reward.cell
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -134,16 +140,16 @@ def evaluate(
         _overlap(cells, reward, u, v, cov, out)
         f = out[0]
         if f > MATCHED_OVERLAP:
-            matched += 1
+            matched += weights[k]
         gx, gy = out[1] * scale, out[2] * scale
         a, b, d = out[3] * scale * scale, out[4] * scale * scale, out[5] * scale * scale
         if reward.logarithm:
             inverse = 1.0 / (LOG_FLOOR + f)
-            score += math.log(LOG_FLOOR + f)
+            score += weights[k] * math.log(LOG_FLOOR + f)
             gx, gy = gx * inverse, gy * inverse
             a, b, d = a * inverse + gx * gx, b * inverse + gx * gy, d * inverse + gy * gy
         else:
-            score += f
+            score += weights[k] * f
         # keep the positive part of [[a, b], [b, d]]
         mean, half = 0.5 * (a + d), 0.5 * (a - d)
         radius = math.sqrt(half * half + b * b)
@@ -153,9 +159,17 @@ def evaluate(
         elif low < 0.0:
             keep = high / (2.0 * radius)
             a, b, d = keep * (half + radius), keep * b, keep * (radius - half)
+        w = weights[k]
+        gx, gy, a, b, d = w * gx, w * gy, w * a, w * b, w * d
         gradient[0] += gx
         gradient[1] += gy
         gradient[2] += gy * rx - gx * ry
+        tx = c * tangents[k, 0] - s * tangents[k, 1]
+        ty = s * tangents[k, 0] + c * tangents[k, 1]
+        slope = gx * tx + gy * ty
+        along[0] += slope * tx
+        along[1] += slope * ty
+        along[2] += slope * (ty * rx - tx * ry)
         information[0, 0] += a
         information[0, 1] += b
         information[1, 1] += d
@@ -209,43 +223,50 @@ def refine(
     reward: Reward,
     points: NDArray[np.float64],
     covariances: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    tangents: NDArray[np.float64],
     pose: NDArray[np.float64],
     prediction: NDArray[np.float64],
     precision: NDArray[np.float64],
     tau: float,
     information: NDArray[np.float64],
-) -> tuple[float, float, int]:
+) -> tuple[float, float, float]:
     """Climb to the maximum of tau * reward - 1/2 Mahalanobis^2 from ``pose`` (changed in place).
 
-    Newton's method with Levenberg damping; a step is taken only if it rises. Returns the total
-    score, the prior's part of it and the number of matched observations; leaves the data's
-    information (without tau and prior) in ``information``.
+    Newton's method with Levenberg damping; a step is taken only if it rises. The slope of the
+    reward along observed surfaces is left out of it: there it only says where the map is older,
+    which would hold a robot back in a corridor. Returns reward, prior and the weight of matched
+    observations; leaves the data's information (without tau and prior) in ``information``.
     """
-    gradient, slope, step = np.empty(3), np.empty(3), np.empty(3)
-    trial_gradient, trial_information = np.empty(3), np.empty((3, 3))
-    trial, H = np.empty(3), np.empty((3, 3))
-    rewarded, matched = evaluate(cells, reward, points, covariances, pose, gradient, information)
-    best = tau * rewarded + _prior(pose, prediction, precision, slope)
+    gradient, along, slope, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    trial, trial_gradient, trial_along = np.empty(3), np.empty(3), np.empty(3)
+    trial_information, H = np.empty((3, 3)), np.empty((3, 3))
+    rewarded, matched = evaluate(
+        cells, reward, points, covariances, weights, tangents, pose, gradient, along, information
+    )
+    prior = _prior(pose, prediction, precision, slope)
     damping = 1e-3
     for _ in range(20):
         for a in range(3):
             for b in range(3):
                 H[a, b] = tau * information[a, b] + precision[a, b]
-            slope[a] += tau * gradient[a]
+            slope[a] += tau * (gradient[a] - along[a])
         _solve(H, slope, damping, step)
-        expected = step[0] * slope[0] + step[1] * slope[1] + step[2] * slope[2]
-        if expected < 1e-5:
+        if step[0] * slope[0] + step[1] * slope[1] + step[2] * slope[2] < ENOUGH:
             break
         for a in range(3):
             trial[a] = pose[a] + step[a]
-        rewarded, trial_matched = evaluate(
-            cells, reward, points, covariances, trial, trial_gradient, trial_information
-        )
-        total = tau * rewarded + _prior(trial, prediction, precision, step)
-        if total > best:
-            best, matched = total, trial_matched
+        trial_rewarded, trial_matched = evaluate(
+            cells, reward, points, covariances, weights, tangents,
+            trial, trial_gradient, trial_along, trial_information,
+        )  # fmt: skip
+        older = along[0] * step[0] + along[1] * step[1] + along[2] * step[2]
+        trial_prior = _prior(trial, prediction, precision, step)
+        if tau * (trial_rewarded - rewarded - older) + trial_prior > prior:
+            rewarded, prior, matched = trial_rewarded, trial_prior, trial_matched
             pose[:] = trial
             gradient[:] = trial_gradient
+            along[:] = trial_along
             information[:] = trial_information
             damping = max(0.2 * damping, 1e-6)
         else:
@@ -253,7 +274,7 @@ def refine(
             if damping > 1e6:
                 break
         _prior(pose, prediction, precision, slope)
-    return best, _prior(pose, prediction, precision, slope), matched
+    return rewarded, prior, matched
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -297,24 +318,26 @@ class Matcher:
         precision: Float,
     ) -> Match:
         """The local optimum reached from ``start``; the reward's weight falls with the match."""
-        n = len(observations.points_robot)
+        full = float(observations.weights.sum())
         pose = np.array(start, dtype=np.float64)
         information = np.zeros((3, 3))
         tau, matched, score = self.config.reward, 0.0, -math.inf
-        while n:
-            total, prior, count = refine(
+        while full > 0.0:
+            rewarded, prior, count = refine(
                 network.cells,
                 self.reward,
                 observations.points_robot,
                 observations.covariances,
+                observations.weights,
+                observations.tangents,
                 pose,
                 prediction,
                 precision,
                 tau,
                 information,
             )
-            matched = count / n
-            score = (total - prior) * self.config.reward / tau + prior
+            matched = count / full
+            score = self.config.reward * rewarded + prior
             tempered = max(self.config.reward * matched**self.config.reward_exponent, 1e-6)
             if tau < self.config.reward or tempered > 0.9 * tau:
                 break

@@ -271,7 +271,7 @@ def search(
     bases = np.empty((len(turns), len(chosen), 2), np.int32)
     _place(chosen, prediction, turns, cell, i0, j0, bases)
     best = np.zeros(3, np.int64)
-    scale = gain * len(points) / len(chosen) / FULL
+    scale = gain * float(observations.weights.mean()) * len(points) / len(chosen) / FULL
     _, evaluations = branch_and_bound(
         levels_of(field), bases, turns, reach, cell, precision, scale, best
     )
