@@ -34,7 +34,7 @@ class TourConfig:
 
     v_max_mps: float = 0.7
     omega_max_radps: float = 1.4
-    robot_radius_m: float = 0.30
+    robot_radius_m: float = 0.28
     goal_radius_m: float = 0.5
     patience_s: float = 6.0
 
@@ -53,6 +53,21 @@ def _field_at(
     if i < 0 or j < 0 or i >= field.shape[0] or j >= field.shape[1]:
         return _FAR
     return float(field[i, j])
+
+
+@njit
+def _between(
+    field: NDArray[np.float64], x0: float, y0: float, cell: float, x: float, y: float
+) -> float:
+    """``field`` at (x, y), bilinear between cell centres; 0 outside."""
+    u, v = (x - x0) / cell - 0.5, (y - y0) / cell - 0.5
+    j, i = math.floor(u), math.floor(v)
+    if i < 0 or j < 0 or i + 1 >= field.shape[0] or j + 1 >= field.shape[1]:
+        return 0.0
+    a, b = u - j, v - i
+    low = (1.0 - a) * field[i, j] + a * field[i, j + 1]
+    high = (1.0 - a) * field[i + 1, j] + a * field[i + 1, j + 1]
+    return float((1.0 - b) * low + b * high)
 
 
 @njit
@@ -78,14 +93,14 @@ def _score(
     clearance, cost_to_go, x0, y0, cell, radius = grid
     x, y, theta = pose[0], pose[1], pose[2]
     run_over = 0.0
-    start = min(_field_at(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, 0.0)) - radius
+    start = min(_between(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, 0.0)) - radius
     closest = _FAR
     for step in range(1, 12):
         t = 0.15 * step
         x += 0.15 * v * math.cos(theta + 0.075 * omega)
         y += 0.15 * v * math.sin(theta + 0.075 * omega)
         theta += 0.15 * omega
-        free = min(_field_at(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, t)) - radius
+        free = min(_between(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, t)) - radius
         if free < 0.0 and free <= start + 0.02:  # an overlap at the start may be driven out of
             if v != 0.0:
                 return -_FAR
@@ -112,8 +127,8 @@ def _choose(
     """The best (v, omega) of the window, and its score."""
     v_max, omega_max = limits
     best_v, best_omega, best = 0.0, 0.0, -_FAR
-    for a in range(-1, 5):
-        v = v_max * a / 4.0
+    for a in range(-1, 7):
+        v = v_max * a / 6.0
         if a < 0:
             v = -0.3 * v_max
         if v - now[0] > 0.35:
@@ -142,7 +157,7 @@ class Driver:
         self.config = config
         self.goals = np.asarray(goals, dtype=np.float64)
         self.visited = 0
-        self._grid = grid
+        self._grid = self._walls = grid
         self._index = 0
         self._best = math.inf
         self._idle_s = 0.0
@@ -168,21 +183,33 @@ class Driver:
             self._next()
         to_go = self._grid.cost_to(self.goal)
         left = self._grid.lookup(to_go, T_world_robot[0], T_world_robot[1])
-        if left < self._best - 0.1:
+        if left >= _FAR and self._idle_s > 1.0:
+            self._next()  # there is no way at present: somewhere else meanwhile
+        elif left < self._best - 0.1:
             self._best, self._idle_s = left, 0.0
         else:
             self._idle_s += dt
             if self._idle_s > self.config.patience_s:
                 self._next()
-        grid = self._grid
+        grid, radius = self._grid, self.config.robot_radius_m
+        if self._idle_s > 1.5:
+            radius *= 0.93  # squeeze past rather than stand before a gap that is just wide enough
         v, omega, _ = _choose(
             np.asarray(T_world_robot, dtype=np.float64),
             np.asarray(velocity, dtype=np.float64),
             (self.config.v_max_mps, self.config.omega_max_radps),
             np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 5),
-            (grid.clearance, to_go, grid.x0, grid.y0, grid.cell, self.config.robot_radius_m),
+            (self._walls.clearance, to_go, grid.x0, grid.y0, grid.cell, radius),
         )
         return v, omega
+
+    def use(self, grid: NavGrid) -> None:
+        """Plan on this layout from now on (a door has opened, say).
+
+        What must not be touched is still the first layout, and the discs of each ``command``.
+        """
+        self._grid = grid
+        self._best = math.inf
 
     def _next(self) -> None:
         self._index += 1

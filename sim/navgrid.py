@@ -8,23 +8,23 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from slam._jit import njit
 from slam.frames import Float
 
 _FAR = 1e6
+CLEAR_M = 1.0  # clearance is not told apart beyond this
 
 
 class NavGrid:
     """Clearance and cost-to-go on a grid; row 0 is the lowest y, (x0, y0) its lower left corner.
 
-    A cell that a box touches is blocked, so thin walls have no holes and clearance is at most one
-    cell too small, never too large.
-
     bounds     xmin, ymin, xmax, ymax of the floor, m; outside counts as wall
     obstacles  (n, 5) boxes: centre x, y, half sizes (m), yaw (rad)
-    radius     m, the disc's; cells nearer than this to an obstacle cannot be entered
+    radius     m; a cell whose centre is nearer than this to an obstacle cannot be entered. Keep it
+               above half a cell, else a path may cross a thin wall between two centres
+
+    ``clearance`` is the distance from each cell's centre to the nearest obstacle, at most 1 m.
     """
 
     def __init__(
@@ -34,18 +34,26 @@ class NavGrid:
         radius: float,
         cell: float = 0.1,
     ) -> None:
-        self.cell = cell
+        self.cell, self.radius = cell, radius
         self.x0, self.y0 = bounds[0], bounds[1]
         columns = math.ceil((bounds[2] - bounds[0]) / cell)
         rows = math.ceil((bounds[3] - bounds[1]) / cell)
-        boxes = np.ascontiguousarray(obstacles, dtype=np.float64).reshape(-1, 5)
-        blocked = np.zeros((rows + 2, columns + 2), dtype=np.bool_)  # one ring of wall around it
-        blocked[0], blocked[-1], blocked[:, 0], blocked[:, -1] = True, True, True, True
-        _rasterise(blocked[1:-1, 1:-1], boxes, self.x0, self.y0, cell)
-        distance = ndimage.distance_transform_edt(~blocked)[1:-1, 1:-1]
-        self.clearance: Float = np.ascontiguousarray((distance - 0.5) * cell)
-        self._passable = self.clearance > radius
+        x = bounds[0] + (np.arange(columns) + 0.5) * cell
+        y = bounds[1] + (np.arange(rows) + 0.5) * cell
+        to_side = np.minimum(x - bounds[0], bounds[2] - x)
+        to_end = np.minimum(y - bounds[1], bounds[3] - y)
+        self.clearance: Float = np.minimum(np.minimum(to_side[None, :], to_end[:, None]), CLEAR_M)
+        _approach(self.clearance, _boxes(obstacles), self.x0, self.y0, cell)
         self._costs: dict[tuple[float, float], Float] = {}
+
+    def with_boxes(self, boxes: Float) -> NavGrid:
+        """The same floor with more obstacles on it, (k, 5)."""
+        other = object.__new__(NavGrid)
+        other.cell, other.radius, other.x0, other.y0 = self.cell, self.radius, self.x0, self.y0
+        other.clearance = self.clearance.copy()
+        _approach(other.clearance, _boxes(boxes), self.x0, self.y0, self.cell)
+        other._costs = {}
+        return other
 
     def lookup(self, field: Float, x: float, y: float) -> float:
         """``field`` in the cell of (x, y); 1e6 outside."""
@@ -62,38 +70,43 @@ class NavGrid:
         if key not in self._costs:
             i = math.floor((key[1] - self.y0) / self.cell)
             j = math.floor((key[0] - self.x0) / self.cell)
-            self._costs[key] = _cost_to(self._passable, self.clearance, i, j, self.cell)
+            self._costs[key] = _cost_to(self.clearance, self.radius, i, j, self.cell)
         return self._costs[key]
 
 
+def _boxes(boxes: Float) -> Float:
+    return np.ascontiguousarray(boxes, dtype=np.float64).reshape(-1, 5)
+
+
 @njit
-def _rasterise(
-    blocked: NDArray[np.bool_], boxes: NDArray[np.float64], x0: float, y0: float, cell: float
+def _approach(
+    clearance: NDArray[np.float64], boxes: NDArray[np.float64], x0: float, y0: float, cell: float
 ) -> None:
+    """Lower ``clearance`` to the distance to each box, 0 inside."""
     for k in range(boxes.shape[0]):
         cx, cy, hx, hy, yaw = boxes[k]
         c, s = math.cos(yaw), math.sin(yaw)
-        reach = math.sqrt(hx * hx + hy * hy)
+        reach = math.sqrt(hx * hx + hy * hy) + CLEAR_M
         for i in range(
             max(0, int((cy - reach - y0) / cell)),
-            min(blocked.shape[0], int((cy + reach - y0) / cell) + 2),
+            min(clearance.shape[0], int((cy + reach - y0) / cell) + 2),
         ):
             for j in range(
                 max(0, int((cx - reach - x0) / cell)),
-                min(blocked.shape[1], int((cx + reach - x0) / cell) + 2),
+                min(clearance.shape[1], int((cx + reach - x0) / cell) + 2),
             ):
                 dx, dy = x0 + (j + 0.5) * cell - cx, y0 + (i + 0.5) * cell - cy
-                u, v = c * dx + s * dy, -s * dx + c * dy
-                if abs(u) <= hx + 0.5 * cell and abs(v) <= hy + 0.5 * cell:
-                    blocked[i, j] = True
+                u = max(0.0, abs(c * dx + s * dy) - hx)
+                v = max(0.0, abs(-s * dx + c * dy) - hy)
+                clearance[i, j] = min(clearance[i, j], math.sqrt(u * u + v * v))
 
 
 @njit
 def _cost_to(
-    passable: NDArray[np.bool_], clearance: NDArray[np.float64], i0: int, j0: int, cell: float
+    clearance: NDArray[np.float64], radius: float, i0: int, j0: int, cell: float
 ) -> NDArray[np.float64]:
     """Dijkstra on eight neighbours; a step costs its length times 1 to 3 near walls."""
-    rows, columns = passable.shape
+    rows, columns = clearance.shape
     cost = np.full((rows, columns), _FAR)
     if i0 < 0 or j0 < 0 or i0 >= rows or j0 >= columns:
         return cost
@@ -108,7 +121,7 @@ def _cost_to(
                 a, b = i + di, j + dj
                 if (di == 0 and dj == 0) or a < 0 or b < 0 or a >= rows or b >= columns:
                     continue
-                if not passable[a, b]:
+                if clearance[a, b] < radius:
                     continue
                 tight = max(0.0, 0.7 - clearance[a, b]) / 0.7
                 length = cell * (math.sqrt(2.0) if di != 0 and dj != 0 else 1.0)

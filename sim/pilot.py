@@ -16,9 +16,12 @@ from sim.drive import Driver, TourConfig, tour
 from sim.navgrid import NavGrid
 from sim.world import World
 from slam import se2
-from slam.frames import Float
+from slam.frames import NS_PER_S, Float
 
 SIGHT_M = 4.0  # discs further away than this do not matter within the driver's horizon
+AJAR = 0.6  # rad; a leaf less open than this is let open for the robot, a wider one is gone round
+REPLAN_S = 1.0  # at most this often
+LEAF_M = 0.05  # half thickness with which a leaf is planned around
 
 
 class Pilot:
@@ -26,13 +29,18 @@ class Pilot:
 
     def __init__(self, world: World, config: TourConfig | None = None) -> None:
         self.world = world
-        config = config or TourConfig()
         scene = world.scene
-        grid = NavGrid(scene.bounds, scene.obstacles, config.robot_radius_m)
-        self.driver = Driver(grid, tour(scene.goals, world.seeds.generator("driving")), config)
+        config = config or TourConfig()
         self._doors = np.array([m.kind == "door" for m in scene.movers], dtype=np.bool_)
+        self._closed = world.bodies.hinges([m.name for m in scene.movers if m.kind == "door"])[:, 2]
         self._others = np.array([m.kind not in ("door", "robot") for m in scene.movers])
         self._radii = np.array([m.radius for m in scene.movers], dtype=np.float64)
+        self._planned_ns = world.time_ns
+        self._leaves_planned = self._open_leaves(world.mover_poses())
+        goals = tour(scene.goals, world.seeds.generator("driving"))
+        self._walls = NavGrid(scene.bounds, scene.obstacles, config.robot_radius_m - 0.05)
+        self.driver = Driver(self._walls, goals, config)
+        self.driver.use(self._walls.with_boxes(self._leaves_planned))
         self._last: Float | None = None
         self._here: Float | None = None
 
@@ -43,12 +51,36 @@ class Pilot:
         if self._last is not None:
             velocities = (poses[:, :2] - self._last[:, :2]) / dt
         self._last = poses
+        self._replan(poses)
         here = self.world.robot_pose()
         velocity = self._velocity(here, dt)
         discs = np.concatenate([self._bodies(poses, velocities), self._leaves(poses)])
         gap = discs[:, :2] - here[:2]
         near = gap[:, 0] * gap[:, 0] + gap[:, 1] * gap[:, 1] < SIGHT_M * SIGHT_M
         return self.driver.command(here, velocity, discs[near], dt)
+
+    def _replan(self, poses: Float) -> None:
+        """Plan anew when a leaf stands elsewhere by more than about 20 degrees."""
+        if self.world.time_ns - self._planned_ns < REPLAN_S * NS_PER_S:
+            return
+        leaves = self._open_leaves(poses)
+        if len(leaves) == len(self._leaves_planned):
+            turned = se2.wrap_array(leaves[:, 4] - self._leaves_planned[:, 4])
+            if not (np.abs(turned) > 0.35).any():
+                return
+        self._planned_ns, self._leaves_planned = self.world.time_ns, leaves
+        self.driver.use(self._walls.with_boxes(leaves))
+
+    def _open_leaves(self, poses: Float) -> Float:
+        """(k, 5) boxes of the leaves that stand open."""
+        rows = []
+        doors = np.column_stack([poses, self._radii])[self._doors]
+        for (x, y, yaw, width), closed in zip(doors.tolist(), self._closed.tolist(), strict=True):
+            if abs(se2.wrap(yaw - closed)) > AJAR:
+                half = 0.5 * width
+                cx, cy = x + half * math.cos(yaw), y + half * math.sin(yaw)
+                rows.append((cx, cy, half, LEAF_M, yaw))
+        return np.array(rows, dtype=np.float64).reshape(-1, 5)
 
     def _velocity(self, here: Float, dt: float) -> tuple[float, float]:
         """(v m/s, omega rad/s) since the last call; at rest at the first."""
@@ -63,10 +95,12 @@ class Pilot:
         return np.column_stack([poses[pick, :2], self._radii[pick], velocities[pick]])
 
     def _leaves(self, poses: Float) -> NDArray[np.float64]:
-        """Three discs along each door leaf, taken as standing still."""
+        """Six discs along each door leaf, taken as standing still."""
         rows = []
         for x, y, yaw, width in np.column_stack([poses, self._radii])[self._doors].tolist():
-            for share in (0.2, 0.55, 0.9):
-                reach = share * width
-                rows.append((x + reach * math.cos(yaw), y + reach * math.sin(yaw), 0.15, 0.0, 0.0))
+            for k in range(1, 7):
+                reach = width * k / 6.0
+                rows.append(
+                    (x + reach * math.cos(yaw), y + reach * math.sin(yaw), LEAF_M, 0.0, 0.0)
+                )
         return np.array(rows, dtype=np.float64).reshape(-1, 5)
