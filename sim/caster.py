@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim import fan as fans
 from sim import raycast
 from slam.errors import InvalidValueError
 
@@ -78,15 +79,15 @@ def _changes_height(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.bo
 def _half_height(kind: int, size: Float, mat: Float) -> float:
     """Half the vertical extent of a primitive with the given orientation, m."""
     up = np.abs(mat[6:9])  # world z of the geom's own axes
-    if kind == raycast.PLANE:
+    if kind == fans.PLANE:
         return 0.0 if up[2] > 1.0 - 1e-12 else math.inf
-    if kind == raycast.SPHERE:
+    if kind == fans.SPHERE:
         return float(size[0])
-    if kind == raycast.CAPSULE:
+    if kind == fans.CAPSULE:
         return float(size[0] + size[1] * up[2])
-    if kind == raycast.CYLINDER:
+    if kind == fans.CYLINDER:
         return float(size[1] * up[2] + size[0] * math.sqrt(max(0.0, 1.0 - up[2] * up[2])))
-    if kind == raycast.ELLIPSOID:
+    if kind == fans.ELLIPSOID:
         return float(math.sqrt(float(((up * size) ** 2).sum())))
     return float((up * size).sum())
 
@@ -116,7 +117,8 @@ class Raycaster:
         self.height = height
         self.ids = self._candidates(model, robot, range_max)
         self._table = self._geom_table
-        self._optics = (self.spot.rays(), (self.spot.aperture, self.spot.divergence))
+        self._optics = (self.spot.rays(), self.spot.aperture)
+        self._spot = (self.spot.aperture, self.spot.divergence)
         n = self.ids.size
         self._poses = (np.full((n, 12), np.nan), np.full((n, 12), np.nan))
         self._bounds = np.zeros((n, 6))
@@ -156,7 +158,7 @@ class Raycaster:
             if not (lifts[body] or meets):
                 continue
             kind = int(model.geom_type[geom])
-            if kind not in raycast.PRIMITIVES:
+            if kind not in fans.PRIMITIVES:
                 raise InvalidValueError(
                     f"geom {_name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)!r} is a "
                     f"{mujoco.mjtGeom(kind).name[7:].lower()} at the height of the scanner "
@@ -178,9 +180,7 @@ class Raycaster:
         self._follow(movable, restart=True)
 
     def _follow(self, movable: NDArray[np.int64], *, restart: bool) -> None:
-        raycast.follow(
-            self._table, self.ids, movable, self._views, self._poses, self._bounds, restart
-        )
+        fans.follow(self._table, self.ids, movable, self._views, self._poses, self._bounds, restart)
 
     def cast(
         self,
@@ -198,11 +198,12 @@ class Raycaster:
 
         ``out`` must come in as misses. The end of this step becomes the start of the next.
         """
+        beams, angles, taus = fan
         self._laser[0:6] = (*laser[0], *laser[1])
         self._follow(self._movable, restart=False)
-        raycast.cast_fan(
-            self._table, self._poses, self._bounds, fan, self._laser, self._optics, out
-        )
+        table, poses, bounds = self._table, self._poses, self._bounds
+        plan = fans.prepare(table, poses[1], bounds, angles, taus, self._laser, self._spot)
+        raycast.cast_fan(table, poses, bounds, plan, beams, self.height, self._optics, out)
 
 
 def _visible(model: mujoco.MjModel, geom: int) -> bool:
@@ -218,10 +219,10 @@ def _vertical_extent(
     """(half the height m, whether it is a box that stands upright for good)."""
     kind, mat = int(model.geom_type[geom]), data.geom_xmat[geom]
     bound = float(model.geom_rbound[geom])
-    if kind not in raycast.PRIMITIVES:
+    if kind not in fans.PRIMITIVES:
         # A mesh frame sits at its centre of mass; its bounding sphere is about its box's centre.
         bound += float(np.abs(model.geom_aabb[geom][:3]).sum())
         return bound, False
     if lifts:
-        return (math.inf if kind == raycast.PLANE else bound), False
+        return (math.inf if kind == fans.PLANE else bound), False
     return _half_height(kind, model.geom_size[geom], mat), bool(mat[8] > 1.0 - 1e-12)
