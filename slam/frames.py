@@ -42,8 +42,8 @@ def frozen(
     Raises ``InvalidValueError`` that names owner and field when it cannot be one.
     """
     try:
-        array = np.array(value, dtype=dtype)
-    except (TypeError, ValueError) as error:
+        array = np.array(value, dtype=dtype) if dtype is np.float64 else _cast(value, dtype)
+    except (TypeError, ValueError, ArithmeticError) as error:
         raise InvalidValueError(f"{owner}.{name} must be numeric: {error}") from error
     if array.ndim != len(shape) or any(
         want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
@@ -51,6 +51,18 @@ def frozen(
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         raise InvalidValueError(f"{owner}.{name} must have shape {wanted}, got {array.shape}")
     array.setflags(write=False)
+    return array
+
+
+def _cast(value: ArrayLike, dtype: Any) -> NDArray[Any]:
+    """A copy in a type that may not hold every number: losing more than digits is an error."""
+    raw = np.asarray(value)
+    if np.issubdtype(dtype, np.integer) and raw.size and raw.dtype.kind not in "iub":
+        raise ValueError(f"expected whole numbers, got {raw.dtype}")
+    with np.errstate(over="raise", invalid="raise"):
+        array: NDArray[Any] = np.array(raw, dtype=dtype)
+    if array.dtype.kind in "iu" and not np.array_equal(array, raw):
+        raise ValueError(f"some numbers do not fit {array.dtype}")
     return array
 
 
@@ -135,8 +147,10 @@ class LaserSpec(ByContent):
     T_robot_laser: Float = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        if self.n_beams < 1:
-            raise InvalidValueError(f"LaserSpec.n_beams must be >= 1, got {self.n_beams}")
+        if not isinstance(self.n_beams, (int, np.integer)) or self.n_beams < 1:
+            raise InvalidValueError(
+                f"LaserSpec.n_beams must be a whole number >= 1, got {self.n_beams!r}"
+            )
         if not (math.isfinite(self.angle_min) and math.isfinite(self.angle_increment)):
             raise InvalidValueError("LaserSpec.angle_min and angle_increment must be finite")
         if self.angle_increment <= 0.0:
@@ -156,6 +170,11 @@ class LaserSpec(ByContent):
             (self.n_beams,),
         )
         finite("LaserSpec", "beam_time_offsets", offsets)
+        if offsets.min() < 0.0:
+            raise InvalidValueError(
+                f"LaserSpec.beam_time_offsets must be >= 0 s (the stamp is the earliest beam's), "
+                f"got {offsets.min()}"
+            )
         object.__setattr__(self, "beam_time_offsets", offsets)
         object.__setattr__(
             self, "T_robot_laser", pose("LaserSpec", "T_robot_laser", self.T_robot_laser)
@@ -237,6 +256,11 @@ class Features(ByContent):
         k = len(points)
         covariances = frozen("Features", "covariances", self.covariances, (k, 2, 2))
         finite("Features", "covariances", covariances)
+        transposed = covariances.transpose(0, 2, 1)
+        if np.any(np.diagonal(covariances, axis1=1, axis2=2) < 0.0) or not np.allclose(
+            covariances, transposed, rtol=1e-6, atol=1e-9
+        ):
+            raise InvalidValueError("Features.covariances must be symmetric with variances >= 0")
         object.__setattr__(self, "points_robot", points)
         object.__setattr__(self, "covariances", covariances)
         if self.ids is not None:
@@ -335,6 +359,15 @@ class Frame(ByContent):
 
     def __post_init__(self) -> None:
         _stamp("Frame", self.stamp_ns)
+        sensed = self.scan if self.scan is not None else self.features
+        if self.odometry.stamp_ns != self.stamp_ns or (
+            sensed is not None and sensed.stamp_ns != self.stamp_ns
+        ):
+            raise InvalidValueError(
+                "Frame.stamp_ns must be that of its odometry and of its scan (or features), "
+                f"got {self.stamp_ns} ns beside {self.odometry.stamp_ns} ns"
+                + ("" if sensed is None else f" and {sensed.stamp_ns} ns")
+            )
         if self.truth is not None:
             object.__setattr__(self, "truth", pose("Frame", "truth", self.truth))
         if self.labels is not None and (

@@ -75,7 +75,8 @@ def exp(twist: ArrayLike, duration: float = 1.0) -> Array:
     if abs(theta) < 1e-6:
         sinc, cosc = 1.0 - theta * theta / 6.0, theta / 2.0
     else:
-        sinc, cosc = math.sin(theta) / theta, (1.0 - math.cos(theta)) / theta
+        half_sine = math.sin(theta / 2.0)  # 1 - cos cancels for small angles, 2 sin^2 does not
+        sinc, cosc = math.sin(theta) / theta, 2.0 * half_sine * half_sine / theta
     dx, dy = vx * duration, vy * duration
     return np.array([sinc * dx - cosc * dy, cosc * dx + sinc * dy, wrap(theta)])
 

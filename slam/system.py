@@ -71,7 +71,7 @@ class Raster:
             raise InvalidValueError(
                 f"Raster.values must lie in [0, 1] or be NaN, got {known.min()}..{known.max()}"
             )
-        if not self.resolution_m > 0.0:
+        if not 0.0 < self.resolution_m < np.inf:
             raise InvalidValueError(f"Raster.resolution_m must be > 0 m, got {self.resolution_m}")
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "T_map_origin", pose("Raster", "T_map_origin", self.T_map_origin))
@@ -122,7 +122,8 @@ def describe(name: str) -> str:
 def create(name: str, **config: Any) -> SlamSystem:
     """A fresh SLAM by registered name or by ``module:Class``; ``config`` goes to its constructor.
 
-    Raises ``UnknownNameError`` with the nearest known name, or what is wrong with the entry.
+    Raises ``UnknownNameError`` with the nearest known name, or what is wrong with the entry, and
+    ``InvalidValueError`` for options that its constructor does not have.
     """
     if ":" in name:
         factory = _load(name)
@@ -134,6 +135,7 @@ def create(name: str, **config: Any) -> SlamSystem:
         raise UnknownNameError(
             f"no SLAM is called '{name}'.{hint} Known: {', '.join(names())}, or module:Class."
         )
+    _check_options(name, factory, config)
     system = factory(**config)
     if not isinstance(system, SlamSystem):
         missing = [m for m in ("reset", "update", "map", "trajectory") if not hasattr(system, m)]
@@ -141,11 +143,24 @@ def create(name: str, **config: Any) -> SlamSystem:
     return system
 
 
+def _check_options(name: str, factory: Factory, config: Mapping[str, Any]) -> None:
+    if not callable(factory):
+        raise UnknownNameError(f"'{name}' is no class or function")
+    try:
+        signature = inspect.signature(factory)
+    except ValueError:  # some built-in callables do not tell
+        return
+    try:
+        signature.bind(**config)
+    except TypeError as error:
+        raise InvalidValueError(f"SLAM '{name}': {error}") from error
+
+
 def _load(entry: str) -> Factory:
     module_name, _, attribute = entry.partition(":")
     try:
         module = importlib.import_module(module_name)
-    except ImportError as error:
+    except (ImportError, TypeError, ValueError) as error:  # the last two: no proper module name
         raise UnknownNameError(f"'{entry}': cannot import '{module_name}' ({error})") from error
     try:
         factory: Factory = getattr(module, attribute)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import write_text
 from slam.frames import NS_PER_S, Float, finite, frozen
+
+MAX_STAMP_S = 9e9  # what 64-bit nanoseconds hold: year 2255
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,30 +49,48 @@ def write_tum(path: Path, trajectory: Trajectory) -> None:
     for stamp_ns, (x, y, theta) in zip(
         trajectory.stamps_ns.tolist(), trajectory.poses.tolist(), strict=True
     ):
-        seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
+        seconds, nanoseconds = divmod(abs(stamp_ns), NS_PER_S)
+        sign = "-" if stamp_ns < 0 else ""
         qz, qw = math.sin(theta / 2.0), math.cos(theta / 2.0)
-        lines.append(f"{seconds}.{nanoseconds:09d} {x:.9f} {y:.9f} 0 0 0 {qz:.12f} {qw:.12f}")
+        stamp = f"{sign}{seconds}.{nanoseconds:09d}"
+        lines.append(f"{stamp} {x:.9f} {y:.9f} 0 0 0 {qz:.12f} {qw:.12f}")
     write_text(path, "\n".join(lines) + "\n" if lines else "")
 
 
 def read_tum(path: Path) -> Trajectory:
     """The planar part of a TUM trajectory file; raises ``LogFormatError`` with the line."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise LogFormatError(path, "not a text file") from error
     stamps: list[int] = []
     poses: list[tuple[float, float, float]] = []
-    for number, line in enumerate(path.read_text().splitlines(), 1):
+    for number, line in enumerate(lines, 1):
         if not line.strip() or line.startswith("#"):
             continue
-        words = line.split()
         try:
-            if len(words) != 8:
-                raise ValueError(f"expected 8 numbers, found {len(words)}")
-            whole, _, fraction = words[0].partition(".")
-            stamps.append(int(whole) * NS_PER_S + int((fraction + "000000000")[:9]))
-            x, y, _, qx, qy, qz, qw = (float(word) for word in words[1:])
-        except ValueError as error:
-            raise LogFormatError(path, str(error), number) from error
-        yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-        poses.append((x, y, yaw))
+            stamp_ns, pose = _tum_pose(line.split())
+            if stamps and stamp_ns <= stamps[-1]:
+                raise ValueError("time does not increase")
+        except (ValueError, ArithmeticError) as error:
+            raise LogFormatError(path, f"no TUM pose: {error}", number) from error
+        stamps.append(stamp_ns)
+        poses.append(pose)
     return Trajectory(
         stamps_ns=np.array(stamps, dtype=np.int64), poses=np.array(poses).reshape(-1, 3)
     )
+
+
+def _tum_pose(words: list[str]) -> tuple[int, tuple[float, float, float]]:
+    """Stamp (ns, exact: Unix times have more digits than a float) and (x, y, yaw)."""
+    if len(words) != 8:
+        raise ValueError(f"expected 8 numbers, found {len(words)}")
+    x, y, _, qx, qy, qz, qw = values = [float(word) for word in words[1:]]
+    if not all(map(math.isfinite, values)) or not abs(float(words[0])) < MAX_STAMP_S:
+        raise ValueError(f"expected finite numbers and a time below {MAX_STAMP_S:g} s")
+    if qx == qy == qz == qw == 0.0:
+        raise ValueError("the quaternion is zero")
+    yaw = math.atan2(2.0 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
+    return round(Decimal(words[0]) * NS_PER_S), (x, y, yaw)

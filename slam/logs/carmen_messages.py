@@ -29,7 +29,7 @@ from slam.frames import NS_PER_S
 MAX_BEAMS = 20_000
 MAX_RANGE_M = 1e4
 MAX_COORDINATE = 1e6
-MAX_STAMP_S = 10_000_000_000  # year 2286
+MAX_STAMP_S = 9e9  # what 64-bit nanoseconds hold: year 2255
 NAME = re.compile(r"[A-Za-z][\w-]*")
 KNOWN_NAMES = tuple(
     [name]
