@@ -131,9 +131,11 @@ def choose(
     discs, state = crowd.discs, crowd.state
     wx, wy = wanted
     x, y = discs[i, X], discs[i, Y]
-    pace = max(math.sqrt(wx * wx + wy * wy), 0.5)
     heading = math.atan2(wy, wx)
     here = min(clearance_at(field, x, y), BODY)
+    wish = math.sqrt(wx * wx + wy * wy)
+    pace = max(wish, 0.5)
+    hurry = min(1.5 * state[i, BLOCKED], 3.0) if wish > 0.3 else 0.0
     best, best_x, best_y = math.inf, 0.0, 0.0
     for k in range(35):
         if k == 0:
@@ -146,9 +148,12 @@ def choose(
             angle = heading + (k - 3) // 2 * (math.pi / 8.0)
             speed = pace if k % 2 == 0 else 0.5 * pace
             vx, vy = speed * math.cos(angle), speed * math.sin(angle)
+        speed = math.sqrt(vx * vx + vy * vy)
         cost = math.sqrt((vx - wx) ** 2 + (vy - wy) ** 2)
         cost += 0.15 * math.sqrt((vx - state[i, VX]) ** 2 + (vy - state[i, VY]) ** 2)
         cost += 0.06 * max(0.0, wx * vy - wy * vx)  # people keep right
+        if speed < 0.9 * pace:  # who has been held up steps aside rather than stand
+            cost += hurry * (1.0 - speed / pace)
         for step in range(1, 3):
             c = clearance_at(field, x + 0.3 * step * vx, y + 0.3 * step * vy)
             if c < here:
@@ -221,7 +226,9 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:
                 passage[d, INSIDE] = 1.0
             if side == 0:
                 continue
-            if abs(dx * door[NX] + dy * door[NY]) < 0.4 and inside != int(passage[d, TURN]):
+            across, along = dx * door[NX] + dy * door[NY], dx * door[EX] + dy * door[EY]
+            in_frame = abs(across) < 0.4 and abs(along) < 0.5 * door[WIDTH]
+            if in_frame and (inside == 0 or side == int(passage[d, TURN])):
                 inside = side
             if side == int(passage[d, TURN]) and distance < 1.4:
                 kept = True
@@ -301,11 +308,9 @@ def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[
         side, turn = ways.sides[i, d], ways.passage[d, TURN]
         if side == 0:
             continue
-        door = ways.doors[d]
-        normal = (discs[i, X] - door[CX]) * door[NX] + (discs[i, Y] - door[CY]) * door[NY]
-        if turn != 0.0 and side != turn and side * normal > 0.3:
-            wx, wy = wait_beside(i, door, side, field, discs)
-        elif door[ANGLE] < OPEN:
+        if turn != 0.0 and side != turn:
+            wx, wy = wait_beside(i, ways.doors[d], side, field, discs)
+        elif ways.doors[d, ANGLE] < OPEN:
             wx, wy = hold_off(i, d, (wx, wy), ways, discs)
     return wx, wy
 
@@ -416,6 +421,17 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
 
 
 @njit
+def patience(i: int, time: float, crowd: Crowd) -> float:
+    """Respect of person ``i`` for chairs and leaves in the way: 1 at first, 0 when worn out.
+
+    It wears out after 0.8 to 1.6 s of standing, or 2 to 4 s of walking about without progress.
+    """
+    stood = (crowd.state[i, BLOCKED] - 0.8) / 0.8
+    lost = (time - crowd.state[i, BEST_AT] - 2.0) / 2.0 if crowd.task[i, WALKING] != 0 else 0.0
+    return min(max(1.0 - max(stood, lost), 0.0), 1.0)
+
+
+@njit
 def decide(
     clock: tuple[float, float],
     rates: tuple[float, float],
@@ -444,6 +460,6 @@ def decide(
     for i in range(len(servos)):
         wanted = want(i, pace, ways, field, crowd)
         count = nearby(i, crowd.discs, ways.sides, near)
-        fade = min(max(1.0 - (crowd.state[i, BLOCKED] - 0.8) / 0.8, 0.0), 1.0)
+        fade = patience(i, time, crowd)
         vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
         steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""People and doors of the office: where they go, what they respect, what gives way to them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sim import crowd, gait
+from sim.flow import clearance_at
+from sim.world import SUBSTEPS_PER_S, World
+
+QUARTER_MINUTE = 15
+
+
+@pytest.fixture(scope="module")
+def walk() -> dict[str, np.ndarray | World]:
+    """75 s of a busy office, one sample in 0.1 s."""
+    world = World("office", seed=2, dynamism=0.8)
+    people = world.people
+    poses, clearances, tasks, slips = [], [], [], []
+    shanks = np.array([[world.model.body(f"{p}/shank_{s}").id for s in "lr"] for p in people.names])
+    before, swung = None, None
+    for k in range(75 * SUBSTEPS_PER_S):
+        world.substep()
+        frames = world.data.xmat[shanks].reshape(-1, 2, 3, 3)
+        soles = world.data.xpos[shanks] - gait.SHANK * frames[..., 2]
+        swing = people.feet[:, gait.SWING].copy()
+        if before is not None:
+            for foot in range(2):
+                planted = (swing != foot) & (swung != foot)
+                moved = np.linalg.norm(soles[planted, foot] - before[planted, foot], axis=1)
+                slips.append(moved * SUBSTEPS_PER_S)
+        before, swung = soles, swing
+        if k % 30 == 0:
+            now = world.mover_poses()[_rows(world, "person")]
+            poses.append(now)
+            clearances.append([clearance_at(people._field, x, y) for x, y, _ in now])
+            tasks.append(people._crowd.task.copy())
+    return {
+        "world": world,
+        "poses": np.array(poses),
+        "clearances": np.array(clearances),
+        "tasks": np.array(tasks),
+        "slips": np.concatenate(slips),
+    }
+
+
+def _rows(world: World, kind: str) -> list[int]:
+    return [i for i, m in enumerate(world.scene.movers) if m.kind == kind]
+
+
+def test_people_walk_from_room_to_room(walk):
+    world, poses = walk["world"], walk["poses"]
+    rooms = list(world.scene.rooms.values())
+    visited = []
+    for person in range(poses.shape[1]):
+        inside = {
+            r
+            for r, (x0, y0, x1, y1) in enumerate(rooms)
+            for x, y, _ in poses[:, person]
+            if x0 < x < x1 and y0 < y < y1
+        }
+        visited.append(len(inside))
+    assert np.mean(visited) > 3
+    arrivals = np.sum(np.diff(walk["tasks"][:, :, crowd.WALKING], axis=0) < 0)
+    assert arrivals > poses.shape[1]
+
+
+def test_people_keep_out_of_walls_and_furniture(walk):
+    assert walk["clearances"].min() > 0.15
+    assert np.quantile(walk["clearances"], 0.01) > 0.22
+
+
+def test_people_keep_apart(walk):
+    xy = walk["poses"][:, :, :2]
+    n = xy.shape[1]
+    gaps = np.linalg.norm(xy[:, :, None] - xy[:, None, :], axis=3)[:, ~np.eye(n, dtype=bool)]
+    assert gaps.min() > 0.45
+    assert np.mean(gaps < 0.5) < 0.01
+
+
+def test_people_walk_at_human_speed(walk):
+    xy = walk["poses"][:, :, :2]
+    speed = np.linalg.norm(np.diff(xy, axis=0), axis=2) / 0.1
+    assert speed.max() < 2.2
+    assert 0.7 < np.median(speed[speed > 0.3]) < 1.5
+
+
+def test_people_are_rarely_blocked(walk):
+    walked, blocked = walk["world"].people.walked_s()
+    assert walked.sum() > 150.0
+    assert blocked.sum() / walked.sum() < 0.10
+
+
+def test_stance_feet_do_not_slip(walk):
+    assert np.mean(walk["slips"]) < 0.01
+
+
+def test_the_physics_has_nothing_to_warn_of(walk):
+    assert not any(w.number for w in walk["world"].data.warning)
+    assert np.isfinite(walk["world"].data.qpos).all()
+
+
+def test_a_swinging_leg_is_a_moving_body():
+    world = World("office", seed=2, dynamism=1.0)
+    for _ in range(8 * SUBSTEPS_PER_S):
+        world.substep()
+    moving = world.moving_bodies()
+    for i, row in enumerate(_rows(world, "person")):
+        name = world.people.names[i]
+        for body in ("base", "shank_l", "thigh_r"):
+            assert moving[world.model.body(f"{name}/{body}").id] == world.movers_moving()[row]
+        if world.people.swinging()[i]:
+            assert world.movers_moving()[row]
+    assert not moving[0]
+
+
+def _door_angle(world: World, door: str) -> float:
+    return float(world.data.qpos[int(world.model.joint(f"{door}/hinge").qposadr[0])])
+
+
+def test_a_door_goes_back_to_rest():
+    world = World("office", seed=1, dynamism=0, n_people=0)
+    door = world.scene.movers[_rows(world, "door")[0]].name
+    rest = _door_angle(world, door)
+    at = int(world.model.joint(f"{door}/hinge").qposadr[0])
+    world.data.qpos[at] = 0.2
+    for _ in range(12 * SUBSTEPS_PER_S):
+        world.substep()
+    assert _door_angle(world, door) == pytest.approx(rest, abs=0.12)
+    assert not world.movers_moving()[_rows(world, "door")[0]]
+
+
+def test_a_closed_door_opens_for_a_person_and_closes_behind():
+    """One person, every door made to rest closed: the rooms can still be reached."""
+    world = World("office", seed=3, dynamism=0.6, n_people=1, n_chairs=0)
+    doors = _rows(world, "door")
+    for row in doors:
+        at = int(world.model.joint(f"{world.scene.movers[row].name}/hinge").qposadr[0])
+        world.model.qpos_spring[at] = -0.2
+        world.data.qpos[at] = 0.0
+    world._doors._closers[:, 4] = 0.0
+    world._doors._rate = 0.0
+    world._doors.schedule[:, :3] = math.inf, -math.inf, 0.0
+    rooms, opened = set(), set()
+    for k in range(60 * SUBSTEPS_PER_S):
+        world.substep()
+        if k % 30 == 0:
+            x, y, _ = world.mover_poses()[_rows(world, "person")[0]]
+            for name, (x0, y0, x1, y1) in world.scene.rooms.items():
+                if x0 < x < x1 and y0 < y < y1:
+                    rooms.add(name)
+            opened |= {row for row in doors if _door_angle(world, world.scene.movers[row].name) > 1}
+    assert len(rooms) >= 3
+    assert opened
+    angles = [_door_angle(world, world.scene.movers[row].name) for row in doors]
+    assert np.sum(np.array(angles) < 0.1) >= len(doors) - 1
+
+
+def test_a_door_lets_the_robot_through():
+    world = World("office", seed=3, dynamism=0, n_people=0, n_chairs=0)
+    row = _rows(world, "door")[0]
+    door = world._doors.names.index(world.scene.movers[row].name)
+    at = int(world.model.joint(f"{world.scene.movers[row].name}/hinge").qposadr[0])
+    world.model.qpos_spring[at] = world.data.qpos[at] = 0.0
+    world._doors._closers[door, 4] = 0.0
+    middle, along = world._doors.middles[door], world._doors.along[door]
+    sign = world._doors.hinges[door, 3]
+    push_from = -sign * np.array([-along[1], along[0]])  # the side the leaf swings away from
+    x, y = middle + 1.2 * push_from
+    robot = int(world.model.joint("robot/x").qposadr[0])
+    heading = math.atan2(-push_from[1], -push_from[0])
+    world.data.qpos[robot : robot + 3] = x, y, heading
+    world.set_command(0.5, 0.0)
+    for _ in range(5 * SUBSTEPS_PER_S):
+        world.substep()
+    passed = world.robot_pose()[:2] - middle
+    assert np.dot(passed, push_from) < -0.8
