@@ -35,8 +35,10 @@ def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
     """``<stem>.pgm`` and ``<stem>.yaml``; returns the two paths.
 
     Values above 0.65 are occupied (black), below 0.196 free, all between and NaN unknown: what a
-    map_server in "trinary" mode makes of them. Raises ``OutputError`` when they cannot be written.
+    map_server in "trinary" mode makes of them. Raises ``OutputError`` when they cannot be written
+    and ``InvalidValueError`` for a raster without cells.
     """
+    _check_cells(raster)
     pgm, yaml = stem.with_name(stem.name + ".pgm"), stem.with_name(stem.name + ".yaml")
     height, width = raster.values.shape
     header = f"P5\n{width} {height}\n255\n".encode("ascii")
@@ -93,8 +95,9 @@ def raster_image(raster: Raster) -> NDArray[np.uint8]:
 def write_png(path: Path, raster: Raster, *, scale: int = 1) -> None:
     """``raster_image`` as a PNG, each cell ``scale`` pixels wide.
 
-    Raises ``OutputError`` when it cannot be written.
+    Raises ``OutputError`` when it cannot be written, ``InvalidValueError`` for no cells.
     """
+    _check_cells(raster)
     if scale < 1:
         raise InvalidValueError(f"scale must be >= 1 pixel per cell, got {scale}")
     image = raster_image(raster).repeat(scale, axis=0).repeat(scale, axis=1)
@@ -102,6 +105,11 @@ def write_png(path: Path, raster: Raster, *, scale: int = 1) -> None:
     if not ok:
         raise OutputError(f"cannot write {path}: OpenCV could not encode {image.shape}")
     write_bytes(path, data.tobytes())
+
+
+def _check_cells(raster: Raster) -> None:
+    if raster.values.size == 0:
+        raise InvalidValueError(f"a map file needs a cell, got shape {raster.values.shape}")
 
 
 def _gray(raster: Raster) -> NDArray[np.uint8]:

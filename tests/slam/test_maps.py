@@ -132,3 +132,14 @@ def test_the_picture_tells_unknown_from_known(tmp_path):
     np.testing.assert_array_equal(picture[3:6, 0:3], np.broadcast_to(unknown, (3, 3, 3)))
     with pytest.raises(InvalidValueError, match="scale"):
         maps.write_png(path, small_map(), scale=0)
+
+
+def test_a_raster_without_cells_is_no_map(tmp_path):
+    empty = Raster(values=np.zeros((0, 4)), resolution_m=0.05, T_map_origin=[0.0, 0.0, 0.0])
+    for write in (
+        lambda: maps.write_map(tmp_path / "m", empty),
+        lambda: maps.write_png(tmp_path / "m.png", empty),
+    ):
+        with pytest.raises(InvalidValueError, match="needs a cell"):
+            write()
+    assert list(tmp_path.iterdir()) == []
