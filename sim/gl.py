@@ -104,4 +104,6 @@ def _try(program: str, backend: str | None) -> str | None:
     if run.returncode == 0:
         return None
     lines = [line for line in run.stderr.splitlines() if line.strip()]
-    return lines[-1].strip()[:200] if lines else f"exit status {run.returncode}"
+    last = lines[-1].strip()[:200] if lines else f"exit status {run.returncode}"
+    # what PyOpenGL's loader says when there is nothing to load
+    return "its library is not installed" if "'NoneType' object has no attribute" in last else last
