@@ -1,8 +1,150 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mobilia bench``: speed figures of this machine."""
+"""``mobilia bench``: speed figures of this machine, as a table and as JSON."""
 
 from __future__ import annotations
 
+import json
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated, Any
 
-def bench() -> None:
-    """Measure the speed of simulation, scanner and SLAM on this machine."""
+import numpy as np
+import typer
+from rich.table import Table
+
+from scripts.console import console
+from scripts.output import machine, versions
+from slam.files import write_text
+
+SEED = 100
+DYNAMISM = 0.5
+Row = dict[str, Any]
+
+
+def bench(
+    seconds: Annotated[float, typer.Option(help="Simulated seconds for each measurement, s.")] = 20,
+    out: Annotated[
+        Path | None, typer.Option("--json", help="Also write the figures to this JSON file.")
+    ] = None,
+) -> None:
+    """Measure the speed of simulation, scanner, environment and SLAM on this machine.
+
+    Everything is processor time of one thread after a warm-up, at dynamism 0.5, seed 100, scanner
+    and odometry at their defaults (LMS-221, 0.5 degrees, 361 beams; pioneer3dx) unless a row says
+    otherwise. Targets are those of the design, for one core of a 2020s server.
+    """
+    rows: list[Row] = []
+    table = Table(title="Speed", title_justify="left", caption=str(machine()["processor"]))
+    for heading in ("what", "figure", "unit", "target", "how"):
+        table.add_column(heading, justify="right" if heading == "figure" else "left")
+    for measure in (_simulation, _scanner, _physics, _environment, _slam):
+        with console.status(f"measuring: {measure.__name__.strip('_')}"):
+            found = list(measure(seconds))
+        for row in found:
+            rows.append(row)
+            table.add_row(
+                row["what"], f"{row['figure']:.3g}", row["unit"], row["target"], row["how"]
+            )
+    console.print(table)
+    if out is not None:
+        report = {"schema": 1, "machine": machine(), "versions": versions(), "rows": rows}
+        write_text(out, json.dumps(report, indent=2) + "\n")
+
+
+def _row(what: str, figure: float, unit: str, target: str, how: str) -> Row:
+    return {"what": what, "figure": float(figure), "unit": unit, "target": target, "how": how}
+
+
+def _timed(work: Callable[[], object]) -> float:
+    start = time.process_time()
+    work()
+    return time.process_time() - start
+
+
+def _simulation(seconds: float) -> Iterator[Row]:
+    from sim.simulation import Simulation, n_frames, tour
+
+    for scene, target in (("office", "≥ 20"), ("arena", "")):
+        simulation = Simulation(scene, seed=SEED, dynamism=DYNAMISM)
+        frames = tour(simulation, seconds + 2.0)
+        for _ in range(n_frames(2.0, simulation.scan_period_s)):
+            next(frames)
+        spent = _timed(lambda frames=frames: [None for _ in frames])  # type: ignore[misc]
+        how = f"{scene}: world, actors, scans, odometry, tour driving"
+        yield _row(f"simulation, {scene}", seconds / spent, "× real time", target, how)
+
+
+def _scanner(seconds: float) -> Iterator[Row]:
+    from sim.lidar import Lms221, Lms221Config
+    from sim.world import World
+
+    world = World("office", seed=SEED, dynamism=DYNAMISM)
+    for name, config in (("ideal", Lms221Config.ideal()), ("default", Lms221Config())):
+        laser = Lms221(world.model, config, np.random.default_rng(0))
+        laser.observe(lambda: None, world.data)
+        scans = max(20, round(20 * seconds))
+
+        def many(laser: Lms221 = laser, scans: int = scans) -> None:
+            for _ in range(scans):
+                laser.observe(lambda: None, world.data)
+
+        figure = _timed(many) / scans * 1e6
+        target = "≤ 60" if name == "ideal" else ""
+        yield _row(f"scan, {name}", figure, "µs", target, "361 beams in office, world at rest")
+
+
+def _physics(seconds: float) -> Iterator[Row]:
+    from sim.world import SUBSTEPS_PER_S, World
+
+    world = World("office", seed=SEED, dynamism=DYNAMISM)
+
+    def run(duration_s: float) -> None:
+        for _ in range(round(duration_s * SUBSTEPS_PER_S)):
+            world.substep()
+
+    run(2.0)
+    figure = seconds * SUBSTEPS_PER_S / _timed(lambda: run(seconds))
+    yield _row("physics steps, office", figure, "1/s", "", "1/300 s each, people and doors in")
+
+
+def _environment(seconds: float) -> Iterator[Row]:
+    import gymnasium
+
+    import sim  # noqa: F401  (registers the environments)
+
+    for id_, target in (("mobilia/Arena-v0", ""), ("mobilia/Office-v0", "")):
+        env = gymnasium.make(id_, disable_env_checker=True, time_limit_s=1e6).unwrapped
+        env.reset(seed=SEED)
+        resets = [_timed(lambda env=env, k=k: env.reset(seed=k)) for k in range(5)]  # type: ignore[misc]
+        action = np.array([0.5, 0.2], np.float32)
+        steps = round(37.5 * seconds)
+
+        def run(env: Any = env, steps: int = steps, action: Any = action) -> None:
+            for _ in range(steps):
+                env.step(action)
+
+        yield _row(f"env steps, {id_}", steps / _timed(run), "1/s", target, "one scan a step")
+        yield _row(f"env reset, {id_}", float(np.median(resets)) * 1e3, "ms", "", "median of 5")
+
+
+def _slam(seconds: float) -> Iterator[Row]:
+    from sim.simulation import stream
+    from slam import create
+
+    frames = list(stream("office", seed=SEED, dynamism=DYNAMISM, seconds=seconds + 2.0))
+    for rate, stride, target in ((37.5, 1, "≥ 5"), (5.0, 8, "")):
+        slam = create("shunting")
+        spent = []
+        for frame in frames[::stride]:
+            blind = frame.without_truth()
+            start = time.process_time()
+            slam.update(blind)
+            spent.append(time.process_time() - start)
+        steady = np.array(spent[5:]) * 1e3
+        how = f"361 beams at {37.5 / stride:.1f} Hz, default cells"
+        what = f"shunting, {rate:g} Hz"
+        yield _row(f"{what}, p50", float(np.percentile(steady, 50)), "ms", "", how)
+        yield _row(f"{what}, p99", float(np.percentile(steady, 99)), "ms", "", how)
+        period_ms = 1e3 * stride / 37.5
+        yield _row(what, period_ms / float(steady.mean()), "× real time", target, how)

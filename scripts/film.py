@@ -33,7 +33,7 @@ def require_ffmpeg() -> None:
 
 
 @contextmanager
-def film(path: Path, fps: int) -> Iterator[Film]:
+def film(path: Path, fps: float) -> Iterator[Film]:
     """A film that appears under ``path`` when the block ends well, and not at all otherwise."""
     require_ffmpeg()
     with replacing(path) as temporary:

@@ -135,7 +135,7 @@ def error_chart(
     """Position errors (m, log scale) over time; ``series``: name -> (seconds, errors, colour)."""
     width, height = size
     picture: Picture = np.full((height, width, 3), draw.PAPER, np.uint8)
-    left, right, top, bottom = 58, 12, 26, 24
+    left, right, top, bottom = 58, 26, 26, 24
     low, high = -3.0, 1.0  # 1 mm .. 10 m
     box_w, box_h = width - left - right, height - top - bottom
     for decade, label in zip(range(-3, 2), ("1 mm", "1 cm", "10 cm", "1 m", "10 m"), strict=True):

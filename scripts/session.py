@@ -61,10 +61,11 @@ def run_session(stream: Stream, replay: Replay, show: Show, outputs: Outputs) ->
     if outputs.film:
         require_ffmpeg()
     with whole_folder(outputs.folder, overwrite=outputs.overwrite) as folder:
-        reel = film(folder / "film.mp4", outputs.film_fps) if outputs.film else nullcontext()
+        stride, fps = pace(stream, show.duration_s, outputs.film_fps)
+        reel = film(folder / "film.mp4", fps) if outputs.film else nullcontext()
         started = time.perf_counter()
         with reel as opened:
-            _replay(stream, replay, show, opened, outputs.film_fps)
+            _replay(stream, replay, show, opened, stride)
         wall_s = time.perf_counter() - started
         results = score.results(replay, wall_s, machine())
         _write(folder, replay, show, results)
@@ -74,12 +75,23 @@ def run_session(stream: Stream, replay: Replay, show: Show, outputs: Outputs) ->
     return results
 
 
-def _replay(stream: Stream, replay: Replay, show: Show, reel: Film | None, fps: int) -> None:
+def pace(stream: Stream, duration_s: float, fps: float) -> tuple[int, float]:
+    """(frames per picture, pictures per second): real time up to a minute, faster beyond.
+
+    A stream slower than ``fps`` gets a picture a frame, shown at ``fps``: nobody wants to wait
+    three seconds for each scan of a sparse log.
+    """
+    if not stream.length or duration_s <= 0.0:
+        return 1, fps
+    rate = stream.length / duration_s
+    if rate < fps:
+        return max(1, round(stream.length / (FILM_S * fps))), fps
+    stride = max(1, round(rate / fps))
+    return max(stride, round(stream.length / (FILM_S * fps))), rate / stride
+
+
+def _replay(stream: Stream, replay: Replay, show: Show, reel: Film | None, stride: int) -> None:
     """Every frame through every SLAM; every so many frames a picture into the film."""
-    stride = max(1, round(stream.length / (FILM_S * fps))) if stream.length else 1
-    if show.duration_s > 0.0 and stream.length:
-        live = stream.length / show.duration_s / fps  # frames per picture in real time
-        stride = max(stride, round(live)) if show.duration_s <= FILM_S else stride
     with progress() as bar:
         task = bar.add_task(show.title, total=stream.length, unit="")
         for count, frame in enumerate(replay.run(stream), 1):
