@@ -99,6 +99,7 @@ class Raycaster:
     robot      name of the scanner's own body; it and its children are not seen
     spot       the rays of each beam
     range_max  m, bounds how far the spot spreads up and down
+    only       optional (ngeom,) True for the geoms to consider at all
 
     Raises ``InvalidValueError`` for a mesh, height field or SDF that could meet the scan plane:
     the formulas cover primitives only.
@@ -112,10 +113,12 @@ class Raycaster:
         robot: str | None = "robot/base",
         spot: Spot | None = None,
         range_max: float = 80.0,
+        only: NDArray[np.bool_] | None = None,
     ) -> None:
         self.spot = Spot() if spot is None else spot
         self.height = height
-        self.ids = self._candidates(model, robot, range_max)
+        wanted = np.ones(model.ngeom, dtype=np.bool_) if only is None else only
+        self.ids = self._candidates(model, robot, range_max, wanted)
         self._table = self._geom_table
         self._optics = (self.spot.rays(), self.spot.aperture)
         self._spot = (self.spot.aperture, self.spot.divergence)
@@ -135,7 +138,11 @@ class Raycaster:
         return len(self.spot.offsets)
 
     def _candidates(
-        self, model: mujoco.MjModel, robot: str | None, range_max: float
+        self,
+        model: mujoco.MjModel,
+        robot: str | None,
+        range_max: float,
+        wanted: NDArray[np.bool_],
     ) -> NDArray[np.int64]:
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
@@ -150,7 +157,7 @@ class Raycaster:
         ids, rows = [], []
         for geom in range(model.ngeom):
             body = model.geom_bodyid[geom]
-            if own[body] or not _visible(model, geom):
+            if own[body] or not wanted[geom] or not _visible(model, geom):
                 continue
             half, upright = _vertical_extent(model, data, geom, bool(lifts[body]))
             # A level plane has no height: only a spot that spreads downwards meets it.

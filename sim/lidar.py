@@ -17,134 +17,34 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.caster import Raycaster
+from sim.lidar_config import (
+    DEGREES_PER_STEP,
+    STEPS_PER_SWEEP,
+    STEPS_PER_TURN,
+    TURNS_PER_S,
+    Lms221Config,
+)
+from sim.lidar_effects import (
+    PANE_RETURN_COS,
+    PANE_TRANSMISSION,
+    SignalModel,
+    geom_reflectivity,
+    glass_geoms,
+)
 from sim.raycast import arccos
 from slam import se2
 from slam.errors import InvalidValueError
-from slam.frames import NS_PER_S, LaserSpec
 
 Float = NDArray[np.float64]
+Hits = tuple[Float, NDArray[np.int64], Float]
 
-TURNS_PER_S = 75
-STEPS_PER_TURN = 4
-STEPS_PER_SWEEP = 2
-DEGREES_PER_STEP = 90.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class RangeMode:
-    """One way the device codes distance (TL table 3-7): unit m and largest code that is a range."""
-
-    unit_m: float
-    largest_code: int
-    range_max_m: float
-
-
-RANGE_MODES = MappingProxyType(
-    {
-        "8m": RangeMode(unit_m=0.001, largest_code=8182, range_max_m=8.182),
-        "16m": RangeMode(unit_m=0.001, largest_code=16374, range_max_m=16.374),
-        "32m": RangeMode(unit_m=0.001, largest_code=32758, range_max_m=32.758),
-        "80m": RangeMode(unit_m=0.01, largest_code=8182, range_max_m=80.0),
-    }
-)
-
-# (resolution, field of view) -> mirror turns (TD p10, TL p19, p48).
-SCAN_MODES = MappingProxyType({1.0: 1, 0.5: 2, 0.25: 4})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Lms221Config:
-    """How the scanner is set, and how it errs.
-
-    resolution_deg  1, 0.5 or 0.25: 1, 2 or 4 mirror turns per scan (75, 37.5, 18.75 scans/s)
-    fov_deg         180, or the middle 100
-    range_mode      "8m", "16m", "32m" (1 mm codes) or "80m" (1 cm codes, as delivered, TL 10-12)
-    noise_std_m     statistical error of what is sent, rounding included (TD p34: 10 mm, 1..20 m)
-    quantise        round to the code of the range mode
-    """
-
-    resolution_deg: float = 0.5
-    fov_deg: int = 180
-    range_mode: str = "80m"
-    noise_std_m: float = 0.010
-    quantise: bool = True
-
-    def __post_init__(self) -> None:
-        if self.resolution_deg not in SCAN_MODES:
-            raise InvalidValueError(
-                f"Lms221Config.resolution_deg must be 1, 0.5 or 0.25, got {self.resolution_deg}"
-            )
-        if self.fov_deg not in (100, 180):
-            raise InvalidValueError(f"Lms221Config.fov_deg must be 100 or 180, got {self.fov_deg}")
-        if self.range_mode not in RANGE_MODES:
-            raise InvalidValueError(
-                f"Lms221Config.range_mode must be one of {', '.join(RANGE_MODES)}, "
-                f"got {self.range_mode!r}"
-            )
-        if not 0.0 <= self.noise_std_m <= 1.0:
-            raise InvalidValueError(
-                f"Lms221Config.noise_std_m must be within 0..1 m, got {self.noise_std_m}"
-            )
-
-    @classmethod
-    def ideal(cls, *, resolution_deg: float = 0.5, fov_deg: int = 180) -> Lms221Config:
-        """Geometry and timing of the device, exact ranges."""
-        return cls(resolution_deg=resolution_deg, fov_deg=fov_deg, noise_std_m=0.0, quantise=False)
-
-    @property
-    def turns(self) -> int:
-        """Mirror turns per scan."""
-        return SCAN_MODES[self.resolution_deg]
-
-    @property
-    def steps(self) -> int:
-        """Physics steps per scan."""
-        return STEPS_PER_TURN * self.turns
-
-    @property
-    def sweep_steps(self) -> int:
-        """Physics steps from the start of a scan to its last beam."""
-        return STEPS_PER_TURN * (self.turns - 1) + STEPS_PER_SWEEP
-
-    @property
-    def mode(self) -> RangeMode:
-        """The range mode's unit and limits."""
-        return RANGE_MODES[self.range_mode]
-
-    @property
-    def beams(self) -> tuple[Float, NDArray[np.int64]]:
-        """((n,) degrees of the mirror, (n,) turn) of every beam, counter-clockwise."""
-        first = (180 - self.fov_deg) // 2
-        count = round(self.fov_deg / self.resolution_deg) + 1
-        index = np.arange(count, dtype=np.int64)
-        degrees = np.asarray(first + index * self.resolution_deg, dtype=np.float64)
-        return degrees, index % self.turns
-
-    @property
-    def stamp_offset_ns(self) -> int:
-        """From the start of the scan's first physics step to its earliest beam, ns."""
-        return round(float(self.beams[0][0]) / 360.0 / TURNS_PER_S * NS_PER_S)
-
-    def spec(self, T_robot_laser: Float | None = None) -> LaserSpec:
-        """Geometry and exact beam times: the beam at angle a in turn k is k/75 + (a/360)/75 s."""
-        degrees, turn = self.beams
-        times = (turn + degrees / 360.0) / TURNS_PER_S
-        return LaserSpec(
-            n_beams=degrees.size,
-            angle_min=math.radians(-self.fov_deg / 2),
-            angle_increment=math.radians(self.resolution_deg),
-            range_min=0.0,
-            range_max=self.mode.range_max_m,
-            beam_time_offsets=times - times[0],
-            T_robot_laser=np.zeros(3) if T_robot_laser is None else T_robot_laser,
-        )
+__all__ = ["Lms221", "Lms221Config", "ScanResult"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,6 +56,10 @@ class ScanResult:
     geoms        (n,) int32 geom id, -1 where nothing was hit
     bodies       (n,) int32 body id, -1 likewise
     cosines      (n,) |cos| of the angle between beam and surface normal, NaN likewise
+    mixed        (n,) bool, the range blends two surfaces
+
+    Where the beam is a spot of several rays, ``true_ranges`` is that of the middle ray, and geoms,
+    bodies and cosines are those of the strongest ray of the pulse that was measured.
     """
 
     ranges: NDArray[np.float32]
@@ -163,6 +67,7 @@ class ScanResult:
     geoms: NDArray[np.int32]
     bodies: NDArray[np.int32]
     cosines: Float
+    mixed: NDArray[np.bool_]
 
     @property
     def incidence(self) -> NDArray[np.float32]:
@@ -203,12 +108,25 @@ class Lms221:
         mujoco.mj_kinematics(model, data)
         height = float(data.site_xpos[self._site][2])
         self.spec = self.config.spec(_mounting(model, data, self._site, robot))
-        self.caster = Raycaster(
-            model, height=height, robot=robot, range_max=self.config.mode.range_max_m
-        )
-        # The last entry, which index -1 takes, stands for no hit.
-        self._geom_of = np.append(self.caster.ids.astype(np.int32), np.int32(-1))
+        effects = self.config.effects
+        self._signal = SignalModel(effects, self.config.systematic_bound_m, self._rng)
+        panes = glass_geoms(model) if effects.glass else np.zeros(model.ngeom, dtype=np.bool_)
+
+        def caster(only: NDArray[np.bool_]) -> Raycaster:
+            return Raycaster(
+                model,
+                height=height,
+                robot=robot,
+                spot=self._signal.spot,
+                range_max=self.config.mode.range_max_m,
+                only=only,
+            )
+
+        self.caster = caster(~panes)
+        self._panes = caster(panes) if panes.any() else None
+        # The last entry of each, which index -1 takes, stands for no hit.
         self._body_of = np.append(model.geom_bodyid.astype(np.int32), np.int32(-1))
+        self._reflectivity = np.append(geom_reflectivity(model), 0.0)
         self._fans = self._plan()
 
     def _check_timestep(self, model: mujoco.MjModel) -> None:
@@ -237,12 +155,8 @@ class Lms221:
 
         ``data`` must have fresh kinematics on entry, and after every ``advance``.
         """
-        n, k = self.spec.n_beams, self.caster.rays_per_beam
-        hits = (
-            np.full((n, k), np.inf),
-            np.full((n, k), -1, dtype=np.int64),
-            np.full((n, k), np.nan),
-        )
+        casters = [c for c in (self.caster, self._panes) if c is not None]
+        hits = [_misses(self.spec.n_beams, c.rays_per_beam) for c in casters]
         views = (data.site_xpos[self._site], data.site_xmat[self._site])
         after = None
         for step in range(self.config.steps):
@@ -252,39 +166,68 @@ class Lms221:
                 after = None
                 continue
             if after is None:
-                self.caster.start(data)
+                for caster in casters:
+                    caster.start(data)
                 after = _planar(*views)
             before = after
             advance()
             after = _planar(*views)
-            self.caster.cast(fan, (before, after), hits)
-        return self._result(hits)
+            for caster, out in zip(casters, hits, strict=True):
+                caster.cast(fan, (before, after), out)
+        return self._result([_as_geoms(c, out) for c, out in zip(casters, hits, strict=True)])
 
-    def _result(self, hits: tuple[Float, NDArray[np.int64], Float]) -> ScanResult:
-        true_ranges, geoms, cosines = hits[0][:, 0], self._geom_of[hits[1][:, 0]], hits[2][:, 0]
+    def _result(self, hits: list[Hits]) -> ScanResult:
+        """What is sent, from (distances, geom ids, cosines) of the room and, if any, the panes."""
+        (distances, geoms, cosines), reflectivity = hits[0], self._reflectivity[hits[0][1]]
+        transmission = np.ones(distances.shape)
+        if len(hits) > 1:
+            pane, pane_geoms, pane_cosines = hits[1]
+            before = pane < distances
+            mirror = before & (pane_cosines >= PANE_RETURN_COS)
+            transmission[before & ~mirror] = PANE_TRANSMISSION**2
+            distances, cosines = np.where(mirror, (pane, pane_cosines), (distances, cosines))
+            geoms = np.where(mirror, pane_geoms, geoms)
+            reflectivity = np.where(mirror, 1.0, reflectivity)
+        ranges, rays, mixed = self._signal.apply(
+            (distances, geoms, cosines), reflectivity, transmission
+        )
+        beams = np.arange(ranges.size)
+        seen = np.where(rays < 0, np.int64(-1), geoms[beams, rays])
         return ScanResult(
-            ranges=self._measure(true_ranges),
-            true_ranges=true_ranges,
-            geoms=geoms,
-            bodies=self._body_of[geoms],
-            cosines=cosines,
+            ranges=self._send(ranges),
+            true_ranges=distances[:, 0],
+            geoms=seen.astype(np.int32),
+            bodies=self._body_of[seen],
+            cosines=np.where(rays < 0, math.nan, cosines[beams, rays]),
+            mixed=mixed,
         )
 
-    def _measure(self, true_ranges: Float) -> NDArray[np.float32]:
-        """What the device sends for these distances."""
-        normal = self._rng.standard_normal(true_ranges.size)
+    def _send(self, ranges: Float) -> NDArray[np.float32]:
+        """Add the statistical error, round to codes, leave out what the mode cannot say."""
+        normal = self._rng.standard_normal(ranges.size)
         config, mode = self.config, self.config.mode
         # Rounding adds unit^2 / 12 of its own; what is sent shall have the stated deviation.
         rounding = mode.unit_m**2 / 12.0 if config.quantise else 0.0
         std = math.sqrt(max(config.noise_std_m**2 - rounding, 0.0))
-        ranges = np.maximum(true_ranges + std * normal, 0.0)
+        sent = np.maximum(ranges + std * normal, 0.0)
         limit = mode.range_max_m
         if config.quantise:
-            codes = np.rint(ranges / mode.unit_m)
-            ranges = codes * mode.unit_m
+            codes = np.rint(sent / mode.unit_m)
+            sent = codes * mode.unit_m
             limit = min(limit, mode.largest_code * mode.unit_m)
-        ranges[(ranges > limit) | (true_ranges > limit)] = np.inf
-        return ranges.astype(np.float32)
+        sent[(sent > limit) | (ranges > limit)] = np.inf
+        return sent.astype(np.float32)
+
+
+def _misses(beams: int, rays: int) -> Hits:
+    shape = (beams, rays)
+    return np.full(shape, np.inf), np.full(shape, -1, dtype=np.int64), np.full(shape, np.nan)
+
+
+def _as_geoms(caster: Raycaster, hits: Hits) -> Hits:
+    """The same hits with geom ids instead of the caster's own indices."""
+    distances, indices, cosines = hits
+    return distances, np.append(caster.ids, -1)[indices], cosines
 
 
 def _mounting(model: mujoco.MjModel, data: mujoco.MjData, site: int, robot: str) -> Float:
