@@ -428,7 +428,7 @@ def patience(i: int, time: float, crowd: Crowd) -> float:
     """
     stood = (crowd.state[i, BLOCKED] - 0.8) / 0.8
     lost = (time - crowd.state[i, BEST_AT] - 2.0) / 2.0 if crowd.task[i, WALKING] != 0 else 0.0
-    return min(max(1.0 - max(stood, lost), 0.0), 1.0)
+    return float(min(max(1.0 - max(stood, lost), 0.0), 1.0))
 
 
 @njit

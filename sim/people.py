@@ -76,7 +76,7 @@ class People:
         self.feet = np.zeros((n, gait.N_COLUMNS))
         self._ways = _ways(doors, n)
         self._at = _addresses(bodies, doors, self.names)
-        self._crowd = Crowd(
+        self.crowd = Crowd(
             discs=_discs(bodies, doors, self.names),
             yaws=np.zeros(n),
             state=np.zeros((n, 12)),
@@ -84,11 +84,11 @@ class People:
             draws=counters[:n].copy(),
         )
         self._torsos = np.ascontiguousarray(self._at.discs[:n])
-        self._field = floor_field(scene, doors.boxes_at_rest()) if self.alive else None
+        self.field = floor_field(scene, doors.boxes_at_rest()) if self.alive else None
 
     def start(self, data: mujoco.MjData) -> None:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand."""
-        state, task, draws = self._crowd.state, self._crowd.task, self._crowd.draws
+        state, task, draws = self.crowd.state, self.crowd.task, self.crowd.draws
         for i in range(len(self.names)):
             speed = 1.34 + 0.26 * normal(draws, i)
             state[i, crowd.SPEED] = min(max(speed, 0.8), 1.9)
@@ -96,7 +96,7 @@ class People:
             state[i, crowd.STAY_UNTIL] = first * uniform(draws, i)
             state[i, crowd.LOOK] = data.qpos[self._torsos[i, 0] + 2]
             state[i, crowd.LOOK_UNTIL] = between(draws, i, 4.0, 15.0)
-            n_goals = max(len(self._field.times), 1) if self._field is not None else 1
+            n_goals = max(len(self.field.times), 1) if self.field is not None else 1
             task[i, crowd.GOAL] = int(uniform(draws, i) * n_goals)
         if self.names:
             gait.stand(data.qpos, self._torsos, self.feet)
@@ -104,15 +104,15 @@ class People:
 
     def control(self, time: float, tick: float, data: mujoco.MjData) -> None:
         """Decide for ``tick`` s and write the set points of the torso servos."""
-        if self._field is not None:
+        if self.field is not None:
             crowd.decide(
                 (time, tick),
                 self._rates,
                 (data.qpos, data.qvel, data.ctrl),
                 self._at,
-                self._field,
+                self.field,
                 self._ways,
-                self._crowd,
+                self.crowd,
                 self._servos,
             )
 
@@ -128,12 +128,12 @@ class People:
 
     def walked_s(self) -> tuple[Float, Float]:
         """(n,) s each has been on the way so far, and (n,) s of these standing still, blocked."""
-        state = self._crowd.state
+        state = self.crowd.state
         return state[:, crowd.WALKED_S].copy(), state[:, crowd.BLOCKED_S].copy()
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""
-        c = self._crowd
+        c = self.crowd
         return {"feet": self.feet, "state": c.state, "task": c.task, "draws": c.draws}
 
 

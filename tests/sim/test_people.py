@@ -37,8 +37,8 @@ def walk() -> dict[str, np.ndarray | World]:
         if k % 30 == 0:
             now = world.mover_poses()[_rows(world, "person")]
             poses.append(now)
-            clearances.append([clearance_at(people._field, x, y) for x, y, _ in now])
-            tasks.append(people._crowd.task.copy())
+            clearances.append([clearance_at(people.field, x, y) for x, y, _ in now])
+            tasks.append(people.crowd.task.copy())
     return {
         "world": world,
         "poses": np.array(poses),
