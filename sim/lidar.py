@@ -126,6 +126,8 @@ class Lms221:
         self._panes = caster(panes) if panes.any() else None
         # The last entry of each, which index -1 takes, stands for no hit.
         self._body_of = np.append(model.geom_bodyid.astype(np.int32), np.int32(-1))
+        self._ids = [np.append(c.ids, -1) for c in (self.caster, self._panes) if c is not None]
+        self._beams = np.arange(self.spec.n_beams)
         self._reflectivity = np.append(geom_reflectivity(model), 0.0)
         self._fans = self._plan()
 
@@ -174,12 +176,14 @@ class Lms221:
             after = _planar(*views)
             for caster, out in zip(casters, hits, strict=True):
                 caster.cast(fan, (before, after), out)
-        return self._result([_as_geoms(c, out) for c, out in zip(casters, hits, strict=True)])
+        return self._result(
+            [(d, ids[i], c) for ids, (d, i, c) in zip(self._ids, hits, strict=True)]
+        )
 
     def _result(self, hits: list[Hits]) -> ScanResult:
         """What is sent, from (distances, geom ids, cosines) of the room and, if any, the panes."""
-        (distances, geoms, cosines), reflectivity = hits[0], self._reflectivity[hits[0][1]]
-        transmission = np.ones(distances.shape)
+        distances, geoms, cosines = hits[0]
+        reflectivity, transmission = self._reflectivity[geoms], np.ones(distances.shape)
         if len(hits) > 1:
             pane, pane_geoms, pane_cosines = hits[1]
             before = pane < distances
@@ -191,14 +195,13 @@ class Lms221:
         ranges, rays, mixed = self._signal.apply(
             (distances, geoms, cosines), reflectivity, transmission
         )
-        beams = np.arange(ranges.size)
-        seen = np.where(rays < 0, np.int64(-1), geoms[beams, rays])
+        seen = np.where(rays < 0, np.int64(-1), geoms[self._beams, rays])
         return ScanResult(
             ranges=self._send(ranges),
             true_ranges=distances[:, 0],
             geoms=seen.astype(np.int32),
             bodies=self._body_of[seen],
-            cosines=np.where(rays < 0, math.nan, cosines[beams, rays]),
+            cosines=np.where(rays < 0, math.nan, cosines[self._beams, rays]),
             mixed=mixed,
         )
 
@@ -222,12 +225,6 @@ class Lms221:
 def _misses(beams: int, rays: int) -> Hits:
     shape = (beams, rays)
     return np.full(shape, np.inf), np.full(shape, -1, dtype=np.int64), np.full(shape, np.nan)
-
-
-def _as_geoms(caster: Raycaster, hits: Hits) -> Hits:
-    """The same hits with geom ids instead of the caster's own indices."""
-    distances, indices, cosines = hits
-    return distances, np.append(caster.ids, -1)[indices], cosines
 
 
 def _mounting(model: mujoco.MjModel, data: mujoco.MjData, site: int, robot: str) -> Float:

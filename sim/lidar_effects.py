@@ -226,6 +226,7 @@ class SignalModel:
 
     def __init__(self, effects: RangeEffects, bound: float, rng: np.random.Generator) -> None:
         self.effects = effects
+        self.is_ruler = effects == RangeEffects.none()
         self.spot = LMS221_SPOT if effects.spot else Spot()
         self._weights = np.array(_DISC_WEIGHTS if effects.spot else (1.0,))
         steps = round(100.0 / _NEEDED_STEP)
@@ -249,7 +250,7 @@ class SignalModel:
         distances, surfaces, cosines = hits
         n, effects = distances.shape[0], self.effects
         chances, lost = self._rng.random((n,)), self._rng.random((n,))
-        if effects == RangeEffects.none():
+        if self.is_ruler:
             ranges = distances[:, 0].copy()
             return ranges, np.where(np.isfinite(ranges), 0, -1), np.zeros(n, dtype=np.bool_)
         energies = np.where(np.isfinite(distances), self._weights, 0.0) * transmission
