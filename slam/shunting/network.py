@@ -357,10 +357,12 @@ class Network:
 
         Row 0 is the lowest y. Both are 0 where nothing lives.
         """
-        i0, j0 = math.ceil(xmin / self.cell - 0.5), math.ceil(ymin / self.cell - 0.5)
+        slack = 1e-6  # cells: an edge on a centre counts as reaching it
+        i0 = math.ceil(xmin / self.cell - 0.5 - slack)
+        j0 = math.ceil(ymin / self.cell - 0.5 - slack)
         shape = (
-            max(0, math.floor(ymax / self.cell - 0.5) - j0 + 1),
-            max(0, math.floor(xmax / self.cell - 0.5) - i0 + 1),
+            max(0, math.floor(ymax / self.cell - 0.5 + slack) - j0 + 1),
+            max(0, math.floor(xmax / self.cell - 0.5 + slack) - i0 + 1),
         )
         x, y = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
         _window(self.cells, i0, j0, x, y)

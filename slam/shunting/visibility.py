@@ -29,7 +29,7 @@ class View(NamedTuple):
     limit     (bins,) m: least range of the bin and its two neighbours, 0 where none was measured;
               three, so that a wall seen at a grazing angle is not worn away
     offset    (bins,) bearing of the bin's nearest beam minus the bin's centre, in bins
-    farthest  m, largest limit
+    farthest  m, longest free range
     margin    m a neuron must be nearer than the limit to be seen empty
     gate      m a neuron may lie beside the nearest beam to be seen by it
     """
@@ -53,6 +53,7 @@ def _fill(
     bins = len(limit)
     least = np.full(bins, np.inf)
     offset[:] = np.inf
+    farthest = 0.0
     for beam in range(len(bearings)):
         if ranges[beam] <= 0.0:
             continue
@@ -61,13 +62,12 @@ def _fill(
         off = turns - k
         k %= bins
         least[k] = min(least[k], ranges[beam])
+        farthest = max(farthest, ranges[beam])
         if abs(off) < abs(offset[k]):
             offset[k] = off
-    farthest = 0.0
     for k in range(bins):
         nearest = min(least[k - 1], least[k], least[(k + 1) % bins])
         limit[k] = nearest if nearest < math.inf else 0.0
-        farthest = max(farthest, limit[k])
     return farthest
 
 
