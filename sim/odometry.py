@@ -34,7 +34,9 @@ Vec3 = tuple[float, float, float]
 
 __all__ = ["PRESETS", "OdometryConfig", "WheelOdometry", "preset"]
 
-FLOOR_M2 = 1e-12  # keeps a covariance invertible at standstill: (1e-6 m)^2 and (1e-6 rad)^2
+# What tyres creep in one scan while the encoders stand still, and what keeps a covariance
+# invertible: (20 um)^2 and (20 urad)^2.
+FLOOR = 4e-10
 SLIP_MIN, SLIP_MAX = math.radians(1.0), math.radians(3.0)  # fidelity note, 2.4
 
 
@@ -111,7 +113,7 @@ def _sandwich(random: Float, systematic: Float, variances: Vec3) -> Float:
             for k in range(3):
                 total += systematic[i, k] * variances[k] * systematic[j, k]
             out[i, j] = out[j, i] = total
-        out[i, i] += FLOOR_M2
+        out[i, i] += FLOOR
     return out
 
 

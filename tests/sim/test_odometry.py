@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.odometry import PRESETS, OdometryConfig, WheelOdometry
+from sim.odometry import OdometryConfig, WheelOdometry
 from slam import se2
 from slam.errors import InvalidValueError, UnknownNameError
 
@@ -76,20 +76,29 @@ def test_without_errors_the_wheels_tell_the_true_path() -> None:
     assert se2.wrap(odometry.pose[2] - poses[-1][2]) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", [name for name in PRESETS if name != "ideal"])
+@pytest.mark.parametrize(
+    ("name", "axes"),
+    # Nothing in the second preset goes sideways but at second order: judge it by x and theta.
+    [("pioneer3dx", [0, 1, 2]), ("probabilistic_robotics", [0, 2])],
+)
 @pytest.mark.parametrize("every", [2, 40])
 def test_the_errors_of_100_runs_are_as_large_as_their_covariance_says(
-    name: str, every: int
+    name: str, axes: list[int], every: int
 ) -> None:
-    """NEES of three numbers averages 3. Bounds: 4 standard errors of the 100 run means."""
+    """NEES of k numbers averages k. Bounds: 4 standard errors of the 100 run means."""
     travel, poses = drive(office_tour(seconds=6 if every == 2 else 18))
+    block = np.ix_(axes, axes)
     means = []
     for seed in range(100):
         errors, covariances = increments(name, travel, poses, seed=seed, every=every)
-        nees = [e @ np.linalg.solve(c, e) for e, c in zip(errors, covariances, strict=True)]
+        nees = [
+            e[axes] @ np.linalg.solve(c[block], e[axes])
+            for e, c in zip(errors, covariances, strict=True)
+        ]
         means.append(float(np.mean(nees)))
-    assert np.mean(means) == pytest.approx(3.0, abs=4.0 * np.std(means) / math.sqrt(len(means)))
-    assert np.std(means) / math.sqrt(len(means)) < 0.15
+    standard_error = float(np.std(means)) / math.sqrt(len(means))
+    assert np.mean(means) == pytest.approx(len(axes), abs=4.0 * standard_error)
+    assert standard_error < 0.15
 
 
 def test_covariance_matches_sampling_of_both_parts() -> None:
