@@ -12,10 +12,11 @@ import typer
 from rich.logging import RichHandler
 
 from scripts.bench import bench
-from scripts.console import console, fail
+from scripts.console import console, fail, note
 from scripts.demo import demo
 from scripts.listing import listing
 from scripts.run import run
+from sim import gl
 from slam.errors import MobiliaError
 
 app = typer.Typer(
@@ -54,6 +55,9 @@ def _terminate(_signal: int, _frame: FrameType | None) -> None:
 def main() -> None:
     """Entry point: every failure we foresee is one clear line and a non-zero exit status."""
     signal.signal(signal.SIGTERM, _terminate)
+    warning = gl.sanitise_environment()  # before anything imports mujoco
+    if warning:
+        note(warning)
     try:
         app()
     except MobiliaError as error:

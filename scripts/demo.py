@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from scripts.console import note
 from scripts.session import Outputs
 
 FILM_FPS = 10  # each picture is a fresh 3D rendering on the CPU
@@ -35,7 +34,6 @@ def demo(
     """
     from scripts.live import on_scene
 
-    note("the first run compiles its inner loops: up to half a minute before the bar moves")
     on_scene(
         ["shunting"],
         {"scene": scene, "seconds": seconds, "dynamism": dynamism, "seed": seed},

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -24,8 +25,8 @@ WIDTH, HEIGHT = 1280, 720
 def require_ffmpeg() -> None:
     """Raise ``MissingDependencyError`` with a remedy when no ffmpeg can be found."""
     try:
-        imageio_ffmpeg.get_ffmpeg_exe()
-    except (RuntimeError, OSError) as error:
+        imageio_ffmpeg.get_ffmpeg_version()  # runs it
+    except (RuntimeError, OSError, subprocess.SubprocessError, IndexError) as error:
         raise MissingDependencyError(
             "no ffmpeg was found to write the film: install one (pip install imageio-ffmpeg brings "
             "its own) or set IMAGEIO_FFMPEG_EXE, or pass --no-film"

@@ -93,11 +93,14 @@ def pace(stream: Stream, duration_s: float, fps: float) -> tuple[int, float]:
 def _replay(stream: Stream, replay: Replay, show: Show, reel: Film | None, stride: int) -> None:
     """Every frame through every SLAM; every so many frames a picture into the film."""
     with progress() as bar:
-        task = bar.add_task(show.title, total=stream.length, unit="")
+        warming = "compiling inner loops (the first run only)"
+        task = bar.add_task(warming, total=stream.length, unit="")
         for count, frame in enumerate(replay.run(stream), 1):
             show.note(frame)
             if reel is not None and (count % stride == 0 or count == stream.length):
                 reel.add(show.paint(frame))
+            if count == 1:
+                bar.update(task, description=show.title)
             if count % 25 == 0 or count == stream.length:
                 bar.update(task, completed=count, unit=f"{count}/{stream.length} scans")
 
