@@ -88,6 +88,9 @@ class People:
 
     def start(self, data: mujoco.MjData) -> None:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand."""
+        # Views into data, kept because making one costs as much as the kernels that read it.
+        self._physics = (data.qpos, data.qvel)
+        self._mocap = (data.mocap_pos, data.mocap_quat)
         state, task, draws = self.crowd.state, self.crowd.task, self.crowd.draws
         for i in range(len(self.names)):
             speed = 1.34 + 0.26 * normal(draws, i)
@@ -100,7 +103,7 @@ class People:
             task[i, crowd.GOAL] = int(uniform(draws, i) * n_goals)
         if self.names:
             gait.stand(data.qpos, self._torsos, self.feet)
-            self.pose_limbs(0.0, data)
+            self.pose_limbs(0.0)
 
     def control(self, time: float, tick: float, data: mujoco.MjData) -> None:
         """Decide for ``tick`` s and write the set points of the torso servos."""
@@ -108,7 +111,7 @@ class People:
             crowd.decide(
                 (time, tick),
                 self._rates,
-                (data.qpos, data.qvel, data.ctrl),
+                (*self._physics, data.ctrl),
                 self._at,
                 self.field,
                 self._ways,
@@ -116,11 +119,10 @@ class People:
                 self._servos,
             )
 
-    def pose_limbs(self, dt: float, data: mujoco.MjData) -> None:
+    def pose_limbs(self, dt: float) -> None:
         """Let the feet step for ``dt`` s and write the mocap poses of all limbs."""
         if self.alive or (self.names and dt == 0.0):
-            mocap = (data.mocap_pos, data.mocap_quat)
-            gait.walk(dt, (data.qpos, data.qvel), self._torsos, self._limbs, self.feet, mocap)
+            gait.walk(dt, self._physics, self._torsos, self._limbs, self.feet, self._mocap)
 
     def swinging(self) -> NDArray[np.bool_]:
         """(n,) True for those with a foot in the air."""

@@ -42,14 +42,14 @@ class DriveConfig:
 
 
 class Drive:
-    """Ramp and wheels of the body ``robot/base``. State: ``state`` (6,) float64.
+    """Ramp and wheels of the body ``robot/base``. State: ``state`` (8,) float64.
 
-    ``state`` = commanded v, omega, ramped v, omega, left travel m, right travel m.
+    ``state`` = commanded v, omega; ramped v, omega; travel left, right m; speed left, right m/s.
     """
 
     def __init__(self, model: mujoco.MjModel, config: DriveConfig) -> None:
         self.config = config
-        self.state = np.zeros(6)
+        self.state = np.zeros(8)
         self._left = int(model.actuator("robot/tyre_l").id)
         self._right = int(model.actuator("robot/tyre_r").id)
 
@@ -68,14 +68,12 @@ class Drive:
         omega = _toward(omega, omega_asked, self.config.alpha * tick)
         half = 0.5 * self.config.track * omega
         self.state[2:4] = v, omega
-        ctrl[self._left] = v - half
-        ctrl[self._right] = v + half
+        self.state[6:8] = v - half, v + half
+        ctrl[self._left], ctrl[self._right] = v - half, v + half
 
     def roll(self, duration: float) -> None:
         """Let the wheels turn for ``duration`` s at their present speed."""
-        _, _, v, omega, left, right = self.state.tolist()
-        half = 0.5 * self.config.track * omega
-        self.state[4:6] = left + (v - half) * duration, right + (v + half) * duration
+        self.state[4:6] += self.state[6:8] * duration
 
     @property
     def travel_m(self) -> NDArray[np.float64]:

@@ -123,7 +123,7 @@ class World:
         mujoco.mj_step(self.model, self.data)
         self.step_count += 1
         self._drive.roll(1.0 / SUBSTEPS_PER_S)
-        self.people.pose_limbs(1.0 / SUBSTEPS_PER_S, self.data)
+        self.people.pose_limbs(1.0 / SUBSTEPS_PER_S)
         mujoco.mj_kinematics(self.model, self.data)
         self._contacts.watch(self.data)
 
