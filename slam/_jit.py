@@ -4,13 +4,18 @@
 No ``fastmath`` and no ``parallel``: results must not depend on how a compiler reassociates sums.
 Where no folder for the compile cache can be written (read-only install, no HOME) the kernels are
 compiled anew in each process, which takes some seconds and is said once in the log.
+
+Numba's cache looks at the file of the kernel itself only; a kernel that calls one of another module
+would keep its old code after that module changed. So the files of imported kernels count too.
 """
 
 from __future__ import annotations
 
+import hashlib
 import logging
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
 
 import numba
 
@@ -27,6 +32,7 @@ def njit(function: Callable[P, R]) -> Callable[P, R]:
     if _cache_is_writable:
         try:
             cached: Callable[P, R] = numba.njit(cache=True, nogil=True)(function)
+            _watch_callees(cached, function)
             return cached
         except RuntimeError as error:  # "cannot cache function ...: no locator available"
             if "no locator" not in str(error):
@@ -38,3 +44,18 @@ def njit(function: Callable[P, R]) -> Callable[P, R]:
             )
     compiled: Callable[P, R] = numba.njit(nogil=True)(function)
     return compiled
+
+
+def _watch_callees(dispatcher: Any, function: Any) -> None:
+    """Make the cached code of ``function`` depend on the files of the kernels it imports."""
+    own = function.__code__.co_filename
+    files: set[str] = set()
+    for value in function.__globals__.values():
+        if hasattr(value, "py_func"):
+            files |= getattr(value, "kernel_files", {value.py_func.__code__.co_filename})
+    files.discard(own)
+    dispatcher.kernel_files = {own, *files}
+    index = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    if index is not None and files:
+        digest = hashlib.sha256(b"".join(Path(f).read_bytes() for f in sorted(files)))
+        index._source_stamp = (index._source_stamp, digest.hexdigest())
