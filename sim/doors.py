@@ -25,7 +25,7 @@ Float = NDArray[np.float64]
 # until when the door is kept open for someone s
 NEXT, UNTIL, ANGLE, KEPT = 0, 1, 2, 3
 OPENED = 1.5  # rad, where a hand opens to
-PASSABLE = 1.15  # rad, as ``sim.crowd.OPEN``
+PASSABLE = 1.15  # rad, as ``sim.manners.OPEN``
 RATE_MAX = 1.4  # rad/s, a door pushed open takes a little more than a second
 TORQUE_MAX = 40.0  # N m, against spring and damper too; about 45 N at the handle
 NEAR, FACING = 1.6, 0.3  # m, cosine: a robot this near and facing the doorway is let through
@@ -69,7 +69,7 @@ def swing(
 
     robot    (3,) pose, infinitely far where there is none
     leaves   addresses (m, 2) in qpos and dof, middles (m, 2) m, closers (m, 5), limits (m, 2) rad
-    passage  (m, 3) of ``sim.crowd``: columns 1 asked for by a person, 2 a person is in the way
+    passage  (m, 3) of ``sim.manners``: columns 1 asked for by a person, 2 a person is in the way
     physics  qpos and qvel (read), qfrc_applied (written)
     """
     addresses, middles, closers, limits = leaves

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.scene import Scene
-from sim import crowd, gait
+from sim import crowd, gait, manners
 from sim.bodies import Bodies
-from sim.crowd import Addresses, Crowd
 from sim.doors import Doors
 from sim.draws import between, normal, uniform
 from sim.flow import Field, FlowMap
+from sim.manners import Addresses, Crowd
 
 Float = NDArray[np.float64]
 _LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
@@ -94,13 +94,13 @@ class People:
         state, task, draws = self.crowd.state, self.crowd.task, self.crowd.draws
         for i in range(len(self.names)):
             speed = 1.34 + 0.26 * normal(draws, i)
-            state[i, crowd.SPEED] = min(max(speed, 0.8), 1.9)
+            state[i, manners.SPEED] = min(max(speed, 0.8), 1.9)
             first = min(self._rates[0], _FIRST_STAY_MAX)
-            state[i, crowd.STAY_UNTIL] = first * uniform(draws, i)
-            state[i, crowd.LOOK] = data.qpos[self._torsos[i, 0] + 2]
-            state[i, crowd.LOOK_UNTIL] = between(draws, i, 4.0, 15.0)
+            state[i, manners.STAY_UNTIL] = first * uniform(draws, i)
+            state[i, manners.LOOK] = data.qpos[self._torsos[i, 0] + 2]
+            state[i, manners.LOOK_UNTIL] = between(draws, i, 4.0, 15.0)
             n_goals = max(len(self.field.times), 1) if self.field is not None else 1
-            task[i, crowd.GOAL] = int(uniform(draws, i) * n_goals)
+            task[i, manners.GOAL] = int(uniform(draws, i) * n_goals)
         if self.names:
             gait.stand(data.qpos, self._torsos, self.feet)
             self.pose_limbs(0.0)
@@ -131,7 +131,7 @@ class People:
     def walked_s(self) -> tuple[Float, Float]:
         """(n,) s each has been on the way so far, and (n,) s of these standing still, blocked."""
         state = self.crowd.state
-        return state[:, crowd.WALKED_S].copy(), state[:, crowd.BLOCKED_S].copy()
+        return state[:, manners.WALKED_S].copy(), state[:, manners.BLOCKED_S].copy()
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""
@@ -139,16 +139,16 @@ class People:
         return {"feet": self.feet, "state": c.state, "task": c.task, "draws": c.draws}
 
 
-def _ways(doors: Doors, n_people: int) -> crowd.Doors:
+def _ways(doors: Doors, n_people: int) -> manners.Doors:
     m = len(doors.names)
     table = np.zeros((m, 8))
-    table[:, [crowd.CX, crowd.CY]] = doors.middles
-    table[:, [crowd.EX, crowd.EY]] = doors.along
+    table[:, [manners.CX, manners.CY]] = doors.middles
+    table[:, [manners.EX, manners.EY]] = doors.along
     sign = doors.hinges[:, 3]
-    table[:, crowd.NX], table[:, crowd.NY] = -sign * doors.along[:, 1], sign * doors.along[:, 0]
-    table[:, crowd.WIDTH] = doors.widths
+    table[:, manners.NX], table[:, manners.NY] = -sign * doors.along[:, 1], sign * doors.along[:, 0]
+    table[:, manners.WIDTH] = doors.widths
     sides = np.zeros((n_people, m), dtype=np.int64)
-    return crowd.Doors(doors=table, passage=doors.passage, sides=sides)
+    return manners.Doors(doors=table, passage=doors.passage, sides=sides)
 
 
 def _planar(bodies: Bodies, people: Sequence[str]) -> list[str]:
@@ -166,10 +166,10 @@ def _discs(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Float:
     planar = _planar(bodies, people)
     discs = np.zeros((len(planar) + 3 * len(doors.names), 6))
     for row, name in enumerate(planar):
-        kind = crowd.PERSON if row < len(people) else crowd.CHAIR
-        discs[row, crowd.KIND] = crowd.ROBOT if name == "robot" else kind
-    discs[: len(planar), crowd.R] = bodies.radii(planar)
+        kind = manners.PERSON if row < len(people) else manners.CHAIR
+        discs[row, manners.KIND] = manners.ROBOT if name == "robot" else kind
+    discs[: len(planar), manners.R] = bodies.radii(planar)
     for row in range(len(planar), len(discs)):
-        discs[row, crowd.KIND] = crowd.LEAF + (row - len(planar)) // 3
-        discs[row, crowd.R] = 0.06
+        discs[row, manners.KIND] = manners.LEAF + (row - len(planar)) // 3
+        discs[row, manners.R] = 0.06
     return discs

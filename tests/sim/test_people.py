@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from sim import crowd, gait
+from sim import gait, manners
 from sim.flow import clearance_at
 from sim.world import SUBSTEPS_PER_S, World
 
@@ -65,7 +65,7 @@ def test_people_walk_from_room_to_room(walk):
         }
         visited.append(len(inside))
     assert np.mean(visited) > 3
-    arrivals = np.sum(np.diff(walk["tasks"][:, :, crowd.WALKING], axis=0) < 0)
+    arrivals = np.sum(np.diff(walk["tasks"][:, :, manners.WALKING], axis=0) < 0)
     assert arrivals > poses.shape[1]
 
 
