@@ -48,13 +48,21 @@ def options(
     )
 
 
-def _terminate(_signal: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt  # so that a kill by SIGTERM also removes what is half-written
+class _InterruptedBySignal(BaseException):
+    """Ctrl-C or a kill: unwinds everything, so that what is half-written is removed on the way.
+
+    Not KeyboardInterrupt, which the command line library swallows without a word.
+    """
+
+
+def _interrupt(_signal: int, _frame: FrameType | None) -> None:
+    raise _InterruptedBySignal
 
 
 def main() -> None:
     """Entry point: every failure we foresee is one clear line and a non-zero exit status."""
-    signal.signal(signal.SIGTERM, _terminate)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
     warning = gl.sanitise_environment()  # before anything imports mujoco
     if warning:
         note(warning)
@@ -63,8 +71,8 @@ def main() -> None:
     except MobiliaError as error:
         fail(str(error))
         sys.exit(1)
-    except KeyboardInterrupt:
-        fail("interrupted; nothing half-written was left behind")
+    except _InterruptedBySignal:
+        fail("interrupted: nothing half-written is left behind")
         sys.exit(130)
     except BrokenPipeError:
         sys.exit(1)

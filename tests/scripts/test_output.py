@@ -43,9 +43,14 @@ def test_somebody_elses_files_are_never_replaced(tmp_path: Path):
 @pytest.mark.parametrize("failure", [KeyboardInterrupt, RuntimeError])
 def test_a_failure_leaves_nothing_and_keeps_the_earlier_run(tmp_path: Path, failure: type):
     make(tmp_path / "run", "one")
-    with pytest.raises(failure), whole_folder(tmp_path / "run", overwrite=True) as folder:
-        (folder / "data.txt").write_text("half")
-        raise failure
+
+    def half_a_run() -> None:
+        with whole_folder(tmp_path / "run", overwrite=True) as folder:
+            (folder / "data.txt").write_text("half")
+            raise failure
+
+    with pytest.raises(failure):
+        half_a_run()
     assert (tmp_path / "run" / "data.txt").read_text() == "one"
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
