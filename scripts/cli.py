@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import sys
 from types import FrameType
@@ -63,6 +64,7 @@ def main() -> None:
     """Entry point: every failure we foresee is one clear line and a non-zero exit status."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
+    sys.path.append(os.getcwd())  # so that module:Class finds what lies in the user's folder
     warning = gl.sanitise_environment()  # before anything imports mujoco
     if warning:
         note(warning)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import imageio.v2 as imageio
+
 from scripts import figures, score
 from scripts.console import console, progress
 from scripts.film import Film, film, require_ffmpeg
@@ -69,6 +71,8 @@ def run_session(stream: Stream, replay: Replay, show: Show, outputs: Outputs) ->
         wall_s = time.perf_counter() - started
         results = score.results(replay, wall_s, machine())
         _write(folder, replay, show, results)
+        if opened is not None and opened.last is not None:
+            imageio.imwrite(folder / "poster.png", opened.last)
         write_recipe(folder, outputs.command, outputs.settings)
     score.print_table(results, show.title)
     _tell(outputs)
