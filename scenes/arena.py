@@ -2,27 +2,47 @@
 """The arena: one empty room full of chairs that get pushed about.
 
 The smallest world in which the walls are the only thing to rely on, and the chairs hide them.
+Without walls (``walls="none"``) there is nothing to rely on at all: they still hold the chairs in,
+but no ray meets them, no camera sees them and the true map is empty, as if the room were wider than
+the laser reaches.
 """
 
 from __future__ import annotations
 
+from functools import cache
+
 from scenes.builder import Builder
-from scenes.recipe import Draws, count, finish, free_floor, scatter, seat_chairs
+from scenes.plan import Plan
+from scenes.recipe import Draws, choice, count, finish, free_floor, scatter, seat_chairs
 from scenes.registry import register
 from scenes.scene import Scene
 
+WALLS = ("visible", "none")
+
 
 @register("arena")
-def arena(seed: int, *, n_chairs: int | None = None, n_people: int | None = None) -> Scene:
-    """10 x 8 m, ``n_chairs`` (16) chairs anywhere, ``n_people`` (0) people."""
-    options = {
-        "n_chairs": count("n_chairs", n_chairs, 16),
-        "n_people": count("n_people", n_people, 0),
-    }
+def arena(
+    seed: int, *, n_chairs: int | None = None, n_people: int | None = None, walls: str = "visible"
+) -> Scene:
+    """10 x 8 m, ``n_chairs`` (16) chairs anywhere, ``n_people`` (0) people.
+
+    ``walls``: "visible", or "none" for walls that stop chairs but that nobody can see.
+    """
+    n_chairs = count("n_chairs", n_chairs, 16)
+    n_people = count("n_people", n_people, 0)
+    walls = choice("walls", walls, WALLS)
     draws = Draws(seed)
-    builder = Builder("arena")
-    start = next(builder.find("start")).pose
-    floor = free_floor(builder, start)
-    seat_chairs(builder, floor, (), options["n_chairs"], draws)
-    scatter(builder, floor, "person", options["n_people"], draws, draws.people)
-    return finish(builder, "arena", seed, start, options)
+    builder = Builder(_plan(walls))
+    floor = free_floor(builder)
+    seat_chairs(builder, floor, (), n_chairs, draws)
+    scatter(builder, floor, "person", n_people, draws, draws.people)
+    options = {"n_chairs": n_chairs, "n_people": n_people, "walls": walls}
+    return finish(builder, "arena", seed, options)
+
+
+@cache
+def _plan(walls: str) -> Plan:
+    plan = Plan("arena")
+    if walls == "none":
+        plan.hide_walls()
+    return plan.finish()

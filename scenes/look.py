@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
 
 from scenes import textures
 
+WALLS = ("wall", "parapet", "glass")  # first words of the names of what walls off
 CAP_HEIGHT = 0.012
 SKIRTING = (0.008, 0.04)  # how far it stands out, half height, m
 PANE_HEIGHT = 0.28  # half height of a pane on a parapet, m
@@ -50,17 +51,17 @@ SKIN = {
 UPHOLSTERY = ("fabric_blue", "fabric_blue", "fabric_blue", "fabric_teal", "fabric_slate")
 
 
+WARDROBES: Mapping[str, Mapping[str, tuple[float, float, float]]] = {
+    "shirt": SHIRTS,
+    "trousers": TROUSERS,
+    "hair": HAIR,
+    "skin": SKIN,
+}
+
+
 def dress(rng: np.random.Generator) -> Mapping[str, str]:
     """Materials of one person: part's name -> wardrobe's name."""
-    return {
-        slot: f"{slot}_{rng.choice(sorted(wardrobe))}"
-        for slot, wardrobe in (
-            ("shirt", SHIRTS),
-            ("trousers", TROUSERS),
-            ("hair", HAIR),
-            ("skin", SKIN),
-        )
-    }
+    return {slot: f"{slot}_{rng.choice(sorted(wardrobe))}" for slot, wardrobe in WARDROBES.items()}
 
 
 def upholster(rng: np.random.Generator) -> Mapping[str, str]:
@@ -68,19 +69,9 @@ def upholster(rng: np.random.Generator) -> Mapping[str, str]:
     return {"fabric_blue": str(rng.choice(UPHOLSTERY))}
 
 
-def finish(spec: mujoco.MjSpec) -> None:
-    """Everything that is the same for all scenes, once all parts are attached."""
-    for geom in spec.geoms:
-        geom.material = geom.material.rpartition("/")[2]
-    for camera in spec.cameras:
-        camera.name = camera.name.rpartition("/")[2]
-    _trim_walls(spec)
-    _make_wardrobe(spec)
-    _paint_floors(spec)
-
-
-def _paint_floors(spec: mujoco.MjSpec) -> None:
-    used = {geom.material for geom in spec.geoms}
+def paint_floors(spec: mujoco.MjSpec, more: Sequence[str] = ()) -> None:
+    """Give the floor materials in use, and ``more``, their textures."""
+    used = {geom.material for geom in spec.geoms} | set(more)
     for material in sorted(used & textures.PAINTERS.keys()):
         data, n, size_m = textures.floor(material)
         texture = spec.add_texture(
@@ -95,15 +86,22 @@ def _paint_floors(spec: mujoco.MjSpec) -> None:
         surface.textures = roles
 
 
-def _trim_walls(spec: mujoco.MjSpec) -> None:
+def trim_walls(spec: mujoco.MjSpec) -> None:
+    """Caps and skirting boards, panes on parapets, rails of glass walls; nothing where hidden."""
     for wall in list(spec.geoms):
         kind, _, name = wall.name.partition(":")
-        if kind not in ("wall", "parapet"):
+        if kind not in WALLS or wall.group != 0:
             continue
         (x, y, z), (a, b, c) = wall.pos, wall.size
         top = z + c
+        if kind == "glass":
+            rail = [max(half, 0.03) for half in (a, b)]
+            for which, height in (("rail", 0.03), ("cap", top)):
+                _trim(spec, f"{which}:{name}", (x, y, height), (*rail, 0.03), "metal_dark")
+            continue
         if kind == "parapet":
-            _trim(spec, f"pane:{name}", (x, y, top + PANE_HEIGHT), (0.012, b, PANE_HEIGHT), "glass")
+            pane = [min(half, 0.012) if half < 0.1 else half for half in (a, b)]
+            _trim(spec, f"pane:{name}", (x, y, top + PANE_HEIGHT), (*pane, PANE_HEIGHT), "glass")
             top += 2.0 * PANE_HEIGHT - 0.01
         out, half = SKIRTING
         _trim(spec, f"cap:{name}", (x, y, top), (a + 0.006, b + 0.006, CAP_HEIGHT), "wall_cap")
@@ -130,17 +128,10 @@ def _trim(
     )
 
 
-def _make_wardrobe(spec: mujoco.MjSpec) -> None:
-    """Materials that ``dress`` named, as far as they are worn."""
-    used = {geom.material for geom in spec.geoms}
-    for slot, wardrobe in (
-        ("shirt", SHIRTS),
-        ("trousers", TROUSERS),
-        ("hair", HAIR),
-        ("skin", SKIN),
-    ):
+def fill_wardrobe(spec: mujoco.MjSpec) -> None:
+    """All materials that ``dress`` may name."""
+    for slot, wardrobe in WARDROBES.items():
         for colour, rgb in wardrobe.items():
-            if f"{slot}_{colour}" in used:
-                spec.add_material(
-                    name=f"{slot}_{colour}", rgba=[*rgb, 1.0], specular=0.02, shininess=0.1
-                )
+            spec.add_material(
+                name=f"{slot}_{colour}", rgba=[*rgb, 1.0], specular=0.02, shininess=0.1
+            )

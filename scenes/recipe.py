@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from scenes import look
-from scenes.builder import Builder, Mark, hull_radius
-from scenes.footprint import static_raster
+from scenes.assembly import Mark, hull_radius
+from scenes.builder import Builder
 from scenes.placement import Floor
 from scenes.scene import Kind, Pose, Scene
 from slam.errors import InvalidValueError
@@ -45,23 +45,40 @@ def count(field: str, value: int | None, default: int) -> int:
     return int(value)
 
 
-def free_floor(builder: Builder, start: Pose) -> Floor:
-    """The rooms' floor less furniture, doorways, open leaves and the robot's start."""
-    leaves = [builder.leaf_box(name) for name in builder.door_angles]
-    boxes = np.vstack([builder.boxes, np.reshape(leaves, (-1, 5))])
-    floor = Floor([mark.rect for mark in builder.find("room")], boxes)
+def switch(field: str, value: bool) -> bool:
+    """An option that is on or off."""
+    if not isinstance(value, bool):
+        raise InvalidValueError(f"{field} must be True or False, got {value!r}")
+    return value
+
+
+def choice(field: str, value: str, known: Sequence[str]) -> str:
+    """An option that is one of a few words."""
+    if value not in known:
+        raise InvalidValueError(f"{field} must be one of {', '.join(known)}, got {value!r}")
+    return value
+
+
+def free_floor(builder: Builder) -> Floor:
+    """The rooms' floor less furniture, doorways, open leaves, goals, movers, the robot's start."""
+    plan = builder.plan
+    boxes = np.vstack([plan.boxes, builder.leaf_boxes()])
+    floor = Floor([mark.rect for mark in plan.find("room")], boxes)
     for name in builder.door_angles:
         x, y, _ = builder.doorway(name)
         floor.block(x, y, DOORWAY_RADIUS)
-    floor.block(start[0], start[1], START_RADIUS)
-    for goal in builder.find("goal"):
+    floor.block(plan.start[0], plan.start[1], START_RADIUS)
+    for goal in plan.find("goal"):
         floor.block(goal.pose[0], goal.pose[1], GOAL_RADIUS)
+    for mover in builder.movers:
+        if mover.kind != "door":
+            floor.block(*builder.initial[mover.name][:2], mover.radius)
     return floor
 
 
 def hang_doors(builder: Builder, rng: np.random.Generator) -> None:
     """A door at each ``door:ROOM:left|right`` mark, at rest at a seeded angle."""
-    for index, mark in enumerate(builder.find("door")):
+    for index, mark in enumerate(builder.plan.find("door")):
         angle = float(rng.uniform(*REST_ANGLES))
         builder.add_door(
             f"door{index}", mark.pose, clockwise=mark.words[2] == "right", angle=round(angle, 3)
@@ -96,34 +113,31 @@ def scatter(
         floor.block(pose[0], pose[1], hull_radius(kind))
 
 
-def finish(
-    builder: Builder, name: str, seed: int, start: Pose, options: Mapping[str, int]
-) -> Scene:
-    """Robot, surfaces and facts."""
-    builder.add("robot", "robot", start)
-    look.finish(builder.spec)
-    rects = [mark.rect for mark in builder.find("room")]
-    bounds = (
-        min(r[0] for r in rects),
-        min(r[1] for r in rects),
-        max(r[2] for r in rects),
-        max(r[3] for r in rects),
-    )
-    obstacles = builder.boxes
-    obstacles.setflags(write=False)
+def put_bins(builder: Builder, rng: np.random.Generator) -> None:
+    """A bin within a hand's breadth of each ``bin:...`` mark, away from the wall."""
+    for index, mark in enumerate(builder.plan.find("bin")):
+        shift = rng.uniform(-MARGIN, MARGIN, 2).tolist()
+        yaw = float(rng.uniform(-3.0, 3.0))
+        builder.add("bin", f"bin{index}", (mark.pose[0] + shift[0], mark.pose[1] + shift[1], yaw))
+
+
+def finish(builder: Builder, name: str, seed: int, options: Mapping[str, object]) -> Scene:
+    """Robot and facts."""
+    plan = builder.plan
+    builder.add("robot", "robot", plan.start)
     return Scene(
         name=name,
         seed=seed,
-        spec=builder.spec,
+        spec=builder.spec(),
         movers=tuple(builder.movers),
         initial=dict(builder.initial),
         door_angles=dict(builder.door_angles),
-        goals={mark.words[1]: (mark.pose[0], mark.pose[1]) for mark in builder.find("goal")},
-        rooms={mark.words[1]: mark.rect for mark in builder.find("room")},
-        bounds=bounds,
-        obstacles=obstacles,
-        static_map=static_raster(builder.spec.compile(), bounds),
-        start=start,
+        goals={mark.words[1]: (mark.pose[0], mark.pose[1]) for mark in plan.find("goal")},
+        rooms={mark.words[1]: mark.rect for mark in plan.find("room")},
+        bounds=plan.bounds,
+        obstacles=plan.boxes,
+        static_map=plan.static_map,
+        start=plan.start,
         options=dict(options),
     )
 

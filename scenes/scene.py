@@ -66,7 +66,7 @@ class Scene:
     obstacles: NDArray[np.float64]
     static_map: Raster
     start: Pose
-    options: Mapping[str, int] = field(default_factory=dict)
+    options: Mapping[str, object] = field(default_factory=dict)
 
     def compile(self) -> mujoco.MjModel:
         """The model; its qpos0 is zero, as a planar qpos *is* the world pose: see ``place``."""

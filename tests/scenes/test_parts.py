@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 import pytest
 
-import scenes.builder
+import scenes.assembly
 from scenes import textures
 from scenes.placement import Floor, gap_to_boxes
 
-PARTS = sorted((Path(scenes.builder.__file__).parent / "parts").glob("*.xml"))
+PARTS = sorted((Path(scenes.assembly.__file__).parent / "parts").glob("*.xml"))
 
 
 @pytest.mark.parametrize("path", PARTS, ids=lambda path: path.stem)

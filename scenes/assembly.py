@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts put side by side under their names, then into a scene all at once.
+
+A part is attached under a prefix ("chair3/"), which MuJoCo also puts before the part's references
+to materials; so a part's own materials are dropped and the prefix is stripped from the reference.
+Attaching costs more the bigger the scene is, so parts first meet in a spec of their own: one for
+all whose names differ in the number only ("chair0", "chair1", ...).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import mujoco
+
+from scenes.scene import Pose
+from slam.errors import InvalidValueError
+
+HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mark:
+    """A site of a plan: ``words`` of its name split at ':', where it is, half sizes of its box."""
+
+    words: tuple[str, ...]
+    pose: Pose
+    half: tuple[float, float]
+
+    @property
+    def rect(self) -> tuple[float, float, float, float]:
+        """xmin, ymin, xmax, ymax of an unrotated box, m."""
+        (x, y, _), (a, b) = self.pose, self.half
+        return x - a, y - b, x + a, y + b
+
+
+def marks(spec: mujoco.MjSpec) -> tuple[Mark, ...]:
+    """Every site of an uncompiled spec, in the order of the file."""
+    return tuple(
+        Mark(
+            words=tuple(site.name.split(":")),
+            pose=(float(site.pos[0]), float(site.pos[1]), _yaw(site)),
+            half=(float(site.size[0]), float(site.size[1])),
+        )
+        for site in spec.sites
+    )
+
+
+def moved(pose: Pose, local: Pose) -> Pose:
+    """``local``, given in the frame of ``pose``, in the world."""
+    x, y, yaw = pose
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    turned = math.remainder(yaw + local[2], math.tau)
+    return x + cos * local[0] - sin * local[1], y + sin * local[0] + cos * local[1], turned
+
+
+def file_of(folder: str, name: str) -> Path:
+    """The MJCF file of a part or plan: one of ours by its name, anybody's by its path."""
+    path = Path(name) if name.endswith(".xml") else HERE / folder / f"{name}.xml"
+    if not path.is_file():
+        raise InvalidValueError(f"no file '{path.name}' for '{name}' among the {folder}")
+    return path
+
+
+@cache
+def part(name: str) -> mujoco.MjSpec:
+    """The parsed part without its materials; copy before use."""
+    spec = mujoco.MjSpec.from_file(str(file_of("parts", name)))
+    for material in list(spec.materials):
+        spec.delete(material)
+    return spec
+
+
+@cache
+def part_marks(name: str) -> tuple[Mark, ...]:
+    """The marks of a part, in its own frame."""
+    return marks(part(name))
+
+
+@cache
+def hull_radius(name: str) -> float:
+    """Radius of a planar part's hull, m."""
+    return float(part(name).geom("hull").size[0])
+
+
+class Assembly:
+    """Parts on their way into a scene."""
+
+    def __init__(self) -> None:
+        self._groups: dict[str, mujoco.MjSpec] = {}
+
+    def put(
+        self,
+        name: str,
+        instance: str,
+        pose: Pose,
+        prepare: Callable[[mujoco.MjSpec], None] | None = None,
+    ) -> None:
+        """Put a copy of part ``name``, altered by ``prepare``, at ``pose`` as ``instance``."""
+        child = part(name).copy()
+        if prepare:
+            prepare(child)
+        kin = instance.rstrip("0123456789")
+        group = self._groups.setdefault(kin, mujoco.MjSpec())
+        frame = group.worldbody.add_frame(pos=[pose[0], pose[1], 0.0], quat=quaternion(pose[2]))
+        group.attach(child, frame=frame, prefix=f"{instance.removeprefix(kin)}/")
+
+    def into(self, spec: mujoco.MjSpec) -> None:
+        """Hand everything over to ``spec``, whose materials the parts use from now on."""
+        for kin, group in self._groups.items():
+            spec.attach(group, frame=spec.worldbody.add_frame(), prefix=kin)
+        self._groups = {}
+        for geom in spec.geoms:
+            material = geom.material
+            if "/" in material:
+                geom.material = material.rpartition("/")[2]
+        for camera in spec.cameras:
+            camera.name = camera.name.rpartition("/")[2]
+
+
+def quaternion(yaw: float) -> list[float]:
+    """Of a turn about the vertical."""
+    return [math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)]
+
+
+def _yaw(site: mujoco.MjsSite) -> float:
+    return (
+        float(site.alt.euler[2])
+        if site.alt.type == mujoco.mjtOrientation.mjORIENTATION_EULER
+        else 0.0
+    )

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What never moves: walls, floors and furniture of a scene, with the true map they make.
+
+A plan is the same for all seeds of most scenes, so it is made once per process and the things that
+move are added to copies of it (``scenes.builder``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes import look
+from scenes.assembly import Assembly, Mark, file_of, marks, moved, part_marks
+from scenes.footprint import static_raster
+from scenes.scene import Pose
+from slam.errors import InvalidValueError
+from slam.system import Raster
+
+JAMB_OFFSET = 0.04  # m from the plane of a hinge to the middle of its wall, away from the swing
+WALL_HEIGHT = 1.1  # m, walls are cut there
+GLASS_HALF = 0.012  # m, half thickness of a pane
+HIDDEN = 3  # group of what collides and is seen by neither rays nor cameras
+
+
+class Plan:
+    """A plan in the making: ``furnish`` it, then ``finish`` it, then only read it."""
+
+    spec: mujoco.MjSpec
+    static_map: Raster
+
+    def __init__(self, source: str, *, floors: Sequence[str] = ()) -> None:
+        """``source``: name of one of our plans or path of an MJCF file; ``floors``: materials that
+        will be used beside those of the file."""
+        parsed, self.marks = _parsed(source, tuple(floors))
+        self.spec = parsed.copy()
+        self.seats: list[Mark] = list(self.find("seat"))
+        self._furniture: list[list[float]] = []
+        self._boxes: NDArray[np.float64] | None = None
+        self._parts = Assembly()
+
+    def find(self, first: str) -> Iterator[Mark]:
+        """Marks whose name starts with that word."""
+        return (mark for mark in self.marks if mark.words[0] == first)
+
+    def mark(self, name: str, pose: Pose, half: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Add a mark to those of the file."""
+        self.marks = (*self.marks, Mark(words=tuple(name.split(":")), pose=pose, half=half))
+
+    @property
+    def start(self) -> Pose:
+        """Where the robot starts."""
+        return next(self.find("start")).pose
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """xmin, ymin, xmax, ymax of all rooms, m."""
+        rects = [mark.rect for mark in self.find("room")]
+        low = [min(rect[i] for rect in rects) for i in (0, 1)]
+        high = [max(rect[i] for rect in rects) for i in (2, 3)]
+        return low[0], low[1], high[0], high[1]
+
+    @property
+    def boxes(self) -> NDArray[np.float64]:
+        """(n, 5) walls and furniture so far: cx, cy, half_x, half_y m, yaw rad; read-only."""
+        if self._boxes is not None:
+            return self._boxes
+        walls = [
+            [geom.pos[0], geom.pos[1], geom.size[0], geom.size[1], 0.0]
+            for geom in self.spec.geoms
+            if geom.name.partition(":")[0] in look.WALLS
+        ]
+        boxes = np.array(walls + self._furniture, dtype=np.float64).reshape(-1, 5)
+        boxes.setflags(write=False)
+        return boxes
+
+    def furnish(self, part: str, instance: str, pose: Pose) -> None:
+        """Put a static part; its ``seat:...`` marks become seats of the plan."""
+        self._parts.put(part, instance, pose)
+        for mark in part_marks(part):
+            place = moved(pose, mark.pose)
+            if mark.words[0].startswith("footprint"):
+                self._furniture.append([place[0], place[1], *mark.half, place[2]])
+            elif mark.words[0] == "seat":
+                self.seats.append(Mark(words=mark.words, pose=place, half=mark.half))
+
+    def furnish_marks(self, parts: Sequence[str]) -> None:
+        """Put each of these parts wherever a mark starts with its name."""
+        for part in parts:
+            for index, mark in enumerate(self.find(part)):
+                self.furnish(part, f"{part}{index}", mark.pose)
+
+    def frame_doors(self) -> None:
+        """Jambs and threshold at each ``door:ROOM:left|right`` mark."""
+        for index, mark in enumerate(self.find("door")):
+            side = JAMB_OFFSET if mark.words[2] == "right" else -JAMB_OFFSET
+            self.furnish("door_frame", f"door_frame{index}", moved(mark.pose, (0.0, side, 0.0)))
+
+    def wall(self, name: str, pos: tuple[float, float], half: tuple[float, float]) -> None:
+        """A wall of its usual height, along x or y."""
+        self.spec.worldbody.add_geom(
+            name=f"wall:{name}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=[*pos, 0.5 * WALL_HEIGHT],
+            size=[*half, 0.5 * WALL_HEIGHT],
+            material="wall",
+            contype=1,
+            conaffinity=0,
+            group=0,
+        )
+
+    def floor(
+        self, name: str, pos: tuple[float, float], half: tuple[float, float], material: str
+    ) -> None:
+        """A floor, which must be among the plan's or ``floors`` to be painted."""
+        self.spec.worldbody.add_geom(
+            name=f"floor:{name}",
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            pos=[*pos, 0.0],
+            size=[*half, 0.1],
+            material=material,
+            contype=0,
+            conaffinity=0,
+            group=0,
+            castshadow=False,
+        )
+
+    def glaze(self, name: str) -> None:
+        """Make a wall or parapet one pane of glass from the floor up."""
+        for kind in ("wall", "parapet"):
+            geom = self.spec.geom(f"{kind}:{name}")
+            if geom is None:
+                continue
+            thin = 0 if geom.size[0] < geom.size[1] else 1
+            size = [float(v) for v in geom.size]
+            size[thin], size[2] = GLASS_HALF, 0.5 * WALL_HEIGHT
+            geom.name, geom.material, geom.castshadow = f"glass:{name}", "glass", False
+            geom.size, geom.pos = size, [geom.pos[0], geom.pos[1], 0.5 * WALL_HEIGHT]
+            return
+        raise InvalidValueError(f"the plan has no wall or parapet '{name}' to glaze")
+
+    def hide_walls(self) -> None:
+        """Keep walls for what rolls against them, but out of sight of rays and cameras."""
+        for geom in self.spec.geoms:
+            if geom.name.partition(":")[0] in look.WALLS:
+                geom.group = HIDDEN
+
+    def finish(self) -> Plan:
+        """Put the parts in, dress the walls, draw the true map."""
+        self._parts.into(self.spec)
+        self._boxes = self.boxes
+        look.trim_walls(self.spec)
+        self.static_map = static_raster(self.spec.compile(), self.bounds)
+        return self
+
+
+@cache
+def _parsed(source: str, floors: tuple[str, ...]) -> tuple[mujoco.MjSpec, tuple[Mark, ...]]:
+    """The file without its marks, floors painted, all clothes in the wardrobe; copy before use."""
+    spec = mujoco.MjSpec.from_file(str(file_of("plans", source)))
+    found = marks(spec)
+    for site in list(spec.sites):
+        spec.delete(site)
+    look.paint_floors(spec, floors)
+    look.fill_wardrobe(spec)
+    return spec, found
