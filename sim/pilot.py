@@ -21,6 +21,7 @@ from slam.frames import NS_PER_S, Float
 SIGHT_M = 4.0  # discs further away than this do not matter within the driver's horizon
 AJAR = 0.6  # rad; a leaf less open than this is let open for the robot, a wider one is gone round
 REPLAN_S = 1.0  # at most this often
+DECIDE_S = 0.05  # a command holds for at least this long
 LEAF_M = 0.05  # half thickness with which a leaf is planned around
 
 
@@ -43,9 +44,14 @@ class Pilot:
         self.driver.use(self._walls.with_boxes(self._leaves_planned))
         self._last: Float | None = None
         self._here: Float | None = None
+        self._since, self._decided = 0.0, (0.0, 0.0)
 
     def command(self, dt: float) -> tuple[float, float]:
         """(v m/s, omega rad/s) for the next ``dt`` s, from where everything truly is now."""
+        self._since += dt
+        if self._last is not None and self._since < DECIDE_S:
+            return self._decided
+        dt, self._since = self._since, 0.0
         poses = self.world.mover_poses()
         velocities = np.zeros((len(poses), 2))
         if self._last is not None:
@@ -57,18 +63,20 @@ class Pilot:
         discs = np.concatenate([self._bodies(poses, velocities), self._leaves(poses)])
         gap = discs[:, :2] - here[:2]
         near = gap[:, 0] * gap[:, 0] + gap[:, 1] * gap[:, 1] < SIGHT_M * SIGHT_M
-        return self.driver.command(here, velocity, discs[near], dt)
+        self._decided = self.driver.command(here, velocity, discs[near], dt)
+        return self._decided
 
     def _replan(self, poses: Float) -> None:
         """Plan anew when a leaf stands elsewhere by more than about 20 degrees."""
         if self.world.time_ns - self._planned_ns < REPLAN_S * NS_PER_S:
             return
+        self._planned_ns = self.world.time_ns
         leaves = self._open_leaves(poses)
         if len(leaves) == len(self._leaves_planned):
             turned = se2.wrap_array(leaves[:, 4] - self._leaves_planned[:, 4])
             if not (np.abs(turned) > 0.35).any():
                 return
-        self._planned_ns, self._leaves_planned = self.world.time_ns, leaves
+        self._leaves_planned = leaves
         self.driver.use(self._walls.with_boxes(leaves))
 
     def _open_leaves(self, poses: Float) -> Float:
