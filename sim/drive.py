@@ -188,7 +188,7 @@ class Driver:
             self.visited += 1
             self._next()
         to_go = self._grid.cost_to(self.goal)
-        left = self._grid.lookup(to_go, T_world_robot[0], T_world_robot[1])
+        left = self._grid.cost_near(to_go, T_world_robot[0], T_world_robot[1])
         if left >= _FAR and self._idle_s > 1.0:
             self._next()  # there is no way at present: somewhere else meanwhile
         elif left < self._best - 0.1:
@@ -200,6 +200,8 @@ class Driver:
         grid, radius = self._grid, self.config.robot_radius_m
         if self._idle_s > 1.5:
             radius *= 0.93  # squeeze past rather than stand before a gap that is just wide enough
+        if 2.5 < self._idle_s < 4.5:
+            to_go = np.zeros_like(to_go)  # make room first: away from whatever is in the way
         v, omega, _ = _choose(
             np.asarray(T_world_robot, dtype=np.float64),
             np.asarray(velocity, dtype=np.float64),

@@ -61,6 +61,12 @@ class NavGrid:
         inside = 0 <= i < field.shape[0] and 0 <= j < field.shape[1]
         return float(field[i, j]) if inside else _FAR
 
+    def cost_near(self, costs: Float, x: float, y: float) -> float:
+        """The least of ``costs`` within a cell of (x, y): a robot may stand where none may go."""
+        j, i = math.floor((x - self.x0) / self.cell), math.floor((y - self.y0) / self.cell)
+        around = costs[max(0, i - 1) : i + 2, max(0, j - 1) : j + 2]
+        return float(around.min()) if around.size else _FAR
+
     def cost_to(self, goal: Float) -> Float:
         """Cost of the best way to ``goal`` from every cell: metres, dearer close to walls.
 
