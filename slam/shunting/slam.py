@@ -33,8 +33,9 @@ WIDEST = SearchWindow(reach_m=0.6, turn_rad=0.5)
 GOOD_SHARE = 0.85  # of the usual matched fraction: below it the neighbourhood is searched
 VAGUE_CELLS = 1.0  # a prior wider than this may leave the basin of the right optimum
 LOST_AFTER, PATIENCE = 3, 30  # doubtful frames in a row: then lost; then the map is written anew
-INFORMATION_SHARE = 0.02  # of the data's curvature that is independent from frame to frame
-DRIFT_SHARE = 0.5
+INFORMATION_SHARE = 0.3  # of the data's curvature that is independent from frame to frame
+DRIFT_SHARE = 1.0  # of the pose's error that goes into newly mapped structure
+LOCK_CELLS, LOCK_RAD = 0.05, 3e-4  # what the lattice itself leaves, 1 sigma
 
 
 @register("shunting")
@@ -160,8 +161,12 @@ class ShuntingSlam:
         share = INFORMATION_SHARE * match.tau
         self._relative = inverted(inverted(spread) + share * match.information)
         # What is new is mapped with the pose's present error, which then stays in the map.
-        self._drift = self._drift + DRIFT_SHARE * (1.0 - match.matched) * self._relative
-        self._covariance = self._relative + self._drift
+        share = DRIFT_SHARE * (1.0 - match.matched)
+        share *= math.sqrt(min(5.0 * max(prediction.elapsed, 0.0), 1.0))
+        self._drift = self._drift + share * self._relative
+        cell = self.config.cell_m
+        floor = np.diag([(LOCK_CELLS * cell) ** 2, (LOCK_CELLS * cell) ** 2, LOCK_RAD**2])
+        self._covariance = self._relative + self._drift + floor
 
     def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
         self._before = frame.odometry
