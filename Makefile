@@ -11,7 +11,7 @@ help:            ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
 demo: $(STAMP)   ## 60 s of a moving office, SLAM against odometry, a map and a film in out/demo/
-	@$(BIN)/mobilia demo
+	@$(BIN)/mobilia demo --overwrite
 
 test: $(STAMP)   ## the whole test suite
 	@$(BIN)/python -m pytest
