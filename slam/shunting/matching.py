@@ -264,10 +264,10 @@ def refine(
         trial_prior = _prior(trial, prediction, precision, step)
         if tau * (trial_rewarded - rewarded - older) + trial_prior > prior:
             rewarded, prior, matched = trial_rewarded, trial_prior, trial_matched
-            pose[:] = trial
-            gradient[:] = trial_gradient
-            along[:] = trial_along
-            information[:] = trial_information
+            for a in range(3):  # element by element: array assignment triples the compile time
+                pose[a], gradient[a], along[a] = trial[a], trial_gradient[a], trial_along[a]
+                for b in range(3):
+                    information[a, b] = trial_information[a, b]
             damping = max(0.2 * damping, 1e-6)
         else:
             damping = max(10.0 * damping, 0.1)

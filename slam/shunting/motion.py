@@ -7,10 +7,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
-from slam._jit import njit
 from slam.frames import Float, Odometry
 
 WIDEN = 2.5  # times the odometry's own standard deviation: a too tight prior lets the map slip
@@ -19,38 +17,24 @@ FLOOR_M, FLOOR_RAD = 0.004, 0.003  # standard deviation per sqrt(0.2 s): skew, q
 ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
 
 
-@njit
-def turned(covariance: NDArray[np.float64], theta: float) -> NDArray[np.float64]:
+def turned(covariance: Float, theta: float) -> Float:
     """A (3, 3) covariance of a motion in axes turned by -theta; products in a fixed order."""
     c, s = math.cos(theta), math.sin(theta)
-    a, b, d = covariance[0, 0], covariance[0, 1], covariance[1, 1]
-    e, f = covariance[0, 2], covariance[1, 2]
-    out = np.empty((3, 3))
-    out[0, 0] = c * c * a - 2.0 * c * s * b + s * s * d
-    out[0, 1] = out[1, 0] = c * s * (a - d) + (c * c - s * s) * b
-    out[1, 1] = s * s * a + 2.0 * c * s * b + c * c * d
-    out[0, 2] = out[2, 0] = c * e - s * f
-    out[1, 2] = out[2, 1] = s * e + c * f
-    out[2, 2] = covariance[2, 2]
-    return out
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = covariance.tolist()
+    a = c * c * xx - 2.0 * c * s * xy + s * s * yy
+    b = c * s * (xx - yy) + (c * c - s * s) * xy
+    d = s * s * xx + 2.0 * c * s * xy + c * c * yy
+    e, f = c * xt - s * yt, s * xt + c * yt
+    return np.array([[a, b, e], [b, d, f], [e, f, tt]])
 
 
-@njit
-def inverted(m: NDArray[np.float64]) -> NDArray[np.float64]:
+def inverted(matrix: Float) -> Float:
     """Inverse of a symmetric positive definite (3, 3) matrix, in a fixed order of operations."""
-    out = np.empty((3, 3))
-    out[0, 0] = m[1, 1] * m[2, 2] - m[1, 2] * m[1, 2]
-    out[0, 1] = m[0, 2] * m[1, 2] - m[0, 1] * m[2, 2]
-    out[0, 2] = m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1]
-    out[1, 1] = m[0, 0] * m[2, 2] - m[0, 2] * m[0, 2]
-    out[1, 2] = m[0, 1] * m[0, 2] - m[0, 0] * m[1, 2]
-    out[2, 2] = m[0, 0] * m[1, 1] - m[0, 1] * m[0, 1]
-    det = m[0, 0] * out[0, 0] + m[0, 1] * out[0, 1] + m[0, 2] * out[0, 2]
-    out[1, 0], out[2, 0], out[2, 1] = out[0, 1], out[0, 2], out[1, 2]
-    for row in range(3):
-        for column in range(3):
-            out[row, column] /= det
-    return out
+    (a, b, c), (_, d, e), (_, _, f) = matrix.tolist()
+    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
+    bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
+    det = a * aa + b * ab + c * ac
+    return np.array([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]) / det
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

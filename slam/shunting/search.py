@@ -117,55 +117,62 @@ def _mahalanobis(precision: NDArray[np.float64], ex: float, ey: float, et: float
 
 
 @njit
-def branch_and_bound(
+def _heading_cost(precision: NDArray[np.float64], turn: float) -> float:
+    """The least 1/2 e' P^-1 e of a heading, whatever the offset."""
+    det = precision[0, 0] * precision[1, 1] - precision[0, 1] * precision[0, 1]
+    bx = (precision[0, 1] * precision[1, 2] - precision[1, 1] * precision[0, 2]) / det
+    by = (precision[0, 1] * precision[0, 2] - precision[0, 0] * precision[1, 2]) / det
+    return 0.5 * _mahalanobis(precision, bx, by, 1.0) * turn * turn * (1.0 - 1e-9)
+
+
+@njit
+def _bound(
+    level: NDArray[np.uint8],
+    bases: NDArray[np.int32],
+    costs: NDArray[np.float64],
+    reach: int,
+    width: int,
+    gain: float,
+    bounds: NDArray[np.float64],
+) -> None:
+    """Upper bounds (headings, rows, columns) of the coarsest blocks of offsets."""
+    for h in range(bounds.shape[0]):
+        for a in range(bounds.shape[1]):
+            for b in range(bounds.shape[2]):
+                total = _sum(level, bases[h], b * width - reach, a * width - reach)
+                bounds[h, a, b] = gain * total - costs[h]
+
+
+@njit
+def _descend(
     levels: NDArray[np.uint8],
     bases: NDArray[np.int32],
     turns: NDArray[np.float64],
+    costs: NDArray[np.float64],
     reach: int,
     cell: float,
     precision: NDArray[np.float64],
     gain: float,
+    bounds: NDArray[np.float64],
+    order: NDArray[np.int64],
     best_index: NDArray[np.int64],
 ) -> tuple[float, int]:
-    """Maximise gain * sum - 1/2 e' precision e over headings and offsets -reach..reach cells.
-
-    ``levels`` (L + 1, rows, columns); level l holds maxima over 2^l x 2^l. ``bases`` (headings, n,
-    2) columns and rows of the points at offset (0, 0); ``turns`` (headings,) rad from the
-    prediction. Fills ``best_index`` with (heading, di, dj); returns the score and how many
-    candidates were scored.
-    """
+    """Depth first through the blocks in falling ``order`` of their bounds."""
     top = len(levels) - 1
-    width = 1 << top
-    across = (2 * reach) // width + 1
-    count = len(turns) * across * across
-    bounds = np.empty(count)
-    # The least a heading costs whatever the offset: e' P^-1 e minimised over x and y.
-    det = precision[0, 0] * precision[1, 1] - precision[0, 1] * precision[0, 1]
-    bx = (precision[0, 1] * precision[1, 2] - precision[1, 1] * precision[0, 2]) / det
-    by = (precision[0, 1] * precision[0, 2] - precision[0, 0] * precision[1, 2]) / det
-    least = _mahalanobis(precision, bx, by, 1.0)
-    evaluations = count
-    for h in range(len(turns)):
-        cost = 0.5 * least * turns[h] * turns[h] * (1.0 - 1e-9)
-        for a in range(across):
-            for b in range(across):
-                total = _sum(levels[top], bases[h], b * width - reach, a * width - reach)
-                bounds[(h * across + a) * across + b] = gain * total - cost
-    best = -math.inf
-    best_index[:] = 0
+    across = bounds.shape[1]
+    best, evaluations = -math.inf, 0
     stack = np.empty((4 * (top + 1) + 4, 3), np.int64)  # di, dj, level
     stack_bound = np.empty(4 * (top + 1) + 4)
-    child_bound = np.empty(4)
-    for entry in np.argsort(-bounds, kind="mergesort"):
-        if bounds[entry] <= best:
-            break
+    children = np.empty(4)
+    for entry in order:
         h, rest = entry // (across * across), entry % (across * across)
-        cost = 0.5 * least * turns[h] * turns[h] * (1.0 - 1e-9)
+        if bounds[h, rest // across, rest % across] <= best:
+            break
         depth = 1
-        stack[0, 0] = (rest % across) * width - reach
-        stack[0, 1] = (rest // across) * width - reach
+        stack[0, 0] = (rest % across) * (1 << top) - reach
+        stack[0, 1] = (rest // across) * (1 << top) - reach
         stack[0, 2] = top
-        stack_bound[0] = bounds[entry]
+        stack_bound[0] = bounds[h, rest // across, rest % across]
         while depth > 0:
             depth -= 1
             di, dj, level = stack[depth, 0], stack[depth, 1], stack[depth, 2]
@@ -178,24 +185,59 @@ def branch_and_bound(
             span = 1 << (level - 1)
             for q in range(4):
                 i, j = di + (q & 1) * span, dj + (q >> 1) * span
-                child_bound[q] = -math.inf
+                children[q] = -math.inf
                 if i > reach or j > reach:
                     continue
                 evaluations += 1
                 value = gain * _sum(levels[level - 1], bases[h], i, j)
                 if level == 1:
-                    value -= 0.5 * _mahalanobis(precision, i * cell, j * cell, turns[h])
+                    children[q] = value - 0.5 * _mahalanobis(
+                        precision, i * cell, j * cell, turns[h]
+                    )
                 else:
-                    value -= cost
-                child_bound[q] = value
-            for q in np.argsort(child_bound, kind="mergesort"):  # the best is pushed last
-                if child_bound[q] > best:
-                    stack[depth, 0] = di + (q & 1) * span
-                    stack[depth, 1] = dj + (q >> 1) * span
+                    children[q] = value - costs[h]
+            for _ in range(4):  # the best is pushed last
+                least = 0
+                for q in range(1, 4):
+                    if children[q] < children[least]:
+                        least = q
+                if best < children[least] < math.inf:
+                    stack[depth, 0] = di + (least & 1) * span
+                    stack[depth, 1] = dj + (least >> 1) * span
                     stack[depth, 2] = level - 1
-                    stack_bound[depth] = child_bound[q]
+                    stack_bound[depth] = children[least]
                     depth += 1
+                children[least] = math.inf
     return best, evaluations
+
+
+def branch_and_bound(
+    levels: NDArray[np.uint8],
+    bases: NDArray[np.int32],
+    turns: Float,
+    reach: int,
+    cell: float,
+    precision: Float,
+    gain: float,
+    best_index: NDArray[np.int64],
+) -> tuple[float, int]:
+    """Maximise gain * sum - 1/2 e' precision e over headings and offsets -reach..reach cells.
+
+    ``levels`` (L + 1, rows, columns); level l holds maxima over 2^l x 2^l. ``bases`` (headings, n,
+    2) columns and rows of the points at offset (0, 0); ``turns`` (headings,) rad from the
+    prediction. Fills ``best_index`` with (heading, di, dj); returns the score and how many
+    candidates were scored.
+    """
+    width = 1 << (len(levels) - 1)
+    across = (2 * reach) // width + 1
+    costs = np.array([_heading_cost(precision, float(turn)) for turn in turns])
+    bounds = np.empty((len(turns), across, across))
+    _bound(levels[-1], bases, costs, reach, width, gain, bounds)
+    order = np.argsort(-bounds.ravel(), kind="stable")
+    best, evaluations = _descend(
+        levels, bases, turns, costs, reach, cell, precision, gain, bounds, order, best_index
+    )
+    return best, evaluations + bounds.size
 
 
 @njit
