@@ -34,7 +34,8 @@ def inverted(matrix: Float) -> Float:
     aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
     bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
     det = a * aa + b * ab + c * ac
-    return np.array([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]) / det
+    adjugate = [[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]
+    return np.array([[entry / det for entry in row] for row in adjugate])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
