@@ -125,7 +125,7 @@ def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any])
         figures.errors(folder / "errors.png", online, truth)
     figures.trajectories(folder / "trajectories.png", online, truth, raster, truth_name)
     if raster is not None:
-        write_map(folder / "map", raster)
+        write_map(folder / "map", show.seen.merge(raster))
         figures.map_picture(folder / "map.png", raster, online[show.primary], show.last_points_map)
     write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
 
@@ -136,9 +136,9 @@ def file_name(name: str) -> str:
 
 
 def _tell(outputs: Outputs) -> None:
-    first = "film.mp4" if outputs.film else "map.png"
+    first, then = ("film.mp4", "map.png") if outputs.film else ("map.png", "trajectories.png")
     console.print(
-        f"Open [bold]{outputs.folder / first}[/bold] first, then map.png and errors.png beside it; "
+        f"Open [bold]{outputs.folder / first}[/bold] first, then {then} and errors.png beside it; "
         "results.json has every number, trajectory_*.tum is for evo, map.yaml for map_server.",
         soft_wrap=True,
     )

@@ -23,6 +23,9 @@ from scripts.panes import (
 from slam import se2
 from slam.frames import Float, Frame, Scan
 from slam.replay import Replay, Track
+from slam.seen import SeenSpace
+
+SEEN_EVERY_NS = 200_000_000  # the areas of neighbouring scans overlap
 
 Painter = Callable[[Frame, tuple[int, int]], Picture]
 """Paints the true world at a frame into (width, height)."""
@@ -49,6 +52,8 @@ class Show:
     camera: Painter | None = None
     truth_name: str = "truth"
     last_points_map: Float = field(default_factory=lambda: np.zeros((0, 2)))
+    seen: SeenSpace = field(default_factory=SeenSpace)
+    _seen_ns: int = -SEEN_EVERY_NS
     _errors: dict[str, tuple[list[float], list[float]]] = field(default_factory=dict)
     _trails: dict[str, list[Float]] = field(default_factory=dict)
     _first: tuple[int, Float | None] | None = None
@@ -74,6 +79,9 @@ class Show:
         if frame.scan is not None:
             T_map_robot = self._track().estimates[-1].T_map_robot
             self.last_points_map = se2.transform(T_map_robot, points_robot(frame.scan))
+            if frame.stamp_ns - self._seen_ns >= SEEN_EVERY_NS:
+                self.seen.add(frame.scan, T_map_robot)
+                self._seen_ns = frame.stamp_ns
         for name, track in self.replay.tracks.items():
             T_map_robot = track.estimates[-1].T_map_robot
             self._trails.setdefault(name, []).append(T_map_robot)
