@@ -5,9 +5,29 @@ scene = scenes.build("office", seed=3, n_people=0)
 model = scene.compile()
 """
 
+from scenes.apartment import apartment
 from scenes.arena import arena
+from scenes.classroom import classroom
+from scenes.corridor import corridor
 from scenes.office import office
-from scenes.registry import build, names, register
+from scenes.random_rooms import random_rooms
+from scenes.registry import build, describe, names, register
 from scenes.scene import SCAN_HEIGHT, Mover, Scene
+from scenes.warehouse import warehouse
 
-__all__ = ["SCAN_HEIGHT", "Mover", "Scene", "arena", "build", "names", "office", "register"]
+__all__ = [
+    "SCAN_HEIGHT",
+    "Mover",
+    "Scene",
+    "apartment",
+    "arena",
+    "build",
+    "classroom",
+    "corridor",
+    "describe",
+    "names",
+    "office",
+    "random_rooms",
+    "register",
+    "warehouse",
+]

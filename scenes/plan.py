@@ -7,8 +7,10 @@ move are added to copies of it (``scenes.builder``).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import cache
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -18,6 +20,7 @@ from scenes import look
 from scenes.assembly import Assembly, Mark, file_of, marks, moved, part_marks
 from scenes.footprint import static_raster
 from scenes.scene import Pose
+from scenes.views import add_cameras
 from slam.errors import InvalidValueError
 from slam.system import Raster
 
@@ -41,6 +44,7 @@ class Plan:
         self.seats: list[Mark] = list(self.find("seat"))
         self._furniture: list[list[float]] = []
         self._boxes: NDArray[np.float64] | None = None
+        self._counts: Counter[str] = Counter()
         self._parts = Assembly()
 
     def find(self, first: str) -> Iterator[Mark]:
@@ -78,9 +82,14 @@ class Plan:
         boxes.setflags(write=False)
         return boxes
 
-    def furnish(self, part: str, instance: str, pose: Pose) -> None:
-        """Put a static part; its ``seat:...`` marks become seats of the plan."""
-        self._parts.put(part, instance, pose)
+    def furnish(self, part: str, pose: Pose) -> None:
+        """Put a static part, named by its kind and number ("desk0", "desk1", ...).
+
+        Its ``seat:...`` marks become seats of the plan.
+        """
+        kind = Path(part).stem
+        self._parts.put(part, f"{kind}{self._counts[kind]}", pose)
+        self._counts[kind] += 1
         for mark in part_marks(part):
             place = moved(pose, mark.pose)
             if mark.words[0].startswith("footprint"):
@@ -91,14 +100,14 @@ class Plan:
     def furnish_marks(self, parts: Sequence[str]) -> None:
         """Put each of these parts wherever a mark starts with its name."""
         for part in parts:
-            for index, mark in enumerate(self.find(part)):
-                self.furnish(part, f"{part}{index}", mark.pose)
+            for mark in self.find(Path(part).stem):
+                self.furnish(part, mark.pose)
 
     def frame_doors(self) -> None:
         """Jambs and threshold at each ``door:ROOM:left|right`` mark."""
-        for index, mark in enumerate(self.find("door")):
+        for mark in self.find("door"):
             side = JAMB_OFFSET if mark.words[2] == "right" else -JAMB_OFFSET
-            self.furnish("door_frame", f"door_frame{index}", moved(mark.pose, (0.0, side, 0.0)))
+            self.furnish("door_frame", moved(mark.pose, (0.0, side, 0.0)))
 
     def wall(self, name: str, pos: tuple[float, float], half: tuple[float, float]) -> None:
         """A wall of its usual height, along x or y."""
@@ -150,10 +159,11 @@ class Plan:
                 geom.group = HIDDEN
 
     def finish(self) -> Plan:
-        """Put the parts in, dress the walls, draw the true map."""
+        """Put the parts in, dress the walls, add cameras where none are, draw the true map."""
         self._parts.into(self.spec)
         self._boxes = self.boxes
         look.trim_walls(self.spec)
+        add_cameras(self.spec, self.bounds)
         self.static_map = static_raster(self.spec.compile(), self.bounds)
         return self
 

@@ -21,17 +21,20 @@ GOAL_RADIUS = 0.45  # m of free floor around a goal
 START_RADIUS = 0.7  # m of free floor around the robot
 REST_ANGLES = (1.25, 1.75)  # rad; doors rest open, so that every room can be reached at dynamism 0
 MAX_COUNT = 400
+Spread = tuple[tuple[float, float], float, float]
+PULLED: Spread = ((0.0, 0.25), 0.12, 0.5)  # a chair: m back (least, most), m sideways, rad turned
+ASKEW: Spread = ((-0.12, 0.12), 0.08, 0.12)  # a trolley or pallet
 
-_STREAMS = ("chairs", "people", "doors", "bins", "colours")
+_STREAMS = ("chairs", "people", "doors", "bins", "colours", "cargo", "rooms")
 
 
 class Draws:
     """One generator per subject, so that one more person does not move the chairs."""
 
     def __init__(self, seed: int) -> None:
-        self.chairs, self.people, self.doors, self.bins, self.colours = (
-            np.random.default_rng([seed, index]) for index in range(len(_STREAMS))
-        )
+        streams = [np.random.default_rng([seed, index]) for index in range(len(_STREAMS))]
+        self.chairs, self.people, self.doors, self.bins, self.colours = streams[:5]
+        self.cargo, self.rooms = streams[5:]
 
 
 def count(field: str, value: int | None, default: int) -> int:
@@ -43,6 +46,16 @@ def count(field: str, value: int | None, default: int) -> int:
     if not 0 <= value <= MAX_COUNT:
         raise InvalidValueError(f"{field} must lie in 0..{MAX_COUNT}, got {value}")
     return int(value)
+
+
+def within(field: str, value: float, low: float, high: float) -> float:
+    """An option that is a number in a range."""
+    number = isinstance(value, int | float | np.floating | np.integer)
+    if isinstance(value, bool) or not number:
+        raise InvalidValueError(f"{field} must be a number, got {value!r}")
+    if not low <= value <= high:
+        raise InvalidValueError(f"{field} must lie in {low:g}..{high:g}, got {value:g}")
+    return float(value)
 
 
 def switch(field: str, value: bool) -> bool:
@@ -67,6 +80,8 @@ def free_floor(builder: Builder) -> Floor:
     for name in builder.door_angles:
         x, y, _ = builder.doorway(name)
         floor.block(x, y, DOORWAY_RADIUS)
+    for opening in plan.find("opening"):
+        floor.block(*opening.pose[:2], DOORWAY_RADIUS)
     floor.block(plan.start[0], plan.start[1], START_RADIUS)
     for goal in plan.find("goal"):
         floor.block(goal.pose[0], goal.pose[1], GOAL_RADIUS)
@@ -92,7 +107,7 @@ def seat_chairs(
     order = draws.chairs.permutation(len(seats))[:n]
     for index in sorted(order.tolist()):
         kind: Kind = "chair_visitor" if seats[index].words[1] == "chair_visitor" else "chair_swivel"
-        pose = _pulled_out(floor, seats[index].pose, hull_radius(kind) + MARGIN, draws.chairs)
+        pose = _askew(floor, seats[index].pose, hull_radius(kind) + MARGIN, draws.chairs, PULLED)
         if pose is not None:
             _add_chair(builder, floor, kind, pose, draws)
     while sum(m.kind.startswith("chair") for m in builder.movers) < n:
@@ -100,6 +115,20 @@ def seat_chairs(
         _add_chair(
             builder, floor, extra, _anywhere(floor, extra, "n_chairs", n, draws.chairs), draws
         )
+
+
+def park(builder: Builder, floor: Floor, kind: Kind, n: int, rng: np.random.Generator) -> None:
+    """``n`` things on a seeded choice of ``spot:KIND:N`` marks, somewhat askew; others anywhere."""
+    spots = [mark for mark in builder.plan.find("spot") if mark.words[1] == kind]
+    radius = hull_radius(kind) + MARGIN
+    chosen = [spots[i] for i in sorted(rng.permutation(len(spots))[:n].tolist())]
+    for index in range(n):
+        pose = None
+        if index < len(chosen):
+            pose = _askew(floor, chosen[index].pose, radius, rng, ASKEW)
+        pose = pose or _anywhere(floor, kind, f"n_{kind}s", n, rng)
+        builder.add(kind, f"{kind}{index}", pose)
+        floor.block(pose[0], pose[1], hull_radius(kind))
 
 
 def scatter(
@@ -149,16 +178,20 @@ def _add_chair(builder: Builder, floor: Floor, kind: Kind, pose: Pose, draws: Dr
     floor.block(pose[0], pose[1], hull_radius(kind))
 
 
-def _pulled_out(floor: Floor, seat: Pose, radius: float, rng: np.random.Generator) -> Pose | None:
-    """The seat, shifted back and sideways and turned, where there is room; else as is, or None."""
-    x, y, yaw = seat
+def _askew(
+    floor: Floor, pose: Pose, radius: float, rng: np.random.Generator, spread: Spread
+) -> Pose | None:
+    """``pose``, shifted back and sideways and turned, where there is room; else as is, or None."""
+    x, y, yaw = pose
     cos, sin = math.cos(yaw), math.sin(yaw)
+    (least, most), sideways, turning = spread
     for _ in range(8):
-        back, side, turn = rng.uniform([0.0, -0.12, -0.5], [0.25, 0.12, 0.5]).tolist()
+        low, high = [least, -sideways, -turning], [most, sideways, turning]
+        back, side, turn = rng.uniform(low, high).tolist()
         place = (x - cos * back - sin * side, y - sin * back + cos * side, yaw + turn)
         if floor.fits(place[0], place[1], radius):
             return place
-    return seat if floor.fits(x, y, radius) else None
+    return pose if floor.fits(x, y, radius) else None
 
 
 def _anywhere(floor: Floor, kind: Kind, field: str, n: int, rng: np.random.Generator) -> Pose:

@@ -16,7 +16,9 @@ from slam.system import Raster
 SCAN_HEIGHT = 0.36
 """Height of the laser's scan plane above the floor, m (where parts/robot.xml has its laser)."""
 
-Kind = Literal["chair_swivel", "chair_visitor", "bin", "person", "door", "robot"]
+Kind = Literal[
+    "chair_swivel", "chair_visitor", "bin", "trolley", "pallet", "person", "door", "robot"
+]
 Pose = tuple[float, float, float]
 
 

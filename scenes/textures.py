@@ -101,11 +101,53 @@ def vinyl(size_m: float = 1.2, n: int = 384) -> Image:
     return _clip(image)
 
 
+def concrete(size_m: float = 6.0, n: int = 768) -> Image:
+    """Ground concrete, cloudy, with one expansion joint each way."""
+    del size_m
+    rng = np.random.default_rng(15)
+    clouds = 0.030 * _noise(rng, n, 60.0, 60.0) + 0.022 * _noise(rng, n, 12.0, 12.0)
+    base = np.array([0.62, 0.62, 0.605], dtype=np.float32)
+    image = base * (1.0 + clouds + 0.022 * _noise(rng, n, 0.8, 0.8))[..., None]
+    image[:3] *= 0.84
+    image[:, :3] *= 0.84
+    return _clip(image)
+
+
+def lino(size_m: float = 2.0, n: int = 512) -> Image:
+    """Marbled linoleum, pale olive, one piece."""
+    del size_m
+    rng = np.random.default_rng(16)
+    flow = 0.030 * _noise(rng, n, 18.0, 3.0) + 0.018 * _noise(rng, n, 3.0, 1.0)
+    base = np.array([0.66, 0.655, 0.56], dtype=np.float32)
+    return _clip(base * (1.0 + flow[..., None]))
+
+
+def tiles(size_m: float = 1.2, n: int = 384) -> Image:
+    """Blue-grey ceramic tiles of 0.3 m, each of its own tone, pale joints."""
+    rng = np.random.default_rng(17)
+    count = round(size_m / 0.3)
+    step = n // count
+    image = np.empty((n, n, 3), dtype=np.float32)
+    for i in range(count):
+        for j in range(count):
+            tone = float(rng.normal(1.0, 0.035))
+            image[i * step : (i + 1) * step, j * step : (j + 1) * step] = tone
+    image *= np.array([0.60, 0.68, 0.71], dtype=np.float32)
+    image *= (1.0 + 0.015 * _noise(rng, n, 4.0, 4.0))[..., None]
+    for line in range(0, n, step):
+        image[line : line + 3] = 0.80
+        image[:, line : line + 3] = 0.80
+    return _clip(image)
+
+
 PAINTERS = {
     "floor_planks": (planks, 4.0),
     "floor_carpet": (carpet, 2.0),
     "floor_felt": (felt, 2.0),
     "floor_vinyl": (vinyl, 1.2),
+    "floor_concrete": (concrete, 6.0),
+    "floor_lino": (lino, 2.0),
+    "floor_tiles": (tiles, 1.2),
 }
 
 

@@ -28,6 +28,11 @@ FLOORS = {
     "felt": (224, 229, 222),
     "vinyl": (234, 234, 231),
     "rug": (226, 200, 178),
+    "concrete": (228, 228, 225),
+    "lino": (230, 230, 214),
+    "tiles": (214, 227, 231),
+    "mat": (190, 192, 196),
+    "line": (236, 204, 96),
 }
 WALL = (66, 73, 88)
 PALE = 0.42  # share of white in the colour of furniture
@@ -175,7 +180,7 @@ def _colour(model: mujoco.MjModel, geom: int, material: str) -> tuple[int, int, 
     surface, _, variant = material.partition("_")
     if surface == "floor":
         return FLOORS.get(variant.partition("_")[0], PAPER)
-    if surface == "wall" and variant != "board":
+    if surface == "wall" and not variant.startswith("board"):
         return WALL
     rgb = model.mat_rgba[model.geom_matid[geom], :3] if material else model.geom_rgba[geom, :3]
     red, green, blue = (round(255 * (PALE + (1.0 - PALE) * float(c))) for c in rgb)

@@ -25,6 +25,8 @@ BLUE: Colour = (70, 118, 186)
 RED: Colour = (206, 74, 66)
 WOOD: Colour = (160, 108, 66)
 GREEN: Colour = (84, 132, 116)
+CARTON: Colour = (202, 164, 116)
+NAVY: Colour = (48, 74, 140)
 SICK_BLUE: Colour = (34, 84, 196)
 ROBOT_RED: Colour = (196, 36, 44)
 
@@ -82,6 +84,10 @@ def icon(kind: Kind, size: float, colour: Colour | None = None) -> tuple[Shape, 
             Shape(lines=(leaf,), colour=WOOD, width=0.06),
             Shape(lines=(disc(0, 0, 0.045),), colour=INK),
         )
+    if kind == "trolley":
+        return _trolley()
+    if kind == "pallet":
+        return _pallet()
     if kind == "robot":
         return _robot()
     return _person(colour or BLUE)
@@ -115,6 +121,21 @@ def _chair_visitor(cloth: Colour) -> tuple[Shape, ...]:
         Shape(lines=(block(0.01, 0.0, 0.20, 0.19, 0.04),), colour=cloth),
         Shape(lines=(back,), colour=_darker(cloth), width=0.065),
     )
+
+
+def _trolley() -> tuple[Shape, ...]:
+    handle = np.array([[-0.45, -0.26], [-0.45, 0.26]])
+    return (
+        Shape(lines=(block(0.0, 0.0, 0.45, 0.30, 0.03),), colour=STEEL),
+        Shape(lines=(block(0.19, 0.01, 0.21, 0.27), block(-0.21, 0.03, 0.15, 0.21)), colour=CARTON),
+        Shape(lines=(handle,), colour=NAVY, width=0.05),
+    )
+
+
+def _pallet() -> tuple[Shape, ...]:
+    boards = tuple(block(x, 0.0, 0.05, 0.30) for x in (-0.35, -0.175, 0.0, 0.175, 0.35))
+    loads = (block(-0.19, 0.0, 0.175, 0.26), block(0.19, 0.0, 0.175, 0.26))
+    return (Shape(lines=boards, colour=WOOD), Shape(lines=loads, colour=CARTON))
 
 
 def _person(shirt: Colour) -> tuple[Shape, ...]:

@@ -37,7 +37,16 @@ TRAILS = {
 }
 OTHER_TRAILS = ((146, 64, 190), (24, 150, 110), (200, 50, 110))
 MAX_TRAIL_POINTS = 500
-ORDER = {"bin": 0, "chair_visitor": 1, "chair_swivel": 1, "door": 2, "robot": 3, "person": 4}
+ORDER = {
+    "bin": 0,
+    "pallet": 0,
+    "trolley": 1,
+    "chair_visitor": 1,
+    "chair_swivel": 1,
+    "door": 2,
+    "robot": 3,
+    "person": 4,
+}
 
 
 class MapView:

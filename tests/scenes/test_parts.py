@@ -14,6 +14,7 @@ from scenes import textures
 from scenes.placement import Floor, gap_to_boxes
 
 PARTS = sorted((Path(scenes.assembly.__file__).parent / "parts").glob("*.xml"))
+PLANAR = ("chair_swivel", "chair_visitor", "bin", "trolley", "pallet", "person", "robot")
 
 
 @pytest.mark.parametrize("path", PARTS, ids=lambda path: path.stem)
@@ -25,7 +26,7 @@ def test_a_part_is_a_model_of_its_own(path):
         assert model.body(body).name
 
 
-@pytest.mark.parametrize("kind", ["chair_swivel", "chair_visitor", "bin", "person", "robot"])
+@pytest.mark.parametrize("kind", PLANAR)
 def test_a_planar_part_collides_with_one_sphere(kind):
     model = mujoco.MjModel.from_xml_path(str(PARTS[0].parent / f"{kind}.xml"))
     solid = np.flatnonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The apartment: small furnished rooms, few chairs, four doors."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from scenes.builder import Builder
+from scenes.plan import Plan
+from scenes.recipe import (
+    Draws,
+    count,
+    finish,
+    free_floor,
+    hang_doors,
+    put_bins,
+    scatter,
+    seat_chairs,
+)
+from scenes.registry import register
+from scenes.scene import Scene
+
+FURNITURE = (
+    *("sofa", "coffee_table", "tv", "bookshelf", "cabinet", "plant", "kitchen", "dining"),
+    *("bathtub", "toilet", "basin", "desk", "bed", "wardrobe"),
+)
+
+
+@register("apartment")
+def apartment(seed: int, *, n_chairs: int | None = None, n_people: int | None = None) -> Scene:
+    """12 x 9 m, seven rooms of a flat: ``n_chairs`` (6) chairs, ``n_people`` (2) people."""
+    n_chairs, n_people = count("n_chairs", n_chairs, 6), count("n_people", n_people, 2)
+    draws = Draws(seed)
+    plan = _plan()
+    builder = Builder(plan)
+    hang_doors(builder, draws.doors)
+    put_bins(builder, draws.bins)
+    floor = free_floor(builder)
+    seat_chairs(builder, floor, plan.seats, n_chairs, draws)
+    scatter(builder, floor, "person", n_people, draws, draws.people)
+    return finish(builder, "apartment", seed, {"n_chairs": n_chairs, "n_people": n_people})
+
+
+@cache
+def _plan() -> Plan:
+    plan = Plan("apartment")
+    plan.furnish_marks(FURNITURE)
+    plan.frame_doors()
+    return plan.finish()

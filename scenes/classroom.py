@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The classrooms: two rooms alike to the last chair, each full of thin legs."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from scenes.builder import Builder
+from scenes.plan import Plan
+from scenes.recipe import (
+    Draws,
+    count,
+    finish,
+    free_floor,
+    hang_doors,
+    put_bins,
+    scatter,
+    seat_chairs,
+    switch,
+)
+from scenes.registry import register
+from scenes.scene import Scene
+
+FURNITURE = ("school_desk", "desk", "bookshelf", "cabinet", "plant")
+
+
+@register("classroom")
+def classroom(
+    seed: int, *, n_chairs: int | None = None, n_people: int | None = None, glass: bool = False
+) -> Scene:
+    """18 x 10 m, two equal rooms and a corridor: ``n_chairs`` (34), ``n_people`` (4).
+
+    ``glass``: panes instead of walls between the rooms and the corridor.
+    """
+    n_chairs, n_people = count("n_chairs", n_chairs, 34), count("n_people", n_people, 4)
+    glass = switch("glass", glass)
+    draws = Draws(seed)
+    plan = _plan(glass)
+    builder = Builder(plan)
+    hang_doors(builder, draws.doors)
+    put_bins(builder, draws.bins)
+    floor = free_floor(builder)
+    seat_chairs(builder, floor, plan.seats, n_chairs, draws)
+    scatter(builder, floor, "person", n_people, draws, draws.people)
+    options = {"n_chairs": n_chairs, "n_people": n_people, "glass": glass}
+    return finish(builder, "classroom", seed, options)
+
+
+@cache
+def _plan(glass: bool) -> Plan:
+    plan = Plan("classroom")
+    plan.furnish_marks(FURNITURE)
+    plan.frame_doors()
+    for wall in ("hall_a", "hall_b") if glass else ():
+        plan.glaze(wall)
+    return plan.finish()
