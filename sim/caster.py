@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which geoms of a model a planar scanner can see, and how it casts on them.
 
-The candidates are chosen once: visible geoms (alpha above 0, not in the group of the collision
-hulls, not on the scanner's own robot) whose height can meet the scan plane. Everything in a world
-of planar movers keeps its height, so the list holds for the whole run; what can change height
-(limbs, free bodies) is always kept.
+The candidates are chosen once: visible geoms (alpha above 0, not in the groups of collision hulls
+and of painted shadows, not on the scanner's own robot) whose height can meet the scan plane.
+Everything in a world of planar movers keeps its height, so the list holds for the whole run; what
+can change height (limbs, free bodies) is always kept.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -21,9 +22,13 @@ from sim import raycast
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
-Pose = tuple[float, float, float]
+Hits = tuple[Float, NDArray[np.int64], Float]
+
+MAX_SLOTS = 12  # the ends of the two physics steps of each of four sweeps
 
 HULL_GROUP = 3  # collision hulls: never seen by rays or cameras
+PAINT_GROUP = 5  # shadows painted on the floor: for cameras only
+UNSEEN_GROUPS = (HULL_GROUP, PAINT_GROUP)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,12 +44,12 @@ class Spot:
     offsets: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
 
     def rays(self) -> Float:
-        """(k, 5): left, up, and the unit direction (forward, left, up) in the beam's frame."""
-        out = np.empty((len(self.offsets), 5))
+        """(k, 6): left, up, unit direction (forward, left, up), way up per metre forward."""
+        out = np.empty((len(self.offsets), 6))
         for k, (u, v) in enumerate(self.offsets):
             left, up = self.divergence * u, self.divergence * v
             length = math.sqrt(1.0 + left * left + up * up)
-            out[k] = u, v, 1.0 / length, left / length, up / length
+            out[k] = u, v, 1.0 / length, left / length, up / length, up
         return out
 
 
@@ -92,17 +97,49 @@ def _half_height(kind: int, size: Float, mat: Float) -> float:
     return float((up * size).sum())
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FanPlan:
+    """The beams of a scan, fan by fan.
+
+    beams  (m,) number of each beam
+    ends   (fans + 1,) where each fan's rows begin, and the last one's end
+    rows   (m, 5) angle rad in the laser frame, ascending by even steps within a fan, its cosine
+           and sine; slot of the last ``note`` before the beam and part of the way to the next
+    """
+
+    beams: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    rows: Float
+
+    @classmethod
+    def of(cls, fans: Sequence[tuple[NDArray[np.int64], Float, Float, Float]]) -> FanPlan:
+        """From (beams, angles, slots, parts) of each fan."""
+        beams, angles, slots, parts = (np.concatenate(column) for column in zip(*fans, strict=True))
+        cos, sin = ([f(a) for a in angles.tolist()] for f in (math.cos, math.sin))
+        return cls(
+            beams=beams.astype(np.int64),
+            ends=np.cumsum([0, *(fan[0].size for fan in fans)]).astype(np.int64),
+            rows=np.ascontiguousarray(np.column_stack((angles, cos, sin, slots, parts))),
+        )
+
+
 class Raycaster:
-    """Casts fans of beams on the geoms of one model.
+    """Casts scans, fans of beams, on the geoms of one model.
 
     height     m, of the scan plane
     robot      name of the scanner's own body; it and its children are not seen
     spot       the rays of each beam
     range_max  m, bounds how far the spot spreads up and down
-    only       optional (ngeom,) True for the geoms to consider at all
+    panes      optional (ngeom,) True for what beams may pass: cast apart, as a second layer
+    site       id of the laser's site, whose poses are then noted too
 
     Raises ``InvalidValueError`` for a mesh, height field or SDF that could meet the scan plane:
     the formulas cover primitives only.
+
+    Attributes: ``ids`` (n,) geom ids of the candidates; ``lasers`` (slots, 3) x, y, yaw of the
+    laser at each ``note`` of the scan; after ``cast``, ``hits`` (ranges m, candidates, |cos| of
+    the incidence), each (layers, beams, rays): inf, -1 and NaN for a miss, and ``fan`` (m, 7) the
+    beams in the world.
     """
 
     def __init__(
@@ -113,24 +150,28 @@ class Raycaster:
         robot: str | None = "robot/base",
         spot: Spot | None = None,
         range_max: float = 80.0,
-        only: NDArray[np.bool_] | None = None,
+        panes: NDArray[np.bool_] | None = None,
+        site: int = -1,
     ) -> None:
         self.spot = Spot() if spot is None else spot
         self.height = height
-        wanted = np.ones(model.ngeom, dtype=np.bool_) if only is None else only
-        self.ids = self._candidates(model, robot, range_max, wanted)
-        self._table = self._geom_table
-        self._optics = (self.spot.rays(), self.spot.aperture)
-        self._spot = (self.spot.aperture, self.spot.divergence)
+        passed = np.zeros(model.ngeom, dtype=np.bool_) if panes is None else panes
+        self.ids = self._candidates(model, robot, range_max, passed)
+        self.layers = 2 if bool(passed[self.ids].any()) else 1
         n = self.ids.size
-        self._poses = (np.full((n, 12), np.nan), np.full((n, 12), np.nan))
-        self._bounds = np.zeros((n, 6))
+        self._rays = self.spot.rays()
+        self._optics = (height, self.spot.aperture, self.spot.divergence)
+        self.poses = np.zeros((MAX_SLOTS, n, 12))
+        self.bounds = np.zeros((n, 6))
+        self.lasers = np.zeros((MAX_SLOTS, 3))
+        self._all = np.arange(n)
         self._movable = np.flatnonzero(
             np.isin(model.geom_bodyid[self.ids], np.flatnonzero(model.body_weldid != 0))
         )
+        self._site = site
+        self._slots = 0
         self._seen: mujoco.MjData | None = None
-        self._laser = np.zeros(7)
-        self._laser[6] = height
+        self._plan: FanPlan | None = None
 
     @property
     def rays_per_beam(self) -> int:
@@ -142,7 +183,7 @@ class Raycaster:
         model: mujoco.MjModel,
         robot: str | None,
         range_max: float,
-        wanted: NDArray[np.bool_],
+        panes: NDArray[np.bool_],
     ) -> NDArray[np.int64]:
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
@@ -157,7 +198,7 @@ class Raycaster:
         ids, rows = [], []
         for geom in range(model.ngeom):
             body = model.geom_bodyid[geom]
-            if own[body] or not wanted[geom] or not _visible(model, geom):
+            if own[body] or not _visible(model, geom):
                 continue
             half, upright = _vertical_extent(model, data, geom, bool(lifts[body]))
             # A level plane has no height: only a spot that spreads downwards meets it.
@@ -174,50 +215,67 @@ class Raycaster:
                     f"{HULL_GROUP} and add primitives for the laser to see"
                 )
             ids.append(geom)
-            rows.append((kind, *model.geom_size[geom], half, float(upright)))
-        self._geom_table = np.array(rows, dtype=np.float64).reshape(-1, 6)
+            rows.append((kind, *model.geom_size[geom], half, float(upright), float(panes[geom])))
+        self.table = np.array(rows, dtype=np.float64).reshape(-1, 7)
         return np.array(ids, dtype=np.int64)
 
     def start(self, data: mujoco.MjData) -> None:
-        """Note where everything is at the start of a physics step; needs fresh kinematics."""
-        movable = self._movable
+        """Forget the last scan, and note where everything is; needs fresh kinematics."""
+        self._slots = 0
         if data is not self._seen:
-            self._seen, movable = data, np.arange(self.ids.size)
-            self._views = (data.geom_xpos, data.geom_xmat)
-        self._follow(movable, restart=True)
+            self._seen = data
+            self._views = (data.geom_xpos, data.geom_xmat, data.site_xpos, data.site_xmat)
+            self._note(self._all)
+            self.poses[1:] = self.poses[0]  # what cannot move is never noted again
+            fans.enclose(self.table, self._all, self.poses, 1, self.bounds)
+        else:
+            self._note(self._movable)
 
-    def _follow(self, movable: NDArray[np.int64], *, restart: bool) -> None:
-        fans.follow(self._table, self.ids, movable, self._views, self._poses, self._bounds, restart)
+    def note(self) -> None:
+        """Note where everything is now, in the next slot."""
+        self._note(self._movable)
 
-    def cast(
-        self,
-        fan: tuple[NDArray[np.int64], Float, Float],
-        laser: tuple[Pose, Pose],
-        out: tuple[Float, NDArray[np.int64], Float],
-    ) -> None:
-        """Cast the beams measured during the physics step that has just ended.
+    def _note(self, rows: NDArray[np.int64]) -> None:
+        fans.note(self.ids, rows, self._views, self._site, self.poses, self.lasers, self._slots)
+        self._slots += 1
 
-        fan    beams (m,) rows of ``out``, angles (m,) rad in the laser frame at even ascending
-               steps, taus (m,) time of each beam within the step, 0..1
-        laser  pose (x, y, yaw) of the laser at the start and at the end of the step
-        out    (n, k) each: ranges m, inf for a miss; index into ``ids``, -1; |cos| of the
-               incidence, NaN
+    def cast(self, plan: FanPlan) -> None:
+        """Cast the beams of the scan that has just ended, into ``hits``."""
+        if plan is not self._plan:
+            self._prepare(plan)
+        raycast.sweep(
+            self.table, self._movable, self.poses, self.lasers, self._slots, self.bounds,
+            plan.rows, plan.ends, plan.beams, self._rays, self._optics, self._work, self.hits,
+        )  # fmt: skip
 
-        ``out`` must come in as misses. The end of this step becomes the start of the next.
+    def _prepare(self, plan: FanPlan) -> None:
+        """Room for the beams of a plan."""
+        self._plan, m, n = plan, plan.beams.size, 3 * self.ids.size
+        shape = (self.layers, m, self.rays_per_beam)
+        self.hits = (np.zeros(shape), np.zeros(shape, dtype=np.int64), np.zeros(shape))
+        self.fan = np.zeros((m, 7))
+        self._work = (
+            self.fan, np.zeros((plan.ends.size - 1, 3)), np.zeros(shape[:2]),
+            np.zeros((n, 4)), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64),
+        )  # fmt: skip
+
+    def mirror(self, polished: NDArray[np.bool_], out: Hits) -> None:
+        """Follow the middle rays off panes and off ``polished`` candidates.
+
+        out  (all beams,) each: length of the way m, inf for none; candidate; |cos| there
         """
-        beams, angles, taus = fan
-        self._laser[0:6] = (*laser[0], *laser[1])
-        self._follow(self._movable, restart=False)
-        table, poses, bounds = self._table, self._poses, self._bounds
-        plan = fans.prepare(table, poses[1], bounds, angles, taus, self._laser, self._spot)
-        raycast.cast_fan(table, poses, bounds, plan, beams, self.height, self._optics, out)
+        assert self._plan is not None
+        raycast.reflect(
+            self.table, polished, self.poses, self.bounds, self.fan, self._plan.beams,
+            self.height, self.hits, out,
+        )  # fmt: skip
 
 
 def _visible(model: mujoco.MjModel, geom: int) -> bool:
-    """Rays see it: MuJoCo's own rule, and not a collision hull."""
+    """Rays see it: MuJoCo's own rule, and neither a collision hull nor paint."""
     material = model.geom_matid[geom]
     rgba = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
-    return bool(rgba[3] != 0.0) and model.geom_group[geom] != HULL_GROUP
+    return bool(rgba[3] != 0.0) and model.geom_group[geom] not in UNSEEN_GROUPS
 
 
 def _vertical_extent(

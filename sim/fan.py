@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which beams of a fan can meet which geom: the bounds that make the caster fast.
 
-A fan is a set of beams at even steps of azimuth. Every beam has its own time within one physics
-step, hence its own origin and direction, because the robot moves; and so do the things. Each geom
-is turned into the interval of beams that can meet it and the distance from which on it can be met
-(design note, world section 1.2), so a beam is left with about one exact test instead of one for
-every geom. Bounds are generous by ``SLACK``; the exact tests are in ``sim.raycast``.
+A fan is the beams of one sweep of the mirror, at even steps of azimuth; a scan is one to four of
+them. Every beam has its own time, hence its own origin and direction, because the robot moves; and
+so do the things: poses are noted at the physics steps and are linear in between. Each geom is
+turned into the interval of azimuth in which the beams of a scan can meet it and the distance from
+which on it can be met (design note, world section 1.2), so a beam is left with about two exact
+tests instead of one for every geom. Bounds are generous by ``SLACK``; the exact tests are in
+``sim.ray_shapes``.
 """
 
 from __future__ import annotations
@@ -24,36 +26,103 @@ Vec3 = tuple[float, float, float]
 # mjtGeom
 PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 0, 2, 3, 4, 5, 6
 PRIMITIVES = (PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX)
+BUCKETS = 64
 SLACK = 5e-5  # rad and m by which bounds are widened: above what ``_azimuth`` and rounding miss
 
-# Columns of the geom table.
-KIND, SIZE_X, SIZE_Y, SIZE_Z, HALF_HEIGHT, UPRIGHT = range(6)
+# Columns of the geom table; the layer is 0 for the room, 1 for panes that a beam may pass.
+KIND, SIZE_X, SIZE_Y, SIZE_Z, HALF_HEIGHT, UPRIGHT, LAYER = range(7)
 
-# Columns of the fan: azimuth, origin, direction, time within the step.
-AZIMUTH, ORIGIN_X, ORIGIN_Y, COS, SIN, TAU = range(6)
+# Columns of the plan of the fans: angle in the laser frame, its cosine and sine, the slot of the
+# last noted poses before the beam, and which part of the way to the next slot it comes at.
+ANGLE, ANGLE_COS, ANGLE_SIN, PLAN_SLOT, PLAN_PART = range(5)
 
-# Columns of the bounds: a disc that contains the geom during the whole step, its height above the
-# ground and half its vertical extent; and whether the geom moved in the step.
+# Columns of a laid fan, in the world: azimuth, origin, direction, slot and part as above.
+AZIMUTH, ORIGIN_X, ORIGIN_Y, COS, SIN, SLOT, PART = range(7)
+
+# Of each fan: first azimuth, step, and the largest departure of an azimuth from even steps.
+START, STEP, UNEVEN = range(3)
+
+# Columns of the bounds: a disc that contains the geom during the whole scan, its height above
+# the ground and half its vertical extent; and whether the geom moved.
 DISC_X, DISC_Y, DISC_RADIUS, DISC_Z, DISC_HALF, MOVED = range(6)
+
+# Columns of the windows: nearest and farthest distance at which the geom can be met, and the
+# interval of azimuth, without the width of a spot.
+NEAR, FAR, LOW, HIGH = range(4)
 
 
 @njit
-def _horizontal_bound(geom: Float, pose: Float) -> float:
+def note(
+    ids: Int,
+    rows: Int,
+    views: tuple[Float, Float, Float, Float],
+    site: int,
+    poses: Float,
+    lasers: Float,
+    slot: int,
+) -> None:
+    """Take over where the geoms ``ids[rows]`` and the laser are now.
+
+    views   ``geom_xpos``, ``geom_xmat``, ``site_xpos``, ``site_xmat`` of the model's data
+    site    of the laser, -1 for none
+    poses   (slots, n, 12): position, then matrix by rows; ``lasers`` (slots, 3): x, y, yaw
+    """
+    xpos, xmat, site_xpos, site_xmat = views
+    for row in range(rows.size):
+        j = rows[row]
+        g = ids[j]
+        for i in range(3):
+            poses[slot, j, i] = xpos[g, i]
+        for i in range(9):
+            poses[slot, j, 3 + i] = xmat[g, i]
+    if site >= 0:
+        lasers[slot, 0], lasers[slot, 1] = site_xpos[site, 0], site_xpos[site, 1]
+        lasers[slot, 2] = math.atan2(site_xmat[site, 3], site_xmat[site, 0])
+
+
+@njit
+def _horizontal_bound(table: Float, j: int, poses: Float, slot: int) -> float:
     """Radius of a vertical cylinder about the geom's centre that contains it."""
-    kind = int(geom[KIND])
+    kind = int(table[j, KIND])
+    s0, s1, s2 = table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z]
     if kind == SPHERE:
-        return float(geom[SIZE_X])
+        return float(s0)
     if kind in (CAPSULE, CYLINDER):
-        lean = math.sqrt(pose[5] * pose[5] + pose[8] * pose[8])
-        return float(geom[SIZE_X] + geom[SIZE_Y] * lean)
+        lean_x, lean_y = poses[slot, j, 5], poses[slot, j, 8]
+        return float(s0 + s1 * math.sqrt(lean_x * lean_x + lean_y * lean_y))
     if kind == ELLIPSOID:
-        return float(max(geom[SIZE_X], geom[SIZE_Y], geom[SIZE_Z]))
+        return float(max(s0, s1, s2))
     if kind == PLANE:
         return math.inf
-    s0, s1, s2 = geom[SIZE_X], geom[SIZE_Y], geom[SIZE_Z]
-    if geom[UPRIGHT] > 0.0:
+    if table[j, UPRIGHT] > 0.0:
         return math.sqrt(s0 * s0 + s1 * s1)
     return math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
+
+
+@njit
+def enclose(table: Float, rows: Int, poses: Float, slots: int, bounds: Float) -> None:
+    """Renew the bounds of the geoms ``rows`` from their poses in the first ``slots`` slots."""
+    last = slots - 1
+    for row in range(rows.size):
+        j = rows[row]
+        moved = False
+        for s in range(last):
+            # First row and column of a rotation that changes little tell all of it.
+            for i in (0, 1, 2, 3, 4, 6):
+                moved = moved or poses[s, j, i] != poses[last, j, i]
+        radius, half = _horizontal_bound(table, j, poses, last), table[j, HALF_HEIGHT]
+        x, y, z = poses[last, j, 0], poses[last, j, 1], poses[last, j, 2]
+        if moved:
+            x, y = 0.5 * (x + poses[0, j, 0]), 0.5 * (y + poses[0, j, 1])
+            radius, lift = 0.0, 0.0
+            for s in range(slots):
+                dx, dy = poses[s, j, 0] - x, poses[s, j, 1] - y
+                reach = _horizontal_bound(table, j, poses, s) + math.sqrt(dx * dx + dy * dy)
+                radius, lift = max(radius, reach), max(lift, abs(poses[s, j, 2] - z))
+            half += lift
+        bounds[j, DISC_X], bounds[j, DISC_Y], bounds[j, DISC_Z] = x, y, z
+        bounds[j, DISC_RADIUS], bounds[j, DISC_HALF] = radius, half
+        bounds[j, MOVED] = 1.0 if moved else 0.0
 
 
 @njit
@@ -77,13 +146,13 @@ def _half_angle(radius: float, distance: float) -> float:
 
 
 @njit
-def _box_extent(table: Float, end: Float, j: int, dx: float, dy: float, spread: float) -> Vec3:
+def _box_extent(table: Float, poses: Float, j: int, dx: float, dy: float, spread: float) -> Vec3:
     """(nearest distance, lowest, highest azimuth) of an upright box whose centre is at (dx, dy).
 
     Azimuths are in (-pi, 2 pi), high above low; both widened for origins up to ``spread`` away.
     All around when the box may contain such an origin.
     """
-    ux, uy, wx, wy = end[j, 3], end[j, 6], end[j, 4], end[j, 7]
+    ux, uy, wx, wy = poses[0, j, 3], poses[0, j, 6], poses[0, j, 4], poses[0, j, 7]
     half_x, half_y = table[j, SIZE_X], table[j, SIZE_Y]
     across = max(abs(dx * ux + dy * uy) - half_x, 0.0)
     along = max(abs(dx * wx + dy * wy) - half_y, 0.0)
@@ -112,133 +181,121 @@ def _box_extent(table: Float, end: Float, j: int, dx: float, dy: float, spread: 
 
 
 @njit
-def _bound(geom: Float, was: Float, now: Float, moved: bool, out: Float) -> None:
-    out[DISC_X], out[DISC_Y], out[DISC_Z] = now[0], now[1], now[2]
-    out[DISC_HALF], out[MOVED] = geom[HALF_HEIGHT], 0.0
-    radius = _horizontal_bound(geom, now)
-    if moved:
-        sx, sy, lift = 0.5 * (now[0] - was[0]), 0.5 * (now[1] - was[1]), abs(now[2] - was[2])
-        out[DISC_X], out[DISC_Y] = now[0] - sx, now[1] - sy
-        radius = max(radius, _horizontal_bound(geom, was)) + math.sqrt(sx * sx + sy * sy)
-        out[DISC_HALF] += lift
-        out[MOVED] = 1.0
-    out[DISC_RADIUS] = radius
-
-
-@njit
-def follow(
-    table: Float,
-    ids: Int,
-    movable: Int,
-    views: tuple[Float, Float],
-    poses: tuple[Float, Float],
-    bounds: Float,
-    restart: bool,
-) -> None:
-    """Take over the poses at the end of a physics step; what was the end becomes the start.
-
-    movable  rows of ``ids`` that can move at all
-    views    ``geom_xpos`` and ``geom_xmat`` of all geoms
-    poses    (n, 12) at the start and at the end of the step: position, then matrix by rows
-    bounds   (n, 6) renewed where something changed
-    restart  forget the start: everything rests in the step that ends now
-    """
-    xpos, xmat = views
-    start, end = poses
-    for row in range(movable.size):
-        j = movable[row]
-        g = ids[j]
-        changed = False
-        for i in range(3):
-            changed = changed or end[j, i] != xpos[g, i]
-        for i in range(9):
-            changed = changed or end[j, 3 + i] != xmat[g, i]
-        if not changed and bounds[j, MOVED] == 0.0:
-            continue
-        for i in range(12):
-            value = xpos[g, i] if i < 3 else xmat[g, i - 3]
-            start[j, i] = value if restart else end[j, i]
-            end[j, i] = value
-        _bound(table[j], start[j], end[j], changed and not restart, bounds[j])
-
-
-@njit
 def _wrapped(angle: float) -> float:
     return angle - math.tau * math.floor(angle / math.tau + 0.5)
 
 
 @njit
-def _lay_fan(angles: Float, taus: Float, laser: Float) -> Float:
-    """(m, 6) table of the beams in the world; the laser moves evenly from start to end."""
-    fan = np.empty((angles.size, 6))
-    yaw, turn = _wrapped(laser[2]), _wrapped(laser[5] - laser[2])
-    for i in range(angles.size):
-        tau = taus[i]
-        azimuth = yaw + tau * turn + angles[i]
-        fan[i, AZIMUTH] = azimuth
-        fan[i, ORIGIN_X] = laser[0] + tau * (laser[3] - laser[0])
-        fan[i, ORIGIN_Y] = laser[1] + tau * (laser[4] - laser[1])
-        fan[i, COS], fan[i, SIN] = math.cos(azimuth), math.sin(azimuth)
-        fan[i, TAU] = tau
-    return fan
+def _turned_by(delta: float) -> tuple[float, float]:
+    """(cos, sin) of what a robot turns in a step: series to 1e-17 below 0.03 rad."""
+    if abs(delta) > 0.03:
+        return math.cos(delta), math.sin(delta)
+    u = delta * delta
+    c = 1.0 - u * (0.5 - u * (1.0 / 24.0 - u * (1.0 / 720.0 - u / 40320.0)))
+    return c, delta * (
+        1.0 - u * (1.0 / 6.0 - u * (1.0 / 120.0 - u * (1.0 / 5040.0 - u / 362880.0)))
+    )
 
 
 @njit
-def _fan_frame(fan: Float) -> Float:
-    """(mid x, mid y, spread of the origins m, unevenness of the azimuths rad, first azimuth, step).
+def lay_fans(plan: Float, lasers: Float, ends: Int, fan: Float, frames: Float) -> None:
+    """Fill the (m, 7) table of the beams in the world, and the (fans, 3) frames of the fans.
 
-    The unevenness is the largest departure of an azimuth from even steps.
+    plan    (m, 5) of the beams; fan k has the rows ``ends[k]`` to ``ends[k + 1]``
+    lasers  (slots, 3); the laser moves evenly between slots
     """
-    last = fan.shape[0] - 1
+    slot = -1
+    yaw, turn, cos_yaw, sin_yaw = _wrapped(lasers[0, 2]), 0.0, 1.0, 0.0
+    for i in range(plan.shape[0]):
+        k, part = int(plan[i, PLAN_SLOT]), plan[i, PLAN_PART]
+        while slot < k:
+            slot += 1
+            if slot > 0:
+                yaw += _wrapped(lasers[slot, 2] - lasers[slot - 1, 2])
+            turn = _wrapped(lasers[slot + 1, 2] - lasers[slot, 2])
+            cos_yaw, sin_yaw = math.cos(yaw), math.sin(yaw)
+        c, s = cos_yaw, sin_yaw
+        if turn != 0.0:
+            a, b = _turned_by(part * turn)
+            c, s = cos_yaw * a - sin_yaw * b, sin_yaw * a + cos_yaw * b
+        a, b = plan[i, ANGLE_COS], plan[i, ANGLE_SIN]
+        fan[i, COS], fan[i, SIN] = c * a - s * b, s * a + c * b
+        fan[i, AZIMUTH] = yaw + part * turn + plan[i, ANGLE]
+        fan[i, ORIGIN_X] = lasers[k, 0] + part * (lasers[k + 1, 0] - lasers[k, 0])
+        fan[i, ORIGIN_Y] = lasers[k, 1] + part * (lasers[k + 1, 1] - lasers[k, 1])
+        fan[i, SLOT], fan[i, PART] = plan[i, PLAN_SLOT], part
+    for f in range(ends.size - 1):
+        first, last = ends[f], ends[f + 1] - 1
+        start, step, uneven = fan[first, AZIMUTH], 1.0, 0.0
+        if last > first:
+            step = (fan[last, AZIMUTH] - start) / (last - first)
+        for i in range(first, last + 1):
+            uneven = max(uneven, abs(fan[i, AZIMUTH] - start - (i - first) * step))
+        frames[f, START], frames[f, STEP], frames[f, UNEVEN] = start, step, uneven + SLACK
+
+
+@njit
+def _origins(fan: Float) -> Vec3:
+    """(mid x, mid y, largest distance of any beam's origin from there)."""
+    last, spread = fan.shape[0] - 1, 0.0
     mid_x = 0.5 * (fan[0, ORIGIN_X] + fan[last, ORIGIN_X])
     mid_y = 0.5 * (fan[0, ORIGIN_Y] + fan[last, ORIGIN_Y])
-    step = (fan[last, AZIMUTH] - fan[0, AZIMUTH]) / last if last > 0 else 1.0
-    spread, uneven = 0.0, 0.0
     for i in range(last + 1):
         x, y = fan[i, ORIGIN_X] - mid_x, fan[i, ORIGIN_Y] - mid_y
         spread = max(spread, x * x + y * y)
-        uneven = max(uneven, abs(fan[i, AZIMUTH] - fan[0, AZIMUTH] - i * step))
-    return np.array([mid_x, mid_y, math.sqrt(spread), uneven, fan[0, AZIMUTH], step])
+    return mid_x, mid_y, math.sqrt(spread)
 
 
 @njit
-def _windows(
+def ray_wedge(frames: Float, ends: Int, slope: float) -> tuple[float, float]:
+    """(lowest, highest) azimuth of any ray of the scan."""
+    low, high = math.inf, -math.inf
+    for f in range(frames.shape[0]):
+        widen = frames[f, UNEVEN] + slope
+        stop = frames[f, START] + frames[f, STEP] * (ends[f + 1] - ends[f] - 1)
+        low, high = min(low, frames[f, START] - widen), max(high, stop + widen)
+    return low, high
+
+
+@njit
+def find_windows(
     table: Float,
-    end: Float,
+    poses: Float,
     bounds: Float,
     fan: Float,
-    height: float,
-    spot: tuple[float, float],
-    windows: Int,
-    nearest: Float,
+    wedge: tuple[float, float],
+    optics: Vec3,
+    windows: Float,
+    owners: Int,
 ) -> int:
-    """Which beams can meet which geom.
+    """Where the beams of a scan can meet which geom.
 
-    Fills rows (candidate, first beam, last beam) and the least distance at which one can; returns
-    how many rows.
+    wedge    lowest and highest azimuth of any ray
+    optics   height of the scan plane m, aperture radius m and half divergence rad of the spot
+    windows  (3 n, 4), filled; ``owners`` (3 n,) the geom of each
+
+    Returns how many.
     """
-    frame = _fan_frame(fan)
-    mid_x, mid_y, start, step = frame[0], frame[1], frame[4], frame[5]
-    aperture, slope = spot
-    spread, widen = frame[2] + aperture + SLACK, frame[3] + slope + SLACK
-    count = fan.shape[0]
-    stop = start + step * (count - 1)
-    wedge = stop - start + 2.0 * widen < math.pi
-    left_c, left_s = math.cos(stop + widen), math.sin(stop + widen)
-    right_c, right_s = math.cos(start - widen), math.sin(start - widen)
-    per_step, lap_steps, found = 1.0 / step, math.tau / step, 0
+    height, aperture, slope = optics
+    mid_x, mid_y, spread = _origins(fan)
+    spread, found = spread + aperture + SLACK, 0
+    first, last = wedge
+    left_c, left_s = math.cos(last), math.sin(last)
+    right_c, right_s = math.cos(first), math.sin(first)
+    span = last - first
     for j in range(bounds.shape[0]):
         dx, dy = bounds[j, DISC_X] - mid_x, bounds[j, DISC_Y] - mid_y
         reach = bounds[j, DISC_RADIUS] + spread
-        # Outside the wedge of this fan: no trigonometry needed to know it.
-        if wedge and (left_c * dy - left_s * dx > reach or right_s * dx - right_c * dy > reach):
+        # Outside the wedge of the scan: no trigonometry needed to know it.
+        left, right = left_c * dy - left_s * dx > reach, right_s * dx - right_c * dy > reach
+        if (left or right) if span < math.pi else (left and right and span < math.tau):
             continue
         distance = math.sqrt(dx * dx + dy * dy)
         gap = abs(bounds[j, DISC_Z] - height) - bounds[j, DISC_HALF] - aperture
         if gap > slope * (distance + reach) + SLACK:
             continue
         if table[j, KIND] == BOX and table[j, UPRIGHT] > 0.0 and bounds[j, MOVED] == 0.0:
-            near, low, high = _box_extent(table, end, j, dx, dy, spread)
+            near, low, high = _box_extent(table, poses, j, dx, dy, spread)
         elif distance <= reach:
             near, low, high = 0.0, -math.pi, math.pi
         else:
@@ -246,42 +303,25 @@ def _windows(
             near, low, high = distance - reach, centre - half, centre + half
         if gap > SLACK:
             near = max(near, (gap - SLACK) / slope)  # a ray that leaves the plane needs that far
-        low, high = (low - widen - start) * per_step, (high + widen - start) * per_step
-        for lap in (-lap_steps, 0.0, lap_steps):
-            if low + lap < count and high + lap >= 0.0:
-                windows[found, 0] = j
-                windows[found, 1] = max(math.ceil(low + lap), 0)
-                windows[found, 2] = min(math.floor(high + lap), count - 1)
-                nearest[found] = near
+        for lap in (-math.tau, 0.0, math.tau):
+            if low - slope + lap <= last and high + slope + lap >= first:
+                owners[found] = j
+                windows[found, NEAR], windows[found, FAR] = near, distance + reach
+                windows[found, LOW], windows[found, HIGH] = low + lap, high + lap
                 found += 1
     return found
 
 
 @njit
-def prepare(
-    table: Float,
-    end: Float,
-    bounds: Float,
-    angles: Float,
-    taus: Float,
-    laser: Float,
-    spot: tuple[float, float],
-) -> tuple[Float, Int, Float]:
-    """Lay out a fan and find what it can meet, near things first.
-
-    table    (n, 6) the candidate geoms, ``end`` (n, 12) their poses at the end of the step and
-             ``bounds`` (n, 6) as ``follow`` left them
-    angles   (m,) rad in the laser frame, ascending by even steps; taus (m,) time of each beam
-             within the step, 0..1
-    laser    (7,) x, y, yaw at the start of the step, the same at its end, height
-    spot     aperture radius m and half divergence rad
-
-    Returns the fan (m, 6); rows (candidate, first beam, last beam), a geom that spans the whole
-    circle may have two; and for each row the least distance at which the geom can be met.
-    """
-    fan = _lay_fan(angles, taus, laser)
-    windows = np.empty((3 * table.shape[0], 3), dtype=np.int64)
-    nearest = np.empty(3 * table.shape[0])
-    found = _windows(table, end, bounds, fan, laser[6], spot, windows, nearest)
-    order = np.argsort(nearest[:found])
-    return fan, windows[order], nearest[order]
+def nearest_first(windows: Float, found: int, order: Int) -> None:
+    """Order of the first ``found`` windows by distance, to 0.25 m: enough, and three times faster
+    than a sort."""
+    starts = np.zeros(BUCKETS + 1, dtype=np.int64)
+    for row in range(found):
+        starts[1 + min(int(4.0 * windows[row, NEAR]), BUCKETS - 1)] += 1
+    for k in range(BUCKETS):
+        starts[k + 1] += starts[k]
+    for row in range(found):
+        k = min(int(4.0 * windows[row, NEAR]), BUCKETS - 1)
+        order[starts[k]] = row
+        starts[k] += 1

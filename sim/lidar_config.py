@@ -50,7 +50,10 @@ SCAN_MODES = MappingProxyType({1.0: 1, 0.5: 2, 0.25: 4})
 
 @dataclass(frozen=True, kw_only=True)
 class Lms221Config:
-    """How the scanner is set, and how it errs.
+    """How the scanner is set, and how it errs: as the device does, unless told otherwise.
+
+    ``Lms221Config()`` has every effect on, ``Lms221Config.ideal()`` none,
+    ``Lms221Config.noise_only()`` the statistical error and the rounding.
 
     resolution_deg  1, 0.5 or 0.25: 1, 2 or 4 mirror turns per scan (75, 37.5, 18.75 scans/s)
     fov_deg         180, or the middle 100
@@ -65,7 +68,7 @@ class Lms221Config:
     range_mode: str = "80m"
     noise_std_m: float = 0.010
     quantise: bool = True
-    effects: RangeEffects = field(default_factory=RangeEffects.none)
+    effects: RangeEffects = field(default_factory=RangeEffects)
 
     def __post_init__(self) -> None:
         if self.resolution_deg not in SCAN_MODES:
@@ -85,14 +88,30 @@ class Lms221Config:
             )
 
     @classmethod
-    def ideal(cls, *, resolution_deg: float = 0.5, fov_deg: int = 180) -> Lms221Config:
-        """Geometry and timing of the device, exact ranges."""
-        return cls(resolution_deg=resolution_deg, fov_deg=fov_deg, noise_std_m=0.0, quantise=False)
+    def ideal(
+        cls, *, resolution_deg: float = 0.5, fov_deg: int = 180, range_mode: str = "80m"
+    ) -> Lms221Config:
+        """Geometry and timing of the device, exact ranges; inf where there is nothing."""
+        return cls(
+            resolution_deg=resolution_deg,
+            fov_deg=fov_deg,
+            range_mode=range_mode,
+            noise_std_m=0.0,
+            quantise=False,
+            effects=RangeEffects.none(),
+        )
 
     @classmethod
-    def datasheet(cls, *, resolution_deg: float = 0.5, fov_deg: int = 180) -> Lms221Config:
-        """Every effect on: spot, edges, dark and oblique surfaces, glass, systematic error."""
-        return cls(resolution_deg=resolution_deg, fov_deg=fov_deg, effects=RangeEffects())
+    def noise_only(
+        cls, *, resolution_deg: float = 0.5, fov_deg: int = 180, range_mode: str = "80m"
+    ) -> Lms221Config:
+        """The 10 mm statistical error and the rounding to codes, no other effect."""
+        return cls(
+            resolution_deg=resolution_deg,
+            fov_deg=fov_deg,
+            range_mode=range_mode,
+            effects=RangeEffects.none(),
+        )
 
     @property
     def turns(self) -> int:

@@ -1,12 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exact tests of rays against MuJoCo's primitive geoms.
+"""Casts the beams of a sweep on a model's geoms, bit for bit as ``mj_multiRay`` would.
 
-The intersection formulas are those of MuJoCo's ``engine_ray.c``, evaluated in the same order, so
-that ranges and geom ids agree with ``mj_multiRay`` to the last bit. Each beam meets each moving
-geom at the beam's own time: poses are linear between the start and the end of a physics step.
-A beam is k rays over the disc of its spot; an ideal beam is the one ray in the middle.
-
-No kernel here calls one of another module: the compile cache does not see edits in such a callee.
+Each beam meets each moving geom at the beam's own time: poses are linear between physics steps. A
+beam is k rays over the disc of its spot; an ideal beam is the one ray in the middle.
 """
 
 from __future__ import annotations
@@ -14,320 +10,274 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.fan import (
     BOX,
-    CAPSULE,
     COS,
-    CYLINDER,
-    ELLIPSOID,
+    DISC_HALF,
+    DISC_RADIUS,
+    DISC_X,
+    DISC_Y,
+    DISC_Z,
+    FAR,
+    HIGH,
     KIND,
+    LAYER,
+    LOW,
     MOVED,
+    NEAR,
     ORIGIN_X,
     ORIGIN_Y,
-    PLANE,
+    PART,
     SIN,
     SIZE_X,
     SIZE_Y,
     SIZE_Z,
-    SPHERE,
-    TAU,
+    SLACK,
+    SLOT,
+    START,
+    STEP,
+    UNEVEN,
     Float,
     Int,
     Vec3,
-)  # fmt: skip
+    enclose,
+    find_windows,
+    lay_fans,
+    nearest_first,
+    ray_wedge,
+)
+from sim.ray_shapes import Pose, face_normal, meet
 from slam._jit import njit
 
-MINVAL = 1e-15  # mjMINVAL
+# Columns of the rays of a spot in the beam's frame: place on the disc (left, up), unit direction
+# (forward, left, up), and the way up per metre forward.
+U, V, FORWARD, LEFT, UP, SLOPE = range(6)
+
+Ray = tuple[Vec3, Vec3]
+AWAY = 1e-6  # m from a mirror at which what it shows begins, so that it does not show itself
 
 
 @njit
-def _quadratic(a: float, b: float, c: float) -> tuple[float, float]:
-    """Both roots of a x^2 + 2 b x + c in ascending order, (-1, -1) without real ones."""
-    det = b * b - a * c
-    if det < MINVAL:
-        return -1.0, -1.0
-    det = math.sqrt(det)
-    return (-b - det) / a, (-b + det) / a
-
-
-@njit
-def _first(low: float, high: float) -> float:
-    """The nearest root in front, -1 when both lie behind."""
-    if low >= 0.0:
-        return low
-    return high if high >= 0.0 else -1.0
-
-
-@njit
-def _sphere(dif: Vec3, vec: Vec3, radius_squared: float) -> float:
-    a = vec[0] * vec[0] + vec[1] * vec[1] + vec[2] * vec[2]
-    b = vec[0] * dif[0] + vec[1] * dif[1] + vec[2] * dif[2]
-    c = dif[0] * dif[0] + dif[1] * dif[1] + dif[2] * dif[2] - radius_squared
-    low, high = _quadratic(a, b, c)
-    return _first(low, high)
-
-
-@njit
-def _tube(pnt: Vec3, vec: Vec3, radius: float, half: float) -> float:
-    """Round side of a cylinder or capsule along local z, between its flat ends."""
-    a = vec[0] * vec[0] + vec[1] * vec[1]
-    b = vec[0] * pnt[0] + vec[1] * pnt[1]
-    c = pnt[0] * pnt[0] + pnt[1] * pnt[1] - radius * radius
-    low, high = _quadratic(a, b, c)
-    x = _first(low, high)
-    return x if x >= 0.0 and abs(pnt[2] + x * vec[2]) <= half else -1.0
-
-
-@njit
-def _nearer(x: float, candidate: float) -> float:
-    return candidate if candidate >= 0.0 and (x < 0.0 or candidate < x) else x
-
-
-@njit
-def _capsule(pnt: Vec3, vec: Vec3, radius: float, half: float) -> float:
-    x = _tube(pnt, vec, radius, half)
-    a = vec[0] * vec[0] + vec[1] * vec[1] + vec[2] * vec[2]
-    for side in (1.0, -1.0):
-        z = pnt[2] - side * half
-        b = vec[0] * pnt[0] + vec[1] * pnt[1] + vec[2] * z
-        c = pnt[0] * pnt[0] + pnt[1] * pnt[1] + z * z - radius * radius
-        for root in _quadratic(a, b, c):
-            if root >= 0.0 and side * (pnt[2] + root * vec[2]) >= half:
-                x = _nearer(x, root)
-    return x
-
-
-@njit
-def _cylinder(pnt: Vec3, vec: Vec3, radius: float, half: float) -> float:
-    x = -1.0
-    if abs(vec[2]) > MINVAL:
-        for side in (-1.0, 1.0):
-            root = (side * half - pnt[2]) / vec[2]
-            if root >= 0.0:
-                p0 = pnt[0] + root * vec[0]
-                p1 = pnt[1] + root * vec[1]
-                if p0 * p0 + p1 * p1 <= radius * radius:
-                    x = _nearer(x, root)
-    return _nearer(x, _tube(pnt, vec, radius, half))
-
-
-@njit
-def _ellipsoid(pnt: Vec3, vec: Vec3, size: Vec3) -> float:
-    s0, s1, s2 = 1.0 / (size[0] * size[0]), 1.0 / (size[1] * size[1]), 1.0 / (size[2] * size[2])
-    a = s0 * vec[0] * vec[0] + s1 * vec[1] * vec[1] + s2 * vec[2] * vec[2]
-    b = s0 * vec[0] * pnt[0] + s1 * vec[1] * pnt[1] + s2 * vec[2] * pnt[2]
-    c = s0 * pnt[0] * pnt[0] + s1 * pnt[1] * pnt[1] + s2 * pnt[2] * pnt[2] - 1.0
-    low, high = _quadratic(a, b, c)
-    return _first(low, high)
-
-
-@njit
-def _slab(pnt: Vec3, vec: Vec3, size: Vec3) -> float:
-    """Nearest face of a box whose axis 0 is the face normal (callers permute the axes)."""
-    x = -1.0
-    if abs(vec[0]) > MINVAL:
-        for side in (-1.0, 1.0):
-            root = (side * size[0] - pnt[0]) / vec[0]
-            if (
-                root >= 0.0
-                and abs(pnt[1] + root * vec[1]) <= size[1]
-                and abs(pnt[2] + root * vec[2]) <= size[2]
-            ):
-                x = _nearer(x, root)
-    return x
-
-
-@njit
-def _box(pnt: Vec3, vec: Vec3, size: Vec3) -> float:
-    x = _slab(pnt, vec, size)
-    x = _nearer(
-        x,
-        _slab((pnt[1], pnt[0], pnt[2]), (vec[1], vec[0], vec[2]), (size[1], size[0], size[2])),
-    )
-    return _nearer(
-        x,
-        _slab((pnt[2], pnt[0], pnt[1]), (vec[2], vec[0], vec[1]), (size[2], size[0], size[1])),
-    )
-
-
-@njit
-def _plane(pnt: Vec3, vec: Vec3, size: Vec3) -> float:
-    if vec[2] > -MINVAL:
-        return -1.0
-    x = -pnt[2] / vec[2]
-    if x < 0.0:
-        return -1.0
-    if size[0] > 0.0 and abs(pnt[0] + x * vec[0]) > size[0]:
-        return -1.0
-    if size[1] > 0.0 and abs(pnt[1] + x * vec[1]) > size[1]:
-        return -1.0
-    return x
-
-
-@njit
-def _to_local(poses: Float, row: int, dif: Vec3) -> Vec3:
-    """A world difference in the frame of a geom; rows of ``poses``: position, matrix by rows."""
+def _pose(poses: Float, slot: int, j: int) -> Pose:
+    """Pose of geom j in a slot."""
     return (
-        poses[row, 3] * dif[0] + poses[row, 6] * dif[1] + poses[row, 9] * dif[2],
-        poses[row, 4] * dif[0] + poses[row, 7] * dif[1] + poses[row, 10] * dif[2],
-        poses[row, 5] * dif[0] + poses[row, 8] * dif[1] + poses[row, 11] * dif[2],
-    )
+        poses[slot, j, 0], poses[slot, j, 1], poses[slot, j, 2], poses[slot, j, 3],
+        poses[slot, j, 4], poses[slot, j, 5], poses[slot, j, 6], poses[slot, j, 7],
+        poses[slot, j, 8], poses[slot, j, 9], poses[slot, j, 10], poses[slot, j, 11],
+    )  # fmt: skip
 
 
 @njit
-def _distance(table: Float, j: int, poses: Float, row: int, origin: Vec3, vec: Vec3) -> float:
-    """Distance from ``origin`` along ``vec`` to geom j, -1 for a miss (MuJoCo's formulas)."""
-    kind = int(table[j, KIND])
-    size = (table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z])
-    dif = (origin[0] - poses[row, 0], origin[1] - poses[row, 1], origin[2] - poses[row, 2])
-    if kind == SPHERE:
-        return _sphere(dif, vec, size[0] * size[0])
-    # MuJoCo tests a bounding sphere first; at a corner it decides, so it is part of the formula.
-    if kind == BOX:
-        bound = size[0] * size[0] + size[1] * size[1] + size[2] * size[2]
-        if _sphere(dif, vec, bound) < 0.0:
-            return -1.0
-    elif kind == CAPSULE:
-        if _sphere(dif, vec, (size[0] + size[1]) * (size[0] + size[1])) < 0.0:
-            return -1.0
-    elif kind == CYLINDER and _sphere(dif, vec, size[0] * size[0] + size[1] * size[1]) < 0.0:
-        return -1.0
-    pnt, ray = _to_local(poses, row, dif), _to_local(poses, row, vec)
-    if kind == BOX:
-        return _box(pnt, ray, size)
-    if kind == CAPSULE:
-        return _capsule(pnt, ray, size[0], size[1])
-    if kind == CYLINDER:
-        return _cylinder(pnt, ray, size[0], size[1])
-    if kind == ELLIPSOID:
-        return _ellipsoid(pnt, ray, size)
-    return _plane(pnt, ray, size)
-
-
-@njit
-def _box_cos(pnt: Vec3, ray: Vec3, size: Vec3, x: float) -> float:
-    """Of a box: the face it hit is the one its point is nearest to."""
-    gap0 = abs(abs(pnt[0] + x * ray[0]) - size[0])
-    gap1 = abs(abs(pnt[1] + x * ray[1]) - size[1])
-    gap2 = abs(abs(pnt[2] + x * ray[2]) - size[2])
-    if gap0 <= gap1 and gap0 <= gap2:
-        return abs(ray[0])
-    return abs(ray[1]) if gap1 <= gap2 else abs(ray[2])
-
-
-@njit
-def _cos(
-    table: Float, j: int, poses: Float, row: int, origin: Vec3, vec: Vec3, distance: float
-) -> float:
-    """|cos| of the angle between a unit ray and the surface normal where it hit.
-
-    Tables and rows instead of slices: to slice costs more than the whole calculation.
-    """
-    kind = int(table[j, KIND])
-    s0, s1, s2 = table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z]
-    dif = (origin[0] - poses[row, 0], origin[1] - poses[row, 1], origin[2] - poses[row, 2])
-    pnt, ray = _to_local(poses, row, dif), _to_local(poses, row, vec)
-    if kind == BOX:
-        return min(_box_cos(pnt, ray, (s0, s1, s2), distance), 1.0)
-    if kind == PLANE:
-        return min(abs(ray[2]), 1.0)
-    n0, n1, n2 = pnt[0] + distance * ray[0], pnt[1] + distance * ray[1], pnt[2] + distance * ray[2]
-    if kind == CAPSULE:
-        n2 -= min(max(n2, -s1), s1)
-    elif kind == CYLINDER:
-        if abs(abs(n2) - s1) < abs(math.sqrt(n0 * n0 + n1 * n1) - s0):
-            return min(abs(ray[2]), 1.0)
-        n2 = 0.0
-    elif kind == ELLIPSOID:
-        n0, n1, n2 = n0 / (s0 * s0), n1 / (s1 * s1), n2 / (s2 * s2)
-    length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-    if length < MINVAL:
-        return 1.0
-    return min(abs(n0 * ray[0] + n1 * ray[1] + n2 * ray[2]) / length, 1.0)
-
-
-@njit
-def _ray(
-    fan: Float, i: int, height: float, rays: Float, k: int, aperture: float
-) -> tuple[Vec3, Vec3]:
-    """Origin and unit direction of ray k of beam i; ``rays`` rows are (u, v, dx, dy, dz)."""
-    c, s = fan[i, COS], fan[i, SIN]
-    u, v = aperture * rays[k, 0], aperture * rays[k, 1]
-    origin = (fan[i, ORIGIN_X] - s * u, fan[i, ORIGIN_Y] + c * u, height + v)
-    dx, dy = rays[k, 2], rays[k, 3]
-    return origin, (c * dx - s * dy, s * dx + c * dy, rays[k, 4])
-
-
-@njit
-def _pose_at(start: Float, end: Float, j: int, tau: float, out: Float) -> None:
-    """Pose of moving geom j at ``tau``, 0..1, into row 0 of ``out``.
+def _between(a: Pose, b: Pose, t: float) -> Pose:
+    """Pose on the way from a to b, ``t`` 0..1.
 
     Linear in the matrix too: at the 0.01 rad a body turns in one step the error is 1e-5 of its
     size.
     """
-    for i in range(12):
-        out[0, i] = start[j, i] + tau * (end[j, i] - start[j, i])
+    return (
+        a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2]),
+        a[3] + t * (b[3] - a[3]), a[4] + t * (b[4] - a[4]), a[5] + t * (b[5] - a[5]),
+        a[6] + t * (b[6] - a[6]), a[7] + t * (b[7] - a[7]), a[8] + t * (b[8] - a[8]),
+        a[9] + t * (b[9] - a[9]), a[10] + t * (b[10] - a[10]), a[11] + t * (b[11] - a[11]),
+    )  # fmt: skip
 
 
 @njit
-def cast_fan(
+def _ray(c: float, s: float, x: float, y: float, z: float, lever: Vec3, way: Vec3) -> Ray:
+    """Origin and unit direction in the world of a ray of the beam that leaves (x, y, z).
+
+    c, s   direction of the beam; ``lever`` (_, left m, up m) and ``way`` (forward, left, up) of
+           the ray in the beam's frame
+    """
+    origin = (x - s * lever[1], y + c * lever[1], z + lever[2])
+    return origin, (c * way[0] - s * way[1], s * way[0] + c * way[1], way[2])
+
+
+@njit
+def _cast_windows(
     table: Float,
-    poses: tuple[Float, Float],
+    poses: Float,
     bounds: Float,
-    plan: tuple[Float, Int, Float],
+    ends: Int,
     beams: Int,
-    height: float,
-    optics: tuple[Float, float],
+    rays: Float,
+    optics: Vec3,
+    work: tuple[Float, Float, Float, Float, Int, Int],
+    found: int,
     out: tuple[Float, Int, Float],
 ) -> None:
-    """Cast the beams of one physics step.
-
-    table   (n, 6) the candidate geoms
-    poses   (n, 12) of them at the start and at the end of the step, and their ``bounds`` (n, 6)
-    plan    of ``sim.fan.prepare``; ``beams`` (m,) the rows of the outputs its beams go to
-    height  m, of the scan plane
-    optics  rays (k, 5): place u, v on the disc of the spot and unit direction in the beam's frame;
-            aperture radius m
-    out     (all beams, k) each: ranges m, inf for a miss; index of the candidate, -1; |cos| of the
-            incidence, NaN. Must come in as misses.
-    """
-    start, end = poses
-    fan, windows, nearest = plan
-    rays, aperture = optics
+    """Test the rays of each window's beams on its geom, near windows first."""
+    fan, frames, farthest, windows, owners, order = work
+    height, aperture, slope = optics
     ranges, hits, cosines = out
-    pose = np.empty((1, 12))
-    for row in range(windows.shape[0]):
-        j, near = windows[row, 0], nearest[row]
-        moves = bounds[j, MOVED] != 0.0
-        for i in range(windows[row, 1], windows[row, 2] + 1):
-            beam = beams[i]
-            for k in range(rays.shape[0]):
-                best = ranges[beam, k]
-                if near > best:
+    count = rays.shape[0]
+    for turn in range(found):
+        row = order[turn]
+        j, near, far = owners[row], windows[row, NEAR], windows[row, FAR]
+        kind, layer = int(table[j, KIND]), int(table[j, LAYER])
+        size = (table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z])
+        moves, pose = bounds[j, MOVED] != 0.0, _pose(poses, 0, j)
+        bottom = bounds[j, DISC_Z] - bounds[j, DISC_HALF] - SLACK
+        top = bounds[j, DISC_Z] + bounds[j, DISC_HALF] + SLACK
+        for f in range(frames.shape[0]):
+            per_step, base = 1.0 / frames[f, STEP], ends[f]
+            lowest = (windows[row, LOW] - frames[f, UNEVEN] - frames[f, START]) * per_step
+            highest = (windows[row, HIGH] + frames[f, UNEVEN] - frames[f, START]) * per_step
+            margin = slope * per_step
+            first = base + max(math.ceil(lowest - margin), 0)
+            last = min(base + math.floor(highest + margin), ends[f + 1] - 1)
+            for i in range(first, last + 1):
+                if near > farthest[layer, i]:
                     continue
-                origin, vec = _ray(fan, i, height, rays, k, aperture)
-                if moves:
-                    _pose_at(start, end, j, fan[i, TAU], pose)
-                    x = _distance(table, j, pose, 0, origin, vec)
-                else:
-                    x = _distance(table, j, end, j, origin, vec)
-                # Equal distances go to the lower id, as in MuJoCo's loop over ascending ids.
-                if x >= 0.0 and (x < best or (x == best and j < hits[beam, k])):
-                    ranges[beam, k] = x
-                    hits[beam, k] = j
+                c, s, x, y = fan[i, COS], fan[i, SIN], fan[i, ORIGIN_X], fan[i, ORIGIN_Y]
+                beam, worst, posed = beams[i], 0.0, not moves
+                for k in range(count):
+                    best = ranges[layer, beam, k]
+                    up = aperture * rays[k, V]
+                    if count > 1:
+                        # Rays of the spot that pass beside, over or under the geom.
+                        place = i - base + rays[k, LEFT] * per_step
+                        rise = rays[k, SLOPE]
+                        low, high = height + up + rise * near, height + up + rise * far
+                        if (
+                            near > best
+                            or place < lowest
+                            or place > highest
+                            or min(low, high) > top
+                            or max(low, high) < bottom
+                        ):
+                            worst = max(worst, best)
+                            continue
+                    if not posed:
+                        slot = int(fan[i, SLOT])
+                        pose = _between(
+                            _pose(poses, slot, j), _pose(poses, slot + 1, j), fan[i, PART]
+                        )
+                        posed = True
+                    lever = (0.0, aperture * rays[k, U], up)
+                    way = (rays[k, FORWARD], rays[k, LEFT], rays[k, UP])
+                    origin, vec = _ray(c, s, x, y, height, lever, way)
+                    distance, cos = meet(kind, size, pose, origin, vec, best)
+                    # Equal distances go to the lower id, as in MuJoCo's loop over ascending ids.
+                    if 0.0 <= distance < best or (distance == best and j < hits[layer, beam, k]):
+                        ranges[layer, beam, k] = best = distance
+                        hits[layer, beam, k] = j
+                        cosines[layer, beam, k] = cos
+                    worst = max(worst, best)
+                farthest[layer, i] = worst
+
+
+@njit
+def sweep(
+    table: Float,
+    movable: Int,
+    poses: Float,
+    lasers: Float,
+    slots: int,
+    bounds: Float,
+    plan: Float,
+    ends: Int,
+    beams: Int,
+    rays: Float,
+    optics: Vec3,
+    work: tuple[Float, Float, Float, Float, Int, Int],
+    out: tuple[Float, Int, Float],
+) -> None:
+    """Cast the beams of one scan.
+
+    table    (n, 7) the candidate geoms; rows ``movable`` of them can move
+    poses    (slots, n, 12) of them at the ``slots`` ends of physics steps; lasers (slots, 3)
+    bounds   (n, 6), as ``enclose`` left them for what cannot move
+    plan     (m, 5) of the beams, fan k in the rows ``ends[k]`` to ``ends[k + 1]``
+    beams    (m,) the rows of the outputs they go to
+    rays     (k, 6) of a beam
+    optics   height of the scan plane m, aperture radius m, half divergence rad
+    work     room for the fans (m, 7), their frames (fans, 3), reach of the beams (layers, m),
+             windows (3 n, 4), their owners (3 n,) and order (3 n,)
+    out      (layers, m, k) each: ranges m, inf for a miss; index of the candidate, -1; |cos| of
+             the incidence, NaN
+    """
+    fan, frames, farthest, windows, owners, order = work
+    ranges, hits, cosines = out
+    ranges[:] = math.inf
+    hits[:] = -1
+    cosines[:] = math.nan
+    farthest[:] = math.inf
+    enclose(table, movable, poses, slots, bounds)
+    lay_fans(plan, lasers, ends, fan, frames)
+    wedge = ray_wedge(frames, ends, optics[2])
+    found = find_windows(table, poses, bounds, fan, wedge, optics, windows, owners)
+    nearest_first(windows, found, order)
+    _cast_windows(table, poses, bounds, ends, beams, rays, optics, work, found, out)
+
+
+@njit
+def cast_one(
+    table: Float, poses: Float, bounds: Float, fan: Float, i: int, origin: Vec3, vec: Vec3
+) -> tuple[float, int, float]:
+    """(distance, candidate, |cos|) of one ray at the time of beam i, (inf, -1, NaN) for a miss.
+
+    Panes are not seen.
+    """
+    best, hit, cosine = math.inf, -1, math.nan
+    slot, part = int(fan[i, SLOT]), fan[i, PART]
+    for j in range(table.shape[0]):
+        dx, dy = bounds[j, DISC_X] - origin[0], bounds[j, DISC_Y] - origin[1]
+        reach = bounds[j, DISC_RADIUS] + SLACK
+        along, aside = dx * vec[0] + dy * vec[1], dy * vec[0] - dx * vec[1]
+        if abs(aside) > reach or along < -reach or along - reach > best or table[j, LAYER] > 0.0:
+            continue
+        pose = _pose(poses, slot, j)
+        if bounds[j, MOVED] != 0.0:
+            pose = _between(pose, _pose(poses, slot + 1, j), part)
+        size = (table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z])
+        x, cos = meet(int(table[j, KIND]), size, pose, origin, vec, best)
+        if 0.0 <= x < best:
+            best, hit, cosine = x, j, cos
+    return best, hit, cosine
+
+
+@njit
+def reflect(
+    table: Float,
+    polished: NDArray[np.bool_],
+    poses: Float,
+    bounds: Float,
+    fan: Float,
+    beams: Int,
+    height: float,
+    hits: tuple[Float, Int, Float],
+    out: tuple[Float, Int, Float],
+) -> None:
+    """Follow the middle rays of a scan that meet a pane or a polished face to what they show.
+
+    polished  (n,) True for candidates of the room's layer that mirror; only boxes do, by a face
+    hits      as ``sweep`` left them
+    out       (all beams,) each: length of the way there m, inf for none; candidate; |cos| there
+    """
+    ranges, found, _ = hits
     for i in range(beams.size):
         beam = beams[i]
-        for k in range(rays.shape[0]):
-            j = hits[beam, k]
-            if j < 0:
-                continue
-            origin, vec = _ray(fan, i, height, rays, k, aperture)
-            if bounds[j, MOVED] != 0.0:
-                _pose_at(start, end, j, fan[i, TAU], pose)
-                cosines[beam, k] = _cos(table, j, pose, 0, origin, vec, ranges[beam, k])
-            else:
-                cosines[beam, k] = _cos(table, j, end, j, origin, vec, ranges[beam, k])
+        out[0][beam], out[1][beam], out[2][beam] = math.inf, -1, math.nan
+        layer = ranges.shape[0] - 1
+        if ranges[layer, beam, 0] >= ranges[0, beam, 0]:
+            layer = 0
+        j, x = found[layer, beam, 0], ranges[layer, beam, 0]
+        if j < 0 or int(table[j, KIND]) != BOX or (layer == 0 and not polished[j]):
+            continue
+        slot = int(fan[i, SLOT])
+        pose = _between(_pose(poses, slot, j), _pose(poses, slot + 1, j), fan[i, PART])
+        size = (table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z])
+        vec = (fan[i, COS], fan[i, SIN], 0.0)
+        at = (fan[i, ORIGIN_X] + x * vec[0], fan[i, ORIGIN_Y] + x * vec[1], height)
+        n = face_normal(size, pose, at)
+        along = 2.0 * (vec[0] * n[0] + vec[1] * n[1] + vec[2] * n[2])
+        vec = (vec[0] - along * n[0], vec[1] - along * n[1], vec[2] - along * n[2])
+        at = (at[0] + AWAY * vec[0], at[1] + AWAY * vec[1], at[2] + AWAY * vec[2])
+        further, out[1][beam], out[2][beam] = cast_one(table, poses, bounds, fan, i, at, vec)
+        out[0][beam] = x + AWAY + further
 
 
 @njit

@@ -106,7 +106,7 @@ def test_noise_has_the_deviation_of_the_data_sheet(room: SimpleNamespace) -> Non
     """TD p34: 10 mm, one sigma, in millimetre mode; here of what is sent, rounding included."""
     for mode in ("32m", "80m"):
         model, data = room.build()
-        lidar = Lms221(model, Lms221Config(range_mode=mode), np.random.default_rng(1))
+        lidar = Lms221(model, Lms221Config.noise_only(range_mode=mode), np.random.default_rng(1))
         advance = room.stepper(model, data)
         errors = []
         for _ in range(60):
@@ -119,7 +119,7 @@ def test_noise_has_the_deviation_of_the_data_sheet(room: SimpleNamespace) -> Non
 
 @pytest.mark.parametrize(("mode", "unit"), [("8m", 0.001), ("32m", 0.001), ("80m", 0.01)])
 def test_ranges_lie_on_the_grid_of_the_mode(room: SimpleNamespace, mode: str, unit: float) -> None:
-    result, _ = scan(room, Lms221Config(range_mode=mode))
+    result, _ = scan(room, Lms221Config.noise_only(range_mode=mode))
     codes = result.ranges.astype(np.float64) / unit
     np.testing.assert_allclose(codes, np.rint(codes), atol=1e-3)
     assert len(np.unique(result.ranges)) > 20
@@ -129,7 +129,7 @@ def test_nothing_and_too_far_are_no_return(room: SimpleNamespace) -> None:
     """A wall at 12 m is beyond the 8 m mode, within the 16 m mode; behind it there is nothing."""
     far = room.wall(12.1, 0.0, 0.1, 1.0)
     for mode, seen in (("8m", False), ("16m", True), ("80m", True)):
-        result, lidar = scan(room, Lms221Config(range_mode=mode), world=far)
+        result, lidar = scan(room, Lms221Config.noise_only(range_mode=mode), world=far)
         assert np.isfinite(result.ranges[180]) == seen
         assert result.ranges[0] == np.inf
         assert result.geoms[0] == -1
@@ -154,9 +154,9 @@ def test_draws_do_not_depend_on_what_is_hit(room: SimpleNamespace) -> None:
     states = []
     for world in (room.SQUARE, "", room.wall(2.0, 0.0, 0.1, 0.1)):
         model, data = room.build(world)
-        rng = np.random.default_rng(9)
-        Lms221(model, Lms221Config(), rng).observe(room.stepper(model, data), data)
-        states.append(rng.bit_generator.state)
+        lidar = Lms221(model, Lms221Config(), np.random.default_rng(9))
+        lidar.observe(room.stepper(model, data), data)
+        states.append([stream.bit_generator.state for stream in lidar.streams])
     assert states[0] == states[1] == states[2]
 
 

@@ -17,10 +17,10 @@ from sim.lidar_effects import (
     NEEDED,
     NEEDED_RANGE_M,
     RangeEffects,
-    SignalModel,
+    error_function,
     needed_reflectivity,
-    reflectivity_of,
 )
+from sim.lidar_surfaces import reflectivity_of
 from slam.errors import InvalidValueError
 
 NONE = RangeEffects.none()
@@ -125,19 +125,22 @@ def test_a_pane_is_seen_only_near_its_normal(room: SimpleNamespace) -> None:
     assert (opaque.ranges[through] < 2.9).all()
 
 
-def test_the_systematic_error_is_smooth_bounded_and_of_the_unit() -> None:
-    distances = np.linspace(1.0, 20.0, 2000)[:, None]
-    hits = (distances, np.zeros(distances.shape, dtype=np.int64), np.ones(distances.shape))
+def test_the_systematic_error_is_smooth_bounded_and_of_the_unit(room: SimpleNamespace) -> None:
+    """TD p34, over 20 units, black to white."""
     curves = []
     for seed in range(20):
-        model = SignalModel(replace(NONE, systematic=True), 0.035, np.random.default_rng(seed))
-        ranges, _, _ = model.apply(hits, np.full(distances.shape, 0.8), np.ones(distances.shape))
-        curves.append(ranges - distances[:, 0])
+        by_range, by_reflectivity = error_function(0.035, np.random.default_rng(seed))
+        curves.append(by_range[10:201])
+        assert np.abs(by_range[10:201]).max() + abs(by_reflectivity) <= 0.035
     errors = np.array(curves)
-    assert np.abs(errors).max() <= 0.035
     assert np.abs(errors).max() > 0.015
-    assert np.abs(np.diff(errors, axis=1)).max() < 0.002
+    assert np.abs(np.diff(errors, axis=1)).max() < 0.02
     assert errors.std(axis=0).min() > 0.003
+    first, second = (look(room, room.SQUARE, seed=seed, systematic=True)[0] for seed in (1, 2))
+    for result in (first, second):
+        error = result.ranges - result.true_ranges
+        assert 0.0 < np.abs(error).max() <= 0.05
+    assert not np.array_equal(first.ranges, second.ranges)
 
 
 def test_centimetre_mode_has_the_larger_bound() -> None:
@@ -152,15 +155,18 @@ def test_lost_values_are_error_codes(room: SimpleNamespace) -> None:
     assert 0.15 < float(np.isnan(result.ranges).mean()) < 0.35
 
 
-def test_switches_do_not_change_the_draws(room: SimpleNamespace) -> None:
-    states = []
-    for config in (Lms221Config.ideal(), Lms221Config(), Lms221Config.datasheet()):
+def test_a_switch_does_not_change_what_other_effects_draw(room: SimpleNamespace) -> None:
+    noise = []
+    for effects in (NONE, replace(NONE, mixed_pixels=True, dropout_rate=0.1)):
         model, data = room.build()
-        rng = np.random.default_rng(3)
-        lidar = Lms221(model, config, rng)
-        lidar.observe(room.stepper(model, data), data)
-        states.append(rng.bit_generator.state)
-    assert states[0] == states[1] == states[2]
+        config = Lms221Config(quantise=False, effects=effects)
+        result = Lms221(model, config, np.random.default_rng(3)).observe(
+            room.stepper(model, data), data
+        )
+        noise.append(result.ranges)
+    kept = np.isfinite(noise[1])
+    assert 0.8 < kept.mean() < 0.97
+    np.testing.assert_array_equal(noise[0][kept], noise[1][kept])
 
 
 @pytest.mark.parametrize(

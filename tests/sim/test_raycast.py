@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.caster import Raycaster, Spot
+from sim.caster import FanPlan, Raycaster, Spot
 from slam.errors import InvalidValueError
 
 HEIGHT = 0.36
-GROUPS = np.array([1, 1, 1, 0, 1, 1], dtype=np.uint8)
+GROUPS = np.array([1, 1, 1, 0, 1, 0], dtype=np.uint8)  # neither hulls nor painted shadows
 SHAPES = (
     mujoco.mjtGeom.mjGEOM_SPHERE,
     mujoco.mjtGeom.mjGEOM_CAPSULE,
@@ -28,7 +28,7 @@ Hits = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
 def random_world(
     rng: np.random.Generator, bodies: int = 60
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """Primitives of all kinds and attitudes, some upright, some in the hull group, some clear."""
+    """Primitives of all kinds and attitudes, some upright, some unseen (hulls, paint, clear)."""
     spec = mujoco.MjSpec()
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[20, 20, 0.1])
     for i in range(bodies):
@@ -40,7 +40,7 @@ def random_world(
             type=SHAPES[rng.integers(len(SHAPES))],
             size=rng.uniform(0.03, 0.6, 3),
             quat=quat / np.linalg.norm(quat),
-            group=3 if rng.random() < 0.1 else 0,
+            group=int(rng.choice([0, 1, 3, 4, 5], p=[0.6, 0.1, 0.1, 0.1, 0.1])),
             rgba=[1, 1, 1, 0 if rng.random() < 0.1 else 1],
         )
     model = spec.compile()
@@ -49,34 +49,51 @@ def random_world(
     return model, data
 
 
-def misses(beams: int, rays: int = 1) -> Hits:
-    shape = (beams, rays)
-    return np.full(shape, np.inf), np.full(shape, -1, dtype=np.int64), np.full(shape, np.nan)
+def plan(angles: NDArray[np.float64], taus: NDArray[np.float64] | None = None) -> FanPlan:
+    """One fan within one physics step."""
+    n = angles.size
+    parts = np.linspace(0.0, 1.0, n) if taus is None else taus
+    return FanPlan.of([(np.arange(n), angles, np.zeros(n), parts)])
 
 
 def cast(
     caster: Raycaster, angles: NDArray[np.float64], start: tuple, end: tuple | None = None
 ) -> Hits:
-    """One fan: (ranges, geom ids, cosines), each (beams,)."""
-    out = misses(angles.size, caster.rays_per_beam)
-    taus = np.linspace(0.0, 1.0, angles.size)
-    caster.cast((np.arange(angles.size), angles, taus), (start, start if end is None else end), out)
+    """One fan: (ranges, geom ids, cosines), each (beams, rays)."""
+    caster.note()
+    caster.lasers[0], caster.lasers[1] = start, start if end is None else end
+    caster.cast(plan(angles))
     ids = np.append(caster.ids, -1)
-    return out[0], ids[out[1]], out[2]
+    return caster.hits[0][0], ids[caster.hits[1][0]], caster.hits[2][0]
 
 
 def multi_ray(
-    model: mujoco.MjModel, data: mujoco.MjData, origin: NDArray[np.float64], azimuths: list[float]
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    origin: NDArray[np.float64],
+    vectors: NDArray[np.float64],
 ) -> Hits:
-    """MuJoCo's answer for level rays: (ranges, geom ids, |cos| of the incidence)."""
-    n = len(azimuths)
-    vectors = np.array([[math.cos(a), math.sin(a), 0.0] for a in azimuths])
+    """MuJoCo's answer: (ranges, geom ids, |cos| of the incidence)."""
+    n = len(vectors)
     ranges, geoms, normals = np.zeros(n), np.zeros(n, dtype=np.int32), np.zeros(3 * n)
     mujoco.mj_multiRay(
         model, data, origin, vectors.ravel(), GROUPS, True, -1, geoms, ranges, normals, n, 1e10
     )  # fmt: skip
     cosines = np.abs((normals.reshape(n, 3) * vectors).sum(axis=1))
     return np.where(geoms < 0, np.inf, ranges), geoms.astype(np.int64), cosines
+
+
+def level(azimuth: float) -> NDArray[np.float64]:
+    """(1, 3) direction of one level ray."""
+    return np.array([[math.cos(azimuth), math.sin(azimuth), 0.0]])
+
+
+def directions(caster: Raycaster) -> NDArray[np.float64]:
+    """(beams, 3) of the level beams just cast, to the last bit; checked against the azimuth."""
+    azimuths, cos, sin = caster.fan[:, 0], caster.fan[:, 3], caster.fan[:, 4]
+    np.testing.assert_allclose(cos, np.cos(azimuths), atol=4e-16 * 4)
+    np.testing.assert_allclose(sin, np.sin(azimuths), atol=4e-16 * 4)
+    return np.column_stack((cos, sin, np.zeros(cos.size)))
 
 
 def fuzz(rays: int, seed: int) -> tuple[int, int, float]:
@@ -91,12 +108,11 @@ def fuzz(rays: int, seed: int) -> tuple[int, int, float]:
     while done < rays:
         model, data = random_world(rng)
         caster = Raycaster(model, height=HEIGHT, robot=None)
-        caster.start(data)
         for _ in range(10):
+            caster.start(data)
             x, y, yaw = (*rng.uniform(-8, 8, 2).tolist(), float(rng.uniform(-3.1, 3.1)))
             ranges, geoms, cosines = (a[:, 0] for a in cast(caster, angles, (x, y, yaw)))
-            azimuths = [yaw + 0.0 + a for a in angles.tolist()]
-            want = multi_ray(model, data, np.array([x, y, HEIGHT]), azimuths)
+            want = multi_ray(model, data, np.array([x, y, HEIGHT]), directions(caster))
             different += int(((ranges != want[0]) | (geoms != want[1])).sum())
             hit = geoms >= 0
             worst = max(worst, float(np.abs(cosines - want[2])[hit].max(initial=0.0)))
@@ -123,7 +139,7 @@ def test_each_beam_starts_where_the_laser_is_at_its_time() -> None:
     for i, tau in enumerate(np.linspace(0.0, 1.0, 91).tolist()):
         origin = np.array([0.3 + tau * 0.07, -0.2 + tau * 0.1, HEIGHT])
         azimuth = 3.1 + tau * turn + angles[i]
-        want = multi_ray(model, data, origin, [azimuth])
+        want = multi_ray(model, data, origin, level(azimuth))
         assert ranges[i, 0] == pytest.approx(want[0][0], abs=1e-9)
         assert geoms[i, 0] == want[1][0]
 
@@ -146,7 +162,7 @@ def test_moving_things_are_seen_where_they_are_at_the_time_of_the_beam() -> None
     for i, tau in enumerate(np.linspace(0.0, 1.0, 181).tolist()):
         still.qpos[:] = before + tau * (after - before)
         mujoco.mj_forward(model, still)
-        want = multi_ray(model, still, np.array([0.1, 0.2, HEIGHT]), [1.0 + angles[i]])
+        want = multi_ray(model, still, np.array([0.1, 0.2, HEIGHT]), level(1.0 + angles[i]))
         assert ranges[i, 0] == pytest.approx(want[0][0], abs=1e-6)
         assert geoms[i, 0] == want[1][0]
 
@@ -159,16 +175,57 @@ def test_the_end_of_a_step_is_the_start_of_the_next() -> None:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     caster = Raycaster(model, height=HEIGHT, robot=None)
-    caster.start(data)
-    ahead = np.zeros(1)
-    seen = []
-    for x in (3.0, 3.1, 3.1, 3.1, 3.3):
+    n = np.zeros(4)
+    slots, parts = np.array([0, 1, 2, 3]), np.full(4, 0.5)
+    ways = FanPlan.of([(np.array([i]), n[:1], slots[i : i + 1], parts[:1]) for i in range(4)])
+    for k, x in enumerate((3.0, 3.1, 3.1, 3.1, 3.3)):
         data.mocap_pos[0, 0] = x
         mujoco.mj_kinematics(model, data)
-        out = misses(1)
-        caster.cast((np.arange(1), ahead, np.array([0.5])), ((0.0, 0.0, 0.0),) * 2, out)
-        seen.append(float(out[0][0, 0]))
-    assert seen == pytest.approx([2.5, 2.55, 2.6, 2.6, 2.7], abs=1e-12)
+        if k == 0:
+            caster.start(data)
+        else:
+            caster.note()
+    caster.lasers[:] = 0.0
+    caster.cast(ways)
+    assert caster.hits[0][0, :, 0] == pytest.approx([2.55, 2.6, 2.6, 2.7], abs=1e-12)
+
+
+def test_a_whole_turn_of_two_fans_while_robot_and_things_move() -> None:
+    """Two sweeps, three notes each; every beam against MuJoCo with things where they are then."""
+    rng = np.random.default_rng(8)
+    model, data = random_world(rng)
+    still = mujoco.MjData(model)
+    caster = Raycaster(model, height=HEIGHT, robot=None)
+    moves = rng.normal(size=data.qpos.shape) * 0.01
+    for k in range(3, moves.size, 7):  # keep the attitudes: only the way is straight exactly
+        moves[k : k + 4] = 0.0
+    first = data.qpos.copy()
+    notes = (0, 1, 2, 4, 5, 6)  # physics steps
+    pose, step = np.array([0.2, -0.1, 3.0]), np.array([0.004, 0.002, 0.05])
+    for slot, k in enumerate(notes):
+        data.qpos[:] = first + k * moves
+        mujoco.mj_kinematics(model, data)
+        caster.start(data) if slot == 0 else caster.note()
+        caster.lasers[slot] = pose + k * step
+    angles = np.linspace(-math.pi / 2, math.pi / 2, 91)
+    times = np.linspace(0.0, 2.0, 91)
+    slots = np.minimum(np.floor(times), 1.0)
+    caster.cast(
+        FanPlan.of(
+            [(2 * np.arange(91) + f, angles, slots + 3 * f, times - slots) for f in range(2)]
+        )
+    )
+    ids = np.append(caster.ids, -1)
+    for f in range(2):
+        for i, time in enumerate((times + 4.0 * f).tolist()):
+            still.qpos[:] = first + time * moves
+            mujoco.mj_forward(model, still)
+            x, y, yaw = (pose + time * step).tolist()
+            origin, way = np.array([x, y, HEIGHT]), level(yaw + angles[i])
+            want = multi_ray(model, still, origin, way)
+            beam = 2 * i + f
+            assert caster.hits[0][0, beam, 0] == pytest.approx(want[0][0], abs=1e-6)
+            assert ids[caster.hits[1][0, beam, 0]] == want[1][0]
 
 
 def test_the_rays_of_a_spot_go_where_its_disc_says() -> None:
