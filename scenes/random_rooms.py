@@ -38,6 +38,7 @@ PURPOSES: dict[str, tuple[str, Sequence[str], Sequence[str]]] = {
 FLOORS = tuple(sorted({floor for floor, _, _ in PURPOSES.values()}))
 DOOR_CLEAR, GOAL_CLEAR = 1.15, 0.65  # m kept free around a doorway's and a room's middle
 PASSAGE = 0.36  # m, radius of what must get from each door to all others
+OVERHANG = {"plant": 0.26}  # m by which a part is wider than its footprint, above the scan plane
 TRIES = 12  # places tried for a piece of furniture
 GRID_M = 0.1
 
@@ -174,6 +175,8 @@ class _Room:
         yaw = 0.5 * math.pi * side
         length, reach = (self._half[0], self._half[1])[:: 1 if side % 2 == 0 else -1]
         half, back = _extent(part)
+        over = OVERHANG.get(part, 0.0)
+        half, back = half + over, back + over
         if half > length:
             return None
         along = (2.0 * v - 1.0) * (length - half)
