@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.flow import box_clearance
+from slam._jit import njit
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -34,6 +35,19 @@ _SLEEP_ARRAYS = (
 _SLEEP_COUNTS = ("ntree_awake", "nbody_awake", "nparent_awake", "nv_awake")
 
 
+@njit
+def _poses(
+    qpos: Float, first: NDArray[np.int64], hinge: Float, door: NDArray[np.bool_], out: Float
+) -> None:
+    for i in range(len(first)):
+        q = first[i]
+        if door[i]:
+            out[i, 0], out[i, 1] = hinge[i, 0], hinge[i, 1]
+            out[i, 2] = hinge[i, 2] + hinge[i, 3] * qpos[q]
+        else:
+            out[i, 0], out[i, 1], out[i, 2] = qpos[q], qpos[q + 1], qpos[q + 2]
+
+
 class Bodies:
     """Addresses of the movers of ``scene`` in ``model``.
 
@@ -51,14 +65,16 @@ class Bodies:
         self._row = {m.name: i for i, m in enumerate(scene.movers)}
         self.mover_of_body = self._owners()
         n = len(scene.movers)
-        self._qpos, self._dof = np.full(n, -1), np.full(n, -1)
+        self._qpos, self._dof = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
         self._hinge = np.zeros((n, 4))  # doors: hinge x, y m; heading rad when closed; sign
         for i, mover in enumerate(scene.movers):
             if mover.kind == "door":
                 self._add_door(i, mover)
             else:
                 self._add_planar(i, mover)
+        self._robot_at = 0 if self.robot is None else int(self._qpos[self.robot])
         kinds = np.array([m.kind == "door" for m in scene.movers], dtype=bool)
+        self._is_door = kinds
         self._planar, self._doors = np.nonzero(~kinds)[0], np.nonzero(kinds)[0]
 
     def _owners(self) -> NDArray[np.int64]:
@@ -109,15 +125,26 @@ class Bodies:
         pose: Float = data.qpos[at : at + 3].copy()
         return pose
 
+    def read_robot(self, data: mujoco.MjData, out: Float) -> None:
+        """``robot_pose`` into ``out``."""
+        at = self._robot_at
+        out[:] = data.qpos[at : at + 3]
+
     def poses(self, data: mujoco.MjData) -> Float:
         """(n, 3) pose of each mover; a door at its hinge, heading along the leaf."""
-        out = np.zeros((len(self.radius), 3))
-        first = self._qpos[self._planar]
-        out[self._planar] = data.qpos[first[:, None] + np.arange(3)]
-        hinge = self._hinge[self._doors]
-        out[self._doors, :2] = hinge[:, :2]
-        out[self._doors, 2] = hinge[:, 2] + hinge[:, 3] * data.qpos[self._qpos[self._doors]]
+        return self.poses_of(data.qpos)
+
+    def poses_of(self, qpos: Float) -> Float:
+        """The same from any qpos."""
+        out = np.empty((len(self.radius), 3))
+        _poses(qpos, self._qpos, self._hinge, self._is_door, out)
         return out
+
+    def copy_mover(self, row: int, source: Float, target: Float) -> None:
+        """Copy where mover ``row`` is from one qpos to another."""
+        first = int(self._qpos[row])
+        last = first + (1 if self._is_door[row] else 3)
+        target[first:last] = source[first:last]
 
     def speeds(self, data: mujoco.MjData) -> Float:
         """(n,) m/s, the greater of the centre's speed and the rim's by turning."""

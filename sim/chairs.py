@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shoves by invisible hands: chairs that roll away, bins that are kicked.
+"""Shoves by invisible hands: chairs that roll away, bins that are kicked, loads that are moved.
 
 Each thing has its own Poisson process with its own generator, and every event takes the same
 number of draws, so the schedule of one thing depends on its seed and rate alone: not on what it
@@ -15,11 +15,16 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.scene import Mover
 from sim.draws import between, waiting
+from sim.dynamism import Dynamism
+from sim.rolling import Rolling, inertia_of
+from sim.seeds import Seeds
 from slam._jit import njit
 
 Float = NDArray[np.float64]
 _TICKS_MIN, _TICKS_MAX = 9, 26  # 0.12 to 0.35 s of shove
+IMPULSE_MAX = 45.0  # N s; what is heavier than a chair gets less speed from the same hands
 
 
 @njit
@@ -51,6 +56,7 @@ def shove(
         schedule[i, 0] = time + waiting(counters, i, rate)
         speed = between(counters, i, low, high)
         heading = between(counters, i, -math.pi, math.pi)
+        speed = min(speed, IMPULSE_MAX / bodies[i, 0])
         duration = tick * math.floor(between(counters, i, _TICKS_MIN, _TICKS_MAX + 1))
         spin = between(counters, i, -spin_max, spin_max)
         schedule[i, 1] = time + duration - 0.5 * tick
@@ -78,19 +84,13 @@ class Shoves:
         self.names = tuple(names)
         n = len(self.names)
         self.rates = np.tile(np.array(rates, dtype=np.float64), (n, 1))
-        self.counters = counters.copy()
+        self.counters = counters[:n].copy()
         self.schedule = np.full((n, 2), math.inf)
-        self._dofs = np.zeros(n, dtype=np.int64)
-        self._bodies = np.zeros((n, 4))
-        for i, name in enumerate(self.names):
-            dof = int(model.joint(f"{name}/x").dofadr[0])
-            body = model.body(f"{name}/base")
-            self._dofs[i] = dof
-            loss = model.dof_frictionloss
-            self._bodies[i] = body.mass[0], body.inertia[2], loss[dof], loss[dof + 2]
+        self._dofs, self._bodies = inertia_of(model, self.names)
+        for i in range(n):
             self.schedule[i, 0] = waiting(self.counters, i, rates[0])
 
-    def control(self, time: float, tick: float, qfrc_applied: Float) -> None:
+    def control(self, time: float, tick: float, data: mujoco.MjData) -> None:
         """Write the forces of the shoves under way at ``time`` s into ``qfrc_applied``."""
         if self.names:
             shove(
@@ -101,9 +101,39 @@ class Shoves:
                 self.schedule,
                 self._bodies,
                 self._dofs,
-                qfrc_applied,
+                data.qfrc_applied,
             )
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""
         return {"counters": self.counters, "schedule": self.schedule}
+
+
+def pushers(
+    model: mujoco.MjModel, movers: Sequence[Mover], rates: Dynamism, seeds: Seeds
+) -> dict[str, Shoves | Rolling]:
+    """What moves the planar things without a will of their own, by the group they belong to.
+
+    "chair", "bin", and "load" for every other kind that is no person, door or robot.
+    """
+    groups: dict[str, list[str]] = {"chair": [], "bin": [], "load": []}
+    for mover in movers:
+        if mover.kind not in ("person", "door", "robot"):
+            kind = mover.kind.partition("_")[0]
+            groups[kind if kind in groups else "load"].append(mover.name)
+    shove = (rates.push_speed_min, rates.push_speed_max, rates.push_spin_max)
+    kick = (rates.kick_speed_min, rates.kick_speed_max, rates.push_spin_max)
+    how = {
+        "chair": (rates.chair_push_rate, *shove),
+        "bin": (rates.bin_kick_rate, *kick),
+        "load": (rates.load_push_rate, *shove),
+    }
+    made: dict[str, Shoves | Rolling] = {}
+    for group, names in groups.items():
+        # One counter for each mover of the scene, so that more people leave the chairs' alone.
+        counters = seeds.counters(f"{group}s", len(movers))
+        if rates.moving_share is not None and group != "bin":
+            made[group] = Rolling(model, names, share=rates.moving_share, counters=counters)
+        else:
+            made[group] = Shoves(model, names, rates=how[group], counters=counters)
+    return made

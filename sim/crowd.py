@@ -207,12 +207,13 @@ def plan(
 ) -> None:
     """Stay, set off, arrive or give up; keeps the account of time walked and blocked."""
     discs, state, task, draws = crowd.discs, crowd.state, crowd.task, crowd.draws
+    look = len(task) + i  # its generator
     if task[i, WALKING] == 0:
         if time >= state[i, STAY_UNTIL]:
             new_trip(i, time, stay, field, crowd)
         elif time >= state[i, LOOK_UNTIL]:
-            state[i, LOOK] = between(draws, i, -math.pi, math.pi)
-            state[i, LOOK_UNTIL] = time + between(draws, i, 4.0, 15.0)
+            state[i, LOOK] = between(draws, look, -math.pi, math.pi)
+            state[i, LOOK_UNTIL] = time + between(draws, look, 4.0, 15.0)
         return
     left = time_at(field, task[i, GOAL], discs[i, X], discs[i, Y])
     state[i, WALKED_S] += tick
@@ -226,7 +227,7 @@ def plan(
     if arrived(i, left, doors, discs, state):
         task[i, WALKING] = 0
         state[i, STAY_UNTIL] += time
-        state[i, LOOK_UNTIL] = time + between(draws, i, 4.0, 15.0)
+        state[i, LOOK_UNTIL] = time + between(draws, look, 4.0, 15.0)
     elif state[i, BLOCKED] > 5.0 or time - state[i, BEST_AT] > 12.0:
         new_trip(i, time, stay, field, crowd)
 

@@ -5,6 +5,7 @@
 |----------------------------------------|------------------|-------|-------|-------|-------|
 | shoves of each chair, 1/s              | 0.05 d           | 0     | 0.013 | 0.025 | 0.05  |
 | kicks of each bin, 1/s                 | 0.02 d           | 0     | 0.005 | 0.010 | 0.02  |
+| moves of each trolley or pallet, 1/s   | 0.02 d           | 0     | 0.005 | 0.010 | 0.02  |
 | each door moved without a person, 1/s  | 0.02 d           | 0     | 0.005 | 0.010 | 0.02  |
 | mean stay of a person at a goal, s     | 4 / d - 2        | never | 14    | 6     | 2     |
 | walking pace, share of a person's own  | 0.7 + 0.3 d      | -     | 0.775 | 0.85  | 1     |
@@ -13,12 +14,16 @@ At 0 nothing moves by itself: people are present and stand perfectly still, chai
 never pushed and doors stay at their angle of rest (a door still gives way to the robot). How hard
 a shove is does not depend on the knob: 0.25 to 1.5 m/s, which for a 13 kg chair is 3 to 20 N s
 (design range for invisible shoves; a person at a desk rolls a chair at walking speed at most).
+Heavier things get the speed that 45 N s give them.
+
+For experiments that ask "how many may move?", ``moving_share`` replaces the shoves of chairs and
+loads by a set share of them on the move at any time (``sim.rolling``).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from slam.errors import InvalidValueError
 
@@ -28,6 +33,9 @@ class Dynamism:
     """All rates of a moving room. ``Dynamism.from_knob`` fills them from the table above.
 
     chair_push_rate  1/s for each chair          bin_kick_rate  1/s for each bin
+    load_push_rate   1/s for each trolley, pallet or whatever else rolls in the plane
+    moving_share     in [0, 1]: of all chairs and loads, on the move at any time; replaces their
+                     shoves unless it is None
     door_rate        1/s for each door           stay_mean      s, infinite: nobody ever leaves
     pace             factor on each person's preferred speed
     push_speed_min/max  m/s a shove gives a chair
@@ -37,6 +45,8 @@ class Dynamism:
 
     chair_push_rate: float = 0.0
     bin_kick_rate: float = 0.0
+    load_push_rate: float = 0.0
+    moving_share: float | None = None
     door_rate: float = 0.0
     stay_mean: float = math.inf
     pace: float = 1.0
@@ -47,13 +57,17 @@ class Dynamism:
     push_spin_max: float = math.pi
 
     def __post_init__(self) -> None:
-        for name in ("chair_push_rate", "bin_kick_rate", "door_rate", "push_spin_max"):
+        rates = ("chair_push_rate", "bin_kick_rate", "load_push_rate", "door_rate", "push_spin_max")
+        for name in rates:
             value = getattr(self, name)
             if not 0.0 <= value < math.inf:
                 raise InvalidValueError(f"Dynamism.{name} must be >= 0 and finite, got {value}")
         for name in ("stay_mean", "pace"):
             if not getattr(self, name) > 0.0:
                 raise InvalidValueError(f"Dynamism.{name} must be > 0, got {getattr(self, name)}")
+        share = self.moving_share
+        if share is not None and not 0.0 <= share <= 1.0:
+            raise InvalidValueError(f"Dynamism.moving_share must lie in [0, 1], got {share}")
         for what in ("push", "kick"):
             low, high = getattr(self, f"{what}_speed_min"), getattr(self, f"{what}_speed_max")
             if not 0.0 <= low <= high < math.inf:
@@ -72,7 +86,14 @@ class Dynamism:
         return cls(
             chair_push_rate=0.05 * d,
             bin_kick_rate=0.02 * d,
+            load_push_rate=0.02 * d,
             door_rate=0.02 * d,
             stay_mean=4.0 / d - 2.0 if d > 0.0 else math.inf,
             pace=0.7 + 0.3 * d,
         )
+
+    @classmethod
+    def of(cls, dynamism: float | Dynamism, moving_share: float | None = None) -> Dynamism:
+        """A knob or the rates themselves, with ``moving_share`` put in if it is not None."""
+        rates = dynamism if isinstance(dynamism, Dynamism) else cls.from_knob(dynamism)
+        return rates if moving_share is None else replace(rates, moving_share=moving_share)

@@ -39,7 +39,7 @@ class BeamLabeller:
             kind=kind,
             displacement=displacement.astype(np.float32),
             incidence=result.incidence,
-            mixed=np.zeros(len(mover), dtype=np.bool_),
+            mixed=result.mixed,
         )
 
     def _displacements(self, seen: NDArray[np.int64]) -> Float:

@@ -39,7 +39,9 @@ OPEN = 1.15  # rad, a leaf this far open lets a person through
 class Crowd(NamedTuple):
     """The people and what is around them, in the columns named above.
 
-    discs (k, 6) people first; yaws (n,) rad; state (n, 12); task (n, 2); draws (n,) generators
+    discs (k, 6) people first; yaws (n,) rad; state (n, 12); task (n, 2); draws (2 n,) generators:
+    of each one's trips, then of each one's looking about while standing, which happens as often as
+    time allows. So the trips of a person are the same, however long each takes.
     """
 
     discs: Float

@@ -21,6 +21,7 @@ from sim.manners import Addresses, Crowd
 
 Float = NDArray[np.float64]
 _LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
+_LOOKS = np.uint64(0xD1342543DE82EF95)  # sets the second generator of each person apart
 _FIRST_STAY_MAX = 8.0  # s, so that a short run of a calm room sees someone set off
 
 
@@ -81,7 +82,7 @@ class People:
             yaws=np.zeros(n),
             state=np.zeros((n, 12)),
             task=np.zeros((n, 2), dtype=np.int64),
-            draws=counters[:n].copy(),
+            draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
         )
         self._torsos = np.ascontiguousarray(self._at.discs[:n])
         self.field = floor_field(scene, doors.boxes_at_rest()) if self.alive else None
@@ -101,9 +102,7 @@ class People:
             state[i, manners.LOOK_UNTIL] = between(draws, i, 4.0, 15.0)
             n_goals = max(len(self.field.times), 1) if self.field is not None else 1
             task[i, manners.GOAL] = int(uniform(draws, i) * n_goals)
-        if self.names:
-            gait.stand(data.qpos, self._torsos, self.feet)
-            self.pose_limbs(0.0)
+        self.stand(data)
 
     def control(self, time: float, tick: float, data: mujoco.MjData) -> None:
         """Decide for ``tick`` s and write the set points of the torso servos."""
@@ -123,6 +122,12 @@ class People:
         """Let the feet step for ``dt`` s and write the mocap poses of all limbs."""
         if self.alive or (self.names and dt == 0.0):
             gait.walk(dt, self._physics, self._torsos, self._limbs, self.feet, self._mocap)
+
+    def stand(self, data: mujoco.MjData) -> None:
+        """Put everybody's feet under them where ``data`` says they are."""
+        if self.names:
+            gait.stand(data.qpos, self._torsos, self.feet)
+            self.pose_limbs(0.0)
 
     def swinging(self) -> NDArray[np.bool_]:
         """(n,) True for those with a foot in the air."""

@@ -26,9 +26,14 @@ LEAF_M = 0.05  # half thickness with which a leaf is planned around
 
 
 class Pilot:
-    """Drives a world's robot round the scene's goals; draws only from the "driving" stream."""
+    """Drives a world's robot round the scene's goals; draws only from the "driving" stream.
 
-    def __init__(self, world: World, config: TourConfig | None = None) -> None:
+    keep_out  (n, 3) poses like ``World.mover_poses`` that are avoided too, though nothing is there
+    """
+
+    def __init__(
+        self, world: World, config: TourConfig | None = None, *, keep_out: Float | None = None
+    ) -> None:
         self.world = world
         scene = world.scene
         config = config or TourConfig()
@@ -42,6 +47,10 @@ class Pilot:
         self._walls = NavGrid(scene.bounds, scene.obstacles, config.robot_radius_m - 0.05)
         self.driver = Driver(self._walls, goals, config)
         self.driver.use(self._walls.with_boxes(self._leaves_planned))
+        self._ghosts = np.zeros((0, 5))
+        if keep_out is not None:
+            still = np.zeros((len(keep_out), 2))
+            self._ghosts = np.concatenate([self._bodies(keep_out, still), self._leaves(keep_out)])
         self._last: Float | None = None
         self._here: Float | None = None
         self._since, self._decided = 0.0, (0.0, 0.0)
@@ -60,7 +69,7 @@ class Pilot:
         self._replan(poses)
         here = self.world.robot_pose()
         velocity = self._velocity(here, dt)
-        discs = np.concatenate([self._bodies(poses, velocities), self._leaves(poses)])
+        discs = np.concatenate([self._bodies(poses, velocities), self._leaves(poses), self._ghosts])
         gap = discs[:, :2] - here[:2]
         near = gap[:, 0] * gap[:, 0] + gap[:, 1] * gap[:, 1] < SIGHT_M * SIGHT_M
         self._decided = self.driver.command(here, velocity, discs[near], dt)

@@ -16,7 +16,18 @@ from numpy.typing import NDArray
 from slam.errors import InvalidValueError, UnknownNameError
 
 # The position in this tuple is part of every recorded run: append, never reorder.
-STREAMS = ("layout", "chairs", "people", "doors", "lidar", "odometry", "driving", "bins", "tags")
+STREAMS = (
+    "layout",
+    "chairs",
+    "people",
+    "doors",
+    "lidar",
+    "odometry",
+    "driving",
+    "bins",
+    "tags",
+    "loads",
+)
 
 
 class Seeds:

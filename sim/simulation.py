@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,48 @@ from sim.seeds import Seeds
 from sim.world import SUBSTEPS_PER_S, World
 from slam import se2
 from slam.errors import InvalidValueError
-from slam.frames import Float, Frame, LaserSpec, Scan, Stream, StreamMetadata
+from slam.frames import Float, Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScanTiming:
+    """When a scan's first and last beam are, in physics steps after its start.
+
+    What the encoders and the truth say is interpolated to these between the steps.
+    """
+
+    first: float
+    last: float
+    sweep_s: float
+
+    @classmethod
+    def of(cls, laser: Lms221) -> ScanTiming:
+        first = laser.config.stamp_offset_ns * 1e-9 * SUBSTEPS_PER_S
+        sweep = laser.spec.sweep_duration
+        return cls(first=first, last=first + sweep * SUBSTEPS_PER_S, sweep_s=sweep)
+
+    def odometry(
+        self, encoders: WheelOdometry, travel: Float, stamp_ns: int, touched: bool
+    ) -> Odometry:
+        """Advance the encoders over a scan; ``travel`` (steps + 1, 2) m rolled at its steps."""
+        encoders.begin_scan(_at(travel, self.first), contact=touched)
+        return encoders.end_scan(
+            _at(travel, self.last), stamp_ns=stamp_ns, sweep_s=self.sweep_s, contact=touched
+        )
+
+    def truth(self, path: Float) -> Float:
+        """(3,) pose at the first beam; ``path`` (steps + 1, 3)."""
+        k = min(int(self.first), len(path) - 2)
+        if self.first == k:
+            x, y, theta = path[k].tolist()
+            return np.array([x, y, se2.wrap(theta)])
+        return se2.interpolate(path[k], path[k + 1], self.first - k)
+
+
+def _at(travel: Float, step: float) -> Float:
+    k = min(int(step), len(travel) - 2)
+    between: Float = travel[k] + (step - k) * (travel[k + 1] - travel[k])
+    return between
 
 
 class Simulation:
@@ -31,11 +72,14 @@ class Simulation:
     scene      name of a registered scene, or ``module:function``
     seed       whole number or ``Seeds``; every part draws from its own stream
     dynamism   0 (nothing moves) to 1, or the rates themselves
+    moving_share  in [0, 1]: of the chairs, on the move at any time (``sim.rolling``)
     laser      how the scanner is set; default ``Lms221Config()``
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
     drive      limits of the robot
     labels     whether frames carry truth per beam
     options    passed on to the scene, e.g. ``n_chairs=10``
+
+    Attribute ``path``: (steps + 1, 3) true poses of the robot at the steps of the last scan.
     """
 
     def __init__(
@@ -44,6 +88,7 @@ class Simulation:
         *,
         seed: int | Seeds = 0,
         dynamism: float | Dynamism = 0.5,
+        moving_share: float | None = None,
         laser: Lms221Config | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
@@ -51,7 +96,8 @@ class Simulation:
         **options: Any,
     ) -> None:
         drive = drive or DriveConfig()
-        self.world = World(scene, seed=seed, dynamism=dynamism, drive=drive, **options)
+        rates = Dynamism.of(dynamism, moving_share)
+        self.world = World(scene, seed=seed, dynamism=rates, drive=drive, **options)
         self.odometry_preset = odometry
         seeds = self.world.seeds
         self.laser = Lms221(self.world.model, laser, seeds.generator("lidar"))
@@ -59,8 +105,11 @@ class Simulation:
         self._labeller = BeamLabeller(self.world) if labels else None
         self.frame: Frame | None = None  # the last one observed
         self.contacts: list[Contact] = []  # what the robot touched during the last scan
-        self._travel: list[Float] = []
-        self._poses: list[Float] = []
+        self._timing = ScanTiming.of(self.laser)
+        steps = self.laser.config.steps
+        self.path: Float = np.zeros((steps + 1, 3))
+        self._travel: Float = np.zeros((steps + 1, 2))
+        self._step = 0
 
     @property
     def spec(self) -> LaserSpec:
@@ -74,11 +123,11 @@ class Simulation:
 
     def _advance(self) -> None:
         self.world.substep()
+        self._step += 1
         self._note()
 
     def _note(self) -> None:
-        self._travel.append(self.world.wheel_angles())
-        self._poses.append(self.world.robot_pose())
+        self.world.read_robot(self.path[self._step], self._travel[self._step])
 
     def observe(self) -> Frame:
         """Let one scan's worth of time pass under the present command; the frame it gives.
@@ -86,43 +135,20 @@ class Simulation:
         The frame's stamp is that of the earliest beam, so its odometry and truth lie one scan
         period before the world's present: nobody can know a scan before it is over.
         """
-        config = self.laser.config
-        start_ns = self.world.time_ns
-        self._travel, self._poses = [], []
+        stamp_ns = self.world.time_ns + self.laser.config.stamp_offset_ns
+        self._step = 0
         self._note()
         result = self.laser.observe(self._advance, self.world.data)
-        stamp_ns = start_ns + config.stamp_offset_ns
-        first = config.stamp_offset_ns * 1e-9 * SUBSTEPS_PER_S
-        last = first + self.spec.sweep_duration * SUBSTEPS_PER_S
         self.contacts = self.world.take_contacts()
         touched = bool(self.contacts)
-        self.encoders.begin_scan(self._travel_at(first), contact=touched)
-        odometry = self.encoders.end_scan(
-            self._travel_at(last),
-            stamp_ns=stamp_ns,
-            sweep_s=self.spec.sweep_duration,
-            contact=touched,
-        )
         self.frame = Frame(
             stamp_ns=stamp_ns,
-            odometry=odometry,
+            odometry=self._timing.odometry(self.encoders, self._travel, stamp_ns, touched),
             scan=Scan(stamp_ns=stamp_ns, ranges=result.ranges, spec=self.spec),
-            truth=self._pose_at(first),
+            truth=self._timing.truth(self.path),
             labels=self._labeller.label(result) if self._labeller else None,
         )
         return self.frame
-
-    def _travel_at(self, step: float) -> Float:
-        """(2,) m rolled by the wheels, ``step`` physics steps after the scan's start."""
-        k = min(int(step), len(self._travel) - 2)
-        return self._travel[k] + (step - k) * (self._travel[k + 1] - self._travel[k])
-
-    def _pose_at(self, step: float) -> Float:
-        k = min(int(step), len(self._poses) - 2)
-        if step == k:
-            x, y, theta = self._poses[k].tolist()
-            return np.array([x, y, se2.wrap(theta)])
-        return se2.interpolate(self._poses[k], self._poses[k + 1], step - k)
 
     def metadata(self) -> StreamMetadata:
         """What a recording says about itself."""

@@ -18,7 +18,7 @@ from scenes import build
 from scenes.scene import Scene
 from sim import state
 from sim.bodies import Bodies
-from sim.chairs import Shoves
+from sim.chairs import pushers
 from sim.contacts import Contact, RobotContacts
 from sim.doors import Doors
 from sim.dynamism import Dynamism
@@ -40,6 +40,7 @@ class World:
     scene     a built ``Scene``, or the name of one; a name is built from the "layout" stream
     seed      whole number or ``Seeds``
     dynamism  knob in [0, 1] (see ``sim.dynamism``), or the rates themselves
+    moving_share  in [0, 1]: keep that share of chairs and loads on the move, instead of shoves
     drive     limits of the robot
     options   passed on to the scene when it is given by name, e.g. ``n_chairs=10``
 
@@ -52,11 +53,12 @@ class World:
         *,
         seed: int | Seeds = 0,
         dynamism: float | Dynamism = 0.5,
+        moving_share: float | None = None,
         drive: DriveConfig | None = None,
         **options: Any,
     ) -> None:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
-        self.rates = dynamism if isinstance(dynamism, Dynamism) else Dynamism.from_knob(dynamism)
+        self.rates = Dynamism.of(dynamism, moving_share)
         self.scene = self._built(scene, options)
         self.model: mujoco.MjModel = self.scene.compile()
         self.data = mujoco.MjData(self.model)
@@ -65,7 +67,7 @@ class World:
         self._contacts = RobotContacts(self.model, self.bodies)
         self.drive_config = drive or DriveConfig()
         self._drive = Drive(self.model, self.drive_config)
-        self._shoves = {kind: self._make_shoves(kind) for kind in ("chair", "bin")}
+        self._shoves = pushers(self.model, self.scene.movers, self.rates, self.seeds)
         self._doors = Doors(
             self.model,
             self.bodies,
@@ -100,15 +102,6 @@ class World:
     def _counters(self, stream: str) -> NDArray[np.uint64]:
         return self.seeds.counters(stream, len(self.scene.movers))
 
-    def _make_shoves(self, kind: str) -> Shoves:
-        r = self.rates
-        if kind == "chair":
-            rates = (r.chair_push_rate, r.push_speed_min, r.push_speed_max, r.push_spin_max)
-        else:
-            rates = (r.bin_kick_rate, r.kick_speed_min, r.kick_speed_max, r.push_spin_max)
-        counters = self._counters("chairs" if kind == "chair" else "bins")
-        return Shoves(self.model, self._named(kind), rates=rates, counters=counters)
-
     # -- time -------------------------------------------------------------------------------
 
     @property
@@ -132,7 +125,7 @@ class World:
         self.people.control(time, tick, self.data)
         self._doors.control(time, self._robot_or_nowhere(), self.data)
         for shoves in self._shoves.values():
-            shoves.control(time, tick, self.data.qfrc_applied)
+            shoves.control(time, tick, self.data)
         self._drive.control(tick, self.data.ctrl)
 
     def _robot_or_nowhere(self) -> Float:
@@ -147,6 +140,11 @@ class World:
     def robot_pose(self) -> Float:
         """(3,) ``T_world_robot``: x m, y m, heading rad (not wrapped)."""
         return self.bodies.robot_pose(self.data)
+
+    def read_robot(self, pose: Float, travel: Float) -> None:
+        """``robot_pose`` and ``wheel_angles`` into (3,) and (2,) arrays."""
+        self.bodies.read_robot(self.data, pose)
+        travel[:] = self._drive.state[4:6]
 
     def wheel_angles(self) -> Float:
         """(2,) m truly rolled by the left and the right wheel since the start."""
