@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import fan as fans
-from sim import raycast
+from sim import raycast, windows
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
@@ -215,8 +215,10 @@ class Raycaster:
                     f"{HULL_GROUP} and add primitives for the laser to see"
                 )
             ids.append(geom)
-            rows.append((kind, *model.geom_size[geom], half, float(upright), float(panes[geom])))
-        self.table = np.array(rows, dtype=np.float64).reshape(-1, 7)
+            rows.append(
+                (kind, *model.geom_size[geom], half, float(upright), float(panes[geom]), body)
+            )
+        self.table = np.array(rows, dtype=np.float64).reshape(-1, 8)
         return np.array(ids, dtype=np.int64)
 
     def start(self, data: mujoco.MjData) -> None:
@@ -224,19 +226,17 @@ class Raycaster:
         self._slots = 0
         if data is not self._seen:
             self._seen = data
-            self._views = (data.geom_xpos, data.geom_xmat, data.site_xpos, data.site_xmat)
-            self._note(self._all)
+            views = (data.geom_xpos, data.geom_xmat, data.site_xpos, data.site_xmat)
+            where = (*views, self._site, self.poses, self.lasers)
+            windows.note(self.ids, self._all, *where, 0)
             self.poses[1:] = self.poses[0]  # what cannot move is never noted again
-            fans.enclose(self.table, self._all, self.poses, 1, self.bounds)
-        else:
-            self._note(self._movable)
+            windows.enclose(self.table, self._all, self.poses, 1, self.bounds)
+            self._noted = (self.ids, self._movable, *where)
+        self.note()
 
     def note(self) -> None:
         """Note where everything is now, in the next slot."""
-        self._note(self._movable)
-
-    def _note(self, rows: NDArray[np.int64]) -> None:
-        fans.note(self.ids, rows, self._views, self._site, self.poses, self.lasers, self._slots)
+        windows.note(*self._noted, self._slots)
         self._slots += 1
 
     def cast(self, plan: FanPlan) -> None:

@@ -88,7 +88,7 @@ class SignalModel:
         self._surface = (np.append(surface[0], 0.0), np.append(surface[1], False))
         self._owner = np.stack([np.append(ids, -1) for ids in surface[2:]])
         self._needed = needed_table() if effects.reflectivity else np.zeros(1)
-        self._error: tuple[Float, float] = (np.zeros(2), 0.0)
+        self._error: tuple[Float, float] = (np.zeros(0), 0.0)
         if effects.systematic:
             self._error = error_function(config.systematic_bound_m, unit_of_run)
         shaping = ("spot", "reflectivity", "incidence", "mixed_pixels", "glass", "bounce")

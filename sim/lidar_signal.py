@@ -227,6 +227,7 @@ def send(
     received      (3, n) and (n,) of ``receive``
     reflectivity  (candidates + 1,); ``owner`` (2, candidates + 1) geom, body; -1 for no hit
     draws         standard normal; 0..1 against the share of lost values; (n,) where needed
+    error         of ``error_function``; (0,) for none
     steps         m: of the counter and of the code, 0 for continuous; the largest value
     errors        noise m; share of lost values; what no return becomes, NaN or inf
     out           (n,) ranges m; (2, n) geom, body
@@ -248,7 +249,8 @@ def send(
         value = max(place + noise * normal[i], 0.0) if noise > 0.0 else place
         if counter > 0.0:
             value = math.floor(value / counter + 0.5) * counter
-        value = max(value + _correction(error, place, reflectivity[j]), 0.0)
+        if error[0].size > 0:
+            value = max(value + _correction(error, place, reflectivity[j]), 0.0)
         if unit > 0.0:
             value = math.floor(value / unit + 0.5) * unit
         if value > limit + 1e-9 or place > limit:  # the code itself is no round number

@@ -42,13 +42,11 @@ from sim.fan import (
     Float,
     Int,
     Vec3,
-    enclose,
-    find_windows,
     lay_fans,
-    nearest_first,
     ray_wedge,
 )
 from sim.ray_shapes import Pose, face_normal, meet
+from sim.windows import enclose, find_windows, nearest_first
 from slam._jit import njit
 
 # Columns of the rays of a spot in the beam's frame: place on the disc (left, up), unit direction
@@ -187,7 +185,7 @@ def sweep(
 ) -> None:
     """Cast the beams of one scan.
 
-    table    (n, 7) the candidate geoms; rows ``movable`` of them can move
+    table    (n, 8) the candidate geoms; rows ``movable`` of them can move
     poses    (slots, n, 12) of them at the ``slots`` ends of physics steps; lasers (slots, 3)
     bounds   (n, 6), as ``enclose`` left them for what cannot move
     plan     (m, 5) of the beams, fan k in the rows ``ends[k]`` to ``ends[k + 1]``
