@@ -112,12 +112,11 @@ class Assembly:
     def into(self, spec: mujoco.MjSpec) -> None:
         """Hand everything over to ``spec``, whose materials the parts use from now on."""
         for kin, group in self._groups.items():
+            geoms = group.geoms  # still the same geoms once attached
             spec.attach(group, frame=spec.worldbody.add_frame(), prefix=kin)
+            for geom in geoms:
+                geom.material = geom.material.rpartition("/")[2]
         self._groups = {}
-        for geom in spec.geoms:
-            material = geom.material
-            if "/" in material:
-                geom.material = material.rpartition("/")[2]
         for camera in spec.cameras:
             camera.name = camera.name.rpartition("/")[2]
 
