@@ -19,15 +19,14 @@ from slam._jit import njit
 from slam.frames import Features, Float, Scan
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.network import FREE_COUNT, MASK, SHIFT, TOUCHED_COUNT, Cells, Network
+from slam.shunting.surfaces import join, unveiled
 from slam.shunting.visibility import FREE_WITHOUT_RETURN_M, View, view_of_beams, view_of_features
 
 SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
 SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
 FAINT = 12.0  # squared Mahalanobis distance of I = 0.0025, where an impression ends
 NEAR_JOIN_CELLS = 3.0
-LONGEST_JOIN_M = 1.0
 SPACING_M, LEAST_WEIGHT = 0.1, 0.3  # beams closer than this share one observation's weight
-STRAIGHT = math.cos(math.radians(12.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,16 +125,21 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
         bearings,
         free,
     )
-    variance = max(SIGMA_CELLS * config.cell_m, SENSOR_SIGMA_M) ** 2
-    covariances = np.zeros((count, 3))
-    covariances[:, 0] = covariances[:, 2] = variance
+    points, beams = points[:count], beams[:count]
     onward, tangents = np.zeros(count, np.bool_), np.zeros((count, 2))
-    join(points[:count], beams[:count], NEAR_JOIN_CELLS * config.cell_m, onward, tangents)
-    distances = np.sqrt((points[:count] * points[:count]).sum(axis=1))
+    near = NEAR_JOIN_CELLS * config.cell_m
+    join(points, beams, spec.T_robot_laser, near, onward, tangents)
+    clear = np.zeros(count, np.bool_)
+    if unveiled(points, beams, spec.T_robot_laser, onward, clear) < count:
+        points, onward, tangents = points[clear], onward[clear], tangents[clear]
+    variance = max(SIGMA_CELLS * config.cell_m, SENSOR_SIGMA_M) ** 2
+    covariances = np.zeros((len(points), 3))
+    covariances[:, 0] = covariances[:, 2] = variance
+    distances = np.sqrt((points * points).sum(axis=1))
     weights = np.clip(distances * spec.angle_increment / SPACING_M, LEAST_WEIGHT, 1.0)
     view = view_of_beams(bearings, free, spec.angle_increment, config.cell_m)
     return Observations(
-        points_robot=points[:count],
+        points_robot=points,
         covariances=covariances,
         weights=weights,
         tangents=tangents,
@@ -174,44 +178,6 @@ def joined(first: Observations, second: Observations) -> Observations:
         view=first.view,
         T_robot_laser=first.T_robot_laser,
     )
-
-
-@njit
-def join(
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    near: float,
-    out: NDArray[np.bool_],
-    tangents: NDArray[np.float64],
-) -> None:
-    """Mark the points whose surface goes on to the next one; fill the tangents.
-
-    Hits of neighbouring beams (of index ``beams``) are joined when they are within ``near`` m, or
-    when the stretch between them goes on straight, in like steps, before or behind.
-    """
-    n = len(points)
-    for k in range(n):
-        out[k] = False
-        if k + 1 >= n or beams[k + 1] != beams[k] + 1:
-            continue
-        dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
-        d = math.sqrt(dx * dx + dy * dy)
-        if d <= near:
-            out[k] = True
-        elif d <= LONGEST_JOIN_M:
-            for a in (k - 1, k + 1):
-                if a < 0 or a + 1 >= n or beams[a + 1] != beams[a] + 1:
-                    continue
-                ex, ey = points[a + 1, 0] - points[a, 0], points[a + 1, 1] - points[a, 1]
-                e = math.sqrt(ex * ex + ey * ey)
-                if 0.4 * d < e < 2.5 * d and dx * ex + dy * ey > STRAIGHT * d * e:
-                    out[k] = True
-    for k in range(n):
-        tangents[k] = 0.0
-        if k > 0 and out[k - 1] and out[k]:
-            dx, dy = points[k + 1, 0] - points[k - 1, 0], points[k + 1, 1] - points[k - 1, 1]
-            d = math.sqrt(dx * dx + dy * dy)
-            tangents[k, 0], tangents[k, 1] = dx / d, dy / d
 
 
 @njit

@@ -20,12 +20,15 @@ from slam._jit import njit
 from slam.frames import Float
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.impressions import Observations
+from slam.shunting.motion import inverted, turned
 from slam.shunting.network import MASK, SHIFT, Cells, Network
 from slam.shunting.search import SearchWindow, search
 
 MATCHED_OVERLAP = 0.15  # an observation that overlaps the map less is not matched
 ENOUGH = 1e-4  # expected rise of the score below which climbing ends
 LOG_FLOOR = 0.1  # added to an overlap before its logarithm is taken
+FEW = 90  # observations are enough to come near
+WIDEST_CELLS = 3.0  # standard deviation an observation is blurred to while coming near, at most
 
 
 class Reward(NamedTuple):
@@ -277,6 +280,20 @@ def refine(
     return rewarded, prior, matched
 
 
+def _spread(points_robot: Float, T_map_robot: Float, covariance: Float) -> Float:
+    """(n, 3) xx, xy, yy of points (robot frame) that a pose's (3, 3) ``covariance`` smears."""
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = turned(covariance, -float(T_map_robot[2])).tolist()
+    x, y = points_robot[:, 0], points_robot[:, 1]
+    return np.stack(
+        [
+            xx - 2.0 * xt * y + tt * y * y,
+            xy + xt * x - yt * y - tt * x * y,
+            yy + 2.0 * yt * x + tt * x * x,
+        ],
+        axis=1,
+    )
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Match:
     """Result of matching one frame.
@@ -346,6 +363,38 @@ class Matcher:
         return Match(
             T_map_robot=pose, information=information, matched=matched, score=score, tau=tau
         )
+
+    def approach(
+        self, network: Network, observations: Observations, prediction: Float, covariance: Float
+    ) -> Float:
+        """Where to start climbing: the optimum for observations blurred by the prior's own spread.
+
+        Returns the prediction itself where the prior moves no observation by half a neuron.
+        """
+        points = observations.points_robot
+        every = max(1, math.ceil(len(points) / FEW))
+        few = points[::every]
+        spread = _spread(few, prediction, covariance)
+        most = (WIDEST_CELLS * self.config.cell_m) ** 2
+        widths = spread[:, 0] + spread[:, 2]
+        if not (widths > (0.5 * self.config.cell_m) ** 2).any():
+            return prediction
+        spread *= np.minimum(1.0, most / np.maximum(widths, 1e-12))[:, None]
+        pose = np.array(prediction, dtype=np.float64)
+        refine(
+            network.cells,
+            self.reward,
+            np.ascontiguousarray(few),
+            observations.covariances[::every] + spread,
+            np.ascontiguousarray(observations.weights[::every]) * every,
+            np.ascontiguousarray(observations.tangents[::every]),
+            pose,
+            prediction,
+            inverted(covariance),
+            self.config.reward,
+            np.zeros((3, 3)),
+        )
+        return pose
 
     def search(
         self,

@@ -111,7 +111,8 @@ class ShuntingSlam:
         """Climb from the prediction; search around it when that is vague or finds too little."""
         predicted = prediction.T_map_robot
         precision = inverted(prediction.covariance)
-        match = self._matcher.climb(self.network, observations, predicted, predicted, precision)
+        start = self._matcher.approach(self.network, observations, predicted, prediction.covariance)
+        match = self._matcher.climb(self.network, observations, start, predicted, precision)
         sd = [math.sqrt(prediction.covariance[k, k]) for k in range(3)]
         spread = max(sd[0], sd[1])
         near = SearchWindow(

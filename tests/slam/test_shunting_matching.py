@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.frames import Features, Odometry, Scan
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import from_features, from_scan, join, stamp
+from slam.shunting.impressions import from_features, from_scan, stamp
 from slam.shunting.matching import Matcher, evaluate
 from slam.shunting.motion import WIDEN, inverted, predict, turned
 from slam.shunting.network import Network
 from slam.shunting.search import SearchWindow, branch_and_bound, levels_of
-from tests.world2d import World2D, arena, laser
+from slam.shunting.surfaces import join
+from tests.world2d import World2D, arena, laser, rectangle
 
 Array = NDArray[np.float64]
 CONFIG = ShuntingConfig(cell_m=0.05)
@@ -141,14 +142,43 @@ def test_returns_of_one_wall_are_joined_and_those_across_a_gap_are_not() -> None
     post = np.array([[4.4, 1.0], [4.8, 3.5]])
     points = np.vstack([wall, post])
     joined, tangents = np.zeros(13, np.bool_), np.zeros((13, 2))
-    join(points, np.arange(13), 0.1, joined, tangents)
+    join(points, np.arange(13), np.array([2.0, 0.0, 0.0]), 0.1, joined, tangents)
     assert joined[:10].all()
     assert not joined[10:].any()
     np.testing.assert_allclose(tangents[1:10], np.tile([1.0, 0.0], (9, 1)))
     beams = np.arange(13)
     beams[5:] += 1  # a beam without a return between the fifth and the sixth
-    join(points, beams, 0.1, joined, tangents)
+    join(points, beams, np.array([2.0, 0.0, 0.0]), 0.1, joined, tangents)
     assert not joined[4]
+
+
+def test_table_legs_in_line_with_a_wall_are_not_joined_to_it() -> None:
+    """A near leg, a far leg and the wall, nearly radial and evenly spaced: three hits in line."""
+    points = np.array([[1.00, 0.0], [1.60, 0.02], [2.25, 0.04], [2.25, 0.09], [2.25, 0.14]])
+    joined, tangents = np.zeros(5, np.bool_), np.zeros((5, 2))
+    join(points, np.arange(5), np.zeros(3), 0.06, joined, tangents)
+    assert joined.tolist() == [False, False, True, True, False]
+
+
+def test_a_mixed_pixel_is_left_out_and_a_thin_leg_is_not() -> None:
+    spec = laser(181)
+    for ranges, seen in (
+        ([2.0, 2.0, 2.0, 2.4, 2.9, 2.9, 2.9], 6),
+        ([3.0] * 3 + [1.5] + [3.0] * 3, 7),
+    ):
+        scan = Scan(stamp_ns=0, ranges=np.array(ranges + [np.inf] * 174, np.float32), spec=spec)
+        assert len(from_scan(scan, np.zeros(3), CONFIG).points_robot) == seen
+
+
+def test_coming_near_helps_where_the_heading_is_vague() -> None:
+    network, matcher = room(), Matcher(CONFIG)
+    truth = np.array([0.02, -0.01, 0.05])
+    seen = from_scan(room_scan(truth), np.zeros(3), CONFIG)
+    sure, vague = np.diag([1e-6, 1e-6, 1e-8]), np.diag([4e-4, 4e-4, 9e-4])
+    still = matcher.approach(network, seen, np.zeros(3), sure)
+    np.testing.assert_array_equal(still, np.zeros(3))
+    start = matcher.approach(network, seen, np.zeros(3), vague)
+    np.testing.assert_allclose(start, truth, atol=0.02)
 
 
 def test_deskewing_puts_beams_where_they_were_measured() -> None:
@@ -158,7 +188,7 @@ def test_deskewing_puts_beams_where_they_were_measured() -> None:
     poses = np.array(
         [se2.compose(se2.exp(twist, float(t)), spec.T_robot_laser) for t in spec.beam_time_offsets]
     )
-    world = World2D(arena())
+    world = World2D(rectangle(-5.0, -4.0, 5.0, 4.0))
     ranges = world.ranges(0.0, poses, spec.angles, 80.0).astype(np.float32)
     scan = Scan(stamp_ns=0, ranges=ranges, spec=spec)
     ends = np.stack([np.cos(poses[:, 2] + spec.angles), np.sin(poses[:, 2] + spec.angles)], 1)

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which hits of a scan lie on one surface, and which on none."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import njit
+
+LONGEST_JOIN_M = 1.0
+LINE_HITS = 4  # evidence for a surface between hits farther apart than ``NEAR_JOIN_CELLS``
+LIKE_STEPS = 2.5  # ratio of neighbouring steps along a surface, at most
+LINE_SLACK_M, LINE_SLACK = 0.04, 0.15  # m and share of a step, along the beam
+MIXED_M = 1.5  # the receiver tells two surfaces farther apart than this from each other
+
+
+@njit
+def _one_line(
+    points: NDArray[np.float64], beams: NDArray[np.int64], first: int, x: float, y: float
+) -> bool:
+    """True where hits ``first`` .. ``first + 3`` lie as on one straight surface seen from (x, y).
+
+    They must come from neighbouring beams, in steps that grow or shrink evenly, and the inner two
+    lie where their beams cut the line through the outer two.
+    """
+    last = first + LINE_HITS - 1
+    if beams[last] != beams[first] + LINE_HITS - 1:
+        return False
+    ax, ay = points[first, 0] - x, points[first, 1] - y
+    ex, ey = points[last, 0] - points[first, 0], points[last, 1] - points[first, 1]
+    before = 0.0
+    for k in range(first, last):
+        dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
+        step = math.sqrt(dx * dx + dy * dy)
+        if dx * ex + dy * ey <= 0.0 or step > LONGEST_JOIN_M:
+            return False
+        if k > first and not before < LIKE_STEPS * step < LIKE_STEPS * LIKE_STEPS * before:
+            return False
+        before = step
+    slack = max(LINE_SLACK_M, LINE_SLACK * math.sqrt(ex * ex + ey * ey) / (LINE_HITS - 1))
+    for k in range(first + 1, last):
+        bx, by = points[k, 0] - x, points[k, 1] - y
+        cross = bx * ey - by * ex
+        if cross == 0.0:
+            return False
+        share = (ax * ey - ay * ex) / cross  # the line cuts the beam at this share of its range
+        if abs(share - 1.0) * math.sqrt(bx * bx + by * by) > slack:
+            return False
+    return True
+
+
+@njit
+def join(
+    points: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    origin: NDArray[np.float64],
+    near: float,
+    out: NDArray[np.bool_],
+    tangents: NDArray[np.float64],
+) -> None:
+    """Mark the points whose surface goes on to the next one; fill the tangents.
+
+    Hits of neighbouring beams (of index ``beams``, from a laser at ``origin``) are joined when they
+    are within ``near`` m, or when the stretch between them is part of a run of four hits on one
+    line. Less evidence will not do: two table legs and the wall behind them often are in line.
+    """
+    n = len(points)
+    out[:] = False
+    for k in range(n - 1):
+        if beams[k + 1] != beams[k] + 1:
+            continue
+        dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
+        if dx * dx + dy * dy <= near * near:
+            out[k] = True
+    for k in range(n - LINE_HITS + 1):
+        if not (out[k] and out[k + 1] and out[k + 2]) and _one_line(
+            points, beams, k, origin[0], origin[1]
+        ):
+            out[k], out[k + 1], out[k + 2] = True, True, True
+    for k in range(n):
+        tangents[k] = 0.0
+        if k > 0 and out[k - 1] and out[k]:
+            dx, dy = points[k + 1, 0] - points[k - 1, 0], points[k + 1, 1] - points[k - 1, 1]
+            d = math.sqrt(dx * dx + dy * dy)
+            if d > 0.0:
+                tangents[k, 0], tangents[k, 1] = dx / d, dy / d
+
+
+@njit
+def unveiled(
+    points: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    origin: NDArray[np.float64],
+    joined: NDArray[np.bool_],
+    out: NDArray[np.bool_],
+) -> int:
+    """Mark the hits that are no mixed pixel, and count them.
+
+    A spot that lies half on an edge and half on what is behind is ranged somewhere between: between
+    its neighbours' ranges, and joined to neither of them.
+    """
+    n, count = len(points), 0
+    for k in range(n):
+        out[k] = True
+        inside = 0 < k < n - 1 and beams[k - 1] == beams[k] - 1 and beams[k + 1] == beams[k] + 1
+        if inside and not joined[k - 1] and not joined[k]:
+            before, here = _range(points, k - 1, origin), _range(points, k, origin)
+            after = _range(points, k + 1, origin)
+            between = before < here < after or before > here > after
+            out[k] = abs(after - before) > MIXED_M or not between
+        if out[k]:
+            count += 1
+    return count
+
+
+@njit
+def _range(points: NDArray[np.float64], k: int, origin: NDArray[np.float64]) -> float:
+    dx, dy = points[k, 0] - origin[0], points[k, 1] - origin[1]
+    return math.sqrt(dx * dx + dy * dy)
