@@ -31,7 +31,7 @@ SAME_SURFACE = 0.5  # m, the same where both hit one thing: an oblique wall; inf
 RETURN_COS = math.cos(math.radians(5.0))  # a mirror answers only that near its normal; inferred
 GLASS_AT_NORMAL = 0.08  # share of the energy a pane mirrors: two faces of n = 1.5 (Schlick)
 POLISHED_SHARE = 0.9  # share that a polished face mirrors; inferred
-POLISHED_DIFFUSE = 0.1  # what is left of its reflectivity away from its normal; inferred
+POLISHED_DIFFUSE = 0.005  # what is left of its reflectivity away from its normal; inferred
 
 
 @njit

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,7 +26,7 @@ from slam.errors import InvalidValueError
 NONE = RangeEffects.none()
 MATERIALS = "".join(
     f'<asset><material name="{name}" rgba="1 1 1 {alpha}"/></asset>'
-    for name, alpha in (("glass", 0.3), ("rubber", 1), ("paper", 1), ("wall", 1))
+    for name, alpha in (("glass", 0.3), ("rubber", 1), ("paper", 1), ("wall", 1), ("mirror", 1))
 )
 
 
@@ -123,6 +123,85 @@ def test_a_pane_is_seen_only_near_its_normal(room: SimpleNamespace) -> None:
         clear.ranges[through], 5.0 / np.cos(lidar.spec.angles[through]), rtol=1e-6
     )
     assert (opaque.ranges[through] < 2.9).all()
+
+
+def slanted(material: str, at: float = 3.0) -> str:
+    """A wall at 45 degrees across the way ahead, 6 m wide."""
+    return (
+        f'<geom type="box" size=".01 3 1" pos="{at} 0 1" euler="0 0 {math.pi / 4}" '
+        f'material="{material}"/>'
+    )
+
+
+def test_a_mirror_shows_what_lies_round_the_corner(room: SimpleNamespace) -> None:
+    """A beam ahead turns by 90 degrees at a mirror at 45 degrees: 3 m there, 2 m on."""
+    world = slanted("mirror") + room.wall(3, 2.1, 2, 0.1, 'material="paper"')
+    world += room.wall(3, -2.1, 2, 0.1, 'material="paper"')
+    surface, _ = look(room, world)
+    switched, lidar = look(room, world, spot=True, reflectivity=True, bounce=True)
+    assert surface.ranges[180] == pytest.approx(3.0 - 0.02 - 0.01 * math.sqrt(2.0), abs=1e-3)
+    straight = lidar.spec.angles[180]
+    assert straight == pytest.approx(0.0, abs=1e-12)
+    assert switched.ghost[180]
+    assert switched.ranges[180] == pytest.approx(surface.ranges[180] + 2.0, abs=0.02)
+    assert not look(room, world, spot=True, reflectivity=True)[0].ghost.any()
+
+
+def test_a_pane_at_a_grazing_angle_shows_a_ghost_and_square_on_none(room: SimpleNamespace) -> None:
+    """Schlick: 8 % each way square on, not enough to be seen; more than 40 % below 10 degrees."""
+    pane = room.wall(4.0, -0.3, 3.5, 0.01, 'material="glass"')
+    on = {"spot": True, "reflectivity": True, "incidence": True, "glass": True, "bounce": True}
+    result, lidar = look(room, pane + room.wall(8.1, 2, 0.1, 2.1, 'material="paper"'), **on)
+    seen = np.flatnonzero(result.ghost)
+    angles = lidar.spec.angles[seen]
+    assert seen.size > 5
+    assert (np.abs(angles) < math.radians(30.0)).all()
+    np.testing.assert_allclose(result.ranges[seen], 7.98 / np.cos(angles), rtol=1e-3)
+    square = room.wall(3.0, 0, 0.01, 2, 'material="glass"') + room.wall(-2, 0, 0.1, 4)
+    assert not look(room, square, **on)[0].ghost.any()
+
+
+def test_the_counter_counts_in_centimetres_also_in_millimetre_mode(room: SimpleNamespace) -> None:
+    for systematic in (False, True):
+        config = Lms221Config(
+            range_mode="32m", effects=replace(NONE, timer=True, systematic=systematic)
+        )
+        model, data = room.build()
+        lidar = Lms221(model, config, np.random.default_rng(4))
+        advance = room.stepper(model, data)
+        scans = [lidar.observe(advance, data) for _ in range(60)]
+        errors = np.array([s.ranges - s.true_ranges for s in scans])
+        assert errors.std(axis=0).mean() == pytest.approx(0.010, rel=0.03)
+        values = np.unique(np.rint(np.array([s.ranges[100] for s in scans]) * 1e3).astype(int))
+        assert (np.diff(values) >= 9).all()
+        assert (values % 10 == 0).all() != systematic
+
+
+def test_no_return_is_an_error_code_as_the_driver_has_it(room: SimpleNamespace) -> None:
+    """STW: no stop signal becomes NaN; a value beyond the largest code +inf (REP 117)."""
+    far = room.wall(12.1, 0.0, 0.1, 1.0)
+    text = far + "</worldbody>" + MATERIALS + "<worldbody>"
+    for error_codes in (False, True):
+        config = Lms221Config(range_mode="8m", effects=replace(NONE, error_codes=error_codes))
+        model, data = room.build(text)
+        result = Lms221(model, config).observe(room.stepper(model, data), data)
+        assert result.ranges[180] == np.inf
+        assert np.isnan(result.ranges[0]) == error_codes
+
+
+def test_paint_on_the_floor_is_not_seen(room: SimpleNamespace) -> None:
+    world = room.wall(2.1, 0, 0.1, 1, 'group="5"') + room.wall(3.1, 0, 0.1, 1, 'group="1"')
+    result, _ = look(room, world)
+    assert result.ranges[180] == pytest.approx(2.98)
+
+
+def test_every_effect_is_on_unless_told_otherwise() -> None:
+    assert Lms221Config().effects == RangeEffects()
+    assert all(getattr(RangeEffects(), f.name) for f in fields(RangeEffects)[:-1])
+    assert Lms221Config.ideal().effects == NONE
+    assert Lms221Config.ideal().noise_std_m == 0.0
+    assert Lms221Config.noise_only().effects == NONE
+    assert Lms221Config.noise_only().noise_std_m == 0.010
 
 
 def test_the_systematic_error_is_smooth_bounded_and_of_the_unit(room: SimpleNamespace) -> None:
