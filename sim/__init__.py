@@ -1,8 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The moving world: importing it registers the Gymnasium environments ``mobilia/...-v0``."""
+"""The moving world: importing it registers an environment ``mobilia/<Scene>-v0`` for each scene."""
 
 from gymnasium.envs.registration import register, registry
 
-for _id, _scene in (("mobilia/Arena-v0", "arena"), ("mobilia/Office-v0", "office")):
+_SCENES = {
+    "Arena": "arena",
+    "Office": "office",
+    "Corridor": "corridor",
+    "Warehouse": "warehouse",
+    "Classroom": "classroom",
+    "Apartment": "apartment",
+    "RandomRooms": "random-rooms",
+}
+for _name, _scene in _SCENES.items():
+    _id = f"mobilia/{_name}-v0"
     if _id not in registry:
         register(id=_id, entry_point="sim.env:MobiliaEnv", kwargs={"scene": _scene})
