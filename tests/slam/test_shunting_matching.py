@@ -194,7 +194,8 @@ def test_deskewing_puts_beams_where_they_were_measured() -> None:
     ends = np.stack([np.cos(poses[:, 2] + spec.angles), np.sin(poses[:, 2] + spec.angles)], 1)
     truth = poses[:, :2] + ranges[:, None].astype(np.float64) * ends
     moved = from_scan(scan, twist, CONFIG).points_robot
-    still = from_scan(scan, np.zeros(3), CONFIG).points_robot
+    at_stamp = np.stack([np.cos(spec.angles), np.sin(spec.angles)], 1)
+    still = spec.T_robot_laser[:2] + ranges[:, None].astype(np.float64) * at_stamp
     assert np.abs(moved - truth).max() < 1e-4
     assert np.abs(still - truth).max() > 0.1
 
