@@ -126,6 +126,13 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
         free,
     )
     points, beams = points[:count], beams[:count]
+    if spec.sweep_duration > 0.0 and (np.diff(bearings) < 0.0).any():
+        # An interlaced scanner that turns: neighbours are those by bearing, not by number.
+        rank = np.empty(n, np.int64)
+        rank[np.argsort(bearings, kind="stable")] = np.arange(n)
+        beams = rank[beams]
+        in_order = np.argsort(beams)
+        points, beams = points[in_order], beams[in_order]
     onward, tangents = np.zeros(count, np.bool_), np.zeros((count, 2))
     near = NEAR_JOIN_CELLS * config.cell_m
     join(points, beams, spec.T_robot_laser, near, onward, tangents)
