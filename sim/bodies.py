@@ -48,6 +48,13 @@ def _poses(
             out[i, 0], out[i, 1], out[i, 2] = qpos[q], qpos[q + 1], qpos[q + 2]
 
 
+@njit
+def _read_robot(qpos: Float, at: int, wheels: Float, pose: Float, travel: Float) -> None:
+    for k in range(3):
+        pose[k] = qpos[at + k]
+    travel[0], travel[1] = wheels[4], wheels[5]
+
+
 class Bodies:
     """Addresses of the movers of ``scene`` in ``model``.
 
@@ -67,9 +74,13 @@ class Bodies:
         n = len(scene.movers)
         self._qpos, self._dof = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
         self._hinge = np.zeros((n, 4))  # doors: hinge x, y m; heading rad when closed; sign
+        data: mujoco.MjData | None = None
         for i, mover in enumerate(scene.movers):
             if mover.kind == "door":
-                self._add_door(i, mover)
+                if data is None:
+                    data = mujoco.MjData(self.model)
+                    mujoco.mj_kinematics(self.model, data)
+                self._add_door(i, mover, data)
             else:
                 self._add_planar(i, mover)
         self._robot_at = 0 if self.robot is None else int(self._qpos[self.robot])
@@ -90,11 +101,9 @@ class Bodies:
             )
         self._qpos[i], self._dof[i] = addresses[0], int(joints[0].dofadr[0])
 
-    def _add_door(self, i: int, mover: Mover) -> None:
+    def _add_door(self, i: int, mover: Mover, data: mujoco.MjData) -> None:
         joint = self.model.joint(f"{mover.name}/hinge")
         self._qpos[i], self._dof[i] = int(joint.qposadr[0]), int(joint.dofadr[0])
-        data = mujoco.MjData(self.model)
-        mujoco.mj_kinematics(self.model, data)
         x, y = data.xanchor[joint.id][:2].tolist()
         centre = data.xipos[int(joint.bodyid[0])]
         heading = math.atan2(float(centre[1]) - y, float(centre[0]) - x)
@@ -125,10 +134,25 @@ class Bodies:
         pose: Float = data.qpos[at : at + 3].copy()
         return pose
 
-    def read_robot(self, data: mujoco.MjData, out: Float) -> None:
-        """``robot_pose`` into ``out``."""
-        at = self._robot_at
-        out[:] = data.qpos[at : at + 3]
+    def place_robot(self, data: mujoco.MjData, pose: Sequence[float]) -> None:
+        """Put the robot at (x, y, heading); ``InvalidValueError`` where it does not fit."""
+        x, y, yaw = (float(v) for v in pose)
+        here = self.poses(data)
+        if self.robot is None or not math.isfinite(x + y + yaw):
+            raise InvalidValueError(f"start must be a finite pose of a robot, got {pose!r}")
+        data.qpos[self._robot_at : self._robot_at + 3] = x, y, yaw
+        for k, mover in enumerate(self.scene.movers):
+            if k == self.robot or mover.kind == "door":
+                continue
+            free = math.hypot(here[k, 0] - x, here[k, 1] - y) - float(self.radius[k])
+            if free < float(self.radius[self.robot]):
+                raise InvalidValueError(f"start {(x, y)} is taken by {mover.name}")
+        if self.clearance(data) < 0.0:
+            raise InvalidValueError(f"start {(x, y)} does not lie on free floor")
+
+    def read_robot(self, data: mujoco.MjData, wheels: Float, pose: Float, travel: Float) -> None:
+        """``robot_pose`` into ``pose``, and entries 4 and 5 of the drive's state to ``travel``."""
+        _read_robot(data.qpos, self._robot_at, wheels, pose, travel)
 
     def poses(self, data: mujoco.MjData) -> Float:
         """(n, 3) pose of each mover; a door at its hinge, heading along the leaf."""

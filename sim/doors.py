@@ -29,6 +29,7 @@ PASSABLE = 1.15  # rad, as ``sim.manners.OPEN``
 RATE_MAX = 1.4  # rad/s, a door pushed open takes a little more than a second
 TORQUE_MAX = 40.0  # N m, against spring and damper too; about 45 N at the handle
 NEAR, FACING = 1.6, 0.3  # m, cosine: a robot this near and facing the doorway is let through
+REST_STEP = 0.75  # rad: closed, ajar, open
 CLEAR = 0.95  # m, a door is not let go of while someone is this near its middle
 
 
@@ -145,10 +146,15 @@ class Doors:
             )
 
     def boxes_at_rest(self) -> Float:
-        """(m, 5) leaves at their angle of rest: centre x, y, half sizes m, yaw rad."""
+        """(m, 5) leaves at about their angle of rest: centre x, y, half sizes m, yaw rad.
+
+        To the nearest ``REST_STEP``, so that rooms that differ only in how wide their doors stand
+        open have the same ways through them, which are costly to find.
+        """
         boxes = np.zeros((len(self.names), 5))
         for d, (x, y, closed, sign) in enumerate(self.hinges.tolist()):
-            yaw, half = closed + sign * float(self._closers[d, 4]), 0.5 * float(self.widths[d])
+            rest = REST_STEP * round(float(self._closers[d, 4]) / REST_STEP)
+            yaw, half = closed + sign * rest, 0.5 * float(self.widths[d])
             boxes[d] = x + half * math.cos(yaw), y + half * math.sin(yaw), half, 0.03, yaw
         return boxes
 

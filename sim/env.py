@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
@@ -12,17 +11,30 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from sim.env_options import episode
 from sim.lidar import Lms221Config
 from sim.seeds import Seeds
 from sim.simulation import Simulation
 from slam.errors import InvalidValueError
-from slam.frames import Frame
+from slam.frames import Frame, LaserSpec
 
 V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
 GOAL_RADIUS_M = 0.4
 _MAX_TICKS = 2**40
 
 Observation = dict[str, Any]  # arrays by name; Gymnasium types Dict spaces so
+
+
+def _observation_space(spec: LaserSpec) -> spaces.Dict:
+    n = spec.n_beams
+    return spaces.Dict(
+        {
+            "ranges": spaces.Box(0.0, np.float32(spec.range_max), (n,), np.float32),
+            "valid": spaces.Box(0, 1, (n,), np.uint8),
+            "encoders": spaces.Box(-_MAX_TICKS, _MAX_TICKS, (2,), np.int64),
+            "time": spaces.Box(0.0, 1e9, (), np.float64),
+        }
+    )
 
 
 class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -61,9 +73,22 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     "top", "follow" or "persp" for the former; ``render_size`` (width, height) px.
 
     ### Reset options
-    ``goal`` (x, y) m, ``dynamism``, ``seeds`` (stream name -> seed, see ``sim.seeds``), ``scene``
-    (options of the scene recipe, e.g. ``{"n_chairs": 8}``). Unknown keys are refused. They hold for
-    one episode.
+    They hold for one episode; an unknown key is refused by name.
+
+    | key                       | meaning                                                       |
+    |---------------------------|---------------------------------------------------------------|
+    | `goal`                    | (x, y) m: reward and end of the episode                       |
+    | `start`                   | (x, y, heading) of the robot; refused where it does not fit   |
+    | `n_chairs`, `n_people`    | counts, for scenes that have them                             |
+    | `scene`                   | any options of the scene recipe, e.g. ``{"n_chairs": 8}``     |
+    | `dynamism`                | the knob, or a ``sim.dynamism.Dynamism``                      |
+    | `moving_share`            | share of chairs on the move at any time                       |
+    | `rates`                   | single rates of ``Dynamism``, e.g. ``{"door_rate": 0.1}``     |
+    | `resolution_deg`          | 1, 0.5 or 0.25; changes the observation space (give ``laser`` |
+    |                           | to the constructor where a wrapper holds on to the space)     |
+    | `noise_std_m`             | statistical error of the ranges                               |
+    | `laser`                   | a whole ``Lms221Config``, e.g. ``Lms221Config.ideal()``       |
+    | `seeds`                   | stream name -> seed (``sim.seeds``)                           |
 
     ### Version history
     v0: first version.
@@ -109,17 +134,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._simulation: Simulation | None = None
         self._goal: tuple[float, float] | None = None
         self._distance: float | None = None
-        spec = self._settings["laser"].spec()
-        n = spec.n_beams
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        self.observation_space = spaces.Dict(
-            {
-                "ranges": spaces.Box(0.0, np.float32(spec.range_max), (n,), np.float32),
-                "valid": spaces.Box(0, 1, (n,), np.uint8),
-                "encoders": spaces.Box(-_MAX_TICKS, _MAX_TICKS, (2,), np.int64),
-                "time": spaces.Box(0.0, 1e9, (), np.float64),
-            }
-        )
+        spec = self._settings["laser"].spec()
+        self._n_beams = spec.n_beams
+        self.observation_space = _observation_space(spec)
 
     @property
     def simulation(self) -> Simulation:
@@ -133,39 +151,17 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Build the scene anew and take a first scan standing still."""
         super().reset(seed=seed)
-        settings, self._goal = self._with_options(options or {})
-        overrides = settings.pop("seeds")
-        episode_seed = int(self.np_random.integers(2**31))
+        plan = episode(self._settings, options)
+        self._goal = plan.goal
+        own = Seeds(int(self.np_random.integers(2**31)), **plan.seeds)
         self._close_renderer()
-        self._simulation = Simulation(seed=Seeds(episode_seed, **overrides), **settings)
+        self._simulation = Simulation(seed=own, **plan.settings)
+        if self._simulation.spec.n_beams != self._n_beams:
+            self._n_beams = self._simulation.spec.n_beams
+            self.observation_space = _observation_space(self._simulation.spec)
         frame = self._simulation.observe()
         self._distance = self._goal_distance()
         return self._observation(frame), self._info(frame)
-
-    def _with_options(
-        self, options: Mapping[str, Any]
-    ) -> tuple[dict[str, Any], tuple[float, float] | None]:
-        known = {"goal", "dynamism", "seeds", "scene"}
-        unknown = sorted(set(options) - known)
-        if unknown:
-            raise InvalidValueError(
-                f"unknown reset option {unknown[0]!r}; known: {', '.join(sorted(known))}"
-            )
-        settings = dict(self._settings)
-        if options.get("dynamism") is not None:
-            settings["dynamism"] = options["dynamism"]
-        settings["seeds"] = dict(options.get("seeds") or {})
-        settings |= dict(options.get("scene") or {})
-        goal = options.get("goal")
-        if goal is None:
-            return settings, None
-        try:
-            x, y = (float(v) for v in goal)
-        except (TypeError, ValueError):
-            raise InvalidValueError(f"option goal must be (x, y) in m, got {goal!r}") from None
-        if not (math.isfinite(x) and math.isfinite(y)):
-            raise InvalidValueError(f"option goal must be finite, got {goal!r}")
-        return settings, (x, y)
 
     def step(
         self, action: NDArray[np.float32]
@@ -206,14 +202,13 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _info(self, frame: Frame) -> dict[str, Any]:
         world = self.simulation.world
         contacts = self.simulation.contacts
-        poses = world.mover_poses()
         return {
             "pose": world.robot_pose(),
             "frame": frame,
             "beam_time": frame.stamp + self.simulation.spec.beam_time_offsets,
             "contacts": tuple(contact.name for contact in contacts),
             "hard_collision": any(contact.hard for contact in contacts),
-            "movers": {m.name: poses[k] for k, m in enumerate(world.scene.movers)},
+            "movers": dict(zip(world.mover_names, world.mover_poses(), strict=True)),
             "goal_distance": self._distance,
         }
 

@@ -25,7 +25,7 @@ _LOOKS = np.uint64(0xD1342543DE82EF95)  # sets the second generator of each pers
 _FIRST_STAY_MAX = 8.0  # s, so that a short run of a calm room sees someone set off
 
 
-@functools.lru_cache(maxsize=4)
+@functools.lru_cache(maxsize=8)
 def _flow(
     bounds: tuple[float, float, float, float], boxes: bytes, leaves: bytes, goals: bytes
 ) -> FlowMap:

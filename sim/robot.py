@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from slam._jit import njit
 from slam.errors import InvalidValueError
 
 
@@ -41,6 +42,27 @@ class DriveConfig:
                 raise InvalidValueError(f"DriveConfig.{name} must be > 0, got {value}")
 
 
+@njit
+def toward(value: float, target: float, step: float) -> float:
+    """``value`` moved by at most ``step`` towards ``target``."""
+    return value + min(max(target - value, -step), step)
+
+
+@njit
+def ramp(state: NDArray[np.float64], speed_step: float, turn_step: float, half: float) -> None:
+    """One tick of the ramp, and the wheel speeds that follow; ``half`` m is half the track."""
+    state[2] = toward(state[2], state[0], speed_step)
+    state[3] = toward(state[3], state[1], turn_step)
+    state[6], state[7] = state[2] - half * state[3], state[2] + half * state[3]
+
+
+@njit
+def roll(state: NDArray[np.float64], duration: float) -> None:
+    """Let the wheels turn at their present speed."""
+    state[4] += state[6] * duration
+    state[5] += state[7] * duration
+
+
 class Drive:
     """Ramp and wheels of the body ``robot/base``. State: ``state`` (8,) float64.
 
@@ -63,23 +85,15 @@ class Drive:
 
     def control(self, tick: float, ctrl: NDArray[np.float64]) -> None:
         """Ramp for ``tick`` s and write the wheel surface speeds into ``ctrl``."""
-        v_asked, omega_asked, v, omega = self.state[:4].tolist()
-        v = _toward(v, v_asked, self.config.accel * tick)
-        omega = _toward(omega, omega_asked, self.config.alpha * tick)
-        half = 0.5 * self.config.track * omega
-        self.state[2:4] = v, omega
-        self.state[6:8] = v - half, v + half
-        ctrl[self._left], ctrl[self._right] = v - half, v + half
+        c = self.config
+        ramp(self.state, c.accel * tick, c.alpha * tick, 0.5 * c.track)
+        ctrl[self._left], ctrl[self._right] = self.state[6], self.state[7]
 
     def roll(self, duration: float) -> None:
         """Let the wheels turn for ``duration`` s at their present speed."""
-        self.state[4:6] += self.state[6:8] * duration
+        roll(self.state, duration)
 
     @property
     def travel_m(self) -> NDArray[np.float64]:
         """(2,) m rolled by the left and the right wheel since the start, backwards negative."""
         return self.state[4:6].copy()
-
-
-def _toward(value: float, target: float, step: float) -> float:
-    return value + min(max(target - value, -step), step)

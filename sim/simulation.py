@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -32,15 +32,19 @@ class ScanTiming:
     What the encoders and the truth say is interpolated to these between the steps.
     """
 
+    offset_ns: int
     first: float
     last: float
     sweep_s: float
 
     @classmethod
     def of(cls, laser: Lms221) -> ScanTiming:
-        first = laser.config.stamp_offset_ns * 1e-9 * SUBSTEPS_PER_S
+        offset_ns = laser.config.stamp_offset_ns
+        first = offset_ns * 1e-9 * SUBSTEPS_PER_S
         sweep = laser.spec.sweep_duration
-        return cls(first=first, last=first + sweep * SUBSTEPS_PER_S, sweep_s=sweep)
+        return cls(
+            offset_ns=offset_ns, first=first, last=first + sweep * SUBSTEPS_PER_S, sweep_s=sweep
+        )
 
     def odometry(
         self, encoders: WheelOdometry, travel: Float, stamp_ns: int, touched: bool
@@ -76,6 +80,7 @@ class Simulation:
     laser      how the scanner is set; default ``Lms221Config()``
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
     drive      limits of the robot
+    start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted
     labels     whether frames carry truth per beam
     options    passed on to the scene, e.g. ``n_chairs=10``
 
@@ -92,12 +97,13 @@ class Simulation:
         laser: Lms221Config | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
+        start: Sequence[float] | None = None,
         labels: bool = False,
         **options: Any,
     ) -> None:
         drive = drive or DriveConfig()
         rates = Dynamism.of(dynamism, moving_share)
-        self.world = World(scene, seed=seed, dynamism=rates, drive=drive, **options)
+        self.world = World(scene, seed=seed, dynamism=rates, drive=drive, start=start, **options)
         self.odometry_preset = odometry
         seeds = self.world.seeds
         self.laser = Lms221(self.world.model, laser, seeds.generator("lidar"))
@@ -109,6 +115,7 @@ class Simulation:
         steps = self.laser.config.steps
         self.path: Float = np.zeros((steps + 1, 3))
         self._travel: Float = np.zeros((steps + 1, 2))
+        self._rows = list(zip(self.path, self._travel, strict=True))
         self._step = 0
 
     @property
@@ -127,7 +134,7 @@ class Simulation:
         self._note()
 
     def _note(self) -> None:
-        self.world.read_robot(self.path[self._step], self._travel[self._step])
+        self.world.read_robot(*self._rows[self._step])
 
     def observe(self) -> Frame:
         """Let one scan's worth of time pass under the present command; the frame it gives.
@@ -135,7 +142,7 @@ class Simulation:
         The frame's stamp is that of the earliest beam, so its odometry and truth lie one scan
         period before the world's present: nobody can know a scan before it is over.
         """
-        stamp_ns = self.world.time_ns + self.laser.config.stamp_offset_ns
+        stamp_ns = self.world.time_ns + self._timing.offset_ns
         self._step = 0
         self._note()
         result = self.laser.observe(self._advance, self.world.data)

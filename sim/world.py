@@ -8,6 +8,7 @@ two substeps (a scanner, a film, ``save_state``) sees poses of that very instant
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -42,6 +43,7 @@ class World:
     dynamism  knob in [0, 1] (see ``sim.dynamism``), or the rates themselves
     moving_share  in [0, 1]: keep that share of chairs and loads on the move, instead of shoves
     drive     limits of the robot
+    start     (x m, y m, heading rad) of the robot instead of the scene's
     options   passed on to the scene when it is given by name, e.g. ``n_chairs=10``
 
     Raises ``InvalidValueError`` for a dynamism outside [0, 1], ``UnknownNameError`` for a scene.
@@ -55,6 +57,7 @@ class World:
         dynamism: float | Dynamism = 0.5,
         moving_share: float | None = None,
         drive: DriveConfig | None = None,
+        start: Sequence[float] | None = None,
         **options: Any,
     ) -> None:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
@@ -62,6 +65,7 @@ class World:
         self.scene = self._built(scene, options)
         self.model: mujoco.MjModel = self.scene.compile()
         self.data = mujoco.MjData(self.model)
+        self.mover_names = tuple(m.name for m in self.scene.movers)
         self.step_count = 0
         self.bodies = Bodies(self.model, self.scene)
         self._contacts = RobotContacts(self.model, self.bodies)
@@ -85,6 +89,8 @@ class World:
         )
         self._people_rows = self.bodies.rows(self.people.names)
         self.scene.place(self.model, self.data)
+        if start is not None:
+            self.bodies.place_robot(self.data, start)
         self.people.start(self.data)
         mujoco.mj_forward(self.model, self.data)
 
@@ -143,8 +149,7 @@ class World:
 
     def read_robot(self, pose: Float, travel: Float) -> None:
         """``robot_pose`` and ``wheel_angles`` into (3,) and (2,) arrays."""
-        self.bodies.read_robot(self.data, pose)
-        travel[:] = self._drive.state[4:6]
+        self.bodies.read_robot(self.data, self._drive.state, pose, travel)
 
     def wheel_angles(self) -> Float:
         """(2,) m truly rolled by the left and the right wheel since the start."""

@@ -140,12 +140,53 @@ def test_the_cameras_see_a_room():
         ({"dynamism": 2.0}, "dynamism must lie in"),
         ({"seeds": {"chiars": 1}}, "Did you mean 'chairs'"),
         ({"scene": {"n_chairs": -1}}, "n_chairs"),
+        ({"n_people": -1}, "n_people"),
+        ({"rates": {"door_rat": 1.0}}, "door_rat"),
+        ({"moving_share": 3.0}, "moving_share"),
+        ({"resolution_deg": 0.3}, "resolution_deg"),
+        ({"laser": "best"}, "option laser"),
+        ({"start": (0.0, 0.0)}, "option start must be"),
+        ({"start": (99.0, 0.0, 0.0)}, "free floor"),
     ],
 )
 def test_wrong_options_are_refused_by_name(options, message):
     env = make("mobilia/Arena-v0")
     with pytest.raises(MobiliaError, match=message):
         env.reset(seed=0, options=options)
+
+
+def test_an_episode_can_have_its_own_counts_rates_laser_and_start():
+    env = make("mobilia/Arena-v0")
+    start = (1.2, 1.1, 0.7)
+    observation, info = env.reset(
+        seed=3,
+        options={
+            "n_chairs": 2,
+            "rates": {"chair_push_rate": 0.3},
+            "moving_share": 1.0,
+            "resolution_deg": 1.0,
+            "noise_std_m": 0.0,
+            "start": start,
+        },
+    )
+    world = env.simulation.world
+    np.testing.assert_allclose(info["pose"], start, atol=1e-6)
+    assert [m.kind.partition("_")[0] for m in world.scene.movers] == ["chair", "chair", "robot"]
+    assert (world.rates.chair_push_rate, world.rates.moving_share) == (0.3, 1.0)
+    assert env.simulation.laser.config.noise_std_m == 0.0
+    assert observation["ranges"].shape == (181,)
+    assert env.observation_space.contains(observation)
+    observation, _ = env.reset(seed=3)
+    assert observation["ranges"].shape == (361,)
+    assert env.observation_space.contains(observation)
+
+
+def test_a_start_on_a_chair_is_refused():
+    env = make("mobilia/Arena-v0")
+    layout = {"seeds": {"layout": 1}}
+    _, info = env.reset(seed=0, options=layout)
+    with pytest.raises(InvalidValueError, match="taken by chair0"):
+        env.reset(seed=0, options={"start": info["movers"]["chair0"], **layout})
 
 
 def test_wrong_settings_are_refused():

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one episode may have different: the ``options`` of ``reset``, checked by name."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from sim.dynamism import Dynamism
+from sim.lidar import Lms221Config
+from slam.errors import InvalidValueError
+
+OPTIONS = (
+    "goal", "start", "seeds", "scene", "n_chairs", "n_people", "dynamism", "moving_share", "rates",
+    "resolution_deg", "noise_std_m", "laser",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Episode:
+    """One episode: arguments of ``Simulation`` but the seed, overrides of streams, the goal."""
+
+    settings: dict[str, Any]
+    seeds: dict[str, int]
+    goal: tuple[float, float] | None
+
+
+def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> Episode:
+    """``settings`` of the environment with the ``options`` of one reset put in.
+
+    Raises ``InvalidValueError`` naming the option that is unknown or has a value it cannot have.
+    """
+    given = {k: v for k, v in (options or {}).items() if v is not None or k not in OPTIONS}
+    for name in sorted(given):
+        if name not in OPTIONS:
+            near = difflib.get_close_matches(name, OPTIONS, n=1)
+            hint = f", did you mean {near[0]!r}?" if near else ""
+            raise InvalidValueError(
+                f"unknown reset option {name!r}{hint} Known: {', '.join(sorted(OPTIONS))}"
+            )
+    merged = dict(settings)
+    merged |= dict(given.get("scene") or {})
+    merged |= {name: given[name] for name in ("n_chairs", "n_people") if name in given}
+    merged["dynamism"] = _rates(merged["dynamism"], given)
+    merged["laser"] = _laser(merged["laser"], given)
+    if "start" in given:
+        merged["start"] = numbers("start", given["start"], 3, "(x m, y m, heading rad)")
+    goal = numbers("goal", given["goal"], 2, "(x, y) in m") if "goal" in given else None
+    return Episode(
+        settings=merged,
+        seeds=dict(given.get("seeds") or {}),
+        goal=None if goal is None else (goal[0], goal[1]),
+    )
+
+
+def numbers(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
+    """``n`` finite numbers."""
+    try:
+        out = tuple(float(v) for v in value)
+    except (TypeError, ValueError):
+        out = ()
+    if len(out) != n:
+        raise InvalidValueError(f"option {name} must be {meaning}, got {value!r}")
+    if not all(math.isfinite(v) for v in out):
+        raise InvalidValueError(f"option {name} must be finite, got {value!r}")
+    return out
+
+
+def _rates(dynamism: float | Dynamism, given: Mapping[str, Any]) -> Dynamism:
+    rates = Dynamism.of(given.get("dynamism", dynamism), given.get("moving_share"))
+    changes = dict(given.get("rates") or {})
+    known = {f.name for f in fields(Dynamism)}
+    for name in sorted(set(changes) - known):
+        raise InvalidValueError(
+            f"option rates: unknown rate {name!r}; known: {', '.join(sorted(known))}"
+        )
+    return replace(rates, **changes)
+
+
+def _laser(laser: Lms221Config, given: Mapping[str, Any]) -> Lms221Config:
+    chosen = given.get("laser", laser)
+    if not isinstance(chosen, Lms221Config):
+        raise InvalidValueError(f"option laser must be a Lms221Config, got {chosen!r}")
+    changes = {k: given[k] for k in ("resolution_deg", "noise_std_m") if k in given}
+    return replace(chosen, **changes)
