@@ -24,6 +24,7 @@ from slam.shunting.matching import Match, Matcher
 from slam.shunting.motion import WIDEN, Prediction, inverted, predict
 from slam.shunting.network import Network
 from slam.shunting.search import SearchWindow
+from slam.shunting.warmup import warm_up
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
 
@@ -54,6 +55,7 @@ class ShuntingSlam:
                 )
             config = ShuntingConfig.paper() if config == "paper" else ShuntingConfig.robust()
         self.config: ShuntingConfig = config
+        warm_up()
         self.reset()
 
     def reset(self) -> None:
@@ -89,9 +91,8 @@ class ShuntingSlam:
         twist = frame.odometry.twist
         observations = self._observe(frame, np.zeros(3) if twist is None else np.asarray(twist))
         stamp(self.network, observations, self._T_map_robot)
-        self.network.integrate(
-            observations.view, observations.T_robot_laser, FIRST_LOOK_S, write=True
-        )
+        T_map_laser = se2.compose(self._T_map_robot, observations.T_robot_laser)
+        self.network.integrate(observations.view, T_map_laser, FIRST_LOOK_S, write=True)
         match = Match(
             T_map_robot=np.zeros(3), information=np.zeros((3, 3)), matched=1.0, score=0.0, tau=0.0
         )

@@ -12,6 +12,7 @@ from slam._jit import njit
 
 LONGEST_JOIN_M = 1.0
 LINE_HITS = 4  # evidence for a surface between hits farther apart than ``NEAR_JOIN_CELLS``
+LIKE_STEPS = 4.0  # ratio of neighbouring steps along a surface, at most
 LINE_SLACK_M, LINE_SLACK = 0.04, 0.15  # m and share of a step, along the beam
 MIXED_M = 1.5  # the receiver tells two surfaces farther apart than this from each other
 
@@ -30,11 +31,15 @@ def _one_line(
         return False
     ax, ay = points[first, 0] - x, points[first, 1] - y
     ex, ey = points[last, 0] - points[first, 0], points[last, 1] - points[first, 1]
+    before = 0.0
     for k in range(first, last):
         dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
         step = math.sqrt(dx * dx + dy * dy)
         if dx * ex + dy * ey <= 0.0 or step > LONGEST_JOIN_M:
             return False
+        if k > first and not before < LIKE_STEPS * step < LIKE_STEPS * LIKE_STEPS * before:
+            return False
+        before = step
     slack = max(LINE_SLACK_M, LINE_SLACK * math.sqrt(ex * ex + ey * ey) / (LINE_HITS - 1))
     for k in range(first + 1, last):
         bx, by = points[k, 0] - x, points[k, 1] - y

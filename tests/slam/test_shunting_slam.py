@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
+from numba.core import event
 from numpy.typing import NDArray
 
 import slam
@@ -14,6 +16,7 @@ from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Features, Frame, Odometry, Scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.shunting.warmup import COMPILING
 from tests.world2d import Chairs, Drive, World2D, arena, frames, laser, rectangle, wander
 
 Array = NDArray[np.float64]
@@ -245,3 +248,33 @@ def test_a_scan_without_a_single_return_is_survived() -> None:
         )
         assert np.isfinite(estimate.covariance).all()
     assert system.map() is None
+
+
+def test_no_frame_waits_for_the_compiler() -> None:
+    """After construction nothing is compiled, not even at the first wide search."""
+    compiled: list[str] = []
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: Any) -> None:
+            compiled.append(event.data["dispatcher"].py_func.__name__)
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    stream = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(61, interlaced=True))
+    system = ShuntingSlam(FAST)
+    listener = Listener()
+    event.register(COMPILING, listener)
+    try:
+        for frame in stream[:3]:
+            system.update(frame)
+        here, elsewhere = stream[3], stream[60].scan
+        assert elsewhere is not None
+        scan = Scan(stamp_ns=here.stamp_ns, ranges=elsewhere.ranges, spec=elsewhere.spec)
+        jump = Frame(stamp_ns=here.stamp_ns, odometry=here.odometry, scan=scan)
+        searched = system.update(jump).diagnostics["searched"]
+        system.map()
+    finally:
+        event.unregister(COMPILING, listener)
+    assert searched
+    assert compiled == []
