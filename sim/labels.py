@@ -14,11 +14,14 @@ from slam.frames import BeamClass, BeamLabels, Float
 
 
 class BeamLabeller:
-    """Labels scans of one world and remembers where each mover was when last seen."""
+    """Labels scans of one world and remembers where each mover was when last seen.
+
+    Attribute ``last_seen`` (movers, 3): that memory, NaN for what was never seen.
+    """
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._last_seen = np.full((len(world.scene.movers), 3), np.nan)
+        self.last_seen = np.full((len(world.scene.movers), 3), np.nan)
 
     def label(self, result: ScanResult) -> BeamLabels:
         """Labels of the scan that has just been taken.
@@ -46,7 +49,7 @@ class BeamLabeller:
         poses = self._world.mover_poses()
         moved = np.zeros(len(poses))
         for k in seen.tolist():
-            dx, dy = (poses[k, :2] - self._last_seen[k, :2]).tolist()
+            dx, dy = (poses[k, :2] - self.last_seen[k, :2]).tolist()
             moved[k] = 0.0 if math.isnan(dx) else math.sqrt(dx * dx + dy * dy)
-            self._last_seen[k] = poses[k]
+            self.last_seen[k] = poses[k]
         return moved

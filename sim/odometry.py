@@ -18,10 +18,13 @@ increments over many metres must add to it (``WheelOdometry.systematic_std`` has
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim import state
 from sim.odometry_config import PRESETS, OdometryConfig, preset
 from slam import se2
 from slam._jit import njit
@@ -233,6 +236,24 @@ class WheelOdometry:
         # An extra length driven on an extra half turn: the one second-order term that matters,
         # because nothing of first order is sideways but ``side``.
         return (trans, side + 0.25 * trans * rot, rot), noise
+
+    def save(self) -> tuple[dict[str, Float], dict[str, Any]]:
+        """Everything that decides what comes next: arrays, and the words of the generator."""
+        arrays = {
+            "wheels": np.array([self._reported, self._counted, self._true]),
+            "poses": np.array([self.pose, self._at_stamp, self._increment]),
+            "spread": np.array([self._random, self._systematic, self._covariance]),
+        }
+        return arrays, {"errors": list(self.errors), "random": state.random_words(self._rng)}
+
+    def load(self, arrays: Mapping[str, Float], words: Mapping[str, Any]) -> None:
+        """Go on from ``save``; ``InvalidValueError`` if it is of a run with other errors."""
+        if list(self.errors) != words["errors"]:
+            raise InvalidValueError("the state is of a run whose odometry errs otherwise")
+        state.restore_random(self._rng, words["random"])
+        self._reported, self._counted, self._true = arrays["wheels"].tolist()
+        self.pose, self._at_stamp, self._increment = (a.copy() for a in arrays["poses"])
+        self._random, self._systematic, self._covariance = (a.copy() for a in arrays["spread"])
 
     def begin_scan(self, travel: ArrayLike, *, contact: bool = False) -> None:
         """Advance to the stamp of a scan (its earliest beam); closes the motion increment."""

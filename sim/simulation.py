@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from sim import state
 from sim.contacts import Contact
 from sim.drive import TourConfig
 from sim.dynamism import Dynamism
@@ -156,6 +157,34 @@ class Simulation:
             labels=self._labeller.label(result) if self._labeller else None,
         )
         return self.frame
+
+    def save_state(self) -> bytes:
+        """World, scanner, encoders and labels: everything that decides the scans to come.
+
+        Load it into a simulation made with the same arguments, in this or another process; it goes
+        on bit for bit. Save between two calls of ``observe``.
+        """
+        arrays, words = self.encoders.save()
+        world = np.frombuffer(self.world.save_state(), dtype=np.uint8)
+        seen = self._labeller.last_seen if self._labeller else np.zeros((0, 3))
+        lasers = [state.random_words(rng) for rng in self.laser.streams]
+        arrays |= {"world": world, "seen": seen}  # type: ignore[dict-item]
+        return state.pack(arrays, {"encoders": words, "lasers": lasers})
+
+    def load_state(self, block: bytes) -> None:
+        """Go on from ``save_state``; ``InvalidValueError`` if it is of another simulation."""
+        arrays, words = state.unpack(block)
+        if not {"encoders", "lasers"} <= set(words) or "world" not in arrays:
+            raise InvalidValueError("this is the state of a world, not of a simulation")
+        if len(words["lasers"]) != len(self.laser.streams):
+            raise InvalidValueError("the state is of another kind of scanner")
+        self.world.load_state(arrays["world"].tobytes())
+        self.encoders.load(arrays, words["encoders"])
+        for rng, saved in zip(self.laser.streams, words["lasers"], strict=True):
+            state.restore_random(rng, saved)
+        if self._labeller is not None and len(arrays["seen"]):
+            self._labeller.last_seen[...] = arrays["seen"]
+        self.contacts = []
 
     def metadata(self) -> StreamMetadata:
         """What a recording says about itself."""

@@ -43,3 +43,16 @@ def unpack(block: bytes) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     if at != len(block):
         raise InvalidValueError(f"this saved world is damaged: {len(block) - at} bytes too many")
     return arrays, words
+
+
+def random_words(rng: np.random.Generator) -> dict[str, Any]:
+    """The state of a generator as JSON words."""
+    return dict(rng.bit_generator.state)
+
+
+def restore_random(rng: np.random.Generator, words: Mapping[str, Any]) -> None:
+    """Inverse of ``random_words``; ``InvalidValueError`` for another kind of generator."""
+    try:
+        rng.bit_generator.state = dict(words)
+    except (ValueError, TypeError, KeyError) as error:
+        raise InvalidValueError(f"this state of a generator does not fit: {error}") from error

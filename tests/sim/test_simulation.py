@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from sim.lidar import Lms221Config
+from sim.seeds import Seeds
 from sim.simulation import Simulation, stream, tour
 from slam import create, se2
 from slam.errors import InvalidValueError, UnknownNameError
@@ -140,3 +141,43 @@ def test_hashes_of_two_iterations_match():
         return sha.hexdigest()
 
     assert hashed(1) == hashed(1) != hashed(2)
+
+
+RESUME = """
+import hashlib, sys
+from sim.simulation import Simulation
+simulation = Simulation("office", seed=5, dynamism=0.9, labels=True)
+simulation.world.set_command(0.3, 0.1)
+if sys.argv[1] == "resume":
+    simulation.load_state(open(sys.argv[2], "rb").read())
+else:
+    for _ in range(90):
+        simulation.observe()
+    open(sys.argv[2], "wb").write(simulation.save_state())
+sha = hashlib.sha256()
+for _ in range(90):
+    frame = simulation.observe()
+    for part in (frame.scan.ranges, frame.odometry.T_odom_robot, frame.truth,
+                 frame.odometry.increment_covariance, frame.odometry.twist,
+                 frame.labels.displacement, frame.labels.kind, frame.labels.mixed):
+        sha.update(part.tobytes())
+print(frame.stamp_ns, sha.hexdigest())
+"""
+
+
+def test_a_saved_simulation_goes_on_scan_for_scan_in_another_process(tmp_path):
+    def run(how: str) -> str:
+        command = [sys.executable, "-c", RESUME, how, str(tmp_path / "state")]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    assert run("plain") == run("resume")
+
+
+def test_a_state_of_another_simulation_is_refused():
+    ours = Simulation("arena", seed=1, n_chairs=2)
+    with pytest.raises(InvalidValueError, match="not of a simulation"):
+        ours.load_state(ours.world.save_state())
+    with pytest.raises(InvalidValueError, match="odometry errs otherwise"):
+        ours.load_state(Simulation("arena", seed=Seeds(1, odometry=2), n_chairs=2).save_state())
+    with pytest.raises(InvalidValueError, match="this world is"):
+        ours.load_state(Simulation("arena", seed=1, n_chairs=3).save_state())
