@@ -17,6 +17,7 @@ from scripts.console import console, fail, note
 from scripts.demo import demo
 from scripts.listing import listing
 from scripts.run import run
+from scripts.sensor_card import sensor_card
 from sim import gl
 from slam.errors import MobiliaError
 
@@ -35,6 +36,7 @@ app.command("demo")(demo)
 app.command("run")(run)
 app.command("list")(listing)
 app.command("bench")(bench)
+app.command("sensor-card")(sensor_card)
 
 
 @app.callback()

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.caster import Spot
+from sim.lidar_signal import ERROR_STEP, NEEDED_STEP
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
@@ -40,7 +42,6 @@ NEEDED_RANGE_M = (0.2, 0.3, 0.5, 1.0, 1.5, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.
 NEEDED = (
     0.47, 0.20, 0.12, 0.046, 0.030, 0.022, 0.016, 0.022, 0.035, 0.054, 0.107, 0.185, 0.42,
 )  # fmt: skip
-NEEDED_STEP = 0.01  # m, of the table made from it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,12 +93,12 @@ def needed_reflectivity(range_m: float) -> float:
     return math.exp(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
 
 
+@cache
 def needed_table() -> Float:
-    """Needed reflectivity every ``NEEDED_STEP`` to 100 m, for the middle of each step."""
-    return np.array([needed_reflectivity((k + 0.5) * NEEDED_STEP) for k in range(10_000)])
+    """Needed reflectivity every ``NEEDED_STEP`` to 100 m, at the middle of each; read only."""
+    return np.array([needed_reflectivity((k + 0.5) * NEEDED_STEP) for k in range(20_000)])
 
 
-ERROR_STEP = 0.1  # m, of the table of the systematic error
 _ERROR_WAVES = 5
 
 

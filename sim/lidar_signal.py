@@ -18,13 +18,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.lidar_effects import ERROR_STEP, NEEDED_STEP
 from slam._jit import njit
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
+NEEDED_STEP = 0.005  # m, of the table of needed reflectivity
+ERROR_STEP = 0.1  # m, of the table of the systematic error
 PULSE_LENGTH = 1.0  # m, TL p110
 SAME_PULSE = 0.1  # m between rays of one pulse; inferred
 SAME_SURFACE = 0.5  # m, the same where both hit one thing: an oblique wall; inferred
