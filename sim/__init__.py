@@ -15,4 +15,9 @@ _SCENES = {
 for _name, _scene in _SCENES.items():
     _id = f"mobilia/{_name}-v0"
     if _id not in registry:
-        register(id=_id, entry_point="sim.env:MobiliaEnv", kwargs={"scene": _scene})
+        register(
+            id=_id,
+            entry_point="sim.env:MobiliaEnv",
+            vector_entry_point="sim.vector:MobiliaVectorEnv",
+            kwargs={"scene": _scene},
+        )

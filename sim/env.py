@@ -133,7 +133,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._renderer: Any = None
         self._simulation: Simulation | None = None
         self._goal: tuple[float, float] | None = None
-        self._distance: float | None = None
+        self.goal_distance: float | None = None  # m, if this episode has a goal
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         spec = self._settings["laser"].spec()
         self._n_beams = spec.n_beams
@@ -160,27 +160,31 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._n_beams = self._simulation.spec.n_beams
             self.observation_space = _observation_space(self._simulation.spec)
         frame = self._simulation.observe()
-        self._distance = self._goal_distance()
-        return self._observation(frame), self._info(frame)
+        self.goal_distance = self._goal_distance()
+        return self.observation(frame), self._info(frame)
 
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One scan under the given command."""
+        frame, reward, terminated, truncated = self.act(action)
+        return self.observation(frame), reward, terminated, truncated, self._info(frame)
+
+    def act(self, action: NDArray[np.float32]) -> tuple[Frame, float, bool, bool]:
+        """What ``step`` does, before it is dressed up as observation and info."""
         v, omega = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0).tolist()
         simulation = self.simulation
         simulation.world.set_command(v * V_MAX_MPS, omega * OMEGA_MAX_RADPS)
         frame = simulation.observe()
-        before, self._distance = self._distance, self._goal_distance()
+        before, self.goal_distance = self.goal_distance, self._goal_distance()
         reward, terminated = 0.0, False
-        if before is not None and self._distance is not None:
-            reward = before - self._distance
-            terminated = self._distance < GOAL_RADIUS_M
-        info = self._info(frame)
-        if self.terminate_on_collision and info["hard_collision"]:
+        if before is not None and self.goal_distance is not None:
+            reward = before - self.goal_distance
+            terminated = self.goal_distance < GOAL_RADIUS_M
+        if self.terminate_on_collision and any(c.hard for c in simulation.contacts):
             terminated = True
         truncated = simulation.world.time_ns * 1e-9 >= self.time_limit_s
-        return self._observation(frame), reward, terminated, truncated, info
+        return frame, reward, terminated, truncated
 
     def _goal_distance(self) -> float | None:
         if self._goal is None:
@@ -188,7 +192,8 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         x, y, _ = self.simulation.world.robot_pose().tolist()
         return math.hypot(x - self._goal[0], y - self._goal[1])
 
-    def _observation(self, frame: Frame) -> Observation:
+    def observation(self, frame: Frame) -> Observation:
+        """What the robot knows by a frame of this environment's simulation."""
         scan = frame.scan
         assert scan is not None  # a simulation's frames always carry one
         valid = scan.valid
@@ -209,7 +214,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "contacts": tuple(contact.name for contact in contacts),
             "hard_collision": any(contact.hard for contact in contacts),
             "movers": dict(zip(world.mover_names, world.mover_poses(), strict=True)),
-            "goal_distance": self._distance,
+            "goal_distance": self.goal_distance,
         }
 
     def render(self) -> NDArray[np.uint8] | None:
