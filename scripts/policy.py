@@ -17,7 +17,8 @@ if __name__ == "__main__":
         ahead = ranges[:, 150:211].min(axis=1)  # beam 180 looks straight ahead, 0 to the right
         turn = np.where(ranges[:, 200:300].mean(1) > ranges[:, 60:160].mean(1), 0.8, -0.8)
         speed = np.clip(ahead - 0.6, 0.0, 0.6)
-        seen, *_rest, infos = rooms.step(np.stack([speed, np.where(ahead < 1.2, turn, 0.0)], axis=1))
+        action = np.stack([speed, np.where(ahead < 1.2, turn, 0.0)], axis=1)
+        seen, *_rest, infos = rooms.step(action)
         hits += int(infos["hard_collision"].sum())
     away = np.hypot(*(infos["pose"] - start)[:, :2].T)
     print(f"away from the start: {away.mean():.1f} m on average; steps with a hard contact: {hits}")

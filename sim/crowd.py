@@ -60,6 +60,7 @@ from slam._jit import njit
 HORIZON = 2.5  # s, collisions later than this do not matter
 STILL = 0.1  # m/s, a walker slower than this is blocked
 ACCEL = 3.0  # m/s2
+SPARE = 0.05  # m that people leave between themselves and the robot
 
 
 @njit
@@ -233,6 +234,28 @@ def plan(
 
 
 @njit
+def spare_robot(
+    i: int, wanted: tuple[float, float], near: Int, discs: Float
+) -> tuple[float, float]:
+    """The velocity less what would run into the robot: nobody pushes it, not even when held up."""
+    vx, vy = wanted
+    for k in range(len(near)):
+        robot = discs[near[k]]
+        if robot[KIND] != ROBOT:
+            continue
+        dx, dy = robot[X] - discs[i, X], robot[Y] - discs[i, Y]
+        far = math.sqrt(max(dx * dx + dy * dy, 1e-6))
+        ux, uy = dx / far, dy / far
+        gap = far - discs[i, R] - robot[R] - SPARE
+        # A person stops at ACCEL; what the robot itself comes nearer is stepped back from.
+        approach = vx * ux + vy * uy - (robot[U] * ux + robot[V] * uy)
+        allowed = math.sqrt(2.0 * ACCEL * gap) if gap > 0.0 else 4.0 * gap
+        excess = min(max(approach - allowed, 0.0), 2.0)
+        vx, vy = vx - excess * ux, vy - excess * uy
+    return vx, vy
+
+
+@njit
 def nearby(i: int, discs: Float, sides: Int, near: Int) -> int:
     """Rows of ``discs`` within 3 m of person ``i``, into ``near``; returns how many.
 
@@ -338,5 +361,6 @@ def decide(
         wanted = want(i, pace, ways, field, crowd)
         count = nearby(i, crowd.discs, ways.sides, near)
         fade = patience(i, time, crowd)
-        vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
+        chosen = choose(i, wanted, near[:count], fade, field, crowd)
+        vx, vy = spare_robot(i, chosen, near[:count], crowd.discs)
         steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])

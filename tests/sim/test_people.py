@@ -179,3 +179,16 @@ def test_a_door_lets_the_robot_through():
         world.substep()
     passed = world.robot_pose()[:2] - middle
     assert np.dot(passed, push_from) < -0.8
+
+
+def test_nobody_runs_into_a_robot_that_stands_in_a_doorway():
+    """Whoever wants through waits, goes elsewhere or stops before it."""
+    door = World("office", seed=1, dynamism=0)._doors.middles[2]
+    world = World("office", seed=1, dynamism=0.9, start=(*door, 0.3))
+    nearest = math.inf
+    for _ in range(30 * SUBSTEPS_PER_S):
+        world.substep()
+        people = world.mover_poses()[_rows(world, "person"), :2]
+        nearest = min(nearest, float(np.linalg.norm(people - door, axis=1).min()))
+    assert nearest < 1.0  # somebody did come
+    assert all(c.kind != "person" or c.force < 150.0 for c in world.take_contacts())
