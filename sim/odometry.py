@@ -133,6 +133,7 @@ class WheelOdometry:
     rng     drawn from three times at birth and five times at each ``update``, whatever moves
     track   m between the true wheels
     start   (3,) first pose in the odom frame
+    errors  Es, Eb, Ed of a known unit, instead of drawn ones
 
     Attributes: ``pose`` (3,) ``T_odom_robot``; ``ticks`` (2,) int64 encoder counts, left and right;
     ``errors`` Es, Eb, Ed of this run (truth, not for a robot to know).
@@ -145,6 +146,7 @@ class WheelOdometry:
         *,
         track: float = 0.33,
         start: ArrayLike = (0.0, 0.0, 0.0),
+        errors: tuple[float, float, float] | None = None,
     ) -> None:
         self.config = preset(config) if isinstance(config, str) else config
         if not 0.0 < track < math.inf:
@@ -154,7 +156,7 @@ class WheelOdometry:
         c = self.config
         self._systematic_variances = (c.scale_std**2, c.track_std**2, c.diameter_ratio_std**2)
         drawn = self._rng.standard_normal(3).tolist()
-        self.errors = (
+        self.errors = errors or (
             1.0 + c.scale_std * drawn[0],
             1.0 + c.track_std * drawn[1],
             1.0 + c.diameter_ratio_std * drawn[2],
