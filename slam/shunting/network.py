@@ -341,6 +341,17 @@ class Network:
         self.cells.scratch_of[self.cells.touched[:count]] = -1
         self.cells.counts[TOUCHED_COUNT] = 0
 
+    def prune(self) -> None:
+        """Let blocks die that were born under impressions which were then forgotten."""
+        cells = self.cells
+        rows, columns = np.nonzero(cells.directory >= 0)
+        slots = cells.directory[rows, columns]
+        silent = ~(cells.x[slots].any(axis=(1, 2)) | cells.y[slots].any(axis=(1, 2)))
+        count, unused = int(silent.sum()), int(cells.counts[FREE_COUNT])
+        cells.directory[rows[silent], columns[silent]] = -1
+        cells.free[unused : unused + count] = slots[silent]
+        cells.counts[FREE_COUNT] = unused + count
+
     def integrate(
         self, view: View, T_map_laser: NDArray[np.float64], step: float, *, write: bool
     ) -> tuple[float, float, int]:

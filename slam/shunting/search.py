@@ -144,7 +144,21 @@ def _bound(
 
 
 @njit
-def _descend(
+def _is_apart(
+    apart: tuple[NDArray[np.float64], float, float], di: int, dj: int, turn: float
+) -> bool:
+    taken, cells, rad = apart
+    for k in range(len(taken)):
+        off = turn - taken[k, 2]
+        off -= math.tau * math.floor(off / math.tau + 0.5)
+        di_off, dj_off = di - taken[k, 0], dj - taken[k, 1]
+        if abs(off) < rad and di_off * di_off + dj_off * dj_off < cells * cells:
+            return False
+    return True
+
+
+@njit
+def descend(
     levels: NDArray[np.uint8],
     bases: NDArray[np.int32],
     turns: NDArray[np.float64],
@@ -156,11 +170,17 @@ def _descend(
     bounds: NDArray[np.float64],
     order: NDArray[np.int64],
     best_index: NDArray[np.int64],
+    floor: float,
+    apart: tuple[NDArray[np.float64], float, float],
 ) -> tuple[float, int]:
-    """Depth first through the blocks in falling ``order`` of their bounds."""
+    """Depth first through the blocks in falling ``order`` of their bounds.
+
+    Only what scores above ``floor`` counts, and is apart from each of the (n, 3) given offsets di,
+    dj and turns by so many cells or so many rad.
+    """
     top = len(levels) - 1
     across = bounds.shape[1]
-    best, evaluations = -math.inf, 0
+    best, evaluations = floor, 0
     stack = np.empty((4 * (top + 1) + 4, 3), np.int64)  # di, dj, level
     stack_bound = np.empty(4 * (top + 1) + 4)
     children = np.empty(4)
@@ -179,6 +199,8 @@ def _descend(
             if stack_bound[depth] <= best:
                 continue
             if level == 0:
+                if not _is_apart(apart, di, dj, turns[h]):
+                    continue
                 best = stack_bound[depth]
                 best_index[0], best_index[1], best_index[2] = h, di, dj
                 continue
@@ -229,19 +251,33 @@ def branch_and_bound(
     candidates were scored.
     """
     width = 1 << (len(levels) - 1)
-    across = (2 * reach) // width + 1
     costs = np.array([_heading_cost(precision, float(turn)) for turn in turns])
-    bounds = np.empty((len(turns), across, across))
-    _bound(levels[-1], bases, costs, reach, width, gain, bounds)
+    bounds = bounds_of(levels[-1], bases, costs, reach, width, gain)
     order = np.argsort(-bounds.ravel(), kind="stable")
-    best, evaluations = _descend(
-        levels, bases, turns, costs, reach, cell, precision, gain, bounds, order, best_index
-    )
+    best, evaluations = descend(
+        levels, bases, turns, costs, reach, cell, precision, gain, bounds, order, best_index,
+        -math.inf, (np.zeros((0, 3)), 0.0, 0.0),
+    )  # fmt: skip
     return best, evaluations + bounds.size
 
 
+def bounds_of(
+    level: NDArray[np.uint8],
+    bases: NDArray[np.int32],
+    costs: Float,
+    reach: int,
+    width: int,
+    gain: float,
+) -> Float:
+    """Upper bounds (headings, rows, columns) of blocks of ``width`` x ``width`` offsets."""
+    across = (2 * reach) // width + 1
+    bounds = np.empty((len(bases), across, across))
+    _bound(level, bases, costs, reach, width, gain, bounds)
+    return bounds
+
+
 @njit
-def _place(
+def place(
     points: NDArray[np.float64],
     prediction: NDArray[np.float64],
     turns: NDArray[np.float64],
@@ -273,6 +309,15 @@ def _kernel() -> Float:
     """Gaussian taps such that a lone landmark's field is 1 at its centre."""
     taps = np.array([math.exp(-0.5 * (m / SIGMA_CELLS) ** 2) for m in (-2, -1, 0, 1, 2)])
     return taps / math.sqrt(math.pi * SIGMA_CELLS**2)
+
+
+def field_of(
+    network: Network, short_term: float, i0: int, j0: int, rows: int, columns: int
+) -> NDArray[np.uint8]:
+    """(rows, columns) smoothed activities from neuron (i0, j0) on, which begins a block."""
+    field = np.zeros((rows, columns), np.uint8)
+    _field(network.cells, short_term, i0, j0, _kernel(), field)
+    return field
 
 
 def headings(points: Float, window: SearchWindow, cell: float) -> Float:
@@ -307,11 +352,10 @@ def search(
     edge = reach + (1 << LEVELS) + 2
     i0 = ((math.floor((prediction[0] - radius) / cell) - edge) >> SHIFT) * SIDE
     j0 = ((math.floor((prediction[1] - radius) / cell) - edge) >> SHIFT) * SIDE
-    blocks = (math.ceil(2.0 * radius / cell) + 2 * edge) // SIDE + 3
-    field = np.zeros((blocks * SIDE, blocks * SIDE), np.uint8)
-    _field(network.cells, short_term, i0, j0, _kernel(), field)
+    across = ((math.ceil(2.0 * radius / cell) + 2 * edge) // SIDE + 3) * SIDE
+    field = field_of(network, short_term, i0, j0, across, across)
     bases = np.empty((len(turns), len(chosen), 2), np.int32)
-    _place(chosen, prediction, turns, cell, i0, j0, bases)
+    place(chosen, prediction, turns, cell, i0, j0, bases)
     best = np.zeros(3, np.int64)
     scale = gain * float(observations.weights.mean()) * len(points) / len(chosen) / FULL
     _, evaluations = branch_and_bound(

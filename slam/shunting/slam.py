@@ -23,6 +23,7 @@ from slam.shunting.impressions import (
 from slam.shunting.matching import Match, Matcher
 from slam.shunting.motion import WIDEN, Prediction, inverted, predict
 from slam.shunting.network import Network
+from slam.shunting.recovery import COARSE, Recovery
 from slam.shunting.search import SearchWindow
 from slam.shunting.warmup import warm_up
 from slam.system import Estimate, Raster, register
@@ -34,6 +35,8 @@ WIDEST = SearchWindow(reach_m=0.6, turn_rad=0.5)
 GOOD_SHARE = 0.85  # of the usual matched fraction: below it the neighbourhood is searched
 VAGUE_CELLS = 1.0  # a prior wider than this may leave the basin of the right optimum
 LOST_AFTER, PATIENCE = 3, 30  # doubtful frames in a row: then lost; then the map is written anew
+WORTH_SEARCHING = 0.6  # usual support by the map from which on a lost robot searches it
+GIVE_UP_S = 60.0  # of searching: then the map is written on from where odometry says
 INFORMATION_SHARE = 0.3  # of the data's curvature that is independent from frame to frame
 DRIFT_SHARE = 1.0  # of the pose's error that goes into newly mapped structure
 LOCK_CELLS, LOCK_RAD = 0.05, 3e-4  # what the lattice itself leaves, 1 sigma
@@ -68,7 +71,9 @@ class ShuntingSlam:
         self._relative: Float = np.zeros((3, 3))
         self._drift: Float = np.zeros((3, 3))
         self._usual: deque[float] = deque(maxlen=50)
+        self._supports: deque[float] = deque(maxlen=50)
         self._doubts = 0
+        self._recovery: Recovery | None = None
         self._stamps: list[int] = []
         self._poses: list[Float] = []
 
@@ -82,8 +87,11 @@ class ShuntingSlam:
             )
         prediction = predict(self._T_map_robot, self._before, frame.odometry)
         observations = self._observe(frame, prediction.twist)
-        match = self._match(observations, prediction)
-        state = self._integrate(observations, match, prediction.elapsed)
+        if self._recovery is None:
+            match = self._match(observations, prediction)
+            state = self._integrate(observations, match, prediction.elapsed)
+        else:
+            match, state = self._recover(self._recovery, observations, prediction)
         self._believe(match, prediction)
         return self._report(frame, match, state)
 
@@ -133,14 +141,16 @@ class ShuntingSlam:
     def _usual_match(self) -> float:
         return float(np.median(self._usual)) if self._usual else 1.0
 
+    def _usual_support(self) -> float:
+        return float(np.median(self._supports)) if self._supports else 1.0
+
     def _integrate(self, observations: Observations, match: Match, elapsed: float) -> str:
         """Let the network see the frame, unless the map in view contradicts it; the state."""
         stamp(self.network, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
         step = min(elapsed, LONGEST_LOOK_S)
-        usual = self._usual_match()
         doubtful = False
-        if match.matched < self.config.freeze_below * usual:
+        if match.matched < self.config.freeze_below * self._usual_match():
             confirmed, contradicted, _ = self.network.integrate(
                 observations.view, T_map_laser, step, write=False
             )
@@ -148,11 +158,45 @@ class ShuntingSlam:
         self._doubts = self._doubts + 1 if doubtful else 0
         if doubtful and self._doubts <= PATIENCE:
             self.network.release()
+            self.network.prune()
+            # Only a map that usually explains what is seen can tell where the robot is.
+            if self._doubts >= LOST_AFTER and self._usual_support() >= WORTH_SEARCHING:
+                self._recovery = Recovery(self.network, self._matcher)
             return "lost" if self._doubts > LOST_AFTER else "frozen"
+        confirmed, contradicted, _ = self.network.integrate(
+            observations.view, T_map_laser, step, write=True
+        )
         if not doubtful:
             self._usual.append(match.matched)
-        self.network.integrate(observations.view, T_map_laser, step, write=True)
+            if confirmed + contradicted > 0.0:
+                support = match.matched * confirmed / (confirmed + contradicted)
+                self._supports.append(support)
         return "lost" if doubtful else "tracking"
+
+    def _recover(
+        self, recovery: Recovery, observations: Observations, prediction: Prediction
+    ) -> tuple[Match, str]:
+        """Dead reckoning, until one hypothesis alone explains what is seen."""
+        predicted = prediction.T_map_robot
+        precision = inverted(prediction.covariance)
+        here = self._matcher.climb(self.network, observations, predicted, predicted, precision)
+        match = recovery.step(observations, prediction, here, self._usual_support())
+        self.network.prune()
+        if match is not None:
+            self._recovery, self._doubts = None, 0
+            self._relative = COARSE.copy()
+            return match, "relocated"
+        if recovery.elapsed_s > GIVE_UP_S:  # elsewhere: go on from here, as on the first frame
+            self._recovery = None
+            self._doubts = PATIENCE
+        blind = Match(
+            T_map_robot=predicted,
+            information=np.zeros((3, 3)),
+            matched=here.matched,
+            score=here.score,
+            tau=0.0,
+        )
+        return blind, "lost"
 
     def _believe(self, match: Match, prediction: Prediction) -> None:
         """Fuse odometry and match into the covariance of the pose in the map of the start."""
@@ -179,7 +223,7 @@ class ShuntingSlam:
             stamp_ns=frame.stamp_ns,
             T_map_robot=match.T_map_robot,
             covariance=self._covariance,
-            converged=state == "tracking",
+            converged=state in ("tracking", "relocated"),
             diagnostics={
                 "state": state,
                 "matched": match.matched,

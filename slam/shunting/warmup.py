@@ -16,6 +16,7 @@ from numba.core import event
 
 from slam.frames import LaserSpec, Scan
 from slam.shunting.config import ShuntingConfig
+from slam.shunting.everywhere import places
 from slam.shunting.impressions import from_scan, stamp
 from slam.shunting.matching import Matcher
 from slam.shunting.network import Network
@@ -65,4 +66,5 @@ def _run_all() -> None:
     window = SearchWindow(reach_m=0.4, turn_rad=0.1)
     matcher.climb(network, seen, start, origin, np.linalg.inv(covariance))
     matcher.search(network, seen, origin, np.linalg.inv(covariance), window)
+    places(network, 0.3, seen.points_robot, 2)
     network.window(0.0, 0.0, 1.0, 1.0)
