@@ -82,6 +82,7 @@ class Simulation:
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
     drive      limits of the robot
     start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted
+    chairs     their physics: "planar" or "free" (``sim.castors``)
     labels     whether frames carry truth per beam
     options    passed on to the scene, e.g. ``n_chairs=10``
 
@@ -99,12 +100,15 @@ class Simulation:
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
         start: Sequence[float] | None = None,
+        chairs: str = "planar",
         labels: bool = False,
         **options: Any,
     ) -> None:
         drive = drive or DriveConfig()
         rates = Dynamism.of(dynamism, moving_share)
-        self.world = World(scene, seed=seed, dynamism=rates, drive=drive, start=start, **options)
+        self.world = World(
+            scene, seed=seed, dynamism=rates, drive=drive, start=start, chairs=chairs, **options
+        )
         self.odometry_preset = odometry
         seeds = self.world.seeds
         self.laser = Lms221(self.world.model, laser, seeds.generator("lidar"))

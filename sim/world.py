@@ -19,6 +19,7 @@ from scenes import build
 from scenes.scene import Scene
 from sim import state
 from sim.bodies import Bodies
+from sim.castors import checked_level, stand_on_castors
 from sim.chairs import pushers
 from sim.contacts import Contact, RobotContacts
 from sim.doors import Doors
@@ -44,6 +45,7 @@ class World:
     moving_share  in [0, 1]: keep that share of chairs and loads on the move, instead of shoves
     drive     limits of the robot
     start     (x m, y m, heading rad) of the robot instead of the scene's
+    chairs    "planar", or "free": standing on castors, able to rock (``sim.castors``)
     options   passed on to the scene when it is given by name, e.g. ``n_chairs=10``
 
     Raises ``InvalidValueError`` for a dynamism outside [0, 1], ``UnknownNameError`` for a scene.
@@ -58,11 +60,13 @@ class World:
         moving_share: float | None = None,
         drive: DriveConfig | None = None,
         start: Sequence[float] | None = None,
+        chairs: str = "planar",
         **options: Any,
     ) -> None:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
         self.rates = Dynamism.of(dynamism, moving_share)
-        self.scene = self._built(scene, options)
+        built = self._built(scene, options)
+        self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
         self.model: mujoco.MjModel = self.scene.compile()
         self.data = mujoco.MjData(self.model)
         self.mover_names = tuple(m.name for m in self.scene.movers)

@@ -289,3 +289,43 @@ def test_packed_arrays_keep_every_bit():
     assert {k: (v.dtype, v.shape, v.tobytes()) for k, v in back.items()} == {
         k: (v.dtype, v.shape, v.tobytes()) for k, v in arrays.items()
     }
+
+
+# -- chairs on castors ----------------------------------------------------------------------
+
+
+def test_a_chair_on_castors_rolls_as_far_as_a_planar_one_and_sleeps():
+    ways = {}
+    for level in ("planar", "free"):
+        world = World("arena", seed=1, dynamism=0, n_chairs=1, chairs=level)
+        joint = world.model.joint("chair0/x")
+        qpos, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
+        world.data.qpos[qpos : qpos + 2] = 0.0, 1.5
+        run(world, 0.5)
+        world.data.qvel[dof] = 0.9
+        run(world, 4.0)
+        ways[level] = float(world.data.qpos[qpos])
+        assert world.data.qvel[dof] == 0.0
+    assert ways["free"] == pytest.approx(ways["planar"], rel=0.3)
+
+
+def test_chairs_on_castors_stay_upright_and_move_as_often():
+    world = run(World("arena", seed=2, dynamism=1.0, n_people=2, chairs="free"), 12.0)
+    tilt = [
+        world.data.qpos[int(world.model.joint(f"{m.name}/{axis}").qposadr[0])]
+        for m in world.scene.movers
+        if m.kind.startswith("chair")
+        for axis in ("pitch", "roll")
+    ]
+    assert np.abs(tilt).max() < 0.2
+    assert not any(w.number for w in world.data.warning)
+    moved = world.mover_poses() - World("arena", seed=2, dynamism=1.0, n_people=2).mover_poses()
+    assert (np.hypot(moved[:, 0], moved[:, 1]) > 0.2).sum() >= 2
+    fresh = World("arena", seed=2, dynamism=1.0, n_people=2, chairs="free")
+    fresh.load_state(world.save_state())
+    assert digest(run(fresh, 1.0)) == digest(run(world, 1.0))
+
+
+def test_an_unknown_level_is_refused():
+    with pytest.raises(InvalidValueError, match="chairs must be one of planar, free"):
+        World("arena", chairs="rocking")
