@@ -255,7 +255,7 @@ class Raycaster:
         self.hits = (np.zeros(shape), np.zeros(shape, dtype=np.int64), np.zeros(shape))
         self.fan = np.zeros((m, 7))
         self._work = (
-            self.fan, np.zeros((plan.ends.size - 1, 3)), np.zeros(shape[:2]),
+            self.fan, np.zeros((plan.ends.size - 1, 4)), np.zeros(shape[:2]),
             np.zeros((n, 4)), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64),
         )  # fmt: skip
 

@@ -34,8 +34,9 @@ ANGLE, ANGLE_COS, ANGLE_SIN, PLAN_SLOT, PLAN_PART = range(5)
 # Columns of a laid fan, in the world: azimuth, origin, direction, slot and part as above.
 AZIMUTH, ORIGIN_X, ORIGIN_Y, COS, SIN, SLOT, PART = range(7)
 
-# Of each fan: first azimuth, step, and the largest departure of an azimuth from even steps.
-START, STEP, UNEVEN = range(3)
+# Of each fan: first and last azimuth, beams per radian, and the largest departure of an azimuth
+# from even steps.
+START, STOP, PER_RADIAN, UNEVEN = range(4)
 
 # Columns of the bounds: a disc that contains the geom during the whole scan, its height above
 # the ground and half its vertical extent; and whether the geom moved.
@@ -65,7 +66,7 @@ def _turned_by(delta: float) -> tuple[float, float]:
 
 @njit
 def lay_fans(plan: Float, lasers: Float, ends: Int, fan: Float, frames: Float) -> None:
-    """Fill the (m, 7) table of the beams in the world, and the (fans, 3) frames of the fans.
+    """Fill the (m, 7) table of the beams in the world, and the (fans, 4) frames of the fans.
 
     plan    (m, 5) of the beams; fan k has the rows ``ends[k]`` to ``ends[k + 1]``
     lasers  (slots, 3); the laser moves evenly between slots
@@ -97,15 +98,15 @@ def lay_fans(plan: Float, lasers: Float, ends: Int, fan: Float, frames: Float) -
             step = (fan[last, AZIMUTH] - start) / (last - first)
         for i in range(first, last + 1):
             uneven = max(uneven, abs(fan[i, AZIMUTH] - start - (i - first) * step))
-        frames[f, START], frames[f, STEP], frames[f, UNEVEN] = start, step, uneven + SLACK
+        frames[f, START], frames[f, STOP] = start, start + step * (last - first)
+        frames[f, PER_RADIAN], frames[f, UNEVEN] = 1.0 / step, uneven + SLACK
 
 
 @njit
-def ray_wedge(frames: Float, ends: Int, slope: float) -> tuple[float, float]:
+def ray_wedge(frames: Float, slope: float) -> tuple[float, float]:
     """(lowest, highest) azimuth of any ray of the scan."""
     low, high = math.inf, -math.inf
     for f in range(frames.shape[0]):
         widen = frames[f, UNEVEN] + slope
-        stop = frames[f, START] + frames[f, STEP] * (ends[f + 1] - ends[f] - 1)
-        low, high = min(low, frames[f, START] - widen), max(high, stop + widen)
+        low, high = min(low, frames[f, START] - widen), max(high, frames[f, STOP] + widen)
     return low, high

@@ -30,6 +30,7 @@ from sim.fan import (
     ORIGIN_X,
     ORIGIN_Y,
     PART,
+    PER_RADIAN,
     SIN,
     SIZE_X,
     SIZE_Y,
@@ -37,7 +38,6 @@ from sim.fan import (
     SLACK,
     SLOT,
     START,
-    STEP,
     UNEVEN,
     Float,
     Int,
@@ -120,7 +120,7 @@ def _cast_windows(
         bottom = bounds[j, DISC_Z] - bounds[j, DISC_HALF] - SLACK
         top = bounds[j, DISC_Z] + bounds[j, DISC_HALF] + SLACK
         for f in range(frames.shape[0]):
-            per_step, base = 1.0 / frames[f, STEP], ends[f]
+            per_step, base = frames[f, PER_RADIAN], ends[f]
             lowest = (windows[row, LOW] - frames[f, UNEVEN] - frames[f, START]) * per_step
             highest = (windows[row, HIGH] + frames[f, UNEVEN] - frames[f, START]) * per_step
             margin = slope * per_step
@@ -192,7 +192,7 @@ def sweep(
     beams    (m,) the rows of the outputs they go to
     rays     (k, 6) of a beam
     optics   height of the scan plane m, aperture radius m, half divergence rad
-    work     room for the fans (m, 7), their frames (fans, 3), reach of the beams (layers, m),
+    work     room for the fans (m, 7), their frames (fans, 4), reach of the beams (layers, m),
              windows (3 n, 4), their owners (3 n,) and order (3 n,)
     out      (layers, m, k) each: ranges m, inf for a miss; index of the candidate, -1; |cos| of
              the incidence, NaN
@@ -205,7 +205,7 @@ def sweep(
     farthest[:] = math.inf
     enclose(table, movable, poses, slots, bounds)
     lay_fans(plan, lasers, ends, fan, frames)
-    wedge = ray_wedge(frames, ends, optics[2])
+    wedge = ray_wedge(frames, optics[2])
     found = find_windows(table, poses, bounds, fan, wedge, optics, windows, owners)
     nearest_first(windows, found, order)
     _cast_windows(table, poses, bounds, ends, beams, rays, optics, work, found, out)

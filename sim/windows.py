@@ -143,7 +143,10 @@ def _azimuth(y: float, x: float) -> float:
 
 @njit
 def _half_angle(radius: float, distance: float) -> float:
-    """Half the angle a disc fills from ``distance`` > ``radius``, as exact as ``_azimuth``."""
+    """Half the angle a disc fills from ``distance`` > ``radius``, or a little more."""
+    ratio = radius / distance
+    if ratio < 0.3:
+        return ratio + 0.19 * ratio * ratio * ratio  # above the arc sine, by 4e-4 at most
     return _azimuth(radius, math.sqrt((distance - radius) * (distance + radius)))
 
 
