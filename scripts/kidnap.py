@@ -97,7 +97,9 @@ def kidnapped(mapped: list[Frame], later: list[Frame], start: int, scans: int) -
         )
 
 
-def follow(slam: SlamSystem, frames: list[Frame], T_world_map: Float, seed: int) -> Outcome:
+def follow(
+    slam: SlamSystem, frames: list[Frame], T_world_map: Float, moved_m: float, seed: int
+) -> Outcome:
     """Let a copy of ``slam`` live through it."""
     slam = copy.deepcopy(slam)
     detected: int | None = None
@@ -117,9 +119,8 @@ def follow(slam: SlamSystem, frames: list[Frame], T_world_map: Float, seed: int)
             wrong = wrong or not right
             if recovered_s is None:
                 recovered_s, error_m = (frame.stamp_ns - first.stamp_ns) * 1e-9, away
-    moved = math.hypot(*(first.truth - T_world_map)[:2]) if first.truth is not None else 0.0
     return Outcome(
-        seed=seed, moved_m=moved, detected=detected, recovered_s=recovered_s, error_m=error_m,
+        seed=seed, moved_m=moved_m, detected=detected, recovered_s=recovered_s, error_m=error_m,
         right=right, wrong=wrong or detected is None,
     )  # fmt: skip
 
@@ -135,7 +136,12 @@ def kidnap(name: str, seed: int, count: int, seconds: float, dynamism: float) ->
     assert T_world_map is not None
     scans = round(AFTER_S * 1e9 / (mapped[1].stamp_ns - mapped[0].stamp_ns))
     for start in targets(mapped, later, scans, count):
-        yield follow(slam, list(kidnapped(mapped, later, start, scans)), T_world_map, seed)
+        frames = list(kidnapped(mapped, later, start, scans))
+        from_, to = mapped[-1].truth, frames[0].truth
+        assert from_ is not None
+        assert to is not None
+        moved_m = math.hypot(*(to - from_)[:2].tolist())
+        yield follow(slam, frames, T_world_map, moved_m, seed)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -2,6 +2,7 @@
 """SLAM on a shunting short-term memory: a neural map that forgets what moved."""
 
 from slam.shunting.config import ShuntingConfig
+from slam.shunting.occupancy import OccupancySlam
 from slam.shunting.slam import ShuntingSlam
 
-__all__ = ["ShuntingConfig", "ShuntingSlam"]
+__all__ = ["OccupancySlam", "ShuntingConfig", "ShuntingSlam"]

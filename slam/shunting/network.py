@@ -119,7 +119,7 @@ def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
 
 
 @njit
-def _seen_empty(view: View, dx: float, dy: float) -> bool:
+def seen_empty(view: View, dx: float, dy: float) -> bool:
     """True where a beam passed by (dx, dy) (m, from the laser, laser axes) without stopping."""
     r = math.sqrt(dx * dx + dy * dy)
     if r >= view.farthest - view.margin:
@@ -136,7 +136,7 @@ def _seen_empty(view: View, dx: float, dy: float) -> bool:
 
 
 @njit
-def _block_is_hidden(view: View, dx: float, dy: float, half: float) -> bool:
+def block_is_hidden(view: View, dx: float, dy: float, half: float) -> bool:
     """True when no neuron within ``half`` m of (dx, dy) can be in view."""
     r = math.sqrt(dx * dx + dy * dy)
     if r - half >= view.farthest:
@@ -182,7 +182,7 @@ def integrate(
             scratch = cells.scratch_of[slot]
             i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
             bx, by = (i0 + 0.5 * SIDE) * cell - ox, (j0 + 0.5 * SIDE) * cell - oy
-            if scratch < 0 and _block_is_hidden(view, c * bx + s * by, c * by - s * bx, half):
+            if scratch < 0 and block_is_hidden(view, c * bx + s * by, c * by - s * bx, half):
                 continue
             alive = False
             for jj in range(SIDE):
@@ -194,7 +194,7 @@ def integrate(
                     if given == 0.0:
                         px = (i0 + ii + 0.5) * cell - ox
                         py = (j0 + jj + 0.5) * cell - oy
-                        if not _seen_empty(view, c * px + s * py, c * py - s * px):
+                        if not seen_empty(view, c * px + s * py, c * py - s * px):
                             alive = True
                             continue
                         contradicted += y
@@ -346,7 +346,8 @@ class Network:
         cells = self.cells
         rows, columns = np.nonzero(cells.directory >= 0)
         slots = cells.directory[rows, columns]
-        silent = ~(cells.x[slots].any(axis=(1, 2)) | cells.y[slots].any(axis=(1, 2)))
+        silent = ~(cells.x[slots] != 0.0).any(axis=(1, 2))
+        silent &= ~(cells.age[slots] != 0.0).any(axis=(1, 2))
         count, unused = int(silent.sum()), int(cells.counts[FREE_COUNT])
         cells.directory[rows[silent], columns[silent]] = -1
         cells.free[unused : unused + count] = slots[silent]

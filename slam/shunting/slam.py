@@ -35,7 +35,8 @@ WIDEST = SearchWindow(reach_m=0.6, turn_rad=0.5)
 GOOD_SHARE = 0.85  # of the usual matched fraction: below it the neighbourhood is searched
 VAGUE_CELLS = 1.0  # a prior wider than this may leave the basin of the right optimum
 LOST_AFTER, PATIENCE = 3, 30  # doubtful frames in a row: then lost; then the map is written anew
-WORTH_SEARCHING = 0.6  # usual support by the map from which on a lost robot searches it
+WORTH_SEARCHING = 0.6  # usual support by the map from which on a lost robot searches it,
+GROWN_S, GROWN_SCANS = 10.0, 10  # once the map has been tracked on this long
 GIVE_UP_S = 60.0  # of searching: then the map is written on from where odometry says
 INFORMATION_SHARE = 0.3  # of the data's curvature that is independent from frame to frame
 DRIFT_SHARE = 1.0  # of the pose's error that goes into newly mapped structure
@@ -63,7 +64,7 @@ class ShuntingSlam:
 
     def reset(self) -> None:
         """Forget everything; the next frame is the origin of the map."""
-        self.network = Network(self.config)
+        self.network = self._new_network()
         self._matcher = Matcher(self.config)
         self._before: Odometry | None = None
         self._T_map_robot: Float = np.zeros(3)
@@ -74,8 +75,12 @@ class ShuntingSlam:
         self._supports: deque[float] = deque(maxlen=50)
         self._doubts = 0
         self._recovery: Recovery | None = None
+        self._tracked_s, self._tracked = 0.0, 0
         self._stamps: list[int] = []
         self._poses: list[Float] = []
+
+    def _new_network(self) -> Network:
+        return Network(self.config)
 
     def update(self, frame: Frame) -> Estimate:
         """Predict, look, match, integrate."""
@@ -144,6 +149,10 @@ class ShuntingSlam:
     def _usual_support(self) -> float:
         return float(np.median(self._supports)) if self._supports else 1.0
 
+    def _is_worth_searching(self) -> bool:
+        grown = self._tracked_s >= GROWN_S and self._tracked >= GROWN_SCANS
+        return grown and self._usual_support() >= WORTH_SEARCHING
+
     def _integrate(self, observations: Observations, match: Match, elapsed: float) -> str:
         """Let the network see the frame, unless the map in view contradicts it; the state."""
         stamp(self.network, observations, match.T_map_robot)
@@ -159,8 +168,8 @@ class ShuntingSlam:
         if doubtful and self._doubts <= PATIENCE:
             self.network.release()
             self.network.prune()
-            # Only a map that usually explains what is seen can tell where the robot is.
-            if self._doubts >= LOST_AFTER and self._usual_support() >= WORTH_SEARCHING:
+            # Only a map that for long explained what is seen can tell where the robot is.
+            if self._doubts >= LOST_AFTER and self._is_worth_searching():
                 self._recovery = Recovery(self.network, self._matcher)
             return "lost" if self._doubts > LOST_AFTER else "frozen"
         confirmed, contradicted, _ = self.network.integrate(
@@ -168,6 +177,7 @@ class ShuntingSlam:
         )
         if not doubtful:
             self._usual.append(match.matched)
+            self._tracked_s, self._tracked = self._tracked_s + elapsed, self._tracked + 1
             if confirmed + contradicted > 0.0:
                 support = match.matched * confirmed / (confirmed + contradicted)
                 self._supports.append(support)
@@ -189,6 +199,7 @@ class ShuntingSlam:
         if recovery.elapsed_s > GIVE_UP_S:  # elsewhere: go on from here, as on the first frame
             self._recovery = None
             self._doubts = PATIENCE
+            self._tracked_s, self._tracked = 0.0, 0
         blind = Match(
             T_map_robot=predicted,
             information=np.zeros((3, 3)),

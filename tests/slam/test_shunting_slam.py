@@ -310,3 +310,15 @@ def test_no_frame_waits_for_the_compiler() -> None:
         event.unregister(COMPILING, listener)
     assert searched
     assert compiled == []
+
+
+def test_the_ordinary_grid_drives_too_and_remembers_what_is_free() -> None:
+    stream = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(181), seed=8)[:60]
+    system = slam.create("occupancy", cell_m=0.05)
+    assert rms(errors(system, stream)[:, :2]) < 0.05
+    raster = system.map()
+    assert raster is not None
+    column = round((1.0 - raster.T_map_origin[0]) / raster.resolution_m)
+    row = round(-raster.T_map_origin[1] / raster.resolution_m)
+    assert raster.values[row, column] < 0.1  # 1 m ahead of the start
+    assert np.nanmax(raster.values) > 0.9
