@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
 import sys
-from types import FrameType
 
 import typer
 from rich.logging import RichHandler
 
+from scripts import interrupt
 from scripts.bench import bench
 from scripts.console import console, fail, note
 from scripts.demo import demo
@@ -51,21 +50,9 @@ def options(
     )
 
 
-class _InterruptedBySignal(BaseException):
-    """Ctrl-C or a kill: unwinds everything, so that what is half-written is removed on the way.
-
-    Not KeyboardInterrupt, which the command line library swallows without a word.
-    """
-
-
-def _interrupt(_signal: int, _frame: FrameType | None) -> None:
-    raise _InterruptedBySignal
-
-
 def main() -> None:
     """Entry point: every failure we foresee is one clear line and a non-zero exit status."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+    interrupt.install()
     sys.path.append(os.getcwd())  # so that module:Class finds what lies in the user's folder
     warning = gl.sanitise_environment()  # before anything imports mujoco
     if warning:
@@ -75,7 +62,7 @@ def main() -> None:
     except MobiliaError as error:
         fail(str(error))
         sys.exit(1)
-    except _InterruptedBySignal:
+    except interrupt.InterruptedBySignal:
         fail("interrupted: nothing half-written is left behind")
         sys.exit(130)
     except BrokenPipeError:

@@ -13,7 +13,7 @@ from typing import Any
 
 import imageio.v2 as imageio
 
-from scripts import figures, score
+from scripts import figures, interrupt, score
 from scripts.console import console, progress
 from scripts.film import Film, film, require_ffmpeg
 from scripts.output import machine, whole_folder, write_recipe
@@ -100,6 +100,7 @@ def _replay(stream: Stream, replay: Replay, show: Show, reel: Film | None, strid
         warming = "compiling inner loops (the first run only)"
         task = bar.add_task(warming, total=stream.length, unit="")
         for count, frame in enumerate(replay.run(stream), 1):
+            interrupt.check()
             show.note(frame)
             if reel is not None and (count % stride == 0 or count == stream.length):
                 reel.add(show.paint(frame))

@@ -34,6 +34,10 @@ class LogFormatError(MobiliaError):
         super().__init__(f"{where}: {message}")
 
 
+class SlamFailedError(MobiliaError):
+    """A SLAM raised, or returned something that is no estimate; says which one and at which scan."""
+
+
 class OutputError(MobiliaError, OSError):
     """An output file or folder cannot be written."""
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from slam.errors import SlamFailedError
 from slam.frames import Float, Frame
 from slam.system import Estimate, SlamSystem
 from slam.trajectory import Trajectory
@@ -46,11 +47,25 @@ class Track:
         """(n, 3, 3) online covariances in the map frame."""
         return np.array([e.covariance for e in self.estimates]).reshape(-1, 3, 3)
 
+    def _where(self) -> str:
+        return f"SLAM '{self.name}', scan {len(self.estimates)},"
+
     def take(self, frame: Frame) -> Estimate:
-        """One update, timed."""
+        """One update, timed; raises ``SlamFailedError`` when the system does."""
         start = time.process_time()
-        estimate = self.system.update(frame)
+        try:
+            estimate: object = self.system.update(frame)
+        except Exception as error:
+            what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+            raise SlamFailedError(f"{self._where()} raised {what}") from error
         self.durations_s.append(time.process_time() - start)
+        if not isinstance(estimate, Estimate):
+            raise SlamFailedError(f"{self._where()} returned no Estimate but {estimate!r:.80}")
+        if estimate.stamp_ns != frame.stamp_ns:
+            raise SlamFailedError(
+                f"{self._where()} returned an estimate for {estimate.stamp_ns} ns instead of "
+                f"{frame.stamp_ns} ns"
+            )
         self.estimates.append(estimate)
         return estimate
 

@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+import re
 
+import numpy as np
+import pytest
+
+from slam.errors import SlamFailedError
 from slam.frames import Frame, Odometry
 from slam.replay import Replay
 from slam.system import Estimate, Raster, create
@@ -70,3 +74,41 @@ def test_online_and_final_poses_are_kept_apart():
     np.testing.assert_array_equal(final.poses, 1.0)
     np.testing.assert_array_equal(replay.tracks["peeping"].online().poses, 0.0)
     assert len(replay.tracks["odometry"].durations_s) == 5
+
+
+class Guest(Peeping):
+    """Misbehaves at its third frame in a way given at birth."""
+
+    def __init__(self, answer) -> None:
+        super().__init__()
+        self.answer = answer
+
+    def update(self, frame: Frame) -> Estimate:
+        return self.answer(frame) if len(self.stamps) == 2 else super().update(frame)
+
+
+def fail(_frame: Frame) -> Estimate:
+    raise ZeroDivisionError("too clever")
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (fail, "raised ZeroDivisionError: too clever"),
+        (lambda frame: None, "returned no Estimate but None"),
+        (
+            lambda frame: Estimate(
+                stamp_ns=frame.stamp_ns, T_map_robot=[0, float("nan"), 0], covariance=np.eye(3)
+            ),
+            "T_map_robot must be finite",
+        ),
+        (
+            lambda frame: Estimate(stamp_ns=7, T_map_robot=np.zeros(3), covariance=np.eye(3)),
+            "for 7 ns instead of 2 ns",
+        ),
+    ],
+)
+def test_a_failing_guest_is_named_with_the_scan(answer, says):
+    replay = Replay.of({"guest": Guest(answer)})
+    with pytest.raises(SlamFailedError, match=rf"SLAM 'guest', scan 2, .*{re.escape(says)}"):
+        list(replay.run(frames()))
