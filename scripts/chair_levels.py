@@ -45,7 +45,8 @@ def run(level: str, seed: int, seconds: float) -> tuple[float, float]:
         start = frame.truth if start is None else start
         errors.append(se2.between(start, frame.truth)[:2] - estimate.T_map_robot[:2])
     mapped = slam.map()
-    assert start is not None and mapped is not None
+    assert start is not None
+    assert mapped is not None
     rms = float(np.sqrt((np.array(errors) ** 2).sum(axis=1).mean()))
     return rms, map_error(mapped, start, simulation.world.scene.static_map)
 

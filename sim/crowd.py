@@ -2,9 +2,8 @@
 """How people decide, all of them in one compiled call per control tick.
 
 Each person stays somewhere, walks to the next goal down its flow field (``sim.flow``), gives way at
-doors, and picks the velocity that is nearest to the wanted one among those that hit nothing soon:
-reciprocal velocity obstacles by sampling (van den Berg, Lin, Manocha, ICRA 2008), with walls read
-from the clearance field. A person whose way is blocked by a chair loses patience and pushes it.
+doors, and picks a velocity that hits nothing soon (``sim.avoidance``). A person whose way is
+blocked by a chair loses patience and pushes it; now and then one sits down (``sim.sitting``).
 """
 
 from __future__ import annotations
@@ -13,8 +12,9 @@ import math
 
 import numpy as np
 
+from sim.avoidance import ACCEL, choose, spare_robot
 from sim.draws import between, uniform, waiting
-from sim.flow import FAR, Field, clearance_at, time_at, way_at
+from sim.flow import FAR, Field, time_at, way_at
 from sim.manners import (
     ANGLE,
     ARRIVE,
@@ -22,7 +22,6 @@ from sim.manners import (
     BEST_AT,
     BLOCKED,
     BLOCKED_S,
-    BODY,
     CX,
     CY,
     GOAL,
@@ -30,23 +29,26 @@ from sim.manners import (
     LEAF,
     LOOK,
     LOOK_UNTIL,
+    LUCK,
     OPEN,
-    PERSON,
-    ROBOT,
+    SEAT,
+    SIT,
     SPEED,
+    STANDS,
     STAY_UNTIL,
+    TO_SEAT,
     TURN,
     VX,
     VY,
     WALKED_S,
     WALKING,
+    WALKS,
     WIDTH,
     Addresses,
     Crowd,
     Doors,
     Float,
     Int,
-    R,
     U,
     V,
     X,
@@ -55,103 +57,15 @@ from sim.manners import (
     hold_off,
     wait_beside,
 )
+from sim.sitting import may_sit, on_chair, sit, to_chair
 from slam._jit import njit
 
-HORIZON = 2.5  # s, collisions later than this do not matter
 STILL = 0.1  # m/s, a walker slower than this is blocked
-ACCEL = 3.0  # m/s2
-SPARE = 0.05  # m that people leave between themselves and the robot
-
-
-@njit
-def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> float:
-    """s until a point moving at (wx, wy) is within ``reach`` of (dx, dy); HORIZON if later."""
-    c = dx * dx + dy * dy - reach * reach
-    b = dx * wx + dy * wy
-    if c <= 0.0:
-        return 0.0 if b > 0.0 else HORIZON
-    a = wx * wx + wy * wy
-    root = b * b - a * c
-    if b <= 0.0 or root <= 0.0:
-        return HORIZON
-    return min(c / (b + math.sqrt(root)), HORIZON)
-
-
-@njit
-def danger(i: int, vx: float, vy: float, near: Int, discs: Float, fade: float) -> float:
-    """Cost of what person ``i`` would run into at velocity (vx, vy)."""
-    x, y, r, ux, uy = discs[i, X], discs[i, Y], discs[i, R], discs[i, U], discs[i, V]
-    cost = 0.0
-    for k in range(len(near)):
-        other = discs[near[k]]
-        weight = 1.0 if other[KIND] == PERSON or other[KIND] == ROBOT else fade
-        if weight <= 0.0:
-            continue
-        dx, dy, reach = other[X] - x, other[Y] - y, r + other[R] + 0.06
-        if other[KIND] == PERSON:  # each takes half of the evasion
-            wx, wy = 2.0 * vx - ux - other[U], 2.0 * vy - uy - other[V]
-        else:
-            wx, wy = vx - other[U], vy - other[V]
-        gap2 = dx * dx + dy * dy
-        if gap2 < reach * reach:
-            closing = (dx * vx + dy * vy) / math.sqrt(max(gap2, 1e-6))
-            cost += weight * 4.0 * max(closing, 0.0)
-        else:
-            when = impact_time(dx, dy, wx, wy, reach)
-            cost += weight * (1.0 / (when + 0.1) - 1.0 / (HORIZON + 0.1))
-    return cost
-
-
-@njit
-def choose(
-    i: int,
-    wanted: tuple[float, float],
-    near: Int,
-    fade: float,
-    field: Field,
-    crowd: Crowd,
-) -> tuple[float, float]:
-    """The best of 35 velocities for person ``i`` who would like to walk at ``wanted``."""
-    discs, state = crowd.discs, crowd.state
-    wx, wy = wanted
-    x, y = discs[i, X], discs[i, Y]
-    heading = math.atan2(wy, wx)
-    here = min(clearance_at(field, x, y), BODY)
-    wish = math.sqrt(wx * wx + wy * wy)
-    pace = max(wish, 0.5)
-    hurry = min(1.5 * state[i, BLOCKED], 3.0) if wish > 0.3 else 0.0
-    best, best_x, best_y = math.inf, 0.0, 0.0
-    for k in range(35):
-        if k == 0:
-            vx, vy = wx, wy
-        elif k == 1:
-            vx, vy = 0.0, 0.0
-        elif k == 2:
-            vx, vy = state[i, VX], state[i, VY]
-        else:
-            angle = heading + (k - 3) // 2 * (math.pi / 8.0)
-            speed = pace if k % 2 == 0 else 0.5 * pace
-            vx, vy = speed * math.cos(angle), speed * math.sin(angle)
-        speed = math.sqrt(vx * vx + vy * vy)
-        cost = math.sqrt((vx - wx) ** 2 + (vy - wy) ** 2)
-        cost += 0.15 * math.sqrt((vx - state[i, VX]) ** 2 + (vy - state[i, VY]) ** 2)
-        cost += 0.06 * max(0.0, wx * vy - wy * vx)  # people keep right
-        if speed < 0.9 * pace:  # who has been held up steps aside rather than stand
-            cost += hurry * (1.0 - speed / pace)
-        for step in range(1, 3):
-            c = clearance_at(field, x + 0.3 * step * vx, y + 0.3 * step * vy)
-            if c < here:
-                cost += 25.0 * (here - c)
-        if cost < best:
-            cost += danger(i, vx, vy, near, discs, fade)
-        if cost < best:
-            best, best_x, best_y = cost, vx, vy
-    return best_x, best_y
 
 
 @njit
 def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> None:
-    """Draw the next goal of person ``i`` (always four draws) and set off."""
+    """Draw the next goal of person ``i`` (always five draws) and set off."""
     discs, state, task, draws = crowd.discs, crowd.state, crowd.task, crowd.draws
     n_goals = field.times.shape[0]
     offset = 1 + int(uniform(draws, i) * (n_goals - 1))
@@ -159,13 +73,14 @@ def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> No
     state[i, ARRIVE] = between(draws, i, 0.25, 0.8)
     state[i, STAY_UNTIL] = waiting(draws, i, 1.0 / stay)  # a duration until the arrival
     state[i, LOOK] = between(draws, i, -math.pi, math.pi)
+    state[i, LUCK] = uniform(draws, i)
     for _ in range(n_goals):
         goal = (task[i, GOAL] + offset) % n_goals
         if time_at(field, goal, discs[i, X], discs[i, Y]) < FAR:
             break
         offset += 1
     task[i, GOAL] = goal
-    task[i, WALKING] = 1
+    task[i, WALKING] = WALKS
     state[i, BLOCKED] = 0.0
     state[i, BEST], state[i, BEST_AT] = FAR, time
 
@@ -174,7 +89,9 @@ def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> No
 def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[float, float]:
     """The velocity person ``i`` would like to have, other movers aside."""
     discs, state, task = crowd.discs, crowd.state, crowd.task
-    if task[i, WALKING] == 0:
+    if task[i, WALKING] == TO_SEAT:
+        return to_chair(i, crowd)
+    if task[i, WALKING] != WALKS:
         return 0.0, 0.0
     goal = task[i, GOAL]
     wx, wy = way_at(field, goal, discs[i, X], discs[i, Y])
@@ -209,12 +126,18 @@ def plan(
     """Stay, set off, arrive or give up; keeps the account of time walked and blocked."""
     discs, state, task, draws = crowd.discs, crowd.state, crowd.task, crowd.draws
     look = len(task) + i  # its generator
-    if task[i, WALKING] == 0:
+    sit(i, time, tick, crowd)
+    if task[i, WALKING] == TO_SEAT:
+        return
+    if task[i, WALKING] != WALKS:
         if time >= state[i, STAY_UNTIL]:
             new_trip(i, time, stay, field, crowd)
-        elif time >= state[i, LOOK_UNTIL]:
+        elif task[i, WALKING] == STANDS and time >= state[i, LOOK_UNTIL]:
             state[i, LOOK] = between(draws, look, -math.pi, math.pi)
             state[i, LOOK_UNTIL] = time + between(draws, look, 4.0, 15.0)
+        return
+    if state[i, SIT] > 0.0:  # getting up
+        state[i, BEST_AT] = time
         return
     left = time_at(field, task[i, GOAL], discs[i, X], discs[i, Y])
     state[i, WALKED_S] += tick
@@ -226,45 +149,26 @@ def plan(
     if left < state[i, BEST] - 0.3:
         state[i, BEST], state[i, BEST_AT] = left, time
     if arrived(i, left, doors, discs, state):
-        task[i, WALKING] = 0
+        task[i, WALKING] = STANDS
         state[i, STAY_UNTIL] += time
         state[i, LOOK_UNTIL] = time + between(draws, look, 4.0, 15.0)
+        if task[i, SEAT] < 0:
+            may_sit(i, field, crowd)
     elif state[i, BLOCKED] > 5.0 or time - state[i, BEST_AT] > 12.0:
         new_trip(i, time, stay, field, crowd)
 
 
 @njit
-def spare_robot(
-    i: int, wanted: tuple[float, float], near: Int, discs: Float
-) -> tuple[float, float]:
-    """The velocity less what would run into the robot: nobody pushes it, not even when held up."""
-    vx, vy = wanted
-    for k in range(len(near)):
-        robot = discs[near[k]]
-        if robot[KIND] != ROBOT:
-            continue
-        dx, dy = robot[X] - discs[i, X], robot[Y] - discs[i, Y]
-        far = math.sqrt(max(dx * dx + dy * dy, 1e-6))
-        ux, uy = dx / far, dy / far
-        gap = far - discs[i, R] - robot[R] - SPARE
-        # A person stops at ACCEL; what the robot itself comes nearer is stepped back from.
-        approach = vx * ux + vy * uy - (robot[U] * ux + robot[V] * uy)
-        allowed = math.sqrt(2.0 * ACCEL * gap) if gap > 0.0 else 4.0 * gap
-        excess = min(max(approach - allowed, 0.0), 2.0)
-        vx, vy = vx - excess * ux, vy - excess * uy
-    return vx, vy
-
-
-@njit
-def nearby(i: int, discs: Float, sides: Int, near: Int) -> int:
+def nearby(i: int, seat: int, discs: Float, sides: Int, near: Int) -> int:
     """Rows of ``discs`` within 3 m of person ``i``, into ``near``; returns how many.
 
-    The leaf of a door one wants to pass is no obstacle: ``at_door`` deals with it.
+    The leaf of a door one wants to pass is no obstacle: ``at_door`` deals with it; nor is the chair
+    in row ``seat`` that one sits down on.
     """
     count = 0
     for k in range(discs.shape[0]):
         dx, dy = discs[k, X] - discs[i, X], discs[k, Y] - discs[i, Y]
-        if k == i or dx * dx + dy * dy > 9.0 or count == len(near):
+        if k in (i, seat) or dx * dx + dy * dy > 9.0 or count == len(near):
             continue
         if discs[k, KIND] >= LEAF and sides[i, int(discs[k, KIND] - LEAF)] != 0:
             continue
@@ -312,9 +216,11 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
     state[i, VX] += share * dvx
     state[i, VY] += share * dvy
     heading = yaw
-    if state[i, VX] ** 2 + state[i, VY] ** 2 > 0.04:
+    if on_chair(i, crowd):
+        heading = state[i, LOOK]
+    elif state[i, VX] ** 2 + state[i, VY] ** 2 > 0.04:
         heading = math.atan2(state[i, VY], state[i, VX])
-    elif crowd.task[i, WALKING] == 0:
+    elif crowd.task[i, WALKING] == STANDS:
         heading = state[i, LOOK]
     out[0], out[1] = state[i, VX], state[i, VY]
     out[2] = min(max(4.0 * wrap(heading - yaw), -3.0), 3.0)
@@ -327,7 +233,7 @@ def patience(i: int, time: float, crowd: Crowd) -> float:
     It wears out after 0.8 to 1.6 s of standing, or 2 to 4 s of walking about without progress.
     """
     stood = (crowd.state[i, BLOCKED] - 0.8) / 0.8
-    lost = (time - crowd.state[i, BEST_AT] - 2.0) / 2.0 if crowd.task[i, WALKING] != 0 else 0.0
+    lost = (time - crowd.state[i, BEST_AT] - 2.0) / 2.0 if crowd.task[i, WALKING] == WALKS else 0.0
     return float(min(max(1.0 - max(stood, lost), 0.0), 1.0))
 
 
@@ -358,8 +264,12 @@ def decide(
         plan(i, time, tick, stay, ways.doors, field, crowd)
     give_turns(ways, field, crowd)
     for i in range(len(servos)):
+        if on_chair(i, crowd):
+            vx, vy = to_chair(i, crowd)
+            steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])
+            continue
         wanted = want(i, pace, ways, field, crowd)
-        count = nearby(i, crowd.discs, ways.sides, near)
+        count = nearby(i, crowd.task[i, SEAT], crowd.discs, ways.sides, near)
         fade = patience(i, time, crowd)
         chosen = choose(i, wanted, near[:count], fade, field, crowd)
         vx, vy = spare_robot(i, chosen, near[:count], crowd.discs)

@@ -28,6 +28,7 @@ THIGH, SHANK, HIP, HALF_WIDTH = 0.455, 0.435, 0.90, 0.09
 SOLE = 0.010  # m, height of the lower end of a standing shank
 REACH = 0.885  # m, a leg never quite straightens
 LIFT = 0.10  # m
+SEAT_HEIGHT, KNEES = 0.52, 0.42  # m, hips of who sits, and how far ahead of them the feet are
 SWING_SHARE = 0.80  # of a step; the rest is double support
 
 
@@ -111,7 +112,11 @@ def quaternion(yaw: float, ax: float, ay: float, az: float, out: Float) -> None:
 
 @njit
 def pose_leg(
-    hip: tuple[float, float], yaw: float, foot: tuple[float, float, float], pos: Float, quat: Float
+    hip: tuple[float, float, float],
+    yaw: float,
+    foot: tuple[float, float, float],
+    pos: Float,
+    quat: Float,
 ) -> None:
     """Thigh and shank from hip and foot: rows 0 and 1 of ``pos`` (2, 3) and ``quat`` (2, 4).
 
@@ -123,7 +128,7 @@ def pose_leg(
     far = math.sqrt(fx * fx + fy * fy)
     if far > 0.6:  # out of reach after a hard shove: the foot is dragged
         fx, fy, far = fx * 0.6 / far, fy * 0.6 / far, 0.6
-    top = min(HIP, foot[2] + math.sqrt(REACH * REACH - far * far))
+    top = min(hip[2], foot[2] + math.sqrt(REACH * REACH - far * far))
     fz = foot[2] - top
     length = math.sqrt(far * far + fz * fz)
     ux, uy, uz = fx / length, fy / length, fz / length
@@ -156,6 +161,7 @@ def walk(
     addresses: Int,
     limbs: Int,
     feet: Float,
+    sitting: Float,
     mocap: tuple[Float, Float],
 ) -> None:
     """Advance all feet by ``dt`` s and pose all limbs.
@@ -164,6 +170,7 @@ def walk(
     addresses  (n, 2) first qpos and dof of each torso
     limbs      (n, 4) mocap rows of thigh_l, shank_l, thigh_r, shank_r
     feet       (n, 8) state
+    sitting    (n,) 0 stands to 1 sits: the hips sink, the feet go forward
     mocap      positions and quaternions, written
     """
     qpos, qvel = physics
@@ -171,13 +178,20 @@ def walk(
     for i in range(feet.shape[0]):
         q, v = addresses[i]
         pose = (qpos[q], qpos[q + 1], qpos[q + 2])
-        p = feet[i]
+        p, sit = feet[i], sitting[i]
+        forward, height = KNEES * sit, HIP - (HIP - SEAT_HEIGHT) * sit
         if dt > 0.0:
-            step_feet(p, pose, qvel[v], qvel[v + 1], dt)
+            over = (
+                pose[0] + forward * math.cos(pose[2]),
+                pose[1] + forward * math.sin(pose[2]),
+                pose[2],
+            )
+            step_feet(p, over, qvel[v], qvel[v + 1], dt)
         for foot in range(2):
             lift = LIFT * math.sin(math.pi * p[PHASE] ** 0.7) if p[SWING] == foot else 0.0
             place = (p[FEET + 2 * foot], p[FEET + 2 * foot + 1], SOLE + lift)
-            pose_leg(rest_foot(pose[0], pose[1], pose[2], foot), pose[2], place, pos, quat)
+            x, y = rest_foot(pose[0], pose[1], pose[2], foot)
+            pose_leg((x, y, height), pose[2], place, pos, quat)
             for link in range(2):
                 row = limbs[i, 2 * foot + link]
                 mocap[0][row] = pos[link]

@@ -18,14 +18,17 @@ from slam._jit import njit
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-# columns of the people's state, (n, 12) float64
+# columns of the people's state, (n, 14) float64
 SPEED, STAY_UNTIL, BLOCKED, ARRIVE, LOOK, LOOK_UNTIL = 0, 1, 2, 3, 4, 5
 VX, VY, BEST, BEST_AT, WALKED_S, BLOCKED_S = 6, 7, 8, 9, 10, 11
-# columns of their task, (n, 2) int64
-WALKING, GOAL = 0, 1
+SIT, LUCK = 12, 13  # 0 stands to 1 sits; drawn for each trip: whether to look for a chair
+N_STATE = 14
+# columns of their task, (n, 3) int64: what one does, where to, disc row of one's chair (-1 none)
+WALKING, GOAL, SEAT = 0, 1, 2
+STANDS, WALKS, TO_SEAT, SEATED = 0, 1, 2, 3
 # columns of a disc: everything with a round hull, people first, then (k, 6)
 X, Y, R, U, V, KIND = 0, 1, 2, 3, 4, 5
-PERSON, CHAIR, ROBOT, LEAF = 0.0, 1.0, 2.0, 10.0  # LEAF + d: part of the leaf of door d
+PERSON, THING, ROBOT, CHAIR, LEAF = 0.0, 1.0, 2.0, 3.0, 10.0  # LEAF + d: of the leaf of door d
 # columns of a door, (m, 8) float64: centre, normal to the side it swings to, along the leaf when
 # closed, width, angle; and of its passage, (m, 3): whose turn (side +1, -1, 0 none), asked for,
 # someone in it
@@ -39,7 +42,8 @@ OPEN = 1.15  # rad, a leaf this far open lets a person through
 class Crowd(NamedTuple):
     """The people and what is around them, in the columns named above.
 
-    discs (k, 6) people first; yaws (n,) rad; state (n, 12); task (n, 2); draws (2 n,) generators:
+    discs (k, 6) people first; yaws rad of people and things; state (n, 14);
+    task (n, 3); draws (2 n,) generators:
     of each one's trips, then of each one's looking about while standing, which happens as often as
     time allows. So the trips of a person are the same, however long each takes.
     """
@@ -77,7 +81,7 @@ def wants_through(i: int, door: Float, field: Field, crowd: Crowd) -> int:
     discs, task = crowd.discs, crowd.task
     dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
     distance = math.sqrt(dx * dx + dy * dy)
-    if task[i, WALKING] == 0 or distance > 2.2:
+    if task[i, WALKING] != WALKS or distance > 2.2:
         return 0
     goal = task[i, GOAL]
     normal = dx * door[NX] + dy * door[NY]

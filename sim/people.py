@@ -22,6 +22,7 @@ from sim.manners import Addresses, Crowd
 Float = NDArray[np.float64]
 _LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
 _LOOKS = np.uint64(0xD1342543DE82EF95)  # sets the second generator of each person apart
+_PLANAR_BIT = 2  # contype of chairs, bins and the robot
 _FIRST_STAY_MAX = 8.0  # s, so that a short run of a calm room sees someone set off
 
 
@@ -45,6 +46,35 @@ def floor_field(scene: Scene, leaves: Float) -> Field:
     boxes = np.ascontiguousarray(scene.obstacles, dtype=np.float64)
     bounds = (xmin, ymin, xmax, ymax)
     return _flow(bounds, boxes.tobytes(), leaves.tobytes(), goals.tobytes()).field
+
+
+class Hulls:
+    """The parts of the model that depend on who sits: derived from the state, so never saved."""
+
+    def __init__(self, model: mujoco.MjModel, names: Sequence[str]) -> None:
+        self._model = model
+        self._geoms = [int(model.geom(f"{name}/hull").id) for name in names]
+        looks = (mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, f"{p}/look") for p in names)
+        self._looks = list(looks)
+        self._bits = [
+            (int(model.geom_contype[g]), int(model.geom_conaffinity[g])) for g in self._geoms
+        ]
+        self._z = [float(model.body_pos[b, 2]) for b in self._looks]
+        self.changed = False
+
+    def follow(self, crowd: Crowd) -> None:
+        """One who has a chair, and no longer walks to it, meets walls, people and doors only."""
+        self.changed = False
+        for i, geom in enumerate(self._geoms):
+            task = crowd.task[i]
+            off = task[manners.SEAT] >= 0 and task[manners.WALKING] != manners.TO_SEAT
+            contype, affinity = self._bits[i]
+            self._model.geom_contype[geom] = 0 if off else contype
+            self._model.geom_conaffinity[geom] = affinity & ~_PLANAR_BIT if off else affinity
+            self.changed = self.changed or bool(off)
+            if self._looks[i] >= 0:
+                sunk = (gait.HIP - gait.SEAT_HEIGHT) * float(crowd.state[i, manners.SIT])
+                self._model.body_pos[self._looks[i], 2] = self._z[i] - sunk
 
 
 class People:
@@ -79,16 +109,19 @@ class People:
         self._at = _addresses(bodies, doors, self.names)
         self.crowd = Crowd(
             discs=_discs(bodies, doors, self.names),
-            yaws=np.zeros(n),
-            state=np.zeros((n, 12)),
-            task=np.zeros((n, 2), dtype=np.int64),
+            yaws=np.zeros(len(self._at.discs)),
+            state=np.zeros((n, manners.N_STATE)),
+            task=np.zeros((n, 3), dtype=np.int64),
             draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
         )
+        self.crowd.task[:, manners.SEAT] = -1
+        self._hulls = Hulls(model, self.names)
         self._torsos = np.ascontiguousarray(self._at.discs[:n])
         self.field = floor_field(scene, doors.boxes_at_rest()) if self.alive else None
 
     def start(self, data: mujoco.MjData) -> None:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand."""
+        self._sitting = self.crowd.state[:, manners.SIT]
         # Views into data, kept because making one costs as much as the kernels that read it.
         self._physics = (data.qpos, data.qvel)
         self._mocap = (data.mocap_pos, data.mocap_quat)
@@ -117,11 +150,19 @@ class People:
                 self.crowd,
                 self._servos,
             )
+            if self.crowd.task[:, manners.SEAT].max() >= 0 or self._hulls.changed:
+                self.dress()
+
+    def dress(self) -> None:
+        """Let the model follow who sits: hulls that meet no chair, torsos lowered."""
+        self._hulls.follow(self.crowd)
 
     def pose_limbs(self, dt: float) -> None:
         """Let the feet step for ``dt`` s and write the mocap poses of all limbs."""
         if self.alive or (self.names and dt == 0.0):
-            gait.walk(dt, self._physics, self._torsos, self._limbs, self.feet, self._mocap)
+            gait.walk(
+                dt, self._physics, self._torsos, self._limbs, self.feet, self._sitting, self._mocap
+            )
 
     def stand(self, data: mujoco.MjData) -> None:
         """Put everybody's feet under them where ``data`` says they are."""
@@ -170,9 +211,13 @@ def _addresses(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Addresses
 def _discs(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Float:
     planar = _planar(bodies, people)
     discs = np.zeros((len(planar) + 3 * len(doors.names), 6))
-    for row, name in enumerate(planar):
-        kind = manners.PERSON if row < len(people) else manners.CHAIR
-        discs[row, manners.KIND] = manners.ROBOT if name == "robot" else kind
+    discs[: len(planar), manners.KIND] = manners.THING
+    discs[: len(people), manners.KIND] = manners.PERSON
+    for mover in bodies.scene.movers:
+        if mover.kind == "robot":
+            discs[planar.index(mover.name), manners.KIND] = manners.ROBOT
+        elif mover.kind.startswith("chair"):
+            discs[planar.index(mover.name), manners.KIND] = manners.CHAIR
     discs[: len(planar), manners.R] = bodies.radii(planar)
     for row in range(len(planar), len(discs)):
         discs[row, manners.KIND] = manners.LEAF + (row - len(planar)) // 3

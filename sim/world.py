@@ -234,5 +234,6 @@ class World:
         for name, array in live.items():
             array[...] = arrays[name]
         self.step_count = int(steps)
+        self.people.dress()
         self.bodies.restore_physics(self.data, arrays)
         self._contacts.take()

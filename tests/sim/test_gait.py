@@ -18,7 +18,7 @@ class Walker:
 
     def __init__(self, yaw: float) -> None:
         self.qpos, self.qvel = np.array([1.0, -2.0, yaw]), np.zeros(3)
-        self.feet = np.zeros((1, gait.N_COLUMNS))
+        self.feet, self.sitting = np.zeros((1, gait.N_COLUMNS)), np.zeros(1)
         self.at, self.limbs = np.zeros((1, 2), dtype=np.int64), np.arange(4).reshape(1, 4)
         self.pos, self.quat = np.zeros((4, 3)), np.zeros((4, 4))
         gait.stand(self.qpos, self.at, self.feet)
@@ -27,7 +27,8 @@ class Walker:
         yaw = self.qpos[2]
         self.qvel[:] = speed * math.cos(yaw), speed * math.sin(yaw), turn
         self.qpos += DT * self.qvel
-        gait.walk(DT, (self.qpos, self.qvel), self.at, self.limbs, self.feet, (self.pos, self.quat))
+        physics, mocap = (self.qpos, self.qvel), (self.pos, self.quat)
+        gait.walk(DT, physics, self.at, self.limbs, self.feet, self.sitting, mocap)
 
     def ends(self, length: float, rows: tuple[int, int]) -> np.ndarray:
         """Lower ends of the thighs (rows 0, 2) or shanks (rows 1, 3)."""
@@ -92,3 +93,18 @@ def test_who_stops_ends_with_the_feet_under_the_hips():
         place = walker.feet[0, 2 * foot : 2 * foot + 2]
         assert math.hypot(place[0] - rest[0], place[1] - rest[1]) < 0.08
     assert walker.feet[0, gait.SWING] == -1.0
+
+
+def test_who_sits_has_hips_on_the_seat_and_feet_on_the_floor_in_front():
+    walker = Walker(0.4)
+    for k in range(900):
+        walker.sitting[0] = min(k / 240, 1.0)
+        walker.step(0.0)
+    hips = walker.pos[[0, 2], 2]
+    np.testing.assert_allclose(hips, gait.SEAT_HEIGHT, atol=1e-9)
+    soles = walker.ends(gait.SHANK, (1, 3))
+    np.testing.assert_allclose(soles[:, 2], gait.SOLE, atol=1e-6)
+    ahead = (soles[:, :2] - walker.qpos[:2]) @ [math.cos(0.4), math.sin(0.4)]
+    np.testing.assert_allclose(ahead, gait.KNEES, atol=0.08)
+    knees = walker.pos[[1, 3], 2]
+    assert (knees > 0.38).all()

@@ -192,3 +192,37 @@ def test_nobody_runs_into_a_robot_that_stands_in_a_doorway():
         nearest = min(nearest, float(np.linalg.norm(people - door, axis=1).min()))
     assert nearest < 1.0  # somebody did come
     assert all(c.kind != "person" or c.force < 150.0 for c in world.take_contacts())
+
+
+def test_somebody_sits_down_gets_up_and_leaves():
+    """From walking to the chair to being apart from it again; a saved sitter goes on the same."""
+    world = World("office", seed=1, dynamism=0.6)
+    crowd, seen, saved = world.people.crowd, set(), None
+    sitter, later = -1, 0
+    for k in range(60 * SUBSTEPS_PER_S):
+        world.substep()
+        if sitter < 0 and (crowd.state[:, manners.SIT] == 1.0).any():
+            sitter = int(np.argmax(crowd.state[:, manners.SIT]))
+            chair = crowd.discs[crowd.task[sitter, manners.SEAT]].copy()
+            hull = int(world.model.geom(f"{world.people.names[sitter]}/hull").id)
+            assert np.hypot(*(crowd.discs[sitter, :2] - chair[:2])) < 0.15
+            assert chair[manners.KIND] == manners.CHAIR
+            assert world.model.geom_contype[hull] == 0
+            thigh = world.model.body(f"{world.people.names[sitter]}/thigh_l").id
+            assert world.data.xpos[thigh, 2] == pytest.approx(gait.SEAT_HEIGHT, abs=0.02)
+            saved, later = world.save_state(), k + 600
+        if k == later and saved is not None:
+            expected, fresh = world.data.qpos.copy(), World("office", seed=1, dynamism=0.6)
+            fresh.load_state(saved)
+            for _ in range(600):
+                fresh.substep()
+            np.testing.assert_array_equal(fresh.data.qpos, expected)
+        if sitter >= 0:
+            seen.add(int(crowd.task[sitter, manners.WALKING]))
+            if crowd.task[sitter, manners.SEAT] < 0:
+                break
+    assert {manners.SEATED, manners.WALKS} <= seen
+    world.people.dress()
+    assert world.model.geom_contype[hull] == 4
+    assert crowd.state[sitter, manners.SIT] == 0.0
+    assert not any(w.number for w in world.data.warning)
