@@ -52,7 +52,6 @@ def options(
 
 def main() -> None:
     """Entry point: every failure we foresee is one clear line and a non-zero exit status."""
-    interrupt.install()
     sys.path.append(os.getcwd())  # so that module:Class finds what lies in the user's folder
     warning = gl.sanitise_environment()  # before anything imports mujoco
     if warning:
@@ -67,7 +66,3 @@ def main() -> None:
         sys.exit(130)
     except BrokenPipeError:
         sys.exit(1)
-
-
-if __name__ == "__main__":
-    main()

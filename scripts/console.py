@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import (
     BarColumn,
     Progress,
@@ -19,12 +20,14 @@ _errors = Console(stderr=True)
 
 def fail(message: str) -> None:
     """One line on stderr."""
-    _errors.print(f"[bold red]mobilia:[/bold red] {message}", highlight=False, soft_wrap=True)
+    _errors.print(
+        f"[bold red]mobilia:[/bold red] {escape(message)}", highlight=False, soft_wrap=True
+    )
 
 
 def note(message: str) -> None:
     """One line that the user should see but that is no error."""
-    console.print(f"[yellow]note:[/yellow] {message}", highlight=False, soft_wrap=True)
+    console.print(f"[yellow]note:[/yellow] {escape(message)}", highlight=False, soft_wrap=True)
 
 
 def progress() -> Progress:

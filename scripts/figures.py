@@ -87,7 +87,9 @@ def errors(path: Path, tracks: Mapping[str, Trajectory], truth: Trajectory) -> N
         stamps, offset, turned = error_series(track, truth)
         color = color_of(name, list(tracks))
         axes[0].plot(stamps, offset, color=color, lw=1.3, label=name)
-        axes[1].plot(stamps, np.degrees(np.abs(turned)), color=color, lw=1.3, label=name)
+        axes[1].plot(
+            stamps, np.maximum(np.degrees(np.abs(turned)), 0.01), color=color, lw=1.3, label=name
+        )
     axes[0].set(ylabel="position error in m", yscale="log", title="Error over time, unaligned")
     axes[1].set(ylabel="heading error in degrees", yscale="log", xlabel="time in s")
     axes[0].legend(frameon=False)
@@ -102,7 +104,7 @@ def error_series(track: Trajectory, truth: Trajectory) -> tuple[Float, Float, Fl
     delta = track.poses[mine] - truth.poses[theirs]
     offset = np.sqrt(delta[:, 0] ** 2 + delta[:, 1] ** 2)
     seconds = (stamps - truth.stamps_ns[0]) / NS_PER_S
-    return seconds, np.maximum(offset, 1e-5), se2.wrap_array(delta[:, 2])
+    return seconds, np.maximum(offset, 1e-3), se2.wrap_array(delta[:, 2])
 
 
 def in_first_frame(truth: Trajectory) -> Trajectory:

@@ -62,7 +62,8 @@ class Film:
         try:
             self.writer.append_data(picture)
         except OSError as error:
-            raise OutputError(f"cannot write {self.path}: ffmpeg stopped ({error})") from error
+            why = str(error).strip().partition("\n")[0]
+            raise OutputError(f"cannot write {self.path}: ffmpeg stopped ({why})") from error
         self.frames += 1
         self.last = picture
 

@@ -9,7 +9,7 @@ import platform
 import shutil
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ def whole_folder(path: Path, *, overwrite: bool) -> Iterator[Path]:
     path = path.absolute()
     _refuse(path, overwrite)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    made = [parent for parent in path.parents if not parent.exists()]
     try:
         temporary.mkdir(parents=True)
     except OSError as error:
@@ -44,6 +45,9 @@ def whole_folder(path: Path, *, overwrite: bool) -> Iterator[Path]:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+        for parent in made:  # innermost first; one that holds something stays
+            with suppress(OSError):
+                parent.rmdir()
 
 
 def _refuse(path: Path, overwrite: bool) -> None:

@@ -134,11 +134,14 @@ def error_chart(
 ) -> Picture:
     """Position errors (m, log scale) over time; ``series``: name -> (seconds, errors, colour)."""
     width, height = size
+    duration_s = max(duration_s, 1.0)
     picture: Picture = np.full((height, width, 3), draw.PAPER, np.uint8)
     left, right, top, bottom = 58, 26, 26, 24
-    low, high = -3.0, 1.0  # 1 mm .. 10 m
+    worst = max((max(errors) for _, errors, _ in series.values() if errors), default=1.0)
+    low, high = -3.0, (2.0 if worst > 12.0 else 1.0)  # 1 mm .. 10 or 100 m
+    names = ("1 mm", "1 cm", "10 cm", "1 m", "10 m", "100 m")[: round(high - low) + 1]
     box_w, box_h = width - left - right, height - top - bottom
-    for decade, label in zip(range(-3, 2), ("1 mm", "1 cm", "10 cm", "1 m", "10 m"), strict=True):
+    for decade, label in enumerate(names, -3):
         y = top + round(box_h * (high - decade) / (high - low))
         cv2.line(picture, (left, y), (width - right, y), draw.GRID, 1)
         draw.text(picture, label, (8, y - 7), 11, draw.MUTED)

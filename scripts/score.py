@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from rich.markup import escape
 from rich.table import Table
 
 from scripts.console import console
@@ -102,11 +103,11 @@ def print_table(outcome: Mapping[str, Any], title: str) -> None:
         columns.append((name, block, ""))
         if "ate_unaligned_m_final" in block:
             columns.append((f"{name}, final", block, "_final"))
-    table = Table(title=title, title_justify="left", caption=_caption(outcome))
-    table.add_column("online, in the frame of the first pose")
+    table = Table(title=escape(title), title_justify="left", caption=_caption(outcome))
+    table.add_column("online; unaligned: in the frame of the first pose")
     table.add_column("unit")
     for heading, _, _ in columns:
-        table.add_column(heading, justify="right")
+        table.add_column(escape(heading), justify="right")
     for label, key, unit, form in _ROWS:
         cells = [
             form.format(block[key + suffix]) if key + suffix in block else ""

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import imageio.v2 as imageio
+from rich.markup import escape
 
 from scripts import figures, interrupt, score
 from scripts.console import console, progress
@@ -105,7 +106,7 @@ def _replay(stream: Stream, replay: Replay, show: Show, reel: Film | None, strid
             if reel is not None and (count % stride == 0 or count == stream.length):
                 reel.add(show.paint(frame))
             if count == 1:
-                bar.update(task, description=show.title)
+                bar.update(task, description=escape(show.title))
             if count % 25 == 0 or count == stream.length:
                 bar.update(task, completed=count, unit=f"{count}/{stream.length} scans")
 
@@ -114,7 +115,7 @@ def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any])
     online = {name: track.online() for name, track in replay.tracks.items()}
     world_truth = replay.truth()
     truth = figures.in_first_frame(world_truth) if world_truth is not None else None
-    raster = replay.tracks[show.primary].system.map()
+    raster = replay.tracks[show.primary].map()
     truth_name = show.truth_name
     for name, track in online.items():
         write_tum(folder / f"trajectory_{file_name(name)}.tum", track)
@@ -136,10 +137,18 @@ def file_name(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
 
 
+_WORTH_OPENING = ("film.mp4", "map.png", "trajectories.png", "errors.png")
+
+
 def _tell(outputs: Outputs) -> None:
-    first, then = ("film.mp4", "map.png") if outputs.film else ("map.png", "trajectories.png")
+    """What to open first, of what is really there."""
+    there = [name for name in _WORTH_OPENING if (outputs.folder / name).exists()]
+    others = ["results.json has every number", "trajectory_*.tum is for evo"]
+    if (outputs.folder / "map.yaml").exists():
+        others.append("map.yaml for map_server")
+    first = escape(str(outputs.folder / there[0]))
     console.print(
-        f"Open [bold]{outputs.folder / first}[/bold] first, then {then} and errors.png beside it; "
-        "results.json has every number, trajectory_*.tum is for evo, map.yaml for map_server.",
+        f"Open [bold]{first}[/bold] first, then {', '.join(there[1:])} beside it; "
+        f"{', '.join(others)}.",
         soft_wrap=True,
     )

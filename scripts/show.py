@@ -123,7 +123,7 @@ class Show:
         first_truth = self._first[1] if self._first else None
         if self.bounds is not None and first_truth is not None:
             T_view_map = first_truth  # the map drawn the way the world lies; display only
-        raster = self._track().system.map()
+        raster = self._track().map()
         view = View.fitting(self._bounds(T_view_map), pane.width, pane.height)
         if raster is None:
             picture: Picture = np.full((pane.height, pane.width, 3), draw.PAPER, np.uint8)

@@ -35,7 +35,7 @@ class LogFormatError(MobiliaError):
 
 
 class SlamFailedError(MobiliaError):
-    """A SLAM raised, or returned something that is no estimate; says which one and at which scan."""
+    """A SLAM raised, or returned what it must not; says which one and at which scan."""
 
 
 class OutputError(MobiliaError, OSError):

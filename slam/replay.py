@@ -11,7 +11,7 @@ import numpy as np
 
 from slam.errors import SlamFailedError
 from slam.frames import Float, Frame
-from slam.system import Estimate, SlamSystem
+from slam.system import Estimate, Raster, SlamSystem, told
 from slam.trajectory import Trajectory
 
 
@@ -37,11 +37,47 @@ class Track:
 
     def final(self) -> Trajectory | None:
         """The poses as the system sees them now, None where they are the online ones."""
-        final, online = self.system.trajectory(), self.online()
+        online = self.online()
+        try:
+            final: object = self.system.trajectory()
+        except Exception as error:
+            raise SlamFailedError(
+                f"SLAM '{self.name}': trajectory() raised {told(error)}"
+            ) from error
+        if not isinstance(final, Trajectory):
+            raise SlamFailedError(
+                f"SLAM '{self.name}': trajectory() returned no Trajectory but {final!r:.80}"
+            )
+        if not np.isin(online.stamps_ns, final.stamps_ns).all():
+            raise SlamFailedError(
+                f"SLAM '{self.name}': trajectory() has {len(final)} poses and leaves out frames; "
+                f"it must have one for each of the {len(online)} updates"
+            )
         same = np.array_equal(final.stamps_ns, online.stamps_ns) and np.array_equal(
             final.poses, online.poses
         )
         return None if same else final
+
+    def map(self) -> Raster | None:
+        """The map now; raises ``SlamFailedError`` for what no map can be."""
+        try:
+            raster: object = self.system.map()
+        except Exception as error:
+            raise SlamFailedError(f"SLAM '{self.name}': map() raised {told(error)}") from error
+        if raster is None:
+            return None
+        if not isinstance(raster, Raster):
+            raise SlamFailedError(
+                f"SLAM '{self.name}': map() returned no Raster or None but {raster!r:.80}"
+            )
+        if raster.values.size == 0:
+            return None
+        if raster.T_map_origin[2] != 0.0:
+            raise SlamFailedError(
+                f"SLAM '{self.name}': map() must lie along the map's axes, its origin is turned by "
+                f"{raster.T_map_origin[2]} rad"
+            )
+        return raster
 
     def covariances(self) -> Float:
         """(n, 3, 3) online covariances in the map frame."""
@@ -56,8 +92,7 @@ class Track:
         try:
             estimate: object = self.system.update(frame)
         except Exception as error:
-            what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-            raise SlamFailedError(f"{self._where()} raised {what}") from error
+            raise SlamFailedError(f"{self._where()} raised {told(error)}") from error
         self.durations_s.append(time.process_time() - start)
         if not isinstance(estimate, Estimate):
             raise SlamFailedError(f"{self._where()} returned no Estimate but {estimate!r:.80}")

@@ -15,14 +15,16 @@ from __future__ import annotations
 import difflib
 import importlib
 import inspect
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.errors import InvalidValueError, UnknownNameError
+from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError
 from slam.frames import Float, Frame, covariance, frozen, pose
 from slam.trajectory import Trajectory
 
@@ -136,11 +138,25 @@ def create(name: str, **config: Any) -> SlamSystem:
             f"no SLAM is called '{name}'.{hint} Known: {', '.join(names())}, or module:Class."
         )
     _check_options(name, factory, config)
-    system = factory(**config)
+    try:
+        system = factory(**config)
+    except MobiliaError:
+        raise
+    except Exception as error:
+        raise SlamFailedError(f"SLAM '{name}' cannot be made: {told(error)}") from error
     if not isinstance(system, SlamSystem):
         missing = [m for m in ("reset", "update", "map", "trajectory") if not hasattr(system, m)]
         raise UnknownNameError(f"'{name}' is no SlamSystem: it has no {', '.join(missing)}()")
     return system
+
+
+def told(error: BaseException) -> str:
+    """An exception of somebody else's code in one line: type, words, and where it was raised."""
+    words = str(error).strip().partition("\n")[0]
+    what = f"{type(error).__name__}: {words}" if words else type(error).__name__
+    trace = traceback.extract_tb(error.__traceback__)
+    where = f" ({Path(trace[-1].filename).name}:{trace[-1].lineno})" if trace else ""
+    return what + where
 
 
 def _check_options(name: str, factory: Factory, config: Mapping[str, Any]) -> None:
@@ -162,6 +178,8 @@ def _load(entry: str) -> Factory:
         module = importlib.import_module(module_name)
     except (ImportError, TypeError, ValueError) as error:  # the last two: no proper module name
         raise UnknownNameError(f"'{entry}': cannot import '{module_name}' ({error})") from error
+    except Exception as error:
+        raise SlamFailedError(f"'{entry}': '{module_name}' fails: {told(error)}") from error
     try:
         factory: Factory = getattr(module, attribute)
     except AttributeError:

@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 REPO = Path(__file__).resolve().parents[1]
 README = (REPO / "README.md").read_text()
 BLOCKS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
@@ -46,7 +48,7 @@ def test_a_slam_of_twenty_lines_plugs_in(tmp_path: Path):
     assert len(code) <= 20
     (tmp_path / "my_slam.py").write_text(block)
     printed = run(
-        "-m", "scripts.cli", "run", "my_slam:MySlam", "--scene", "arena", "--seconds", "1",
+        "-m", "scripts", "run", "my_slam:MySlam", "--scene", "arena", "--seconds", "1",
         "--no-film", "--out", "out", cwd=tmp_path,
     )  # fmt: skip
     assert "my_slam:MySlam" in printed
@@ -69,3 +71,10 @@ def test_every_dependency_is_explained():
     section = README.split("## Why each dependency")[1].split("##")[0]
     for requirement in project["dependencies"]:
         assert f"`{re.split('[<>=]', requirement)[0]}`" in section
+
+
+@pytest.mark.parametrize("page", [REPO / "README.md", *sorted((REPO / "docs").glob("*.md"))])
+def test_every_link_leads_somewhere(page: Path):
+    for target in re.findall(r"\]\(([^)#]+)", page.read_text()):
+        if "://" not in target:
+            assert (page.parent / target).exists(), f"{page.name} links to {target}"

@@ -23,7 +23,7 @@ REPO = Path(__file__).resolve().parents[2]
 
 def mobilia(*words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "scripts.cli", *map(str, words)],
+        [sys.executable, "-m", "scripts", *map(str, words)],
         capture_output=True,
         text=True,
         check=False,
@@ -178,8 +178,8 @@ def test_an_unusable_mujoco_gl_is_one_line_and_no_obstacle(tmp_path: Path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_leaves_nothing(tmp_path: Path, number):
     process = subprocess.Popen(
-        [sys.executable, "-m", "scripts.cli", "demo", "--seconds", "600", "--no-film",
-         "--out", str(tmp_path / "out")],
+        [sys.executable, "-m", "scripts", "demo", "--seconds", "600", "--no-film",
+         "--out", str(tmp_path / "made" / "out")],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=REPO,
     )  # fmt: skip
     deadline = time.monotonic() + 120.0
@@ -191,3 +191,42 @@ def test_an_interrupted_run_leaves_nothing(tmp_path: Path, number):
     assert process.returncode == 130
     assert "interrupted" in errors
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["nope [/x].log", "[red]gone[/red].log"])
+def test_brackets_in_a_name_are_just_brackets(tmp_path: Path, name: str):
+    done = mobilia("run", "shunting", "--log", tmp_path / name, "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert f"{name}: no such file" in done.stderr
+
+
+def test_a_log_of_one_scan_is_a_run(tmp_path: Path):
+    beams = " ".join(["2.5"] * 180)
+    log = tmp_path / "one.log"
+    log.write_text(f"FLASER 180 {beams} 0 0 0 0 0 0 1.0 host 1.0\n")
+    done = mobilia("run", "shunting", "--log", log, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "film.mp4" in done.stdout
+
+
+def test_only_files_that_exist_are_recommended(tmp_path: Path):
+    out = tmp_path / "a [b] c" / "out"
+    done = mobilia(
+        "run", "odometry", "--scene", "arena", "--seconds", "0.2", "--no-film", "--out", out
+    )
+    assert done.returncode == 0, done.stderr
+    assert "trajectories.png first" in done.stdout.replace("\n", " ")
+    assert "map.yaml" not in done.stdout
+    assert (out / "results.json").exists()
+
+
+def test_a_failing_slam_is_one_line(tmp_path: Path):
+    (tmp_path / "bad_slam.py").write_text("1/0\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "scripts", "run", "bad_slam:Slam", "--scene", "arena"],
+        capture_output=True, text=True, check=False, timeout=60, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(REPO), "COLUMNS": "200"},
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "ZeroDivisionError: division by zero (bad_slam.py:1)" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The console command's first breath: Ctrl-C is understood before the slow imports begin."""
+
+from __future__ import annotations
+
+import sys
+
+from scripts import interrupt
+
+
+def main() -> None:
+    """Install the signal handlers, then load and run the command line."""
+    interrupt.install()
+    try:
+        from scripts.cli import main as command_line
+    except interrupt.InterruptedBySignal:
+        print("mobilia: interrupted", file=sys.stderr)
+        sys.exit(130)
+    command_line()
+
+
+if __name__ == "__main__":
+    main()
