@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.crowd import HORIZON, impact_time
+from sim.avoidance import HORIZON, impact_time
 from sim.flow import FAR, FlowMap, box_clearance, clearance_at, time_at, way_at
 
 BOUNDS = (0.0, 0.0, 10.0, 6.0)
