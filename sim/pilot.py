@@ -16,12 +16,15 @@ from sim.drive import Driver, TourConfig, tour
 from sim.navgrid import NavGrid
 from sim.world import World
 from slam import se2
+from slam._jit import njit
 from slam.frames import NS_PER_S, Float
 
 SIGHT_M = 4.0  # discs further away than this do not matter within the driver's horizon
 AJAR = 0.6  # rad; a leaf less open than this is let open for the robot, a wider one is gone round
 REPLAN_S = 1.0  # at most this often
-DECIDE_S = 0.05  # a command holds for at least this long
+DECIDE_S = 0.07  # a command holds for at least this long
+LEAF_DISCS = 6  # a leaf is avoided as this many discs along it
+BODY, DOOR, ROBOT = 0, 1, 2
 LEAF_M = 0.05  # half thickness with which a leaf is planned around
 
 
@@ -39,7 +42,8 @@ class Pilot:
         config = config or TourConfig()
         self._doors = np.array([m.kind == "door" for m in scene.movers], dtype=np.bool_)
         self._closed = world.bodies.hinges([m.name for m in scene.movers if m.kind == "door"])[:, 2]
-        self._others = np.array([m.kind not in ("door", "robot") for m in scene.movers])
+        number = {"door": DOOR, "robot": ROBOT}
+        self._kinds = np.array([number.get(m.kind, BODY) for m in scene.movers], dtype=np.int64)
         self._radii = np.array([m.radius for m in scene.movers], dtype=np.float64)
         self._planned_ns = world.time_ns
         self._leaves_planned = self._open_leaves(world.mover_poses())
@@ -49,8 +53,7 @@ class Pilot:
         self.driver.use(self._walls.with_boxes(self._leaves_planned))
         self._ghosts = np.zeros((0, 5))
         if keep_out is not None:
-            still = np.zeros((len(keep_out), 2))
-            self._ghosts = np.concatenate([self._bodies(keep_out, still), self._leaves(keep_out)])
+            self._ghosts = self._discs(keep_out, keep_out, np.zeros(3), math.inf, 1.0)
         self._last: Float | None = None
         self._here: Float | None = None
         self._since, self._decided = 0.0, (0.0, 0.0)
@@ -62,18 +65,21 @@ class Pilot:
             return self._decided
         dt, self._since = self._since, 0.0
         poses = self.world.mover_poses()
-        velocities = np.zeros((len(poses), 2))
-        if self._last is not None:
-            velocities = (poses[:, :2] - self._last[:, :2]) / dt
-        self._last = poses
+        before, self._last = self._last, poses
         self._replan(poses)
         here = self.world.robot_pose()
         velocity = self._velocity(here, dt)
-        discs = np.concatenate([self._bodies(poses, velocities), self._leaves(poses), self._ghosts])
-        gap = discs[:, :2] - here[:2]
-        near = gap[:, 0] * gap[:, 0] + gap[:, 1] * gap[:, 1] < SIGHT_M * SIGHT_M
-        self._decided = self.driver.command(here, velocity, discs[near], dt)
+        before = poses if before is None else before
+        discs = self._discs(poses, before, here, SIGHT_M, dt)
+        if len(self._ghosts):
+            gap = self._ghosts[:, :2] - here[:2]
+            near = gap[:, 0] * gap[:, 0] + gap[:, 1] * gap[:, 1] < SIGHT_M * SIGHT_M
+            discs = np.concatenate([discs, self._ghosts[near]])
+        self._decided = self.driver.command(here, velocity, discs, dt)
         return self._decided
+
+    def _discs(self, poses: Float, before: Float, here: Float, sight: float, dt: float) -> Float:
+        return _surroundings(poses, before, self._kinds, self._radii, here, sight, dt)
 
     def _replan(self, poses: Float) -> None:
         """Plan anew when a leaf stands elsewhere by more than about 20 degrees."""
@@ -107,17 +113,36 @@ class Pilot:
         x, y, turned = se2.between(before, here).tolist()
         return math.copysign(math.hypot(x, y), x) / dt, turned / dt
 
-    def _bodies(self, poses: Float, velocities: Float) -> Float:
-        pick = self._others
-        return np.column_stack([poses[pick, :2], self._radii[pick], velocities[pick]])
 
-    def _leaves(self, poses: Float) -> NDArray[np.float64]:
-        """Six discs along each door leaf, taken as standing still."""
-        rows = []
-        for x, y, yaw, width in np.column_stack([poses, self._radii])[self._doors].tolist():
-            for k in range(1, 7):
-                reach = width * k / 6.0
-                rows.append(
-                    (x + reach * math.cos(yaw), y + reach * math.sin(yaw), LEAF_M, 0.0, 0.0)
-                )
-        return np.array(rows, dtype=np.float64).reshape(-1, 5)
+@njit
+def _surroundings(
+    poses: Float,
+    before: Float,
+    kinds: NDArray[np.int64],
+    radii: Float,
+    here: Float,
+    sight: float,
+    dt: float,
+) -> Float:
+    """(k, 5) discs in sight: x, y, radius (m), velocity (m/s) of movers; six along each leaf."""
+    discs = np.empty((len(poses) * LEAF_DISCS, 5))
+    count = 0
+    for k in range(len(poses)):
+        if kinds[k] == ROBOT:
+            continue
+        parts = LEAF_DISCS if kinds[k] == DOOR else 1
+        for part in range(parts):
+            x, y, radius, vx, vy = poses[k, 0], poses[k, 1], radii[k], 0.0, 0.0
+            if kinds[k] == DOOR:
+                reach = radii[k] * (part + 1) / LEAF_DISCS
+                x += reach * math.cos(poses[k, 2])
+                y += reach * math.sin(poses[k, 2])
+                radius = LEAF_M
+            else:
+                vx, vy = (x - before[k, 0]) / dt, (y - before[k, 1]) / dt
+            dx, dy = x - here[0], y - here[1]
+            if dx * dx + dy * dy < sight * sight:
+                discs[count, 0], discs[count, 1], discs[count, 2] = x, y, radius
+                discs[count, 3], discs[count, 4] = vx, vy
+                count += 1
+    return discs[:count]
