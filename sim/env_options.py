@@ -42,7 +42,7 @@ def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> E
                 f"unknown reset option {name!r}{hint} Known: {', '.join(sorted(OPTIONS))}"
             )
     merged = dict(settings)
-    merged |= dict(given.get("scene") or {})
+    merged |= _scene_options(given, settings)
     merged |= {name: given[name] for name in ("n_chairs", "n_people") if name in given}
     merged["dynamism"] = _rates(merged["dynamism"], given)
     merged["laser"] = _laser(merged["laser"], given)
@@ -51,9 +51,28 @@ def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> E
     goal = numbers("goal", given["goal"], 2, "(x, y) in m") if "goal" in given else None
     return Episode(
         settings=merged,
-        seeds=dict(given.get("seeds") or {}),
+        seeds=mapping("seeds", given.get("seeds")),
         goal=None if goal is None else (goal[0], goal[1]),
     )
+
+
+def mapping(name: str, value: Any) -> dict[str, Any]:
+    """A plain dictionary with words as keys; empty for None."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise InvalidValueError(f"option {name} must be a dictionary, got {value!r}")
+    return dict(value)
+
+
+def _scene_options(given: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of the scene's recipe; the simulation's own settings are not among them."""
+    options = mapping("scene", given.get("scene"))
+    for name in sorted(set(options) & {"seed", "drive", *settings}):
+        raise InvalidValueError(
+            f"option scene takes options of the scene's recipe, and {name!r} is none of them"
+        )
+    return options
 
 
 def numbers(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
@@ -71,7 +90,7 @@ def numbers(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
 
 def _rates(dynamism: float | Dynamism, given: Mapping[str, Any]) -> Dynamism:
     rates = Dynamism.of(given.get("dynamism", dynamism), given.get("moving_share"))
-    changes = dict(given.get("rates") or {})
+    changes = mapping("rates", given.get("rates"))
     known = {f.name for f in fields(Dynamism)}
     for name in sorted(set(changes) - known):
         raise InvalidValueError(
