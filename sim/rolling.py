@@ -142,8 +142,9 @@ def inertia_of(model: mujoco.MjModel, names: Sequence[str]) -> tuple[NDArray[np.
         loss = model.dof_frictionloss
         dofs[i] = dof
         bodies[i] = body.mass[0], body.inertia[2], loss[dof], loss[dof + 2]
-        feet = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body.id]
-        feet = [g for g in feet if model.geom(g).name.startswith(f"{name}/foot")]
+        first = int(body.geomadr[0])
+        own = range(first, first + int(body.geomnum[0]))
+        feet = [g for g in own if model.geom(g).name.startswith(f"{name}/foot")]
         if feet:  # its friction is under its castors, not in its joints (``sim.castors``)
             grip = float(model.geom_friction[feet[0], 0]) * float(body.mass[0]) * 9.81
             reach = float(np.hypot(*model.geom_pos[feet[0], :2]))
