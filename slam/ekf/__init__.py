@@ -1,2 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rival: EKF-SLAM on point landmarks, joint compatibility, landmarks that come and go."""
+
+from slam.ekf.config import EkfConfig
+from slam.ekf.slam import EkfSlam, Landmarks
+
+__all__ = ["EkfConfig", "EkfSlam", "Landmarks"]

@@ -4,5 +4,6 @@
 from slam.logs.carmen import read_carmen
 from slam.logs.carmen_writer import write_carmen
 from slam.logs.open import open_log
+from slam.logs.victoria_park import read_victoria_park
 
-__all__ = ["open_log", "read_carmen", "write_carmen"]
+__all__ = ["open_log", "read_carmen", "read_victoria_park", "write_carmen"]

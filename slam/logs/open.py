@@ -13,6 +13,7 @@ from slam.frames import Stream
 from slam.logs.carmen import read_carmen
 from slam.logs.carmen_messages import KNOWN_NAMES
 from slam.logs.text import numbered_lines
+from slam.logs.victoria_park import is_victoria_park, read_victoria_park
 
 _LINES_TO_LOOK_AT = 1000
 
@@ -33,6 +34,11 @@ def _is_carmen(path: Path) -> bool:
 
 
 FORMATS: tuple[LogFormat, ...] = (
+    LogFormat(
+        description="Victoria Park (its folder, features_*.mat or rfs_measurements.dat)",
+        recognises=is_victoria_park,
+        read=read_victoria_park,
+    ),
     LogFormat(
         description="CARMEN text log (.log, .log.gz, .log.xz)",
         recognises=_is_carmen,

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The classification-based EKF-SLAM that the paper compares itself with, as strong as we can."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam import se2
+from slam.ekf.association import METHODS, Gates
+from slam.ekf.config import EkfConfig
+from slam.ekf.corners import CornerConfig, corners
+from slam.ekf.filter import EkfFilter
+from slam.ekf.lifecycle import (
+    WITHOUT,
+    Lifecycle,
+    in_view,
+    unhidden_by_beams,
+    unhidden_by_features,
+)
+from slam.errors import InvalidValueError
+from slam.frames import Features, Float, Frame, Odometry
+from slam.shunting.motion import assumed_covariance
+from slam.system import Estimate, Raster, register
+from slam.trajectory import Trajectory
+
+LOST_AFTER = 10  # frames in a row in which landmarks should be seen and none is
+PRESETS: dict[str, Callable[..., EkfConfig]] = {
+    "points": EkfConfig,
+    "corners": EkfConfig.corners,
+    "victoria_park": EkfConfig.victoria_park,
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Landmarks:
+    """What the EKF has for a map.
+
+    keys         (n,) int64 names, never used twice
+    points_map   (n, 2) m
+    covariances  (n, 2, 2) m^2 in the map frame
+    looks        (n,) int64 how often each was seen
+    """
+
+    keys: NDArray[np.int64]
+    points_map: Float
+    covariances: Float
+    looks: NDArray[np.int64]
+
+    def ellipses(self, sigmas: float = 3.0) -> Float:
+        """(n, 5) for drawing: centre x, y (m), half axes (m), direction of the first axis (rad)."""
+        values, vectors = np.linalg.eigh(self.covariances)
+        axes = sigmas * np.sqrt(np.maximum(values[:, ::-1], 0.0))
+        angles = np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1])
+        return np.column_stack([self.points_map, axes, angles])
+
+
+@register("ekf")
+class EkfSlam:
+    """EKF-SLAM on point landmarks: IPJC association, landmarks that are confirmed and deleted.
+
+    Takes ``frame.features``; where a frame has only a scan, corners are extracted from it. Options
+    are those of ``EkfConfig``; ``preset`` is "points" (the default of ``EkfConfig``), "corners" or
+    "victoria_park", and without it the first frame tells the first two apart.
+    """
+
+    def __init__(
+        self,
+        config: EkfConfig | None = None,
+        *,
+        preset: str | None = None,
+        corner_config: CornerConfig | None = None,
+        **options: Any,
+    ) -> None:
+        if preset is not None and preset not in PRESETS:
+            raise InvalidValueError(f"EkfSlam.preset must be of {list(PRESETS)}, got {preset!r}")
+        if config is not None and (preset is not None or options):
+            raise InvalidValueError("EkfSlam takes a config, or a preset and options, not both")
+        known = EkfConfig.__dataclass_fields__
+        unknown = sorted(set(options) - set(known))
+        if unknown:
+            raise InvalidValueError(f"EkfSlam has no option {unknown[0]!r}; it has {list(known)}")
+        self._options = options
+        self._told = config is not None or preset is not None
+        self.corner_config = corner_config or CornerConfig()
+        self._configure(config or PRESETS[preset or "points"](**options))
+        self.reset()
+
+    def _configure(self, config: EkfConfig) -> None:
+        self.config = config
+        self._gates = Gates(
+            individual=config.individual_gate,
+            joint=config.joint_gate,
+            posterior=config.posterior_gate,
+        )
+
+    def reset(self) -> None:
+        """Forget everything; the next frame is the origin."""
+        self.filter = EkfFilter()
+        self.lifecycle = Lifecycle(self.config)
+        self._before: Odometry | None = None
+        self._unmatched = 0
+        self._stamps: list[int] = []
+        self._poses: list[Float] = []
+
+    def update(self, frame: Frame) -> Estimate:
+        """Predict, associate with landmarks, then with candidates, judge all, add what is new."""
+        if self._stamps and frame.stamp_ns <= self._stamps[-1]:
+            raise InvalidValueError(
+                f"frames must come in order: {frame.stamp_ns} ns after {self._stamps[-1]} ns"
+            )
+        if not self._stamps and not self._told:
+            name = "points" if frame.features is not None else "corners"
+            self._configure(PRESETS[name](**self._options))
+            self.lifecycle = Lifecycle(self.config)
+        points, covariances = self._observe(frame)
+        self._predict(frame.odometry)
+        confirmed = self.lifecycle.confirmed
+        landmarks = np.full(len(points), -1)
+        plausible = np.zeros(len(points), dtype=np.bool_)
+        for stage in (confirmed, ~confirmed):
+            self._associate(np.flatnonzero(stage), points, covariances, landmarks, plausible)
+        matched = int((landmarks >= 0).sum())
+        expected = self._expected(frame, points)
+        self._believe(matched, int((expected & confirmed).sum()))
+        self._forget(landmarks[landmarks >= 0], expected)
+        self._add(points[~plausible], covariances[~plausible])
+        return self._report(frame, matched, len(points))
+
+    def _observe(self, frame: Frame) -> tuple[Float, Float]:
+        features = frame.features
+        if features is None:
+            if frame.scan is None:
+                raise InvalidValueError("the EKF needs a scan or features in every frame")
+            twist = frame.odometry.twist
+            features = corners(frame.scan, twist=twist, config=self.corner_config)
+        return self._used(features)
+
+    def _used(self, features: Features) -> tuple[Float, Float]:
+        points = features.points_robot
+        used = np.hypot(points[:, 0], points[:, 1]) <= self.config.range_m
+        return points[used], features.covariances[used] * self.config.noise_scale**2
+
+    def _predict(self, odometry: Odometry) -> None:
+        if self._before is not None:
+            increment = se2.between(self._before.T_odom_robot, odometry.T_odom_robot)
+            covariance = odometry.increment_covariance
+            if covariance is None:
+                covariance = assumed_covariance(increment)
+            self.filter.predict(increment, covariance)
+        self._before = odometry
+
+    def _associate(
+        self,
+        chosen: NDArray[np.int64],
+        points: Float,
+        covariances: Float,
+        landmarks: NDArray[np.int64],
+        plausible: NDArray[np.bool_],
+    ) -> None:
+        """Pair free points with the chosen landmarks and update; fills in the last two arrays."""
+        near = chosen[self._within_reach(chosen)]
+        free = np.flatnonzero(landmarks < 0)
+        if len(near) == 0 or len(free) == 0:
+            return
+        method = METHODS[self.config.association]
+        found = method(self.filter, near, points[free], covariances[free], self._gates)
+        landmarks[free] = found.landmarks
+        plausible[free] |= found.plausible
+        pairs = free[found.landmarks >= 0]
+        self.filter.update(landmarks[pairs], points[pairs], covariances[pairs])
+
+    def _within_reach(self, chosen: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """What could be seen if the pose is off by three standard deviations."""
+        P = self.filter.pose_covariance()
+        reach = self.config.range_m * (1.0 + 3.0 * P[2, 2] ** 0.5)
+        reach += 3.0 * float(P[0, 0] + P[1, 1]) ** 0.5
+        away = self.filter.landmarks[chosen] - self.filter.pose[:2]
+        near: NDArray[np.bool_] = np.hypot(away[:, 0], away[:, 1]) < reach
+        return near
+
+    def _expected(self, frame: Frame, points: Float) -> NDArray[np.bool_]:
+        """(n,) which landmarks this frame should show."""
+        T_robot_map = se2.inverse(self.filter.pose)
+        landmarks_robot = se2.transform(T_robot_map, self.filter.landmarks)
+        expected = in_view(landmarks_robot, self.config)
+        if frame.features is None and frame.scan is not None:
+            T_laser_robot = se2.inverse(frame.scan.spec.T_robot_laser)
+            landmarks_laser = se2.transform(T_laser_robot, landmarks_robot)
+            return expected & unhidden_by_beams(landmarks_laser, frame.scan)
+        return expected & unhidden_by_features(landmarks_robot, points, self.config)
+
+    def _believe(self, matched: int, expected: int) -> None:
+        if matched:
+            self._unmatched = 0
+        elif expected:
+            self._unmatched += 1
+
+    def _forget(self, seen: NDArray[np.int64], expected: NDArray[np.bool_]) -> None:
+        landmarks_robot = se2.transform(se2.inverse(self.filter.pose), self.filter.landmarks)
+        left_behind = ~in_view(landmarks_robot, self.config, WITHOUT)
+        gone = self.lifecycle.judge(seen, expected, left_behind)
+        self.lifecycle.remove(gone)
+        self.filter.remove(gone)
+
+    def _add(self, points: Float, covariances: Float) -> None:
+        """Candidates from points that no landmark explains, apart from each other and the rest."""
+        taken = se2.transform(se2.inverse(self.filter.pose), self.filter.landmarks)
+        least = self.config.separation_m
+        new: list[int] = []
+        for k, point in enumerate(points):
+            away = np.concatenate([taken, points[new]]) - point
+            if not len(away) or np.hypot(away[:, 0], away[:, 1]).min() >= least:
+                new.append(k)
+        self.filter.add(points[new], covariances[new])
+        self.lifecycle.add(len(new))
+
+    def _report(self, frame: Frame, matched: int, observed: int) -> Estimate:
+        lost = self._unmatched >= LOST_AFTER
+        self._stamps.append(frame.stamp_ns)
+        self._poses.append(self.filter.pose.copy())
+        return Estimate(
+            stamp_ns=frame.stamp_ns,
+            T_map_robot=self.filter.pose,
+            covariance=self.filter.pose_covariance(),
+            converged=not lost,
+            diagnostics={
+                "state": "lost" if lost else "tracking",
+                "observed": observed,
+                "matched": matched,
+                "landmarks": int(self.lifecycle.confirmed.sum()),
+                "deleted": self.lifecycle.deleted,
+            },
+        )
+
+    def landmarks(self) -> Landmarks:
+        """The confirmed landmarks; ``.ellipses()`` for the 3 sigma ellipses of the figures."""
+        confirmed = np.flatnonzero(self.lifecycle.confirmed)
+        return Landmarks(
+            keys=self.lifecycle.keys[confirmed],
+            points_map=self.filter.landmarks[confirmed].copy(),
+            covariances=self.filter.landmark_covariances()[confirmed],
+            looks=self.lifecycle.looks[confirmed],
+        )
+
+    def map(self) -> Raster | None:
+        """None: the map is a list of landmarks, see ``landmarks()``."""
+        return None
+
+    def trajectory(self) -> Trajectory:
+        """The online poses: a filter does not revise its past."""
+        return Trajectory(
+            stamps_ns=np.array(self._stamps, dtype=np.int64),
+            poses=np.array(self._poses).reshape(-1, 3),
+        )

@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Victoria Park, Sydney (Guivant and Nebot 2001): tree trunks, controls and GPS of a pick-up truck.
+
+Read from the dataset's MATLAB files or from the text files of RFS-SLAM:
+
+    features_trees.mat      TLsr s, zt (range m, bearing rad from the right, diameter m) per scan,
+                            time s, u (speed m/s of the left rear wheel, steering rad)
+    features_segments.mat   laserTime ms, laserData, controlTime ms, controlSpeed, controlSteering
+    rfs_measurements.dat    lines ``t range bearing diameter``, beside rfs_inputs.dat
+                            ``t speed steering``; plain, .gz or .xz
+    aa3_gpsx.mat            timeGps ms, Lo_m, La_m;  or rfs_gps.dat ``t x y``
+
+The robot frame is the laser's: on the front left bumper, x forward.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam import se2
+from slam.errors import LogFormatError
+from slam.frames import NS_PER_S, Features, Float, Frame, Odometry, Stream, StreamMetadata, to_ns
+from slam.logs.text import numbered_lines
+
+AXLES_M, HALF_TRACK_M = 2.83, 0.76  # L, H
+LASER_AHEAD_M, LASER_LEFT_M = 3.78, 0.50  # a + L (of the rear axle), b
+SPEED_STD, STEERING_STD = 0.25, math.radians(1.5)  # m/s, rad; of the mean over one scan
+RANGE_STD_M, BEARING_STD = 0.25, math.radians(1.0)  # of a trunk: its shape, a beam is 0.5 degrees
+WHERE = "README.md names where to get the dataset"
+MAT_FILES = ("features_trees.mat", "features_segments.mat")
+TEXT_FILE = "rfs_measurements.dat"
+_PACKED = ("", ".xz", ".gz")
+_MAT_MAGIC = b"MATLAB 5.0 MAT-file"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GpsTrack:
+    """``points`` (n, 2) m east, north (turned by -33 degrees in rfs_gps) at ``stamps_ns`` (n,)."""
+
+    stamps_ns: NDArray[np.int64]
+    points: Float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Drive:
+    """Scans (s, and (n, 3) range, bearing, diameter each); controls (m, 3) s, m/s, rad."""
+
+    scan_times: Float
+    detections: list[Float]
+    controls: Float
+
+
+def is_victoria_park(path: Path) -> bool:
+    """True for a folder with one of the files, or one of them."""
+    if path.is_dir():
+        return _main_file(path) is not None
+    if path.name in {TEXT_FILE + packed for packed in _PACKED}:
+        return True
+    if path.suffix != ".mat" or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(_MAT_MAGIC)) == _MAT_MAGIC
+
+
+def _main_file(folder: Path) -> Path | None:
+    names = [*MAT_FILES, *(TEXT_FILE + packed for packed in _PACKED)]
+    return next((folder / name for name in names if (folder / name).is_file()), None)
+
+
+def read_victoria_park(path: str | Path) -> Stream:
+    """The drive as frames of features: one per laser scan, trunks in the laser's frame.
+
+    ``path`` is the folder of the dataset (its trees are read) or one of its feature files. Odometry
+    chains the vehicle model over the 40 Hz controls up to each scan. No truth: GPS, which gives no
+    heading and has gaps of minutes, is for ``read_gps``; ``metadata.extra`` says if it is there.
+    Raises ``LogFormatError`` where files are missing, damaged or out of order.
+    """
+    given = Path(path)
+    main = _main_file(given) if given.is_dir() else given
+    if main is None or not main.is_file():
+        raise LogFormatError(given, f"no Victoria Park here (no {', '.join(MAT_FILES)} or "
+                             f"{TEXT_FILE}); {WHERE}")  # fmt: skip
+    drive = _from_mat(main) if main.suffix == ".mat" else _from_text(main)
+    _check(main, drive)
+    gps = _gps_file(main.parent)
+    extra: dict[str, Any] = {
+        "file": main.name,
+        "detections": sum(len(found) for found in drive.detections),
+        "controls": len(drive.controls),
+        "gps_file": gps.name if gps else None,
+    }
+    metadata = StreamMetadata(source="victoria_park", robot="pick-up truck", extra=extra)
+    return Stream(metadata=metadata, frames=lambda: _frames(drive), length=len(drive.scan_times))
+
+
+def read_gps(path: str | Path) -> GpsTrack:
+    """The GPS fixes of the folder ``path``, or of one of its two GPS files."""
+    given = Path(path)
+    file = _gps_file(given) if given.is_dir() else given
+    if file is None or not file.is_file():
+        raise LogFormatError(given, f"no GPS here (no aa3_gpsx.mat or rfs_gps.dat); {WHERE}")
+    if file.suffix == ".mat":
+        values = _load(file)
+        names = ("timeGps", "Lo_m", "La_m")
+        table = np.column_stack([_row(file, values, name) for name in names])
+        table[:, 0] /= 1000.0
+    else:
+        table = _table(file, 3)
+    stamps_ns = np.array([to_ns(t) for t in table[:, 0].tolist()], dtype=np.int64)
+    return GpsTrack(stamps_ns=stamps_ns, points=table[:, 1:])
+
+
+def _gps_file(folder: Path) -> Path | None:
+    names = ["aa3_gpsx.mat", *("rfs_gps.dat" + packed for packed in _PACKED)]
+    return next((folder / name for name in names if (folder / name).is_file()), None)
+
+
+def _load(path: Path) -> dict[str, Any]:
+    from scipy.io import loadmat  # takes half a second that other logs need not pay
+
+    try:
+        values: dict[str, Any] = loadmat(path)
+    except OSError as error:
+        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
+    except Exception as error:
+        raise LogFormatError(path, f"is no MATLAB 5 file, or damaged: {error}") from error
+    return values
+
+
+def _row(path: Path, values: dict[str, Any], name: str) -> Float:
+    """A vector of numbers, whichever way it lies."""
+    if name not in values:
+        raise LogFormatError(path, f"has no variable '{name}'")
+    try:
+        return np.asarray(values[name], dtype=np.float64).ravel()
+    except (TypeError, ValueError) as error:
+        raise LogFormatError(path, f"'{name}' is not numeric: {error}") from error
+
+
+def _from_mat(path: Path) -> _Drive:
+    values = _load(path)
+    if "zt" in values:
+        times, cells = _row(path, values, "TLsr"), values["zt"]
+        u = _row(path, values, "u").reshape(2, -1)
+        control_times, speed, steering = _row(path, values, "time"), u[0], u[1]
+    else:
+        times, cells = _row(path, values, "laserTime") / 1000.0, values.get("laserData", [])
+        control_times = _row(path, values, "controlTime") / 1000.0
+        speed, steering = (_row(path, values, f"control{k}") for k in ("Speed", "Steering"))
+    if not len(control_times) == len(speed) == len(steering):
+        raise LogFormatError(path, "times, speeds and steering angles differ in number")
+    return _Drive(
+        scan_times=times,
+        detections=_cells(path, np.asarray(cells, dtype=object).ravel(), len(times)),
+        controls=np.column_stack([control_times, speed, steering]),
+    )
+
+
+def _cells(path: Path, cells: NDArray[np.object_], n: int) -> list[Float]:
+    if len(cells) != n:
+        raise LogFormatError(path, f"{n} scan times but detections of {len(cells)} scans")
+    out = []
+    for k, cell in enumerate(cells):
+        found = np.asarray(cell, dtype=np.float64)
+        if found.size and (found.ndim != 2 or found.shape[0] != 3):
+            raise LogFormatError(path, f"scan {k}: expected 3 x n numbers, got {found.shape}")
+        out.append(found.reshape(3, -1).T)
+    return out
+
+
+def _from_text(path: Path) -> _Drive:
+    name = path.name.replace("measurements", "inputs")
+    stem = name.removesuffix(path.suffix) if path.suffix in _PACKED else name
+    inputs = [path.with_name(stem + packed) for packed in _PACKED]
+    beside = next((file for file in inputs if file.is_file()), None)
+    if beside is None:
+        raise LogFormatError(path, f"needs its controls beside it: no {stem} there; {WHERE}")
+    table = _table(path, 4)
+    times, first = np.unique(table[:, 0], return_index=True)
+    return _Drive(
+        scan_times=times,
+        detections=[found[:, 1:] for found in np.split(table, first[1:])],
+        controls=_table(beside, 3),
+    )
+
+
+def _table(path: Path, columns: int) -> Float:
+    rows: list[list[float]] = []
+    for number, line in numbered_lines(path):
+        words = line.split()
+        try:
+            row = [float(word) for word in words]
+        except ValueError as error:
+            raise LogFormatError(path, str(error), number) from error
+        if len(row) != columns or not all(map(math.isfinite, row)):
+            raise LogFormatError(path, f"expected {columns} finite numbers, got {line!r}", number)
+        if rows and row[0] < rows[-1][0]:
+            raise LogFormatError(path, "time steps back", number)
+        rows.append(row)
+    return np.array(rows)
+
+
+def _check(path: Path, drive: _Drive) -> None:
+    if len(drive.scan_times) == 0 or len(drive.controls) == 0:
+        raise LogFormatError(path, "has no scans or no controls")
+    for what, times in (("scans", drive.scan_times), ("controls", drive.controls[:, 0])):
+        if not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
+            raise LogFormatError(path, f"the times of the {what} do not increase")
+    if not np.isfinite(drive.controls).all():
+        raise LogFormatError(path, "controls must be finite")
+    for k, found in enumerate(drive.detections):
+        if not np.isfinite(found).all() or np.any(found[:, 0] <= 0.0):
+            raise LogFormatError(path, f"scan {k}: ranges must be finite and > 0 m")
+
+
+def twist_of(speed: float, steering: float) -> tuple[float, float, float]:
+    """Body velocity (m/s, m/s, rad/s) of the laser: the README's vehicle model.
+
+    The encoder sits on the left rear wheel, the laser ahead of the front axle and to its left.
+    """
+    tangent = math.tan(steering)
+    forward = speed / (1.0 - tangent * HALF_TRACK_M / AXLES_M)
+    omega = forward * tangent / AXLES_M
+    return forward - omega * LASER_LEFT_M, omega * LASER_AHEAD_M, omega
+
+
+class _DeadReckoning:
+    """The pose along the controls, each of which holds until the next."""
+
+    def __init__(self, controls: Float) -> None:
+        self._controls: list[tuple[float, float, float]] = [tuple(c) for c in controls.tolist()]
+        self._next = 0
+        self._held = self._controls[0]
+        self._time: float | None = None
+        self.pose: Float = np.zeros(3)
+
+    def advance(self, until: float) -> Float:
+        """Move on to time ``until`` (s); the covariance (3, 3) of this increment."""
+        if self._time is None:
+            self._time = until
+        by_speed, by_steering = np.zeros(3), np.zeros(3)
+        while self._time < until:
+            end = until
+            if self._next < len(self._controls):
+                end = min(until, max(self._controls[self._next][0], self._time))
+            duration = end - self._time
+            _, speed, steering = self._held
+            twist = np.array(twist_of(speed, steering))
+            self.pose = se2.compose(self.pose, se2.exp(twist, duration))
+            by_speed += duration * (np.array(twist_of(speed + 0.01, steering)) - twist) / 0.01
+            by_steering += duration * (np.array(twist_of(speed, steering + 0.01)) - twist) / 0.01
+            self._time = end
+            while self._next < len(self._controls) and self._controls[self._next][0] <= end:
+                self._held = self._controls[self._next]
+                self._next += 1
+        covariance: Float = SPEED_STD**2 * np.outer(by_speed, by_speed)
+        covariance += STEERING_STD**2 * np.outer(by_steering, by_steering)
+        return covariance + 1e-8 * np.eye(3)
+
+
+def _frames(drive: _Drive) -> Iterator[Frame]:
+    reckoning = _DeadReckoning(drive.controls)
+    for time_s, found in zip(drive.scan_times.tolist(), drive.detections, strict=True):
+        covariance = reckoning.advance(time_s)
+        stamp_ns = round(time_s * NS_PER_S)
+        odometry = Odometry(
+            stamp_ns=stamp_ns, T_odom_robot=reckoning.pose, increment_covariance=covariance
+        )
+        yield Frame(stamp_ns=stamp_ns, odometry=odometry, features=_features(stamp_ns, found))
+
+
+def _features(stamp_ns: int, found: Float) -> Features:
+    """Trunks (n, 3) range m, bearing rad from the right, diameter m, as points."""
+    points, covariances = np.empty((len(found), 2)), np.empty((len(found), 2, 2))
+    for k, (reach, from_right, _) in enumerate(found.tolist()):
+        bearing = from_right - math.pi / 2.0
+        c, s = math.cos(bearing), math.sin(bearing)
+        radial, lateral = RANGE_STD_M**2, (reach * BEARING_STD) ** 2 + RANGE_STD_M**2 / 4.0
+        across = c * s * (radial - lateral)
+        points[k] = reach * c, reach * s
+        covariances[k] = [
+            [c * c * radial + s * s * lateral, across],
+            [across, s * s * radial + c * c * lateral],
+        ]
+    return Features(stamp_ns=stamp_ns, points_robot=points, covariances=covariances)

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The whole rival on known motion: static and moving points, corners of rooms, a synthetic park."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import slam
+from slam import Frame, Odometry, SlamSystem, se2
+from slam.ekf.config import EkfConfig
+from slam.ekf.slam import EkfSlam
+from slam.errors import InvalidValueError
+from slam.frames import Features
+from slam.points import PointWorld, PointWorldConfig
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import world2d
+
+
+def run(system: EkfSlam, frames: Iterable[Frame]) -> tuple[np.ndarray, np.ndarray]:
+    """Errors (n, 3) and NEES (n - 1,)."""
+    errors, nees, first = [], [], None
+    for frame in frames:
+        first = frame.truth if first is None else first
+        estimate = system.update(frame.without_truth())
+        error = estimate.T_map_robot - se2.between(first, frame.truth)
+        error[2] = se2.wrap(error[2])
+        if errors:
+            nees.append(error @ np.linalg.solve(estimate.covariance, error))
+        errors.append(error)
+    return np.array(errors), np.array(nees)
+
+
+def rmse(errors: np.ndarray) -> float:
+    return math.sqrt(np.mean(errors[:, 0] ** 2 + errors[:, 1] ** 2))
+
+
+def test_it_is_registered():
+    system = slam.create("ekf", range_m=20.0)
+    assert isinstance(system, SlamSystem)
+    assert system.config.range_m == 20.0
+    assert "EKF" in slam.system.describe("ekf")
+
+
+def test_the_static_run_with_ipjc_is_accurate_and_consistent():
+    """The rival's bar: 0.05 m, NEES about 3, every landmark where it is and none deleted."""
+    nees = []
+    for seed in range(8):
+        world = PointWorld(PointWorldConfig(), seed=seed)
+        system = EkfSlam()
+        errors, squares = run(system, world.stream())
+        nees.append(squares.mean())
+        assert rmse(errors) < 0.05, seed
+        landmarks = system.landmarks()
+        truth = se2.transform(se2.inverse(world.path[0]), world.points[0])
+        away = np.linalg.norm(landmarks.points_map[:, None] - truth[None], axis=2)
+        assert away.min(axis=1).max() < 0.1
+        assert len(np.unique(away.argmin(axis=1))) == len(landmarks.keys)  # none twice
+        assert system.lifecycle.deleted <= 1
+    assert 1.5 < np.mean(nees) < 5.0
+
+
+def test_half_of_the_points_may_move():
+    for seed in range(3):
+        world = PointWorld(PointWorldConfig(moving=0.5), seed=seed)
+        system = EkfSlam()
+        errors, _ = run(system, world.stream())
+        assert rmse(errors) < 0.05, seed
+        # What moves is not kept: at most what was taken for static and is out of view.
+        truth = se2.transform(se2.inverse(world.path[0]), world.points[0][~world.moving])
+        away = np.linalg.norm(system.landmarks().points_map[:, None] - truth[None], axis=2)
+        assert (away.min(axis=1) > 0.2).sum() <= 6
+        assert len(system.filter) < 130
+
+
+def test_joint_association_is_what_carries_the_run():
+    """Nearest neighbours with 0.1 m and 0.03 rad steps: worse on the very same frames."""
+    world = PointWorld(PointWorldConfig(n_points=400, n_steps=100), seed=1)
+    joint, _ = run(EkfSlam(), world.stream())
+    alone, _ = run(EkfSlam(association="individual"), world.stream())
+    assert rmse(joint) < 0.05
+    assert rmse(alone) > 2.0 * rmse(joint)
+
+
+def test_corners_of_an_arena_are_enough():
+    frames = world2d.frames(
+        world2d.World2D(world2d.arena(), world2d.Chairs.random(12, (-4, -3, 4, 3), 20.0, 0.0, 0)),
+        world2d.wander(20.0),
+        rate_hz=5.0,
+        seed=2,
+    )
+    system = EkfSlam()
+    errors, _ = run(system, frames[:101])
+    assert system.config == EkfConfig.corners()
+    assert rmse(errors) < 0.06
+    ellipses = system.landmarks().ellipses(3.0)
+    assert ellipses.shape == (len(system.landmarks().keys), 5)
+    assert np.all(ellipses[:, 2] >= ellipses[:, 3])
+    assert np.all(ellipses[:, 3] > 0.0)
+
+
+def test_ellipses_are_those_of_the_covariance():
+    system = EkfSlam(confirm_looks=1)
+    C = se2.rotation(0.5) @ np.diag([0.04, 0.01]) @ se2.rotation(0.5).T
+    odometry = Odometry(stamp_ns=0, T_odom_robot=np.zeros(3))
+    features = Features(stamp_ns=0, points_robot=[[2.0, 1.0]], covariances=[0.5 * (C + C.T)])
+    system.update(Frame(stamp_ns=0, odometry=odometry, features=features))
+    scale = 3.0 * system.config.noise_scale
+    ((x, y, major, minor, angle),) = system.landmarks().ellipses(3.0)
+    np.testing.assert_allclose([x, y, major, minor], [2.0, 1.0, 0.2 * scale, 0.1 * scale])
+    assert math.isclose(math.sin(angle - 0.5), 0.0, abs_tol=1e-9)
+
+
+def test_lost_is_said():
+    """All landmarks gone at once and nothing else seen: no plausible stand-in."""
+    world = PointWorld(PointWorldConfig(n_steps=40), seed=0)
+    frames = list(world.stream())
+    system = EkfSlam(memory_looks=50.0)
+    estimates = []
+    for k, frame in enumerate(frames):
+        if k > 20:
+            frame = Frame(
+                stamp_ns=frame.stamp_ns,
+                odometry=frame.odometry,
+                features=Features(
+                    stamp_ns=frame.stamp_ns,
+                    points_robot=np.zeros((0, 2)),
+                    covariances=np.zeros((0, 2, 2)),
+                ),
+            )
+        estimates.append(system.update(frame.without_truth()))
+    assert all(e.converged for e in estimates[:21])
+    assert not estimates[-1].converged
+    assert estimates[-1].diagnostics["state"] == "lost"
+
+
+def test_resets_repeat_the_run():
+    world = PointWorld(PointWorldConfig(n_steps=30, moving=0.3), seed=3)
+    system = EkfSlam()
+    first, _ = run(system, world.stream())
+    keys = system.landmarks().keys
+    assert len(system.trajectory()) == 31
+    assert system.map() is None
+    system.reset()
+    again, _ = run(system, world.stream())
+    np.testing.assert_array_equal(first, again)
+    np.testing.assert_array_equal(keys, system.landmarks().keys)
+
+
+def test_identities_are_not_read():
+    world = PointWorld(PointWorldConfig(n_steps=20), seed=3)
+    told, blind = EkfSlam(), EkfSlam()
+    for frame in world.stream():
+        a, b = told.update(frame), blind.update(frame.without_truth())
+        np.testing.assert_array_equal(a.T_map_robot, b.T_map_robot)
+
+
+def test_wrong_options_and_frames_are_refused():
+    with pytest.raises(InvalidValueError, match="no option 'gate'"):
+        EkfSlam(gate=3.0)
+    with pytest.raises(InvalidValueError, match="preset"):
+        EkfSlam(preset="office")
+    with pytest.raises(InvalidValueError, match="not both"):
+        EkfSlam(EkfConfig(), range_m=3.0)
+    odometry = Odometry(stamp_ns=5, T_odom_robot=np.zeros(3))
+    system = EkfSlam()
+    with pytest.raises(InvalidValueError, match="scan or features"):
+        system.update(Frame(stamp_ns=5, odometry=odometry))
+    nothing = Features(stamp_ns=5, points_robot=np.zeros((0, 2)), covariances=np.zeros((0, 2, 2)))
+    frame = Frame(stamp_ns=5, odometry=odometry, features=nothing)
+    system.update(frame)
+    with pytest.raises(InvalidValueError, match="in order"):
+        system.update(frame)
