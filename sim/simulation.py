@@ -20,6 +20,7 @@ from sim.odometry import WheelOdometry
 from sim.pilot import Pilot
 from sim.robot import DriveConfig
 from sim.seeds import Seeds
+from sim.tag_cameras import TagCameras, TagReading
 from sim.world import SUBSTEPS_PER_S, World
 from slam import se2
 from slam.errors import InvalidValueError
@@ -83,6 +84,8 @@ class Simulation:
     drive      limits of the robot
     start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted
     chairs     their physics: "planar" or "free" (``sim.castors``)
+    tags       "truth", or "camera": beside the truth, ``tag_reading`` is what a ceiling camera
+               would know of the robot by now (``sim.tag_cameras``)
     labels     whether frames carry truth per beam
     options    passed on to the scene, e.g. ``n_chairs=10``
 
@@ -101,6 +104,7 @@ class Simulation:
         drive: DriveConfig | None = None,
         start: Sequence[float] | None = None,
         chairs: str = "planar",
+        tags: str = "truth",
         labels: bool = False,
         **options: Any,
     ) -> None:
@@ -114,6 +118,7 @@ class Simulation:
         self.laser = Lms221(self.world.model, laser, seeds.generator("lidar"))
         self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=drive.track)
         self._labeller = BeamLabeller(self.world) if labels else None
+        self._tags = self._tag_cameras(tags)
         self.frame: Frame | None = None  # the last one observed
         self.contacts: list[Contact] = []  # what the robot touched during the last scan
         self._timing = ScanTiming.of(self.laser)
@@ -122,6 +127,19 @@ class Simulation:
         self._travel: Float = np.zeros((steps + 1, 2))
         self._rows = list(zip(self.path, self._travel, strict=True))
         self._step = 0
+
+    def _tag_cameras(self, tags: str) -> TagCameras | None:
+        if tags not in ("truth", "camera"):
+            raise InvalidValueError(f"tags must be 'truth' or 'camera', got {tags!r}")
+        if tags == "truth":
+            return None
+        world = self.world
+        return TagCameras(world.model, world.scene.bounds, rng=world.seeds.generator("tags"))
+
+    @property
+    def tag_reading(self) -> TagReading | None:
+        """The newest camera reading of the robot's tag that has arrived; None without cameras."""
+        return None if self._tags is None else self._tags.latest(self.world.time_ns)
 
     @property
     def spec(self) -> LaserSpec:
@@ -137,6 +155,8 @@ class Simulation:
         self.world.substep()
         self._step += 1
         self._note()
+        if self._tags is not None:
+            self._tags.note(self.world.time_ns, self.world.data)
 
     def _note(self) -> None:
         self.world.read_robot(*self._rows[self._step])
@@ -168,6 +188,11 @@ class Simulation:
         Load it into a simulation made with the same arguments, in this or another process; it goes
         on bit for bit. Save between two calls of ``observe``.
         """
+        if self._tags is not None:
+            raise InvalidValueError(
+                "a simulation with tags='camera' cannot be saved: readings on their way are not "
+                "part of the state; use tags='truth'"
+            )
         arrays, words = self.encoders.save()
         world = np.frombuffer(self.world.save_state(), dtype=np.uint8)
         seen = self._labeller.last_seen if self._labeller else np.zeros((0, 3))

@@ -181,3 +181,22 @@ def test_a_state_of_another_simulation_is_refused():
         ours.load_state(Simulation("arena", seed=Seeds(1, odometry=2), n_chairs=2).save_state())
     with pytest.raises(InvalidValueError, match="this world is"):
         ours.load_state(Simulation("arena", seed=1, n_chairs=3).save_state())
+
+
+def test_ceiling_cameras_know_the_robot_late_and_by_centimetres():
+    simulation = Simulation("arena", seed=3, dynamism=0.0, tags="camera", n_chairs=0)
+    simulation.world.set_command(0.3, 0.1)
+    errors = []
+    for _ in range(60):
+        simulation.observe()
+        reading = simulation.tag_reading
+        if reading is not None and np.isfinite(reading.poses[0]).all():
+            assert reading.arrival_ns <= simulation.world.time_ns
+            errors.append(reading.poses[0][:2] - simulation.world.robot_pose()[:2])
+    gaps = np.linalg.norm(errors, axis=1)
+    assert len(errors) > 40
+    assert 0.001 < np.median(gaps) < 0.1
+    with pytest.raises(InvalidValueError, match="cannot be saved"):
+        simulation.save_state()
+    with pytest.raises(InvalidValueError, match="tags must be"):
+        Simulation("arena", tags="gps")
