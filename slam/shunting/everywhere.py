@@ -80,10 +80,17 @@ def _headings(points: Float, pitch: float) -> Float:
     return np.asarray(np.arange(count) * (math.tau / count), dtype=np.float64)
 
 
-def places(network: Network, short_term: float, points_robot: Float, most: int) -> list[Float]:
+def places(
+    network: Network,
+    short_term: float,
+    points_robot: Float,
+    most: int,
+    about: tuple[Float, float, float] | None = None,
+) -> list[Float]:
     """Up to ``most`` poses T_map_robot, the best first, from which the points would fit the map.
 
-    Good to about 0.1 m and 1 degree; to be refined by climbing.
+    ``about`` limits the search to a pose, so many m and so many rad around it. Answers are good to
+    about 0.1 m and 1 degree; to be refined by climbing.
     """
     near = points_robot[(points_robot * points_robot).sum(axis=1) < FAR_M**2]
     extent = network.extent()
@@ -96,17 +103,34 @@ def places(network: Network, short_term: float, points_robot: Float, most: int) 
     i0, j0, i1, j1 = extent
     middle = np.array([0.5 * (i0 + i1) * network.cell, 0.5 * (j0 + j1) * network.cell, 0.0])
     reach = math.ceil(0.5 * max(field.shape))
+    turns = _headings(chosen, pitch)
+    if about is not None:
+        middle, reach = np.array(about[0]), math.ceil(about[1] / pitch)
+        step = float(turns[1])
+        half = math.ceil(about[2] / step)
+        turns = np.asarray(np.arange(-half, half + 1) * step, dtype=np.float64)
     depth = 2
     while (2 * reach) >> depth > MAX_ACROSS:
         depth += 1
-    # Room round the map for points that fall outside it, wherever the robot is tried.
+    # Cut out, or pad, so that no point falls outside wherever the robot is tried.
     radius = math.ceil(math.sqrt(float((chosen * chosen).sum(axis=1).max())) / pitch)
-    edge = radius + reach + (1 << depth) + 2 - min(field.shape) // 2
-    levels = levels_of(np.pad(field, edge), depth)
-    turns = _headings(chosen, pitch)
+    edge = radius + reach + (1 << depth) + 2
+    column = math.floor(float(middle[0]) / pitch) - i0 // pool - edge
+    row = math.floor(float(middle[1]) / pitch) - j0 // pool - edge
+    levels = levels_of(_cut(field, row, column, 2 * edge), depth)
     bases = np.empty((len(turns), len(chosen), 2), np.int32)
-    place(chosen, middle, turns, pitch, i0 // pool - edge, j0 // pool - edge, bases)
+    place(chosen, middle, turns, pitch, column + i0 // pool, row + j0 // pool, bases)
     return _answers(levels, bases, turns, (reach, pitch), middle, most)
+
+
+def _cut(field: NDArray[np.uint8], row: int, column: int, side: int) -> NDArray[np.uint8]:
+    """(side, side) of the field from (row, column) on, 0 where it has nothing."""
+    out = np.zeros((side, side), np.uint8)
+    r0, r1 = max(row, 0), min(row + side, field.shape[0])
+    c0, c1 = max(column, 0), min(column + side, field.shape[1])
+    if r0 < r1 and c0 < c1:
+        out[r0 - row : r1 - row, c0 - column : c1 - column] = field[r0:r1, c0:c1]
+    return out
 
 
 def _answers(

@@ -20,8 +20,9 @@ from slam.shunting.impressions import (
     joined,
     stamp,
 )
+from slam.shunting.loops import Loops
 from slam.shunting.matching import Match, Matcher
-from slam.shunting.motion import WIDEN, Prediction, inverted, predict
+from slam.shunting.motion import WIDEN, Prediction, inverted, predict, turned
 from slam.shunting.network import Network
 from slam.shunting.recovery import COARSE, Recovery
 from slam.shunting.search import SearchWindow
@@ -71,11 +72,13 @@ class ShuntingSlam:
         self._covariance: Float = np.zeros((3, 3))
         self._relative: Float = np.zeros((3, 3))
         self._drift: Float = np.zeros((3, 3))
+        self._newest_drift: Float = np.zeros((3, 3))
         self._usual: deque[float] = deque(maxlen=50)
         self._supports: deque[float] = deque(maxlen=50)
         self._doubts = 0
         self._recovery: Recovery | None = None
         self._tracked_s, self._tracked = 0.0, 0
+        self._loops = Loops(self.config, self._matcher)
         self._stamps: list[int] = []
         self._poses: list[Float] = []
 
@@ -98,6 +101,7 @@ class ShuntingSlam:
         else:
             match, state = self._recover(self._recovery, observations, prediction)
         self._believe(match, prediction)
+        self._keep(observations, match, prediction, state)
         return self._report(frame, match, state)
 
     def _first(self, frame: Frame) -> Estimate:
@@ -109,6 +113,7 @@ class ShuntingSlam:
         match = Match(
             T_map_robot=np.zeros(3), information=np.zeros((3, 3)), matched=1.0, score=0.0, tau=0.0
         )
+        self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
         return self._report(frame, match, "tracking")
 
     def _observe(self, frame: Frame, twist: Float) -> Observations:
@@ -220,10 +225,22 @@ class ShuntingSlam:
         # What is new is mapped with the pose's present error, which then stays in the map.
         share = DRIFT_SHARE * (1.0 - match.matched)
         share *= math.sqrt(min(5.0 * max(prediction.elapsed, 0.0), 1.0))
-        self._drift = self._drift + share * self._relative
+        self._newest_drift = share * self._relative
+        self._drift = self._drift + self._newest_drift
         cell = self.config.cell_m
         floor = np.diag([(LOCK_CELLS * cell) ** 2, (LOCK_CELLS * cell) ** 2, LOCK_RAD**2])
         self._covariance = self._relative + self._drift + floor
+
+    def _keep(
+        self, observations: Observations, match: Match, prediction: Prediction, state: str
+    ) -> None:
+        """For closing loops: the motion as matched, or by odometry where the match is in doubt."""
+        motion = se2.between(self._T_map_robot, match.T_map_robot)
+        covariance = self._newest_drift
+        if state != "tracking":
+            motion, covariance = prediction.increment, prediction.covariance
+        covariance = turned(covariance, -float(self._T_map_robot[2]))
+        self._loops.add(len(self._poses), match.T_map_robot, motion, covariance, observations)
 
     def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
         self._before = frame.odometry
@@ -268,8 +285,8 @@ class ShuntingSlam:
         return self.network.window(xmin, ymin, xmax, ymax)
 
     def trajectory(self) -> Trajectory:
-        """The online poses; final ones differ only once loops are closed."""
+        """The poses with loops closed; the online ones up to 100 m of way, or without a loop."""
         return Trajectory(
             stamps_ns=np.array(self._stamps, dtype=np.int64),
-            poses=np.array(self._poses).reshape(-1, 3),
+            poses=self._loops.corrected(np.array(self._poses).reshape(-1, 3)),
         )
