@@ -42,7 +42,8 @@ def on_scene(names: list[str], settings: Mapping[str, Any], outputs: Outputs) ->
         duration_s=seconds,
         bounds=simulation.world.scene.bounds,
     )
-    recipe = {"slams": list(replay.tracks), **settings}
+    made_with = {"odometry": simulation.odometry_preset, **simulation.metadata().extra}
+    recipe = {"slams": list(replay.tracks), **settings, "simulation": made_with}
     with ExitStack() as stack:
         if outputs.film:
             _add_panes(show, simulation, stack)

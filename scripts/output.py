@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import platform
 import shutil
@@ -114,5 +115,17 @@ def _processor() -> str:
 
 def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> None:
     """``recipe.json``: the command, its settings and the versions it ran with."""
-    recipe = {"schema": 1, "command": command, "settings": settings, "versions": versions()}
-    write_text(folder / RECIPE, json.dumps(recipe, indent=2, sort_keys=True) + "\n")
+    recipe = {"schema": 1, "command": command, "settings": _plain(settings), "versions": versions()}
+    text = json.dumps(recipe, indent=2, sort_keys=True, allow_nan=False)
+    write_text(folder / RECIPE, text + "\n")
+
+
+def _plain(value: Any) -> Any:
+    """``value`` as strict JSON has it: no infinities (a stay that never ends is "inf")."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value

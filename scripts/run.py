@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -84,6 +85,7 @@ def on_log(names: list[str], path: Path, out: Path, overwrite: bool, film: bool)
     settings = {
         "slams": list(replay.tracks),
         "log": path.name,
+        "log_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "log_facts": dict(stream.metadata.extra),
     }
     return run_session(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -61,3 +62,10 @@ def test_a_file_in_the_way_and_an_unwritable_parent_are_named(tmp_path: Path):
         make(tmp_path / "file", "one")
     with pytest.raises(OutputError, match="cannot write"):
         make(tmp_path / "file" / "below", "one")
+
+
+def test_a_recipe_is_strict_json(tmp_path: Path):
+    with whole_folder(tmp_path / "run", overwrite=False) as folder:
+        write_recipe(folder, "test", {"rates": {"stay": float("inf")}, "sizes": (1, 2.5)})
+    recipe = json.loads((tmp_path / "run" / "recipe.json").read_text(), parse_constant=pytest.fail)
+    assert recipe["settings"] == {"rates": {"stay": "inf"}, "sizes": [1, 2.5]}
