@@ -50,9 +50,9 @@ class Gates:
     posterior   what one more pair adds to the joint cost, 2 dof
     """
 
-    individual: float = 0.9999
-    joint: float = 0.999
-    posterior: float = 0.9999
+    individual: float = 0.999999
+    joint: float = 0.999999
+    posterior: float = 0.99999
 
     def single(self) -> float:
         """Limit of a pair's cost under the prior."""

@@ -19,7 +19,9 @@ class EkfConfig:
     association          "ipjc" (incremental posterior joint compatibility), "jcbb", "individual"
     individual_gate      a pair alone must lie within this probability of chi-square, 2 dof
     joint_gate           k pairs together, 2 k dof
-    posterior_gate       a pair given the pairs accepted before it, 2 dof
+    posterior_gate       a pair given the pairs accepted before it, 2 dof. All three are wide: the
+                         first pairs carry the whole error of the odometry, and a step beyond the
+                         gate, one of a thousand at 0.999, would be a step without landmarks
     noise_scale          factor on the standard deviations of features: the share of linearisation
                          errors, which a 1 mm sensor after steps of 0.1 m and 0.03 rad needs
     range_m, fov_deg     what the sensor of features sees; farther features are not used
@@ -32,9 +34,9 @@ class EkfConfig:
     """
 
     association: Association = "ipjc"
-    individual_gate: float = 0.9999
-    joint_gate: float = 0.999
-    posterior_gate: float = 0.9999
+    individual_gate: float = 0.999999
+    joint_gate: float = 0.999999
+    posterior_gate: float = 0.99999
     noise_scale: float = 1.25
     range_m: float = 12.0
     fov_deg: float = 180.0
@@ -74,8 +76,11 @@ class EkfConfig:
 
     @classmethod
     def corners(cls, **changes: Any) -> EkfConfig:
-        """Corners of indoor scans: near, often not found, some round, some false."""
+        """Corners of indoor scans: near, some round, some false; what moves does so slowly."""
         preset: dict[str, Any] = {
+            "individual_gate": 0.9999,
+            "joint_gate": 0.999,
+            "posterior_gate": 0.9999,
             "confirm_looks": 8,
             "detection": 0.8,
             "memory_looks": 4.0,

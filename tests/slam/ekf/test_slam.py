@@ -49,9 +49,12 @@ def test_it_is_registered():
 
 
 def test_the_static_run_with_ipjc_is_accurate_and_consistent():
-    """The rival's bar: 0.05 m, NEES about 3, every landmark where it is and none deleted."""
+    """The rival's bar: 0.05 m, NEES about 3, every landmark where it is and none deleted.
+
+    The last two seeds have odometry errors of 3.5 sigma, beyond gates of the usual width.
+    """
     nees = []
-    for seed in range(8):
+    for seed in (0, 1, 2, 3, 4, 5, 114, 118):
         world = PointWorld(PointWorldConfig(), seed=seed)
         system = EkfSlam()
         errors, squares = run(system, world.stream())
