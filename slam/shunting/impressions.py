@@ -18,13 +18,15 @@ from slam import se2
 from slam._jit import njit
 from slam.frames import Features, Float, Scan
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.network import FREE_COUNT, MASK, SHIFT, TOUCHED_COUNT, Cells, Network
+from slam.shunting.network import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, Network
 from slam.shunting.surfaces import join, unveiled
 from slam.shunting.visibility import FREE_WITHOUT_RETURN_M, View, view_of_beams, view_of_features
 
 SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
 SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
 FAINT = 12.0  # squared Mahalanobis distance of I = 0.0025, where an impression ends
+FINE = 512  # entries of the table below for each unit of it: 0.1 % of I
+BELL = np.array([math.exp(-0.5 * k / FINE) for k in range(int(FAINT) * FINE)], np.float32)
 NEAR_JOIN_CELLS = 3.0
 SPACING_M, LEAST_WEIGHT = 0.1, 0.3  # beams closer than this share one observation's weight
 
@@ -126,7 +128,7 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
         free,
     )
     points, beams = points[:count], beams[:count]
-    if spec.sweep_duration > 0.0 and (np.diff(bearings) < 0.0).any():
+    if spec.sweep_duration > 0.0 and (bearings[1:] < bearings[:-1]).any():
         # An interlaced scanner that turns: neighbours are those by bearing, not by number.
         rank = np.empty(n, np.int64)
         rank[np.argsort(bearings, kind="stable")] = np.arange(n)
@@ -188,13 +190,13 @@ def joined(first: Observations, second: Observations) -> Observations:
 
 
 @njit
-def _raise(cells: Cells, i: int, j: int, value: float) -> bool:
-    """I of neuron (i, j) becomes at least ``value``; its block is born. False: no room is left."""
-    row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
+def _touch(cells: Cells, column: int, row: int) -> int:
+    """Where the impressions of a block are kept; it is born if need be. -1: no room is left."""
+    row, column = row - cells.corner[1], column - cells.corner[0]
     slot = cells.directory[row, column]
     if slot < 0:
         if cells.counts[FREE_COUNT] == 0:
-            return False
+            return -1
         cells.counts[FREE_COUNT] -= 1
         slot = cells.free[cells.counts[FREE_COUNT]]
         cells.directory[row, column] = slot
@@ -206,27 +208,37 @@ def _raise(cells: Cells, i: int, j: int, value: float) -> bool:
     if scratch < 0:
         scratch = cells.counts[TOUCHED_COUNT]
         if scratch == len(cells.touched):
-            return False
+            return -1
         cells.counts[TOUCHED_COUNT] += 1
         cells.touched[scratch] = slot
         cells.scratch_of[slot] = scratch
         cells.impression[scratch] = 0.0
-    if value > cells.impression[scratch, j & MASK, i & MASK]:
-        cells.impression[scratch, j & MASK, i & MASK] = value
-    return True
+    return int(scratch)
 
 
 @njit
 def _stamp_point(cells: Cells, u: float, v: float, a: float, b: float, d: float) -> bool:
     """Gaussian with covariance [[a, b], [b, d]] about (u, v), in cells."""
     det = a * d - b * b
-    wide = max(3.0, 3.3 * math.sqrt(max(a, d)))
+    wide = math.sqrt(FAINT * max(a, d))
+    i0, i1 = math.ceil(u - wide), math.floor(u + wide)
+    pa, pb, pd = d / det, -2.0 * b / det, a / det
     for j in range(math.ceil(v - wide), math.floor(v + wide) + 1):
-        for i in range(math.ceil(u - wide), math.floor(u + wide) + 1):
-            du, dv = i - u, j - v
-            m = (d * du * du - 2.0 * b * du * dv + a * dv * dv) / det
-            if m < FAINT and not _raise(cells, i, j, math.exp(-0.5 * m)):
-                return False
+        dv = j - v
+        whole, part = pd * dv * dv, pb * dv
+        before, scratch = i0 - SIDE, -1
+        for i in range(i0, i1 + 1):
+            du = i - u
+            m = whole + du * (part + pa * du)
+            if m >= FAINT:
+                continue
+            if i >> SHIFT != before >> SHIFT:
+                before, scratch = i, _touch(cells, i >> SHIFT, j >> SHIFT)
+                if scratch < 0:
+                    return False
+            value = BELL[int(m * FINE)]
+            if value > cells.impression[scratch, j & MASK, i & MASK]:
+                cells.impression[scratch, j & MASK, i & MASK] = value
     return True
 
 
@@ -236,17 +248,26 @@ def _stamp_stretch(cells: Cells, u: float, v: float, du: float, dv: float, varia
     square = du * du + dv * dv
     flat = abs(du) >= abs(dv)
     slope = dv / du if flat else du / dv
-    wide = math.sqrt(FAINT * variance)
-    across = wide * math.sqrt(1.0 + slope * slope)
+    across = math.sqrt(FAINT * variance * (1.0 + slope * slope))
+    scale = 1.0 / (square * variance)
     start, end = (min(u, u + du), max(u, u + du)) if flat else (min(v, v + dv), max(v, v + dv))
     for along in range(math.ceil(start), math.floor(end) + 1):
         centre = v + slope * (along - u) if flat else u + slope * (along - v)
+        column, row, scratch = 0, 0, -1
         for aside in range(math.ceil(centre - across), math.floor(centre + across) + 1):
             i, j = (along, aside) if flat else (aside, along)
             cross = (i - u) * dv - (j - v) * du
-            m = cross * cross / (square * variance)
-            if m < FAINT and not _raise(cells, i, j, math.exp(-0.5 * m)):
-                return False
+            m = cross * cross * scale
+            if m >= FAINT:
+                continue
+            if scratch < 0 or i >> SHIFT != column or j >> SHIFT != row:
+                column, row = i >> SHIFT, j >> SHIFT
+                scratch = _touch(cells, column, row)
+                if scratch < 0:
+                    return False
+            value = BELL[int(m * FINE)]
+            if value > cells.impression[scratch, j & MASK, i & MASK]:
+                cells.impression[scratch, j & MASK, i & MASK] = value
     return True
 
 

@@ -372,12 +372,19 @@ class Matcher:
         Returns the prediction itself where the prior moves no observation by half a neuron.
         """
         points = observations.points_robot
+        if len(points) == 0:
+            return prediction
+        least = (0.5 * self.config.cell_m) ** 2
+        (xx, _, _), (_, yy, _), (_, _, tt) = covariance.tolist()
+        farthest = float((points[:, 0] ** 2 + points[:, 1] ** 2).max())
+        if 2.0 * (xx + yy + farthest * tt) < least:  # (a + b)^2 <= 2 (a^2 + b^2)
+            return prediction
         every = max(1, math.ceil(len(points) / FEW))
         few = points[::every]
         spread = _spread(few, prediction, covariance)
         most = (WIDEST_CELLS * self.config.cell_m) ** 2
         widths = spread[:, 0] + spread[:, 2]
-        if not (widths > (0.5 * self.config.cell_m) ** 2).any():
+        if not (widths > least).any():
             return prediction
         spread *= np.minimum(1.0, most / np.maximum(widths, 1e-12))[:, None]
         pose = np.array(prediction, dtype=np.float64)
