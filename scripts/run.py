@@ -26,7 +26,8 @@ def run(
         ),
     ],
     log: Annotated[
-        Path | None, typer.Option(help="A recorded log: CARMEN, plain or .gz or .xz.")
+        Path | None,
+        typer.Option(help="A recorded log: CARMEN (plain, .gz or .xz) or Victoria Park's folder."),
     ] = None,
     scene: Annotated[
         str | None, typer.Option(help="Or a simulated scene, driven on a tour of its rooms.")
@@ -85,7 +86,7 @@ def on_log(names: list[str], path: Path, out: Path, overwrite: bool, film: bool)
     settings = {
         "slams": list(replay.tracks),
         "log": path.name,
-        "log_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "log_sha256": hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None,
         "log_facts": dict(stream.metadata.extra),
     }
     return run_session(
