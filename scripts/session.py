@@ -147,8 +147,8 @@ def _tell(outputs: Outputs) -> None:
     if (outputs.folder / "map.yaml").exists():
         others.append("map.yaml for map_server")
     first = escape(str(outputs.folder / there[0]))
+    then = f", then {', '.join(there[1:])} beside it" if there[1:] else ""
     console.print(
-        f"Open [bold]{first}[/bold] first, then {', '.join(there[1:])} beside it; "
-        f"{', '.join(others)}.",
+        f"Open [bold]{first}[/bold] first{then}; {', '.join(others)}.",
         soft_wrap=True,
     )
