@@ -136,7 +136,7 @@ def test_an_endless_line_is_refused(tmp_path):
 def test_other_text_has_no_known_format(tmp_path):
     path = tmp_path / "notes.txt"
     path.write_text("Dear reader\nthis is no log\n")
-    with pytest.raises(LogFormatError, match="of no known format; known: .*CARMEN"):
+    with pytest.raises(LogFormatError, match=r"of no known format; known: .*CARMEN"):
         open_log(path)
 
 
