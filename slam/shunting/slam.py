@@ -38,6 +38,8 @@ VAGUE_CELLS = 1.0  # a prior wider than this may leave the basin of the right op
 LOST_AFTER, PATIENCE = 3, 30  # doubtful frames in a row: then lost; then the map is written anew
 WORTH_SEARCHING = 0.6  # usual support by the map from which on a lost robot searches it,
 GROWN_S, GROWN_SCANS = 10.0, 10  # once the map has been tracked on this long
+SUSPICIOUS, DENIED, STILL = 0.70, 0.30, 0.20  # of the usual match; share of the map in view
+# contradicted that raises doubt, and that keeps it up
 GIVE_UP_S = 60.0  # of searching: then the map is written on from where odometry says
 INFORMATION_SHARE = 0.3  # of the data's curvature that is independent from frame to frame
 DRIFT_SHARE = 1.0  # of the pose's error that goes into newly mapped structure
@@ -164,17 +166,22 @@ class ShuntingSlam:
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
         step = min(elapsed, LONGEST_LOOK_S)
         doubtful = False
-        if match.matched < self.config.freeze_below * self._usual_match():
+        share = match.matched / max(self._usual_match(), 1e-9)
+        suspicious = self.config.freeze_below > 0.0 and self._is_worth_searching()
+        if share < max(self.config.freeze_below, SUSPICIOUS if suspicious else 0.0):
             confirmed, contradicted, _ = self.network.integrate(
                 observations.view, T_map_laser, step, write=False
             )
-            doubtful = contradicted > confirmed
+            doubtful = share < self.config.freeze_below and contradicted > confirmed
+            denied = STILL if self._doubts else DENIED
+            # A corridor looked at the other way round still fits by two thirds.
+            doubtful |= suspicious and contradicted > denied * (confirmed + contradicted)
         self._doubts = self._doubts + 1 if doubtful else 0
         if doubtful and self._doubts <= PATIENCE:
             self.network.release()
             self.network.prune()
             # Only a map that for long explained what is seen can tell where the robot is.
-            if self._doubts >= LOST_AFTER and self._is_worth_searching():
+            if self._doubts >= LOST_AFTER and suspicious:
                 self._recovery = Recovery(self.network, self._matcher)
             return "lost" if self._doubts > LOST_AFTER else "frozen"
         confirmed, contradicted, _ = self.network.integrate(
