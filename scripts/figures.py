@@ -120,10 +120,10 @@ def in_first_frame(truth: Trajectory) -> Trajectory:
 
 def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float) -> None:
     """The map in the paper's style (Fig. 13): activities coloured, last scan blue, path black."""
-    figure, axes = _axes(10.0, 6.5)
+    height, width = raster.values.shape
+    figure, axes = _axes(min(11.0, max(5.0, 5.5 * width / height + 2.0)), 6.5)
     ax: Axes = axes[0]
     ax.grid(visible=False)
-    height, width = raster.values.shape
     x, y, _ = raster.T_map_origin
     extent = (x, x + width * raster.resolution_m, y, y + height * raster.resolution_m)
     faint = np.where(raster.values > 0.02, raster.values, np.nan)
