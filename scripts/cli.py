@@ -20,6 +20,8 @@ from scripts.sensor_card import sensor_card
 from sim import gl
 from slam.errors import MobiliaError
 
+_log = logging.getLogger(__name__)
+
 app = typer.Typer(
     name="mobilia",
     help=(
@@ -60,6 +62,7 @@ def main() -> None:
         app()
     except MobiliaError as error:
         fail(str(error))
+        _log.info("where it came from:", exc_info=error)  # with --verbose
         sys.exit(1)
     except interrupt.InterruptedBySignal:
         fail("interrupted: nothing half-written is left behind")

@@ -18,7 +18,8 @@ from slam.errors import InvalidValueError
 from slam.frames import Float, Scan
 from slam.system import Raster
 
-FREE_WITHOUT_RETURN_M = 30.0  # a beam without return says nothing about what lies beyond
+# Black or slanted surfaces give no return either: beyond this a silent beam says nothing.
+FREE_WITHOUT_RETURN_M = 30.0
 _CHUNK = 256
 
 

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from slam import se2
 from slam._jit import njit
 from slam.frames import Features, Float, Scan
+from slam.seen import FREE_WITHOUT_RETURN_M
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.network import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, Network
 from slam.shunting.surfaces import join, unveiled
-from slam.shunting.visibility import FREE_WITHOUT_RETURN_M, View, view_of_beams, view_of_features
+from slam.shunting.visibility import View, view_of_beams, view_of_features
 
 SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
 SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from slam._jit import njit
 
-FREE_WITHOUT_RETURN_M = 30.0  # black or slanted surfaces give no return either, from there on
 MARGIN_CELLS = 1.5
 GATE_CELLS = 0.6
 FEATURE_BIN = math.radians(1.0)

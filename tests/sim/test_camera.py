@@ -141,4 +141,4 @@ def test_the_camera_closes_without_a_word(world):
         warnings.simplefilter("error")
         for _ in range(3):
             with Camera(world[0], 32, 32, samples=0) as camera:
-                camera.render(world[1], "top")
+                assert camera.render(world[1], "top").shape == (32, 32, 3)

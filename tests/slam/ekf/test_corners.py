@@ -173,7 +173,8 @@ def test_the_sweep_is_undone():
 
 def test_a_scan_of_two_beams_is_survived():
     spec = LaserSpec(n_beams=2, angle_min=0.0, angle_increment=0.01)
-    corners(Scan(stamp_ns=0, ranges=np.array([2.0, 2.0], dtype=np.float32), spec=spec))
+    scan = Scan(stamp_ns=0, ranges=np.array([2.0, 2.0], dtype=np.float32), spec=spec)
+    assert len(corners(scan).points_robot) == 0
 
 
 def test_impossible_configurations_are_refused():
