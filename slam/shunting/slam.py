@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame, Odometry
+from slam.shunting.belief import Belief
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.impressions import (
     Observations,
@@ -22,7 +23,7 @@ from slam.shunting.impressions import (
 )
 from slam.shunting.loops import Loops
 from slam.shunting.matching import Match, Matcher
-from slam.shunting.motion import WIDEN, Prediction, inverted, predict, turned
+from slam.shunting.motion import Prediction, inverted, predict, turned
 from slam.shunting.network import Network
 from slam.shunting.recovery import COARSE, Recovery
 from slam.shunting.search import SearchWindow
@@ -41,9 +42,6 @@ GROWN_S, GROWN_SCANS = 10.0, 10  # once the map has been tracked on this long
 SUSPICIOUS, DENIED, STILL = 0.70, 0.30, 0.20  # of the usual match; share of the map in view
 # contradicted that raises doubt, and that keeps it up
 GIVE_UP_S = 60.0  # of searching: then the map is written on from where odometry says
-INFORMATION_SHARE = 0.3  # of the data's curvature that is independent from frame to frame
-DRIFT_SHARE = 1.0  # of the pose's error that goes into newly mapped structure
-LOCK_CELLS, LOCK_RAD = 0.05, 3e-4  # what the lattice itself leaves, 1 sigma
 
 
 @register("shunting")
@@ -71,10 +69,7 @@ class ShuntingSlam:
         self._matcher = Matcher(self.config)
         self._before: Odometry | None = None
         self._T_map_robot: Float = np.zeros(3)
-        self._covariance: Float = np.zeros((3, 3))
-        self._relative: Float = np.zeros((3, 3))
-        self._drift: Float = np.zeros((3, 3))
-        self._newest_drift: Float = np.zeros((3, 3))
+        self._belief = Belief(self.config.cell_m)
         self._usual: deque[float] = deque(maxlen=50)
         self._supports: deque[float] = deque(maxlen=50)
         self._doubts = 0
@@ -102,7 +97,7 @@ class ShuntingSlam:
             state = self._integrate(observations, match, prediction.elapsed)
         else:
             match, state = self._recover(self._recovery, observations, prediction)
-        self._believe(match, prediction)
+        self._belief.update(self._T_map_robot, prediction, match)
         self._keep(observations, match, prediction, state)
         return self._report(frame, match, state)
 
@@ -206,7 +201,7 @@ class ShuntingSlam:
         self.network.prune()
         if match is not None:
             self._recovery, self._doubts = None, 0
-            self._relative = COARSE.copy()
+            self._belief.relocated(COARSE)
             return match, "relocated"
         if recovery.elapsed_s > GIVE_UP_S:  # elsewhere: go on from here, as on the first frame
             self._recovery = None
@@ -221,29 +216,12 @@ class ShuntingSlam:
         )
         return blind, "lost"
 
-    def _believe(self, match: Match, prediction: Prediction) -> None:
-        """Fuse odometry and match into the covariance of the pose in the map of the start."""
-        before = se2.propagate(
-            self._relative, self._T_map_robot, prediction.increment, np.zeros((3, 3))
-        )
-        spread = before + prediction.covariance / WIDEN**2
-        share = INFORMATION_SHARE * match.tau
-        self._relative = inverted(inverted(spread) + share * match.information)
-        # What is new is mapped with the pose's present error, which then stays in the map.
-        share = DRIFT_SHARE * (1.0 - match.matched)
-        share *= math.sqrt(min(5.0 * max(prediction.elapsed, 0.0), 1.0))
-        self._newest_drift = share * self._relative
-        self._drift = self._drift + self._newest_drift
-        cell = self.config.cell_m
-        floor = np.diag([(LOCK_CELLS * cell) ** 2, (LOCK_CELLS * cell) ** 2, LOCK_RAD**2])
-        self._covariance = self._relative + self._drift + floor
-
     def _keep(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
     ) -> None:
         """For closing loops: the motion as matched, or by odometry where the match is in doubt."""
         motion = se2.between(self._T_map_robot, match.T_map_robot)
-        covariance = self._newest_drift
+        covariance = self._belief.newest_drift
         if state != "tracking":
             motion, covariance = prediction.increment, prediction.covariance
         covariance = turned(covariance, -float(self._T_map_robot[2]))
@@ -257,7 +235,7 @@ class ShuntingSlam:
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=match.T_map_robot,
-            covariance=self._covariance,
+            covariance=self._belief.covariance,
             converged=state in ("tracking", "relocated"),
             diagnostics={
                 "state": state,
