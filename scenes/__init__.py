@@ -9,6 +9,7 @@ from scenes.apartment import apartment
 from scenes.arena import arena
 from scenes.classroom import classroom
 from scenes.corridor import corridor
+from scenes.mounting import at_scan_height
 from scenes.office import office
 from scenes.random_rooms import random_rooms
 from scenes.registry import build, describe, names, register
@@ -21,6 +22,7 @@ __all__ = [
     "Scene",
     "apartment",
     "arena",
+    "at_scan_height",
     "build",
     "classroom",
     "corridor",

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.scene import SCAN_HEIGHT
+from slam.errors import InvalidValueError
 from slam.system import Raster
 
 Float = NDArray[np.float64]
@@ -25,9 +25,12 @@ def static_geoms(model: mujoco.MjModel) -> NDArray[np.int64]:
 
 
 def static_raster(
-    model: mujoco.MjModel, bounds: tuple[float, float, float, float], height: float = SCAN_HEIGHT
+    model: mujoco.MjModel, bounds: tuple[float, float, float, float], height: float
 ) -> Raster:
-    """1 where the plane z = height lies in a static geom, else 0; cell centres decide."""
+    """1 where the plane z = height m lies in a static geom, else 0; cell centres decide.
+
+    Raises ``InvalidValueError`` for a geom at that height that is no primitive.
+    """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     xmin, ymin = bounds[0] - MARGIN_M, bounds[1] - MARGIN_M
@@ -74,5 +77,6 @@ def _inside(kind: int, size: Float, x: Float, y: Float, z: Float) -> NDArray[np.
     elif kind == GEOM.mjGEOM_ELLIPSOID:
         inside = (x / size[0]) ** 2 + (y / size[1]) ** 2 + (z / size[2]) ** 2 <= 1.0
     else:
-        raise ValueError(f"geom type {kind} has no place at the scan plane; use primitives")
+        word = mujoco.mjtGeom(kind).name[7:].lower()
+        raise InvalidValueError(f"a {word} has no place at the scan plane, expected primitives")
     return inside

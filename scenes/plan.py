@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What never moves: walls, floors and furniture of a scene, with the true map they make.
+"""What never moves: walls, floors and furniture of a scene.
 
 A plan is the same for all seeds of most scenes, so it is made once per process and the things that
 move are added to copies of it (``scenes.builder``).
@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 
 from scenes import look
 from scenes.assembly import Assembly, Mark, file_of, marks, moved, part_marks
-from scenes.footprint import static_raster
 from scenes.scene import Pose
 from scenes.views import add_cameras
 from slam.errors import InvalidValueError
-from slam.system import Raster
 
 JAMB_OFFSET = 0.04  # m from the plane of a hinge to the middle of its wall, away from the swing
 WALL_HEIGHT = 1.1  # m, walls are cut there
@@ -34,7 +32,6 @@ class Plan:
     """A plan in the making: ``furnish`` it, then ``finish`` it, then only read it."""
 
     spec: mujoco.MjSpec
-    static_map: Raster
 
     def __init__(self, source: str, *, floors: Sequence[str] = ()) -> None:
         """``source``: name of one of our plans or path of an MJCF file; ``floors``: materials that
@@ -159,12 +156,11 @@ class Plan:
                 geom.group = HIDDEN
 
     def finish(self) -> Plan:
-        """Put the parts in, dress the walls, add cameras where none are, draw the true map."""
+        """Put the parts in, dress the walls, add cameras where none are."""
         self._parts.into(self.spec)
         self._boxes = self.boxes
         look.trim_walls(self.spec)
         add_cameras(self.spec, self.bounds)
-        self.static_map = static_raster(self.spec.compile(), self.bounds)
         return self
 
 

@@ -19,9 +19,9 @@ from scenes.builder import Builder
 from scenes.partition import OPENING, Cut, Opening, Rect, partition
 from scenes.placement import gap_to_boxes
 from scenes.plan import Plan
-from scenes.recipe import Draws, count, finish, free_floor, hang_doors, scatter, seat_chairs, within
+from scenes.recipe import Draws, count, finish, free_floor, hang_doors, scatter, seat_chairs
 from scenes.registry import register
-from scenes.scene import Pose, Scene
+from scenes.scene import Pose, Scene, within
 
 DEPTH = 0.7  # of the width
 WALL_HALF, OUTER_HALF = 0.06, 0.08

@@ -48,16 +48,6 @@ def count(field: str, value: int | None, default: int) -> int:
     return int(value)
 
 
-def within(field: str, value: float, low: float, high: float) -> float:
-    """An option that is a number in a range."""
-    number = isinstance(value, int | float | np.floating | np.integer)
-    if isinstance(value, bool) or not number:
-        raise InvalidValueError(f"{field} must be a number, got {value!r}")
-    if not low <= value <= high:
-        raise InvalidValueError(f"{field} must lie in {low:g}..{high:g}, got {value:g}")
-    return float(value)
-
-
 def switch(field: str, value: bool) -> bool:
     """An option that is on or off."""
     if not isinstance(value, bool):
@@ -165,7 +155,6 @@ def finish(builder: Builder, name: str, seed: int, options: Mapping[str, object]
         rooms={mark.words[1]: mark.rect for mark in plan.find("room")},
         bounds=plan.bounds,
         obstacles=plan.boxes,
-        static_map=plan.static_map,
         start=plan.start,
         options=dict(options),
     )

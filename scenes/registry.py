@@ -9,7 +9,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from scenes.scene import Scene
+from scenes.mounting import at_scan_height
+from scenes.scene import SCAN_HEIGHT, Scene
 from slam.errors import InvalidValueError, UnknownNameError
 
 Recipe = Callable[..., Scene]
@@ -37,8 +38,11 @@ def describe(name: str) -> str:
     return (inspect.getdoc(_find(name)) or "").partition("\n")[0]
 
 
-def build(name: str, seed: int = 0, **options: Any) -> Scene:
+def build(name: str, seed: int = 0, *, scan_height_m: float = SCAN_HEIGHT, **options: Any) -> Scene:
     """The scene of that name and seed; ``module:function`` names any recipe.
+
+    scan_height_m  of the robot's scanner above the floor, 0.05 to 1 m
+    options        of the recipe
 
     Raises ``UnknownNameError`` with the nearest known name, ``InvalidValueError`` for an option the
     recipe does not know or a value it cannot have.
@@ -53,7 +57,7 @@ def build(name: str, seed: int = 0, **options: Any) -> Scene:
     scene = recipe(seed, **options)
     if not isinstance(scene, Scene):
         raise UnknownNameError(f"'{name}' is no recipe: it returned {type(scene).__name__}")
-    return scene
+    return at_scan_height(scene, scan_height_m)
 
 
 def _find(name: str) -> Recipe:

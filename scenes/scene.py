@@ -5,16 +5,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.footprint import static_raster
+from slam.errors import InvalidValueError
 from slam.system import Raster
 
 SCAN_HEIGHT = 0.36
-"""Height of the laser's scan plane above the floor, m (where parts/robot.xml has its laser)."""
+"""Usual height of the scan plane above the floor, m (where parts/robot.xml has its laser)."""
 
 Kind = Literal[
     "chair_swivel", "chair_visitor", "bin", "trolley", "pallet", "person", "door", "robot"
@@ -52,8 +55,8 @@ class Scene:
     bounds       xmin, ymin, xmax, ymax of the whole floor, m
     obstacles    (n, 5) static boxes a walker avoids: cx, cy, half_x, half_y m, yaw rad; desk tops
                  count
-    static_map   truth at the scan plane from what never moves: 1 occupied, 0 free
     start        the robot's pose at reset, equal to ``initial["robot"]``
+    scan_height_m  of the robot's scanner above the floor; ``scenes.at_scan_height`` changes it
     """
 
     name: str
@@ -66,9 +69,14 @@ class Scene:
     rooms: Mapping[str, tuple[float, float, float, float]]
     bounds: tuple[float, float, float, float]
     obstacles: NDArray[np.float64]
-    static_map: Raster
     start: Pose
     options: Mapping[str, object] = field(default_factory=dict)
+    scan_height_m: float = SCAN_HEIGHT
+
+    @cached_property
+    def static_map(self) -> Raster:
+        """Truth at the scan plane from what never moves: 1 occupied, 0 free."""
+        return static_raster(self.spec.compile(), self.bounds, self.scan_height_m)
 
     def compile(self) -> mujoco.MjModel:
         """The model; its qpos0 is zero, as a planar qpos *is* the world pose: see ``place``."""
@@ -82,6 +90,16 @@ class Scene:
                 continue
             for joint, value in zip(("x", "y", "yaw"), self.initial[mover.name], strict=True):
                 data.qpos[_address(model, f"{mover.name}/{joint}")] = value
+
+
+def within(field: str, value: float, low: float, high: float) -> float:
+    """An option that is a number in a range."""
+    number = isinstance(value, int | float | np.floating | np.integer)
+    if isinstance(value, bool) or not number:
+        raise InvalidValueError(f"{field} must be a number, got {value!r}")
+    if not low <= value <= high:
+        raise InvalidValueError(f"{field} must lie in {low:g}..{high:g}, got {value:g}")
+    return float(value)
 
 
 def _address(model: mujoco.MjModel, joint: str) -> int:

@@ -21,6 +21,7 @@ def demo(
         float, typer.Option(help="How much the room moves: 0 nothing, 1 most.")
     ] = 0.5,
     seed: Annotated[int, typer.Option(help="Seed of everything, whole number >= 0.")] = 4,
+    scan_height: Annotated[float, typer.Option(help="Of the scanner above the floor, m.")] = 0.36,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
     ] = False,
@@ -37,7 +38,13 @@ def demo(
 
     on_scene(
         ["shunting"],
-        {"scene": scene, "seconds": seconds, "dynamism": dynamism, "seed": seed},
+        {
+            "scene": scene,
+            "seconds": seconds,
+            "dynamism": dynamism,
+            "seed": seed,
+            "scan_height_m": scan_height,
+        },
         Outputs(
             folder=out,
             command="demo",

@@ -37,6 +37,9 @@ def run(
         float, typer.Option(help="How much the simulated room moves: 0 nothing, 1 most.")
     ] = 0.5,
     seed: Annotated[int, typer.Option(help="Seed of the simulated run, whole number >= 0.")] = 0,
+    scan_height: Annotated[
+        float, typer.Option(help="Of the simulated scanner above the floor, m.")
+    ] = 0.36,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default out/run-<log or scene>.")
     ] = None,
@@ -60,7 +63,13 @@ def run(
 
         on_scene(
             slam,
-            settings={"scene": scene, "seconds": seconds, "dynamism": dynamism, "seed": seed},
+            settings={
+                "scene": scene,
+                "seconds": seconds,
+                "dynamism": dynamism,
+                "seed": seed,
+                "scan_height_m": scan_height,
+            },
             outputs=Outputs(
                 folder=out or Path("out") / f"run-{scene.replace(':', '-')}",
                 command="run",

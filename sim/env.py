@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from scenes.scene import SCAN_HEIGHT
 from sim.env_options import episode
 from sim.lidar import Lms221Config
 from sim.seeds import Seeds
@@ -68,7 +69,8 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     ``truncated`` after ``time_limit_s``.
 
     ### Arguments
-    ``scene``, ``dynamism``, ``laser``, ``odometry``, ``labels`` as in ``sim.Simulation``;
+    ``scene``, ``dynamism``, ``laser``, ``scan_height_m``, ``odometry``, ``labels`` as in
+    ``sim.Simulation``;
     ``render_mode`` "rgb_array" (3D, needs OpenGL), "map" (2D, needs nothing) or None; ``view``
     "top", "follow" or "persp" for the former; ``render_size`` (width, height) px.
 
@@ -84,6 +86,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     | `dynamism`                | the knob, or a ``sim.dynamism.Dynamism``                      |
     | `moving_share`            | share of chairs on the move at any time                       |
     | `rates`                   | single rates of ``Dynamism``, e.g. ``{"door_rate": 0.1}``     |
+    | `scan_height_m`           | of the scanner above the floor                                |
     | `resolution_deg`          | 1, 0.5 or 0.25; changes the observation space (give ``laser`` |
     |                           | to the constructor where a wrapper holds on to the space)     |
     | `noise_std_m`             | statistical error of the ranges                               |
@@ -105,6 +108,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         *,
         dynamism: float = 0.5,
         laser: Lms221Config | None = None,
+        scan_height_m: float = SCAN_HEIGHT,
         odometry: str = "pioneer3dx",
         time_limit_s: float = 60.0,
         terminate_on_collision: bool = False,
@@ -126,6 +130,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "scene": scene,
             "dynamism": dynamism,
             "laser": laser or Lms221Config(),
+            "scan_height_m": scan_height_m,
             "odometry": odometry,
             "labels": labels,
         }

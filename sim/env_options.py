@@ -15,7 +15,7 @@ from slam.errors import InvalidValueError
 
 OPTIONS = (
     "goal", "start", "seeds", "scene", "n_chairs", "n_people", "dynamism", "moving_share", "rates",
-    "resolution_deg", "noise_std_m", "laser",
+    "scan_height_m", "resolution_deg", "noise_std_m", "laser",
 )  # fmt: skip
 
 
@@ -43,7 +43,8 @@ def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> E
             )
     merged = dict(settings)
     merged |= _scene_options(given, settings)
-    merged |= {name: given[name] for name in ("n_chairs", "n_people") if name in given}
+    passed_on = ("n_chairs", "n_people", "scan_height_m")
+    merged |= {name: given[name] for name in passed_on if name in given}
     merged["dynamism"] = _rates(merged["dynamism"], given)
     merged["laser"] = _laser(merged["laser"], given)
     if "start" in given:

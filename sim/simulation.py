@@ -87,7 +87,8 @@ class Simulation:
     tags       "truth", or "camera": beside the truth, ``tag_reading`` is what a ceiling camera
                would know of the robot by now (``sim.tag_cameras``)
     labels     whether frames carry truth per beam
-    options    passed on to the scene, e.g. ``n_chairs=10``
+    options    passed on to ``scenes.build``: ``scan_height_m`` of the robot's scanner above the
+               floor (0.36), and the scene's own, e.g. ``n_chairs=10``
 
     Attribute ``path``: (steps + 1, 3) true poses of the robot at the steps of the last scan.
     """
@@ -224,7 +225,11 @@ class Simulation:
             laser=self.spec,
             robot=self.odometry_preset,
             truth="simulator",
-            extra={"laser": asdict(self.laser.config), "dynamism": asdict(self.world.rates)},
+            extra={
+                "laser": asdict(self.laser.config),
+                "scan_height_m": self.world.scene.scan_height_m,
+                "dynamism": asdict(self.world.rates),
+            },
         )
 
 

@@ -46,7 +46,8 @@ class World:
     drive     limits of the robot
     start     (x m, y m, heading rad) of the robot instead of the scene's
     chairs    "planar", or "free": standing on castors, able to rock (``sim.castors``)
-    options   passed on to the scene when it is given by name, e.g. ``n_chairs=10``
+    options   passed on to ``scenes.build`` when the scene is given by name, e.g. ``n_chairs=10``;
+              ``scan_height_m`` is one that every scene has
 
     Raises ``InvalidValueError`` for a dynamism outside [0, 1], ``UnknownNameError`` for a scene.
     """
@@ -210,7 +211,8 @@ class World:
 
     def _fingerprint(self) -> dict[str, Any]:
         m = self.model
-        return {"scene": self.scene.name, "size": [m.nq, m.nv, m.nu, m.nbody, m.ngeom]}
+        size = [m.nq, m.nv, m.nu, m.nbody, m.ngeom]
+        return {"scene": self.scene.name, "scan_height_m": self.scene.scan_height_m, "size": size}
 
     def save_state(self) -> bytes:
         """Everything that decides the future of this world, bit for bit.
