@@ -13,9 +13,10 @@ from slam import se2
 from slam.frames import Features, Odometry, Scan
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.impressions import from_features, from_scan, stamp
-from slam.shunting.matching import Matcher, evaluate
+from slam.shunting.matching import Matcher
 from slam.shunting.motion import WIDEN, inverted, predict, turned
 from slam.shunting.network import Network
+from slam.shunting.overlap import evaluate
 from slam.shunting.search import SearchWindow, branch_and_bound, levels_of
 from slam.shunting.surfaces import join
 from tests.world2d import World2D, arena, laser, rectangle
