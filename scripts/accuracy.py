@@ -126,22 +126,28 @@ def thinned(frames: list[Frame], stride: int) -> list[Frame]:
 
 
 def score(blank: Score, frames: list[Frame]) -> Score:
-    """Let the SLAM named in ``blank`` see the frames, and fill the rest of it."""
+    """Let the SLAM named in ``blank`` see the frames, and fill the rest of it; inf if it fails."""
     truth = Trajectory(
         stamps_ns=np.array([f.stamp_ns for f in frames]), poses=np.array([f.truth for f in frames])
     )
-    track = Track(name=blank.slam, system=create(blank.slam))
     wheels = Track(name="odometry", system=create("odometry"))
-    for frame in frames:
-        track.take(frame.without_truth())
-        wheels.take(frame.without_truth())
+    wheels.survive(frames)
+    odometry_m = metrics.ate(wheels.online(), truth).value
+    track = Track(name=blank.slam, system=create(blank.slam))
+    failure = track.survive(frames)
+    if failure is not None:
+        print(f"lost, seed {blank.seed}: {failure}", file=sys.stderr, flush=True)
+        lost = math.inf
+        return replace(
+            blank, ate_m=lost, odometry_m=odometry_m, aligned_m=lost, final_m=lost, heading_rad=lost
+        )
     online = track.online()
     settled = (online.stamps_ns - online.stamps_ns[0]) * 1e-9 > SETTLED_S
     nees = metrics.nees(online, track.covariances(), truth).values[settled]
     return replace(
         blank,
         ate_m=metrics.ate(online, truth).value,
-        odometry_m=metrics.ate(wheels.online(), truth).value,
+        odometry_m=odometry_m,
         aligned_m=metrics.ate(online, truth, align="se2").value,
         final_m=metrics.ate(track.system.trajectory(), truth).value,
         heading_rad=metrics.heading_rmse(online, truth).value,

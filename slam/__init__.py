@@ -2,6 +2,7 @@
 """SLAM on a stream of frames. Works without a simulator: never imports mujoco, gymnasium or sim."""
 
 from slam import ekf as _ekf  # noqa: F401  (registers itself)
+from slam import guests as _guests  # noqa: F401
 from slam import odometry as _odometry  # noqa: F401
 from slam import shunting as _shunting  # noqa: F401
 from slam.frames import (

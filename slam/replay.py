@@ -104,6 +104,18 @@ class Track:
         self.estimates.append(estimate)
         return estimate
 
+    def survive(self, frames: Iterable[Frame]) -> SlamFailedError | None:
+        """Take every frame, stripped of truth; what ended it, None when it came through.
+
+        For comparisons: a system that fails has lost this run, the others go on.
+        """
+        for frame in frames:
+            try:
+                self.take(frame.without_truth())
+            except SlamFailedError as error:
+                return error
+        return None
+
 
 @dataclass(eq=False)
 class Replay:

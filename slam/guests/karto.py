@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Karto's correlative scan matcher (Konolige et al. 2010; Olson 2009) against kept scans.
+
+The package brings the matcher, not Karto's graph: kept scans stay where they were matched. As in
+Karto a scan is kept after some way or turn; each scan, kept or not, is matched to the kept ones
+nearest to its predicted place, old ones too, so that a robot that comes back finds its old map.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float, LaserSpec
+from slam.guests.guest import Guest, needed
+from slam.shunting.motion import Prediction
+from slam.system import register
+
+KEEP_M, KEEP_RAD = 0.2, math.radians(10.0)  # Karto's minimum travel distance and heading
+BASE, NEAR_M = 20, 8.0  # kept scans matched against, and how far from the predicted place
+RANGE_M = 20.0
+NOTHING_M = 1e3  # a range that its matcher takes for no return
+FINE_RAD = math.radians(0.1)
+NARROW, WIDE = (0.3, 0.35), (1.2, 0.5)  # m across, rad either way; WIDE where NARROW does poorly
+POOR = 0.35  # Karto's response, of 1; its own least for a loop
+
+
+@register("karto")
+class KartoSlam(Guest):
+    """Karto's scan matcher, a guest: correlative matching to nearby kept scans, no graph."""
+
+    def __init__(self) -> None:
+        self._module: Any = needed("karto_scanmatcher", "karto-scanmatcher")
+        super().__init__()
+
+    def reset(self) -> None:
+        """Forget everything; the next frame is the origin of the map."""
+        super().reset()
+        self._kept: list[Any] = []
+        self._places: list[Float] = []
+
+    def _begin(self, spec: LaserSpec) -> None:
+        self._spec = spec
+        reach = min(spec.range_max, RANGE_M)
+        first, step = spec.angle_min, spec.angle_increment
+        last = first + (spec.n_beams - 1) * step
+        self._laser = self._module.LaserScanConfig(
+            first, last, step, spec.range_min, spec.range_max, reach, "laser"
+        )
+        self._matchers = []
+        for search_m, search_rad in (NARROW, WIDE):
+            config = self._module.ScanMatcherConfig()
+            config.range_threshold = reach
+            config.search_size = search_m
+            config.coarse_search_angle_offset = search_rad
+            config.fine_search_angle_resolution = FINE_RAD
+            self._matchers.append(self._module.Wrapper(config))
+
+    def _locate(
+        self, points_robot: Float, prediction: Prediction
+    ) -> tuple[Float, dict[str, float]]:
+        T_map_laser = se2.compose(prediction.T_map_robot, self._spec.T_robot_laser)
+        scan = self._scan(points_robot, T_map_laser)
+        if not self._kept:
+            self._keep(scan, T_map_laser)
+            return prediction.T_map_robot, {"response": 1.0}
+        near = self._near(T_map_laser)
+        result = self._matchers[0].match_scan(scan, near, True, True)
+        if result.response < POOR:
+            wide = self._matchers[1].match_scan(scan, near, True, True)
+            if wide.response > result.response:
+                result = wide
+        best = result.best_pose
+        T_map_laser = np.array([best.x, best.y, best.yaw])
+        moved = se2.between(self._places[-1], T_map_laser)
+        if math.hypot(float(moved[0]), float(moved[1])) > KEEP_M or abs(moved[2]) > KEEP_RAD:
+            self._keep(scan, T_map_laser)
+        T_map_robot = se2.compose(T_map_laser, se2.inverse(self._spec.T_robot_laser))
+        return T_map_robot, {"response": float(result.response)}
+
+    def _near(self, T_map_laser: Float) -> list[Any]:
+        """The kept scans to match against."""
+        apart = np.array(self._places)[:, :2] - T_map_laser[:2]
+        squares = (apart * apart).sum(axis=1)
+        nearest = np.argsort(squares, kind="stable")[:BASE]
+        return [self._kept[k] for k in nearest if squares[k] < NEAR_M**2] or self._kept[-1:]
+
+    def _scan(self, points_robot: Float, T_map_laser: Float) -> Any:
+        """Karto's own type: a range for each beam, here of the de-skewed end points."""
+        spec = self._spec
+        x, y = se2.transform(se2.inverse(spec.T_robot_laser), points_robot).T
+        ranges = np.full(spec.n_beams, NOTHING_M)
+        turned = np.array([math.atan2(b, a) for a, b in zip(x.tolist(), y.tolist(), strict=True)])
+        beams = np.floor((turned - spec.angle_min) / spec.angle_increment + 0.5).astype(np.int64)
+        inside = (beams >= 0) & (beams < spec.n_beams)
+        np.minimum.at(ranges, beams[inside], np.sqrt(x * x + y * y)[inside])
+        pose = self._module.Pose2(*T_map_laser.tolist())
+        number = len(self._stamps)
+        return self._module.LocalizedRangeScan(
+            self._laser, ranges.tolist(), pose, pose, number, float(number)
+        )
+
+    def _keep(self, scan: Any, T_map_laser: Float) -> None:
+        scan.corrected_pose = self._module.Pose2(*T_map_laser.tolist())
+        self._kept.append(scan)
+        self._places.append(T_map_laser)
