@@ -27,7 +27,7 @@ SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-p
 SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
 FAINT = 12.0  # squared Mahalanobis distance of I = 0.0025, where an impression ends
 FINE = 512  # entries of the table below for each unit of it: 0.1 % of I
-BELL = np.array([math.exp(-0.5 * k / FINE) for k in range(int(FAINT) * FINE)], np.float32)
+BELL = np.array([math.exp(-0.5 * k / FINE) for k in range(int(FAINT) * FINE)] + [0.0], np.float32)
 NEAR_JOIN_CELLS = 3.0
 SPACING_M, LEAST_WEIGHT = 0.1, 0.3  # beams closer than this share one observation's weight
 
@@ -192,8 +192,10 @@ def joined(first: Observations, second: Observations) -> Observations:
 
 @njit
 def _touch(cells: Cells, column: int, row: int) -> int:
-    """Where the impressions of a block are kept; it is born if need be. -1: no room is left."""
-    row, column = row - cells.corner[1], column - cells.corner[0]
+    """Open a place for the impressions of a block, which is born if need be. -1: no room is left.
+
+    The column and row are those of the directory.
+    """
     slot = cells.directory[row, column]
     if slot < 0:
         if cells.counts[FREE_COUNT] == 0:
@@ -205,15 +207,13 @@ def _touch(cells: Cells, column: int, row: int) -> int:
         cells.y[slot] = 0.0
         cells.age[slot] = 0.0
         cells.scratch_of[slot] = -1
-    scratch = cells.scratch_of[slot]
-    if scratch < 0:
-        scratch = cells.counts[TOUCHED_COUNT]
-        if scratch == len(cells.touched):
-            return -1
-        cells.counts[TOUCHED_COUNT] += 1
-        cells.touched[scratch] = slot
-        cells.scratch_of[slot] = scratch
-        cells.impression[scratch] = 0.0
+    scratch = cells.counts[TOUCHED_COUNT]
+    if scratch == len(cells.touched):
+        return -1
+    cells.counts[TOUCHED_COUNT] += 1
+    cells.touched[scratch] = slot
+    cells.scratch_of[slot] = scratch
+    cells.impression[scratch] = 0.0
     return int(scratch)
 
 
@@ -223,23 +223,30 @@ def _stamp_point(cells: Cells, u: float, v: float, a: float, b: float, d: float)
     det = a * d - b * b
     wide = math.sqrt(FAINT * max(a, d))
     i0, i1 = math.ceil(u - wide), math.floor(u + wide)
+    j0, j1 = math.ceil(v - wide), math.floor(v + wide)
     pa, pb, pd = d / det, -2.0 * b / det, a / det
-    for j in range(math.ceil(v - wide), math.floor(v + wide) + 1):
-        dv = j - v
-        whole, part = pd * dv * dv, pb * dv
-        before, scratch = i0 - SIDE, -1
-        for i in range(i0, i1 + 1):
-            du = i - u
-            m = whole + du * (part + pa * du)
-            if m >= FAINT:
+    cx, cy = cells.corner[0], cells.corner[1]
+    for row in range(j0 >> SHIFT, (j1 >> SHIFT) + 1):
+        for column in range(i0 >> SHIFT, (i1 >> SHIFT) + 1):  # block by block: looked up once
+            first, last = max(i0, column * SIDE), min(i1, column * SIDE + MASK)
+            low, high = max(j0, row * SIDE), min(j1, row * SIDE + MASK)
+            du, dv = min(max(u, first), last) - u, min(max(v, low), high) - v
+            if b == 0.0 and pa * du * du + pd * dv * dv >= FAINT:
                 continue
-            if i >> SHIFT != before >> SHIFT:
-                before, scratch = i, _touch(cells, i >> SHIFT, j >> SHIFT)
+            slot = cells.directory[row - cy, column - cx]
+            scratch = cells.scratch_of[slot] if slot >= 0 else -1
+            if scratch < 0:
+                scratch = _touch(cells, column - cx, row - cy)
                 if scratch < 0:
                     return False
-            value = BELL[int(m * FINE)]
-            if value > cells.impression[scratch, j & MASK, i & MASK]:
-                cells.impression[scratch, j & MASK, i & MASK] = value
+            for j in range(low, high + 1):
+                dv = j - v
+                whole, part = pd * dv * dv, pb * dv
+                for i in range(first, last + 1):
+                    du = i - u
+                    m = min(whole + du * (part + pa * du), FAINT)
+                    value = max(BELL[int(m * FINE)], cells.impression[scratch, j & MASK, i & MASK])
+                    cells.impression[scratch, j & MASK, i & MASK] = value
     return True
 
 
@@ -251,6 +258,7 @@ def _stamp_stretch(cells: Cells, u: float, v: float, du: float, dv: float, varia
     slope = dv / du if flat else du / dv
     across = math.sqrt(FAINT * variance * (1.0 + slope * slope))
     scale = 1.0 / (square * variance)
+    cx, cy = cells.corner[0], cells.corner[1]
     start, end = (min(u, u + du), max(u, u + du)) if flat else (min(v, v + dv), max(v, v + dv))
     for along in range(math.ceil(start), math.floor(end) + 1):
         centre = v + slope * (along - u) if flat else u + slope * (along - v)
@@ -263,9 +271,12 @@ def _stamp_stretch(cells: Cells, u: float, v: float, du: float, dv: float, varia
                 continue
             if scratch < 0 or i >> SHIFT != column or j >> SHIFT != row:
                 column, row = i >> SHIFT, j >> SHIFT
-                scratch = _touch(cells, column, row)
+                slot = cells.directory[row - cy, column - cx]
+                scratch = cells.scratch_of[slot] if slot >= 0 else -1
                 if scratch < 0:
-                    return False
+                    scratch = _touch(cells, column - cx, row - cy)
+                    if scratch < 0:
+                        return False
             value = BELL[int(m * FINE)]
             if value > cells.impression[scratch, j & MASK, i & MASK]:
                 cells.impression[scratch, j & MASK, i & MASK] = value
@@ -310,8 +321,10 @@ def stamp(network: Network, observations: Observations, T_map_robot: Float) -> N
         return
     largest = float(observations.covariances[:, [0, 2]].max())
     edge = max(3.0 * network.cell, 4.0 * math.sqrt(largest)) + network.cell
-    low, high = points_map.min(axis=0) - edge, points_map.max(axis=0) + edge
-    network.cover(float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+    x, y = points_map[:, 0], points_map[:, 1]
+    network.cover(
+        float(x.min()) - edge, float(y.min()) - edge, float(x.max()) + edge, float(y.max()) + edge
+    )
     done = 0
     while done < len(points_map):
         done = _stamp(

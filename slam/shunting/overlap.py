@@ -53,39 +53,53 @@ def _overlap(
     a, b, d = cov
     det = a * d - b * b
     pa, pb, pd = d / det, -b / det, a / det
-    wide = max(3.0, 3.3 * math.sqrt(max(a, d)))
-    j0, j1 = math.ceil(v - wide), math.floor(v + wide)
-    i0, i1 = math.ceil(u - wide), math.floor(u + wide)
+    wide, high = max(3.0, 3.3 / math.sqrt(pa)), max(3.0, 3.3 * math.sqrt(d))
+    lean = b / d  # each row's Gaussian is centred at u + lean * dv, with precision pa,
+    j0, j1 = math.ceil(v - high), math.floor(v + high)
+    weight = math.exp(-0.5 * (j0 - v) * (j0 - v) / d)  # and weighs exp(-dv^2 / 2 d);
+    climb, falling = math.exp(-(j0 - v + 0.5) / d), math.exp(-pa)
+    slowing = falling if a == d else math.exp(-1.0 / d)  # by recurrence: no exp in the loops
+    i0, i1, t, first, second = 0, 0, 0.0, 0.0, 0.0
     m0 = mu = mv = muu = muv = mvv = 0.0
     rows, columns = cells.directory.shape
-    # exp(-(du^2 pa + 2 du dv pb + dv^2 pd) / 2), by recurrence along a row: no exp in the loop
-    falling = math.exp(-pa)
     for j in range(j0, j1 + 1):
-        row = (j >> SHIFT) - cells.corner[1]
-        if row < 0 or row >= rows:
-            continue
         dv = j - v
-        du = i0 - u
-        kernel = math.exp(-0.5 * (pa * du * du + 2.0 * pb * du * dv + pd * dv * dv))
-        ratio = math.exp(-pa * (du + 0.5) - pb * dv)
-        column_before, slot = -1, -1
-        for i in range(i0, i1 + 1):
-            column = (i >> SHIFT) - cells.corner[0]
-            if column != column_before:
-                column_before = column
-                slot = cells.directory[row, column] if 0 <= column < columns else -1
-            if slot >= 0:
-                x, y = cells.x[slot, j & MASK, i & MASK], cells.y[slot, j & MASK, i & MASK]
-                value = kernel * (y + (1.0 - y) * reward.short_term * x)
-                m0 += value
-                mu += value * du
-                mv += value * dv
-                muu += value * du * du
-                muv += value * du * dv
-                mvv += value * dv * dv
-            kernel *= ratio
-            ratio *= falling
-            du += 1.0
+        shift = lean * dv
+        if j == j0 or b != 0.0:
+            i0, i1 = math.ceil(u + shift - wide), math.floor(u + shift + wide)
+            t = i0 - u - shift
+            first, second = math.exp(-0.5 * pa * t * t), math.exp(-pa * (t + 0.5))
+        row = (j >> SHIFT) - cells.corner[1]
+        if 0 <= row < rows:
+            s0 = s1 = s2 = 0.0
+            offset, kernel, ratio = t, first, second
+            column_before, slot = -1, -1
+            for i in range(i0, i1 + 1):
+                column = (i >> SHIFT) - cells.corner[0]
+                if column != column_before:
+                    column_before = column
+                    slot = cells.directory[row, column] if 0 <= column < columns else -1
+                if slot >= 0:
+                    x, y = cells.x[slot, j & MASK, i & MASK], cells.y[slot, j & MASK, i & MASK]
+                    value = kernel * (y + (1.0 - y) * reward.short_term * x)
+                    s0 += value
+                    value *= offset
+                    s1 += value
+                    s2 += value * offset
+                kernel *= ratio
+                ratio *= falling
+                offset += 1.0
+            s2 = weight * (s2 + shift * (2.0 * s1 + shift * s0))
+            s1 = weight * (s1 + shift * s0)
+            s0 *= weight
+            m0 += s0
+            mu += s1
+            mv += s0 * dv
+            muu += s2
+            muv += s1 * dv
+            mvv += s0 * dv * dv
+        weight *= climb
+        climb *= slowing
     norm = 1.0 / (math.pi * math.sqrt(det))
     out[0] = norm * m0
     out[1] = norm * (pa * mu + pb * mv)
