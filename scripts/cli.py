@@ -15,6 +15,7 @@ from scripts.bench import bench
 from scripts.console import console, fail, note
 from scripts.demo import demo
 from scripts.listing import listing
+from scripts.reproduce.verb import reproduce
 from scripts.run import run
 from scripts.sensor_card import sensor_card
 from sim import gl
@@ -38,6 +39,7 @@ app.command("run")(run)
 app.command("list")(listing)
 app.command("bench")(bench)
 app.command("sensor-card")(sensor_card)
+app.command("reproduce")(reproduce)
 
 
 @app.callback()

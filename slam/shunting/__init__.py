@@ -2,7 +2,8 @@
 """SLAM on a shunting short-term memory: a neural map that forgets what moved."""
 
 from slam.shunting.config import ShuntingConfig
+from slam.shunting.featured import FeaturedShuntingSlam
 from slam.shunting.occupancy import OccupancySlam
 from slam.shunting.slam import ShuntingSlam
 
-__all__ = ["OccupancySlam", "ShuntingConfig", "ShuntingSlam"]
+__all__ = ["FeaturedShuntingSlam", "OccupancySlam", "ShuntingConfig", "ShuntingSlam"]

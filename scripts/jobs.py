@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Jobs that can be killed at any time: each writes one file, which is there whole or not at all.
+
+A job is a function called as ``call(path, **arguments)`` that writes ``path``. It gets a temporary
+name, which becomes ``<name>-<digest><suffix>`` when the function returns. The digest is that of the
+arguments and of the code that they are given to, so what is found there is what would be written,
+and is not made again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+
+from scripts import interrupt
+from scripts.console import progress
+from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
+
+PART = ".part"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One file to be made.
+
+    name       what it is called, before the digest: letters, digits, - _ .
+    call       a function of a module (workers import it): ``call(path, **arguments)``
+    arguments  as JSON has them
+    suffix     ending of the file
+    code       folders or files, the digest of whose Python sources is part of the name
+    """
+
+    name: str
+    call: Callable[..., None]
+    arguments: Mapping[str, Any]
+    suffix: str = ".npz"
+    code: Sequence[Path] = ()
+
+    def __post_init__(self) -> None:
+        if not self.name or not all(c.isalnum() or c in "-_." for c in self.name):
+            raise InvalidValueError(
+                f"Job.name must be letters, digits, '-', '_' and '.', got {self.name!r}"
+            )
+
+    def file_name(self) -> str:
+        """Where its result goes, within the folder of the jobs."""
+        call = f"{self.call.__module__}.{self.call.__qualname__}"
+        told = json.dumps([call, dict(self.arguments)], sort_keys=True)
+        sources = "".join(_digest(path) for path in self.code)
+        return f"{self.name}-{_short(told + sources)}{self.suffix}"
+
+
+def _short(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:10]
+
+
+@cache
+def _digest(path: Path) -> str:
+    files = sorted(path.rglob("*.py")) if path.is_dir() else [path]
+    whole = hashlib.sha256()
+    for file in files:
+        whole.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    return whole.hexdigest()
+
+
+def run_jobs(
+    jobs: Iterable[Job], folder: Path, *, processes: int = 1, title: str = "jobs"
+) -> dict[str, Path]:
+    """Make what is missing, on ``processes`` processes; the file of each job by its name.
+
+    A job that fails stops the rest and is named in the error; results that are whole stay, and the
+    next call goes on from them. Raises ``InvalidValueError`` for two jobs of one name.
+    """
+    wanted: dict[str, Job] = {}
+    for job in jobs:
+        if job.name in wanted:
+            raise InvalidValueError(f"two jobs are called {job.name!r}")
+        wanted[job.name] = job
+    if processes < 1:
+        raise InvalidValueError(f"processes must be >= 1, got {processes}")
+    folder.mkdir(parents=True, exist_ok=True)
+    files = {name: folder / job.file_name() for name, job in wanted.items()}
+    missing = [job for name, job in wanted.items() if not files[name].exists()]
+    with progress() as bar:
+        done = len(wanted) - len(missing)
+        task = bar.add_task(escape(title), total=len(wanted), completed=done, unit="")
+
+        def advance() -> None:
+            bar.advance(task)
+            bar.update(task, unit=f"{int(bar.tasks[0].completed)}/{len(wanted)}")
+
+        if processes == 1 or len(missing) < 2:
+            for job in missing:
+                interrupt.check()
+                make(job, files[job.name])
+                advance()
+        else:
+            _in_parallel(missing, files, min(processes, len(missing)), advance)
+    return files
+
+
+def _in_parallel(
+    jobs: list[Job], files: Mapping[str, Path], processes: int, advance: Callable[[], None]
+) -> None:
+    """Spawned, not forked: compiled kernels and OpenGL do not survive a fork."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, mp_context=context) as pool:
+        running: set[Future[None]] = {pool.submit(make, job, files[job.name]) for job in jobs}
+        try:
+            while running:
+                done, running = wait(running, timeout=1.0, return_when=FIRST_COMPLETED)
+                interrupt.check()
+                for future in done:
+                    future.result()
+                    advance()
+        except BrokenProcessPool as error:
+            raise SlamFailedError(
+                "a worker was killed, perhaps for want of memory: what is whole was kept, run it "
+                "again with fewer --jobs"
+            ) from error
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def make(job: Job, file: Path) -> None:
+    """Run one job into ``file``; what a killed run left of it is removed first."""
+    for left in file.parent.glob(f".{file.stem}.*{PART}{file.suffix}"):
+        left.unlink(missing_ok=True)
+    temporary = file.with_name(f".{file.stem}.{os.getpid()}{PART}{file.suffix}")
+    try:
+        job.call(temporary, **job.arguments)
+        os.replace(temporary, file)
+    except MobiliaError:
+        raise
+    except Exception as error:
+        raise SlamFailedError(f"{job.name}: {type(error).__name__}: {error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)

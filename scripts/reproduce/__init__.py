@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia reproduce``: the paper's experiments, its figures and its tables with ours beside."""

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an experiment leaves: figures as PNG and SVG, a Markdown table, the recipe."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+
+from scripts.jobs import Job, run_jobs
+from scripts.output import machine, write_recipe
+from scripts.reproduce.runs import Plan, Run, load_run
+from slam.files import replacing, write_text
+from slam.frames import Float
+
+COLORS = {
+    "truth": "#168c5a", "odometry": "#de6e18", "occupancy": "#7a3fb0", "EKF": "#1f61be",
+    "shunting": "#ce2c3c", "shunting, features": "#b8860b", "shunting, paper preset": "#8c6d1f",
+    "known associations": "#5b6472", "graph": "#5b6472", "GPS": "#168c5a",
+}  # fmt: skip
+
+
+@dataclass(eq=False)
+class Report:
+    """One experiment's folder."""
+
+    name: str
+    plan: Plan
+    started: float = field(default_factory=time.perf_counter)
+    lines: list[str] = field(default_factory=list)
+    recipe: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> Any:
+        """Where it all goes."""
+        return self.plan.out / self.name
+
+    def run(self, jobs: Iterable[Job]) -> dict[str, Run]:
+        """Make the runs that are missing; all of them."""
+        listed = list(jobs)
+        files = run_jobs(
+            listed, self.folder / "runs", processes=self.plan.processes, title=self.name
+        )
+        self.recipe["runs"] = {job.name: dict(job.arguments) for job in listed}
+        return {name: load_run(file) for name, file in files.items()}
+
+    def heading(self, text: str) -> None:
+        """A section of the page."""
+        self.lines += ["", f"## {text}", ""]
+
+    def say(self, text: str) -> None:
+        """A paragraph."""
+        self.lines += [text, ""]
+
+    def table(self, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+        """A table; the first column is words, the others are numbers."""
+        self.lines.append("| " + " | ".join(head) + " |")
+        self.lines.append("|" + "---|" + "---:|" * (len(head) - 1))
+        self.lines += ["| " + " | ".join(row) + " |" for row in rows]
+        self.lines.append("")
+
+    def figure(self, name: str, figure: Figure, caption: str) -> None:
+        """``name``.png and ``name``.svg, and the picture in the page."""
+        for suffix in ("png", "svg"):
+            metadata = {"Software": None} if suffix == "png" else {"Date": None}
+            with (
+                replacing(self.folder / f"{name}.{suffix}") as temporary,
+                mpl.rc_context({"svg.hashsalt": "mobilia"}),
+            ):
+                figure.savefig(temporary, dpi=130, metadata=metadata)
+        self.lines += [f"![{caption}]({name}.png)", "", f"*{caption}*", ""]
+
+    def finish(self, title: str) -> None:
+        """Write the page and the recipe; the page says on which machine and how long."""
+        wall_s = time.perf_counter() - self.started
+        made_on = machine()
+        head = [
+            f"# {title}",
+            "",
+            f"Wall time of this call {wall_s:.0f} s with {self.plan.processes} processes on "
+            f"{made_on['processor']}, {made_on['cores']} cores"
+            + (" (quick: too short and too few to conclude from)." if self.plan.quick else "."),
+            "",
+        ]
+        write_text(self.folder / "README.md", "\n".join(head + self.lines).rstrip() + "\n")
+        settings = {
+            key: str(value) if key in ("out", "data") else value
+            for key, value in asdict(self.plan).items()
+        }
+        write_recipe(
+            self.folder,
+            f"reproduce {self.name}",
+            {"plan": settings, "machine": made_on, "wall_s": wall_s, **self.recipe},
+        )
+
+
+def new_figure(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> Any:
+    """A figure and its axes (always an array, row by row)."""
+    mpl.rcParams.update(
+        {"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
+         "axes.spines.right": False, "figure.constrained_layout.use": True}
+    )  # fmt: skip
+    figure = Figure(figsize=(width, height))
+    return figure, np.atleast_1d(figure.subplots(rows, columns, **options)).ravel()
+
+
+def draw_ellipses(ax: Axes, ellipses: Float, color: str = "black", label: str = "") -> None:
+    """(n, 5) centre, half axes, direction; a dot in each so that tiny ones are seen."""
+    if len(ellipses):
+        ax.add_collection(
+            EllipseCollection(
+                2.0 * ellipses[:, 2], 2.0 * ellipses[:, 3], np.degrees(ellipses[:, 4]),
+                units="xy", offsets=ellipses[:, :2], offset_transform=ax.transData,
+                facecolors="none", edgecolors=color, linewidths=0.9,
+            )
+        )  # fmt: skip
+    ax.plot(ellipses[:, 0], ellipses[:, 1], ".", color=color, ms=2.5, label=label)
+
+
+def draw_activities(ax: Axes, values: NDArray[Any], origin: Float, cell: float, cmap: str) -> Any:
+    """A map's activities (rows from the lowest y) as an image."""
+    height, width = values.shape
+    x, y = float(origin[0]), float(origin[1])
+    # a blob of few neurons would be less than a pixel: swell it to a 150th of the picture
+    swollen = maximum_filter(values.astype(np.float32), size=1 + 2 * (max(height, width) // 300))
+    shown = np.where(swollen > 0.02, swollen, np.nan)
+    return ax.imshow(
+        shown, origin="lower", extent=(x, x + width * cell, y, y + height * cell), cmap=cmap,
+        vmin=0.0, vmax=1.0, interpolation="nearest",
+    )  # fmt: skip
+
+
+def error_axes(seconds: Float, errors: Mapping[str, Float], title: str) -> Figure:
+    """The paper's Figs. 7, 9, 12: errors in x, y and heading over time, one line for each SLAM.
+
+    Linear, unless one SLAM's errors dwarf another's: then linear near zero, logarithmic beyond.
+    """
+    figure: Figure
+    figure, axes = new_figure(9.0, 7.0, rows=3, sharex=True)
+    for ax, k, unit in zip(axes, range(3), ("x in m", "y in m", "heading in rad"), strict=True):
+        for name, e in errors.items():
+            ax.plot(seconds, e[:, k], color=COLORS[name], lw=1.2, label=name)
+        ax.axhline(0.0, color="black", lw=0.5)
+        ax.set(ylabel=f"error of {unit}")
+        sizes = [float(np.nanmax(np.abs(e[:, k]))) for e in errors.values()]
+        if max(sizes) > 15.0 * min(sizes) > 0.0:
+            ax.set_yscale("symlog", linthresh=min(sizes))
+    axes[0].set(title=title)
+    axes[0].legend(frameon=False, ncols=4, fontsize=8)
+    axes[2].set(xlabel="time in s")
+    return figure

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every experiment does: SLAMs over frames, results in one file, numbers over seeds."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import scripts
+import slam
+from scripts.jobs import Job
+from slam import metrics, se2
+from slam.errors import InvalidValueError
+from slam.frames import Float, Frame
+from slam.replay import Track
+from slam.system import SlamSystem
+from slam.trajectory import Trajectory
+
+SOURCES = (Path(slam.__file__).parent, Path(scripts.__file__).parent / "reproduce")
+QUANTITIES = ("x", "y", "θ")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What was asked for.
+
+    out        folder; each experiment writes into a folder of its own in it
+    seeds      simulated runs of each kind, seeds 100 and up: none of them was ever tuned on
+    quick      short runs of few seeds, to see that all works
+    data       folder of the Victoria Park dataset
+    processes  that work at the same time
+    scale      share of the lengths of ``quick``; the tests take less of them
+    """
+
+    out: Path
+    seeds: int = 20
+    quick: bool = False
+    data: Path | None = None
+    processes: int = 1
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.seeds < 1:
+            raise InvalidValueError(f"--seeds must be >= 1, got {self.seeds}")
+        if self.processes < 1:
+            raise InvalidValueError(f"--jobs must be >= 1, got {self.processes}")
+
+    def seed_list(self) -> list[int]:
+        """The seeds of the simulated runs; the first is the single run shown as the paper's."""
+        return list(range(100, 100 + (min(self.seeds, 1) if self.quick else self.seeds)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run:
+    """One job's file: ``numbers`` (JSON) and ``arrays``."""
+
+    numbers: Mapping[str, Any]
+    arrays: Mapping[str, NDArray[Any]]
+
+
+def save_run(path: Path, numbers: Mapping[str, Any], arrays: Mapping[str, ArrayLike]) -> None:
+    """Write a ``Run``; NaN and infinities stay what they are."""
+    everything: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
+    everything["numbers"] = np.array(json.dumps(numbers, sort_keys=True))
+    with path.open("wb") as file:
+        np.savez_compressed(file, **everything)
+
+
+def load_run(path: Path) -> Run:
+    """Read it back."""
+    with np.load(path) as file:
+        arrays = {name: file[name] for name in file.files if name != "numbers"}
+        return Run(numbers=json.loads(str(file["numbers"])), arrays=arrays)
+
+
+def job(name: str, call: Any, **arguments: Any) -> Job:
+    """A job whose result depends on the SLAMs and on this package."""
+    return Job(name=name, call=call, arguments=arguments, code=SOURCES)
+
+
+def truth_of(frames: Sequence[Frame]) -> Trajectory:
+    """The true poses, in the frame of the first."""
+    poses = np.array([frame.truth for frame in frames])
+    first = se2.inverse(poses[0])
+    return Trajectory(
+        stamps_ns=np.array([frame.stamp_ns for frame in frames]),
+        poses=np.array([se2.compose(first, pose) for pose in poses]),
+    )
+
+
+def follow(system: SlamSystem, frames: Iterable[Frame], name: str) -> Track:
+    """One SLAM over the frames, without their truth."""
+    track = Track(name=name, system=system)
+    for frame in frames:
+        track.take(frame.without_truth())
+    return track
+
+
+def pose_numbers(estimate: Trajectory, truth: Trajectory) -> dict[str, Any]:
+    """RMSE, and the paper's mean(e), var(e), var(p) of x, y and heading."""
+    e = metrics.pose_errors(estimate, truth)
+    return {
+        "rmse_m": metrics.ate(estimate, truth).value,
+        "heading_rmse_rad": metrics.heading_rmse(estimate, truth).value,
+        **statistics(e.errors, QUANTITIES),
+    }
+
+
+def statistics(errors: Float, names: Sequence[str]) -> dict[str, Any]:
+    """mean(e), var(e) and var(p) of each column; NaN of fewer than two errors."""
+    out: dict[str, Any] = {}
+    n = len(errors)
+    for k, name in enumerate(names):
+        e = errors[:, k] if n >= 2 else np.full(2, np.nan)
+        mean = float(e.mean())
+        out[f"mean {name}"] = mean
+        out[f"var_e {name}"] = float(((e - mean) ** 2).sum() / (len(e) - 1))
+        out[f"var_p {name}"] = float((e**2).sum() / (len(e) - 1))
+    return out
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """Median and quartiles over the seeds."""
+
+    median: float
+    low: float
+    high: float
+    n: int
+
+    def text(self, form: str = "{:.3g}") -> str:
+        """``median [low, high]``."""
+        if not math.isfinite(self.median):
+            return "–"
+        middle, low, high = (form.format(v) for v in (self.median, self.low, self.high))
+        return f"{middle} [{low}, {high}]" if self.n > 1 else middle
+
+
+def spread(values: Iterable[float]) -> Spread:
+    """Of finite values; NaN where there is none."""
+    finite = np.array([v for v in values if v is not None and math.isfinite(v)])
+    if len(finite) == 0:
+        return Spread(median=math.nan, low=math.nan, high=math.nan, n=0)
+    low, median, high = (float(v) for v in np.percentile(finite, [25, 50, 75]))
+    return Spread(median=median, low=low, high=high, n=len(finite))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignTest:
+    """How often the first of a pair was the smaller, and the two-sided probability of that or
+    more by chance."""
+
+    wins: int
+    losses: int
+    p: float
+
+    def text(self) -> str:
+        """One cell of a table."""
+        return f"{self.wins} : {self.losses}, p = {self.p:.2g}"
+
+
+def sign_test(first: Sequence[float], second: Sequence[float]) -> SignTest:
+    """Paired by seed; ties count for neither."""
+    wins = sum(a < b for a, b in zip(first, second, strict=True))
+    losses = sum(b < a for a, b in zip(first, second, strict=True))
+    n, k = wins + losses, max(wins, losses)
+    tail = sum(math.comb(n, i) for i in range(k, n + 1)) / 2.0**n
+    return SignTest(wins=wins, losses=losses, p=min(1.0, 2.0 * tail) if n else 1.0)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Peaks between neurons, and the shunting SLAM on point features with IPJC."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from slam import create, metrics
+from slam.errors import InvalidValueError
+from slam.frames import Features
+from slam.points import PointWorld, PointWorldConfig
+from slam.replay import Track
+from slam.shunting.config import ShuntingConfig
+from slam.shunting.impressions import from_features, stamp
+from slam.shunting.network import Network
+from slam.shunting.peaks import peaks
+from slam.trajectory import Trajectory
+
+
+def network_of(points: np.ndarray, **options: float) -> Network:
+    config = ShuntingConfig(cell_m=0.1, **options)
+    network = Network(config)
+    covariances = np.repeat(1e-4 * np.eye(2)[None], len(points), axis=0)
+    features = Features(stamp_ns=0, points_robot=points, covariances=covariances)
+    seen = from_features(features, config)
+    stamp(network, seen, np.zeros(3))
+    network.integrate(seen.view, np.zeros(3), 1.0, write=True)
+    return network
+
+
+@pytest.mark.parametrize("trace_s", [0.0, 3.0])
+def test_peaks_lie_between_neurons_where_the_points_were(trace_s):
+    """The Gaussians are exact up to the threshold: a hundredth of a neuron."""
+    rng = np.random.default_rng(0)
+    points = np.stack([np.arange(-4.0, 4.0), rng.uniform(-5.0, 5.0, 8)], axis=1)
+    points += rng.uniform(-0.05, 0.05, points.shape)
+    found, heights = peaks(network_of(points, trace_s=trace_s), 0.05)
+    assert len(found) == len(points)
+    assert (heights > 0.05).all()
+    order = np.argsort(found[:, 0])
+    # the short-term activity I / (A + I) is flatter on top than I, so a little off a Gaussian
+    np.testing.assert_allclose(found[order], points, atol=0.005)
+
+
+def test_peaks_beyond_reach_and_below_the_least_are_left_out():
+    points = np.array([[1.0, 0.0], [30.0, 0.0]])
+    network = network_of(points)
+    near, _ = peaks(network, 0.05, centre=np.zeros(2), reach_m=5.0)
+    np.testing.assert_allclose(near, points[:1], atol=0.01)
+    assert len(peaks(network, 1.0)[0]) == 0
+
+
+@pytest.mark.parametrize("moving", [0.0, 0.5])
+def test_it_localises_among_moving_points(moving):
+    """Odometry alone is metres off; half of the points walk about."""
+    world = PointWorld(PointWorldConfig(moving=moving, n_steps=80), seed=4)
+    frames = list(world.stream())
+    track = Track(
+        name="",
+        system=create("shunting-features", cell_m=0.03, range_m=12.5, freeze_below=0.0),
+    )
+    for frame in frames:
+        track.take(frame.without_truth())
+    truth = Trajectory(
+        stamps_ns=np.array([f.stamp_ns for f in frames]), poses=np.array([f.truth for f in frames])
+    )
+    assert metrics.ate(track.online(), truth).value < 0.05
+
+
+def test_options_are_those_of_the_preset():
+    system = create("shunting-features", config="paper", cell_m=0.05)
+    assert system.config == ShuntingConfig.paper(cell_m=0.05)
+    with pytest.raises(InvalidValueError, match="nonsense"):
+        create("shunting-features", nonsense=1)
+    with pytest.raises(InvalidValueError, match="other"):
+        create("shunting-features", config="other", cell_m=0.05)
