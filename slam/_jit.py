@@ -56,6 +56,21 @@ def _watch_callees(dispatcher: Any, function: Any) -> None:
     files.discard(own)
     dispatcher.kernel_files = {own, *files}
     index = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
-    if index is not None and files:
+    if index is None:
+        return
+    index._load_index = _or_nothing(index._load_index)
+    if files:
         digest = hashlib.sha256(b"".join(Path(f).read_bytes() for f in sorted(files)))
         index._source_stamp = (index._source_stamp, digest.hexdigest())
+
+
+def _or_nothing(load: Callable[[], dict[Any, Any]]) -> Callable[[], dict[Any, Any]]:
+    """A cache of an older version may name types that are gone: then there is nothing in it."""
+
+    def loaded() -> dict[Any, Any]:
+        try:
+            return load()
+        except (AttributeError, ImportError):
+            return {}
+
+    return loaded

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from slam._jit import njit
 from slam.frames import Float
-from slam.shunting.network import SIDE, Network
+from slam.shunting.cells import SIDE
+from slam.shunting.network import Network
 from slam.shunting.search import bounds_of, descend, field_of, levels_of, place
 
 PITCH_M = 0.12  # neurons are pooled up to this edge

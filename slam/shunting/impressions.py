@@ -18,8 +18,9 @@ from slam import se2
 from slam._jit import njit
 from slam.frames import Features, Float, Scan
 from slam.seen import FREE_WITHOUT_RETURN_M
+from slam.shunting.cells import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.network import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, Network
+from slam.shunting.network import Network
 from slam.shunting.surfaces import join, unveiled
 from slam.shunting.visibility import View, view_of_beams, view_of_features
 
@@ -211,7 +212,9 @@ def _touch(cells: Cells, column: int, row: int) -> int:
     if scratch == len(cells.touched):
         return -1
     cells.counts[TOUCHED_COUNT] += 1
-    cells.touched[scratch] = slot
+    cells.touched[scratch, 0] = slot
+    cells.touched[scratch, 1] = column + cells.corner[0]
+    cells.touched[scratch, 2] = row + cells.corner[1]
     cells.scratch_of[slot] = scratch
     cells.impression[scratch] = 0.0
     return int(scratch)

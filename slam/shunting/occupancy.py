@@ -14,19 +14,11 @@ from numpy.typing import NDArray
 
 from slam._jit import njit
 from slam.frames import Float
+from slam.shunting.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.network import (
-    FREE_COUNT,
-    MASK,
-    SHIFT,
-    SIDE,
-    Cells,
-    Network,
-    block_is_hidden,
-    seen_empty,
-)
+from slam.shunting.network import Network
 from slam.shunting.slam import ShuntingSlam
-from slam.shunting.visibility import View
+from slam.shunting.visibility import View, block_is_hidden, seen_empty
 from slam.system import Raster, register
 
 # Inverse sensor model, log-odds per scan: p = 0.7 and 0.4, clamped to 0.97 (Hornung et al. 2013).

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import njit
-from slam.shunting.network import MASK, SHIFT, Cells
+from slam.shunting.cells import MASK, SHIFT, Cells
 
 MATCHED_OVERLAP = 0.15  # an observation that overlaps the map less is not matched
 ENOUGH = 1e-4  # expected rise of the score below which climbing ends

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from slam._jit import njit
 from slam.frames import Float
+from slam.shunting.cells import MASK, SHIFT, SIDE, Cells
 from slam.shunting.impressions import SIGMA_CELLS, Observations
-from slam.shunting.network import MASK, SHIFT, SIDE, Cells, Network
+from slam.shunting.network import Network
 
 LEVELS = 3  # coarsest block of offsets: 8 x 8 neurons
 FULL = 255.0  # integer that stands for the field's value 1

@@ -174,7 +174,6 @@ class ShuntingSlam:
         self._doubts = self._doubts + 1 if doubtful else 0
         if doubtful and self._doubts <= PATIENCE:
             self.network.release()
-            self.network.prune()
             # Only a map that for long explained what is seen can tell where the robot is.
             if self._doubts >= LOST_AFTER and suspicious:
                 self._recovery = Recovery(self.network, self._matcher)
@@ -198,7 +197,6 @@ class ShuntingSlam:
         precision = inverted(prediction.covariance)
         here = self._matcher.climb(self.network, observations, predicted, predicted, precision)
         match = recovery.step(observations, prediction, here, self._usual_support())
-        self.network.prune()
         if match is not None:
             self._recovery, self._doubts = None, 0
             self._belief.relocated(COARSE)

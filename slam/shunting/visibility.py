@@ -101,3 +101,48 @@ def view_of_features(points: NDArray[np.float64], cell: float) -> View:
             ranges += [max(r0, r1)] * len(between)
     view = view_of_beams(np.array(bearings), np.array(ranges), FEATURE_BIN, cell)
     return view._replace(gate=math.inf)
+
+
+@njit
+def seen_empty(view: View, dx: float, dy: float) -> bool:
+    """True where a beam passed by (dx, dy) (m, from the laser, laser axes) without stopping."""
+    r = math.sqrt(dx * dx + dy * dy)
+    if r >= view.farthest - view.margin:
+        return False
+    bins = len(view.limit)
+    turns = math.atan2(dy, dx) / view.step
+    k = math.floor(turns + 0.5)
+    off = turns - k
+    if k < 0:
+        k += bins
+    elif k >= bins:
+        k -= bins
+    if r >= view.limit[k] - view.margin:
+        return False
+    after = view.offset[k + 1 if k + 1 < bins else 0] + 1.0
+    before = view.offset[k - 1 if k > 0 else bins - 1] - 1.0
+    nearest = min(abs(off - view.offset[k]), abs(off - before), abs(off - after))
+    return bool(nearest * view.step * r <= view.gate)
+
+
+@njit
+def block_is_hidden(view: View, dx: float, dy: float, half: float) -> bool:
+    """True when no neuron within ``half`` m of (dx, dy) can be in view."""
+    r = math.sqrt(dx * dx + dy * dy)
+    if r - half >= view.farthest:
+        return True
+    if r <= 2.0 * half:
+        return False
+    bins = len(view.limit)
+    k = math.floor(math.atan2(dy, dx) / view.step + 0.5)
+    spread = int(half / r / view.step * 1.1) + 2
+    if 2 * spread + 1 >= bins:
+        return False
+    m = k - spread
+    if m < 0:
+        m += bins
+    for _ in range(2 * spread + 1):
+        if view.limit[m] > r - half:
+            return False
+        m = m + 1 if m + 1 < bins else 0
+    return True
