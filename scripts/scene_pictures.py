@@ -29,7 +29,7 @@ def draw(name: str, seed: int, view: str) -> Image.Image:
     scene.place(model, data)
     mujoco.mj_forward(model, data)
     width, height = (OVERSAMPLING * side for side in SIZE)
-    with Camera(model, width, height) as camera:
+    with Camera(model, width, height, samples=4) as camera:
         large = camera.render(data, view)
     return Image.fromarray(large).resize(SIZE, Image.Resampling.LANCZOS)
 

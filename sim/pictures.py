@@ -30,8 +30,7 @@ class CameraPicture:
         shadows: bool = True,
     ) -> None:
         self._view = view
-        samples = 4 if shadows else 0
-        self._camera = Camera(simulation.world.model, *size, shadows=shadows, samples=samples)
+        self._camera = Camera(simulation.world.model, *size, shadows=shadows)
 
     def __call__(self, simulation: Simulation) -> NDArray[np.uint8]:
         """(height, width, 3) uint8 RGB."""

@@ -14,7 +14,7 @@ import pytest
 
 import scenes
 from sim import gl
-from sim.camera import Camera
+from sim.camera import Camera, soften
 from slam.errors import InvalidValueError, MissingDependencyError
 
 
@@ -40,6 +40,7 @@ def _needs_gl():
 def test_each_camera_makes_a_picture_of_its_own(world, shadows):
     model, data = world
     quality = model.vis.quality.shadowsize, model.vis.quality.numslices
+    casting = model.geom_castshadow.copy()
     with Camera(model, 160, 90, shadows=shadows, samples=0) as camera:
         top, follow, persp = (camera.render(data, name) for name in ("top", "follow", "persp"))
     for picture in (top, follow, persp):
@@ -49,6 +50,30 @@ def test_each_camera_makes_a_picture_of_its_own(world, shadows):
     assert np.abs(top.astype(int) - follow).mean() > 5.0
     assert np.abs(top.astype(int) - persp).mean() > 5.0
     assert (model.vis.quality.shadowsize, model.vis.quality.numslices) == quality
+    np.testing.assert_array_equal(model.geom_castshadow, casting)
+
+
+@pytest.mark.usefixtures("_needs_gl")
+def test_shadows_darken_the_floor_and_are_the_only_difference(world):
+    model, data = world
+    pictures = []
+    for shadows in (False, True):
+        with Camera(model, 640, 360, shadows=shadows) as camera:
+            pictures.append(camera.render(data, "top").astype(int).sum(axis=2))
+    change = pictures[1] - pictures[0]
+    assert 0.02 < (change < -60).mean() < 0.5
+    assert (change > 60).mean() < 0.02
+
+
+def test_only_edges_are_softened():
+    picture = np.full((40, 40, 3), 100, np.uint8)
+    picture[:, 20:] = 110  # no edge
+    picture[20:] = 200
+    soft = soften(picture.copy())
+    np.testing.assert_array_equal(soft[:18], picture[:18])
+    np.testing.assert_array_equal(soft[22:], picture[22:])
+    assert (picture[19, 5] < soft[19, 5]).all()
+    assert (soft[20, 5] < picture[20, 5]).all()
 
 
 @pytest.mark.usefixtures("_needs_gl")
