@@ -41,7 +41,7 @@ def bench(
     table = Table(title="Speed", title_justify="left", caption=str(machine()["processor"]))
     for heading in ("what", "figure", "unit", "target", "how"):
         table.add_column(heading, justify="right" if heading == "figure" else "left")
-    for measure in (_simulation, _scanner, _physics, _environment, _slam):
+    for measure in (_simulation, _scanner, _physics, _environment, _pictures, _slam):
         with console.status(f"measuring: {measure.__name__.strip('_')}"):
             found = list(measure(seconds))
         for row in found:
@@ -136,6 +136,22 @@ def _environment(seconds: float) -> Iterator[Row]:
 
         yield _row(f"env steps, {id_}", steps / _timed(run), "1/s", target, "one scan a step")
         yield _row(f"env reset, {id_}", float(np.median(resets)) * 1e3, "ms", "", "median of 5")
+
+
+def _pictures(seconds: float) -> Iterator[Row]:
+    from sim import gl
+    from sim.pictures import CameraPicture
+    from sim.simulation import Simulation
+
+    if gl.find().backend is None:
+        return
+    simulation = Simulation("office", seed=SEED, dynamism=DYNAMISM)
+    for shadows, target in ((True, "≤ 110"), (False, "")):
+        with CameraPicture(simulation, (1280, 720), "persp", shadows=shadows) as picture:
+            picture(simulation)
+            spent = [_timed(lambda picture=picture: picture(simulation)) for _ in range(10)]  # type: ignore[misc]
+        what = "picture 1280 × 720, office, " + ("with shadows" if shadows else "no shadows")
+        yield _row(what, float(np.median(spent)) * 1e3, "ms", target, "all threads; software GL")
 
 
 def _slam(seconds: float) -> Iterator[Row]:
