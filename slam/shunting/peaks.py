@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from slam._jit import njit
 from slam.frames import Float
-from slam.shunting.network import MASK, SHIFT, SIDE, Cells, Network
+from slam.shunting.cells import MASK, SHIFT, SIDE, Cells
+from slam.shunting.network import Network
 
 MOST = 1 << 14  # peaks returned at most
 
