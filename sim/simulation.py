@@ -184,22 +184,20 @@ class Simulation:
         return self.frame
 
     def save_state(self) -> bytes:
-        """World, scanner, encoders and labels: everything that decides the scans to come.
+        """World, scanner, encoders, labels, ceiling cameras: all that decides what comes next.
 
         Load it into a simulation made with the same arguments, in this or another process; it goes
         on bit for bit. Save between two calls of ``observe``.
         """
-        if self._tags is not None:
-            raise InvalidValueError(
-                "a simulation with tags='camera' cannot be saved: readings on their way are not "
-                "part of the state; use tags='truth'"
-            )
         arrays, words = self.encoders.save()
         world = np.frombuffer(self.world.save_state(), dtype=np.uint8)
         seen = self._labeller.last_seen if self._labeller else np.zeros((0, 3))
         lasers = [state.random_words(rng) for rng in self.laser.streams]
-        arrays |= {"world": world, "seen": seen}  # type: ignore[dict-item]
-        return state.pack(arrays, {"encoders": words, "lasers": lasers})
+        seen_by, tags = ({}, None) if self._tags is None else self._tags.save()
+        return state.pack(
+            {**arrays, **seen_by, "world": world, "seen": seen},
+            {"encoders": words, "lasers": lasers, "tags": tags},
+        )
 
     def load_state(self, block: bytes) -> None:
         """Go on from ``save_state``; ``InvalidValueError`` if it is of another simulation."""
@@ -208,10 +206,14 @@ class Simulation:
             raise InvalidValueError("this is the state of a world, not of a simulation")
         if len(words["lasers"]) != len(self.laser.streams):
             raise InvalidValueError("the state is of another kind of scanner")
+        if (words.get("tags") is None) != (self._tags is None):
+            raise InvalidValueError("ceiling cameras are in the state or in the simulation only")
         self.world.load_state(arrays["world"].tobytes())
         self.encoders.load(arrays, words["encoders"])
         for rng, saved in zip(self.laser.streams, words["lasers"], strict=True):
             state.restore_random(rng, saved)
+        if self._tags is not None:
+            self._tags.load(arrays, words["tags"])
         if self._labeller is not None and len(arrays["seen"]):
             self._labeller.last_seen[...] = arrays["seen"]
         self.contacts = []

@@ -11,13 +11,15 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim import state
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float
@@ -149,6 +151,37 @@ class TagCameras:
             if reading.arrival_ns <= now_ns:
                 return reading
         return None
+
+    def save(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Everything that decides what comes next, readings on their way too: arrays and words."""
+        kept, tags = list(self._readings), len(self._bodies)
+        times = [(r.stamp_ns, r.arrival_ns) for r in kept]
+        arrays = {
+            "tags.bias": self._bias.copy(),
+            "tags.times_ns": np.array(times, dtype=np.int64).reshape(-1, 2),
+            "tags.poses": np.array([r.poses for r in kept]).reshape(-1, tags, 3),
+            "tags.camera": np.array([r.camera for r in kept], dtype=np.int64).reshape(-1, tags),
+        }
+        words = {"count": self._count, "start_ns": self._start_ns}
+        return arrays, {**words, "random": state.random_words(self._rng)}
+
+    def load(self, arrays: Mapping[str, NDArray[Any]], words: Mapping[str, Any]) -> None:
+        """Go on from ``save``; ``InvalidValueError`` if it is of other cameras."""
+        if not np.array_equal(arrays["tags.bias"], self._bias):
+            raise InvalidValueError("the state is of other ceiling cameras: their errors differ")
+        state.restore_random(self._rng, words["random"])
+        self._count, self._start_ns = words["count"], words["start_ns"]
+        rows = zip(
+            arrays["tags.times_ns"].tolist(),
+            arrays["tags.poses"],
+            arrays["tags.camera"],
+            strict=True,
+        )
+        self._readings.clear()
+        for (stamp_ns, arrival_ns), poses, camera in rows:
+            self._readings.append(
+                TagReading(stamp_ns=stamp_ns, arrival_ns=arrival_ns, poses=poses, camera=camera)
+            )
 
     def _seer(self, data: mujoco.MjData, body: int, pose: tuple[float, float, float]) -> int:
         """The nearest camera that sees all corners of the tag on a body, -1 for none."""
