@@ -11,7 +11,8 @@ import pytest
 from sim.drive import TourConfig
 from sim.dynamism import Dynamism
 from sim.lidar import Lms221Config
-from sim.twins import TWINS, UNSEEN_S, rolled, twins
+from sim.twin_room import UNSEEN_S
+from sim.twins import TWINS, rolled, twins
 from sim.world import SUBSTEPS_PER_S, World
 from slam.errors import InvalidValueError
 from slam.frames import BeamClass
