@@ -199,15 +199,15 @@ class Bodies:
         return {"integration": integration, "sleep.counts": counts, **arrays}
 
     def restore_physics(self, data: mujoco.MjData, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of ``physics_state``; leaves all derived poses fresh."""
+        """Inverse of ``physics_state``; leaves poses fresh, as ``sim.substeps`` does."""
         if arrays["integration"].size != mujoco.mj_stateSize(self.model, _STATE):
             raise InvalidValueError("the state is of another model: its size differs")
         mujoco.mj_resetData(self.model, data)
         mujoco.mj_setState(self.model, data, arrays["integration"], _STATE)
         mujoco.mj_forward(self.model, data)  # while all are awake: sleepers need their poses too
         mujoco.mj_setState(self.model, data, arrays["integration"], _STATE)
-        mujoco.mj_kinematics(self.model, data)
         for name in _SLEEP_ARRAYS:
             getattr(data, name)[...] = arrays[f"sleep.{name}"]
         for name, count in zip(_SLEEP_COUNTS, arrays["sleep.counts"].tolist(), strict=True):
             setattr(data, name, count)
+        mujoco.mj_step1(self.model, data)

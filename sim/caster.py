@@ -139,7 +139,7 @@ class Raycaster:
     Attributes: ``ids`` (n,) geom ids of the candidates; ``lasers`` (slots, 3) x, y, yaw of the
     laser at each ``note`` of the scan; after ``cast``, ``hits`` (ranges m, candidates, |cos| of
     the incidence), each (layers, beams, rays): inf, -1 and NaN for a miss, and ``fan`` (m, 7) the
-    beams in the world.
+    beams in the world; after ``start``, ``noted`` for ``windows.note``.
     """
 
     def __init__(
@@ -169,7 +169,7 @@ class Raycaster:
             np.isin(model.geom_bodyid[self.ids], np.flatnonzero(model.body_weldid != 0))
         )
         self._site = site
-        self._slots = 0
+        self._filled = np.zeros(1, dtype=np.int64)
         self._seen: mujoco.MjData | None = None
         self._plan: FanPlan | None = None
 
@@ -223,28 +223,28 @@ class Raycaster:
 
     def start(self, data: mujoco.MjData) -> None:
         """Forget the last scan, and note where everything is; needs fresh kinematics."""
-        self._slots = 0
+        self._filled[0] = 0
         if data is not self._seen:
             self._seen = data
             views = (data.geom_xpos, data.geom_xmat, data.site_xpos, data.site_xmat)
-            where = (*views, self._site, self.poses, self.lasers)
-            windows.note(self.ids, self._all, *where, 0)
+            where = (*views, self._site, self.poses, self.lasers, self._filled)
+            windows.note(windows.Noted(self.ids, self._all, *where))
             self.poses[1:] = self.poses[0]  # what cannot move is never noted again
             windows.enclose(self.table, self._all, self.poses, 1, self.bounds)
-            self._noted = (self.ids, self._movable, *where)
+            self.noted = windows.Noted(self.ids, self._movable, *where)
+            self._filled[0] = 0
         self.note()
 
     def note(self) -> None:
         """Note where everything is now, in the next slot."""
-        windows.note(*self._noted, self._slots)
-        self._slots += 1
+        windows.note(self.noted)
 
     def cast(self, plan: FanPlan) -> None:
         """Cast the beams of the scan that has just ended, into ``hits``."""
         if plan is not self._plan:
             self._prepare(plan)
         raycast.sweep(
-            self.table, self._movable, self.poses, self.lasers, self._slots, self.bounds,
+            self.table, self._movable, self.poses, self.lasers, int(self._filled[0]), self.bounds,
             plan.rows, plan.ends, plan.beams, self._rays, self._optics, self._work, self.hits,
         )  # fmt: skip
 

@@ -9,7 +9,8 @@ hits, not on how many others there are.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -24,26 +25,31 @@ from slam._jit import njit
 
 Float = NDArray[np.float64]
 _TICKS_MIN, _TICKS_MAX = 9, 26  # 0.12 to 0.35 s of shove
+GROUPS = ("chair", "bin", "load")
 IMPULSE_MAX = 45.0  # N s; what is heavier than a chair gets less speed from the same hands
 
 
-@njit
-def shove(
-    time: float,
-    tick: float,
-    rates: Float,
-    counters: NDArray[np.uint64],
-    schedule: Float,
-    bodies: Float,
-    dofs: NDArray[np.int64],
-    qfrc: Float,
-) -> None:
-    """Start and end shoves due at ``time`` by writing generalised forces.
+class Shoved(NamedTuple):
+    """What is shoved, n things.
 
     rates     (n, 4) 1/s, speed min m/s, speed max m/s, spin max rad/s
+    counters  (n,) generators
     schedule  (n, 2) s: start of the next shove, end of the present one (inf: none)
     bodies    (n, 4) mass kg, yaw inertia kg m2, friction of slides N, of yaw N m
+    dofs      (n,) first of each one's three
     """
+
+    rates: Float
+    counters: NDArray[np.uint64]
+    schedule: Float
+    bodies: Float
+    dofs: NDArray[np.int64]
+
+
+@njit
+def shove(time: float, tick: float, shoved: Shoved, qfrc: Float) -> None:
+    """Start and end shoves due at ``time`` s by writing generalised forces into ``qfrc``."""
+    rates, counters, schedule, bodies, dofs = shoved
     for i in range(len(dofs)):
         dof = dofs[i]
         if time >= schedule[i, 1]:
@@ -70,7 +76,7 @@ def shove(
 
 
 class Shoves:
-    """The shoves of a set of planar bodies of one model."""
+    """The shoves of a set of planar bodies of one model, as ``table``."""
 
     def __init__(
         self,
@@ -83,26 +89,13 @@ class Shoves:
         """``rates``: events 1/s, speed min and max m/s, spin max rad/s; same for all ``names``."""
         self.names = tuple(names)
         n = len(self.names)
-        self.rates = np.tile(np.array(rates, dtype=np.float64), (n, 1))
         self.counters = counters[:n].copy()
         self.schedule = np.full((n, 2), math.inf)
-        self._dofs, self._bodies = inertia_of(model, self.names)
+        dofs, bodies = inertia_of(model, self.names)
         for i in range(n):
             self.schedule[i, 0] = waiting(self.counters, i, rates[0])
-
-    def control(self, time: float, tick: float, data: mujoco.MjData) -> None:
-        """Write the forces of the shoves under way at ``time`` s into ``qfrc_applied``."""
-        if self.names:
-            shove(
-                time,
-                tick,
-                self.rates,
-                self.counters,
-                self.schedule,
-                self._bodies,
-                self._dofs,
-                data.qfrc_applied,
-            )
+        each = np.tile(np.array(rates, dtype=np.float64), (n, 1))
+        self.table = Shoved(each, self.counters, self.schedule, bodies, dofs)
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""
@@ -116,7 +109,7 @@ def pushers(
 
     "chair", "bin", and "load" for every other kind that is no person, door or robot.
     """
-    groups: dict[str, list[str]] = {"chair": [], "bin": [], "load": []}
+    groups: dict[str, list[str]] = {group: [] for group in GROUPS}
     for mover in movers:
         if mover.kind not in ("person", "door", "robot"):
             kind = mover.kind.partition("_")[0]
@@ -137,3 +130,14 @@ def pushers(
         else:
             made[group] = Shoves(model, names, rates=how[group], counters=counters)
     return made
+
+
+def tables(model: mujoco.MjModel, made: Mapping[str, Shoves | Rolling]) -> tuple[Any, Any]:
+    """What ``pushers`` made, as kernels take it: one table of each kind for each of ``GROUPS``."""
+    none = np.zeros(0, dtype=np.uint64)
+    idle = Shoves(model, (), rates=(0.0, 0.0, 0.0, 0.0), counters=none).table
+    still = Rolling(model, (), share=0.0, counters=none).table
+    return (
+        tuple(p.table if isinstance(p, Shoves) else idle for p in made.values()),
+        tuple(p.table if isinstance(p, Rolling) else still for p in made.values()),
+    )

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from sim.bodies import STATIC, Bodies
 from slam._jit import njit
 
+Int = NDArray[np.int64]
+
+_MOST = 64  # contacts of the robot that are looked at
 HARD_FORCE = 60.0  # N; a robot of 22 kg that brakes on something at more than a third of g
 
 
@@ -34,12 +37,18 @@ class Contact:
 
 
 @njit
-def touched(geoms: NDArray[np.int32], first: int, last: int) -> bool:
-    """Whether any of the pairs (n, 2) has a geom of the range; runs at every substep."""
+def touched(geoms: NDArray[np.int32], owners: NDArray[np.int64], robot: int, out: Int) -> int:
+    """Which contacts, by their geoms (n, 2), are the robot's: rows and what is touched to ``out``.
+
+    owners  (ngeom,) mover of each geom; ``out`` (k, 2). Returns how many.
+    """
+    found = 0
     for i in range(geoms.shape[0]):
-        if first <= geoms[i, 0] <= last or first <= geoms[i, 1] <= last:
-            return True
-    return False
+        a, b = owners[geoms[i, 0]], owners[geoms[i, 1]]
+        if robot in (a, b) and found < len(out):
+            out[found, 0], out[found, 1] = i, a + b - robot
+            found += 1
+    return found
 
 
 class RobotContacts:
@@ -49,25 +58,19 @@ class RobotContacts:
         self._model = model
         self._bodies = bodies
         self._mover_of_geom = bodies.mover_of_body[model.geom_bodyid]
-        own = (
-            np.nonzero(self._mover_of_geom == bodies.robot)[0] if bodies.robot is not None else [0]
-        )
-        self._first, self._last = int(own[0]), int(own[-1])  # all geoms of the robot's one body
         self._forces: dict[int, float] = {}
         self._wrench = np.zeros(6)
+        self._found = np.zeros((_MOST, 2), dtype=np.int64)
 
     def watch(self, data: mujoco.MjData) -> None:
-        """Look at the contacts of the substep just made."""
-        if data.ncon == 0 or self._bodies.robot is None:
+        """Look at the contacts of the substep just made, before the next ones are found."""
+        robot = self._bodies.robot
+        if data.ncon == 0 or robot is None:
             return
-        geoms = data.contact.geom
-        if not touched(geoms, self._first, self._last):
-            return
-        movers = self._mover_of_geom[geoms]
-        for i in np.nonzero((movers == self._bodies.robot).any(axis=1))[0].tolist():
+        found = touched(data.contact.geom, self._mover_of_geom, robot, self._found)
+        for i, other in self._found[:found].tolist():
             mujoco.mj_contactForce(self._model, data, i, self._wrench)
             force = float(self._wrench[0])
-            other = int(movers[i, 0] + movers[i, 1]) - self._bodies.robot
             if force > self._forces.get(other, 0.0):
                 self._forces[other] = force
 

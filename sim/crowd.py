@@ -9,6 +9,7 @@ blocked by a chair loses patience and pushes it; now and then one sits down (``s
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,10 +58,37 @@ from sim.manners import (
     hold_off,
     wait_beside,
 )
-from sim.sitting import may_sit, on_chair, sit, to_chair
+from sim.sitting import Hulls, may_sit, on_chair, sit, to_chair
 from slam._jit import njit
 
 STILL = 0.1  # m/s, a walker slower than this is blocked
+
+
+class People(NamedTuple):
+    """Everybody in a room, n people.
+
+    alive    whether they move at all
+    rates    mean stay s, factor on each one's preferred speed
+    at, field, ways, crowd  as in the modules they are from
+    servos   (n,) first of the actuators vx, vy, vyaw of each
+    torsos   (n, 2) first qpos and dof of each
+    limbs    (n, 4) mocap rows of thigh_l, shank_l, thigh_r, shank_r
+    feet     (n, 8) of ``sim.gait``; sitting (n,) 0 stands to 1 sits
+    hulls    what of the model follows who sits
+    """
+
+    alive: bool
+    rates: tuple[float, float]
+    at: Addresses
+    field: Field
+    ways: Doors
+    crowd: Crowd
+    servos: Int
+    torsos: Int
+    limbs: Int
+    feet: Float
+    sitting: Float
+    hulls: Hulls
 
 
 @njit
@@ -238,26 +266,17 @@ def patience(i: int, time: float, crowd: Crowd) -> float:
 
 
 @njit
-def decide(
-    clock: tuple[float, float],
-    rates: tuple[float, float],
-    physics: tuple[Float, Float, Float],
-    at: Addresses,
-    field: Field,
-    ways: Doors,
-    crowd: Crowd,
-    servos: Int,
-) -> None:
+def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], people: People) -> None:
     """One tick of all people, from positions to the set points of their servos.
 
     clock    time s, length of the tick s
-    rates    mean stay s, factor on each one's preferred speed
     physics  qpos and qvel (read), ctrl (written)
-    servos   (n,) first of the actuators vx, vy, vyaw of each person
     """
     time, tick = clock
-    stay, pace = rates
+    stay, pace = people.rates
     qpos, qvel, ctrl = physics
+    at, field, ways, crowd = people.at, people.field, people.ways, people.crowd
+    servos = people.servos
     near = np.zeros(24, dtype=np.int64)
     sense(at, qpos, qvel, ways, crowd)
     for i in range(len(servos)):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -55,32 +56,40 @@ def torque_to(target: float, q: float, qd: float, closer: Float) -> float:
     return float(min(max(torque, -TORQUE_MAX), TORQUE_MAX) + 0.0)
 
 
+class Leaves(NamedTuple):
+    """The doors of a model, m of them.
+
+    rates      (m,) events that nobody in sight causes, 1/s
+    addresses  (m, 2) in qpos and dof; middles (m, 2) m; closers (m, 5); limits (m, 2) rad
+    passage    (m, 3) of ``sim.manners``: columns 1 asked for by a person, 2 a person is in the way
+    schedule   (m, 4) in the columns named above; draws (m,) generators
+    """
+
+    rates: Float
+    addresses: NDArray[np.int64]
+    middles: Float
+    closers: Float
+    limits: Float
+    passage: Float
+    schedule: Float
+    draws: NDArray[np.uint64]
+
+
 @njit
-def swing(
-    time: float,
-    rate: float,
-    robot: Float,
-    leaves: tuple[NDArray[np.int64], Float, Float, Float],
-    passage: Float,
-    schedule: Float,
-    draws: NDArray[np.uint64],
-    physics: tuple[Float, Float, Float],
-) -> None:
+def swing(time: float, robot: Float, leaves: Leaves, physics: tuple[Float, Float, Float]) -> None:
     """One tick of all doors.
 
-    robot    (3,) pose, infinitely far where there is none
-    leaves   addresses (m, 2) in qpos and dof, middles (m, 2) m, closers (m, 5), limits (m, 2) rad
-    passage  (m, 3) of ``sim.manners``: columns 1 asked for by a person, 2 a person is in the way
+    robot    (3,) pose
     physics  qpos and qvel (read), qfrc_applied (written)
     """
-    addresses, middles, closers, limits = leaves
+    rates, addresses, middles, closers, limits, passage, schedule, draws = leaves
     qpos, qvel, qfrc = physics
     for d in range(len(addresses)):
         at, dof = addresses[d]
         row, closer = schedule[d], closers[d]
         low, high = limits[d]
         if time >= row[NEXT]:  # always three draws
-            row[NEXT] = time + waiting(draws, d, rate)
+            row[NEXT] = time + waiting(draws, d, rates[d])
             row[ANGLE] = between(draws, d, low, high)
             row[UNTIL] = time + between(draws, d, 3.0, 9.0)
         if (
@@ -101,7 +110,10 @@ def swing(
 
 
 class Doors:
-    """The doors of a model. ``passage`` is shared with the people, who write what they want."""
+    """The doors of a model, as ``leaves``.
+
+    ``passage`` is shared with the people, who write what they want.
+    """
 
     def __init__(
         self,
@@ -117,7 +129,6 @@ class Doors:
         m = len(self.names)
         self.passage = np.zeros((m, 3))
         self.schedule = np.full((m, 4), -math.inf)
-        self._rate = rate
         self._draws = counters.copy()
         qpos, dof = bodies.addresses(self.names)
         self.addresses = np.column_stack([qpos, dof])
@@ -130,20 +141,10 @@ class Doors:
         for d, name in enumerate(self.names):
             self._closers[d], self._limits[d] = _closer(model, model.joint(f"{name}/hinge"))
             self.schedule[d, NEXT] = waiting(self._draws, d, rate)
-
-    def control(self, time: float, robot: Float, data: mujoco.MjData) -> None:
-        """Write the torques at ``time`` s; ``robot`` is its (3,) pose."""
-        if self.names:
-            swing(
-                time,
-                self._rate,
-                robot,
-                (self.addresses, self.middles, self._closers, self._limits),
-                self.passage,
-                self.schedule,
-                self._draws,
-                (data.qpos, data.qvel, data.qfrc_applied),
-            )
+        self.leaves = Leaves(
+            np.full(m, rate), self.addresses, self.middles, self._closers, self._limits,
+            self.passage, self.schedule, self._draws,
+        )  # fmt: skip
 
     def boxes_at_rest(self) -> Float:
         """(m, 5) leaves at about their angle of rest: centre x, y, half sizes m, yaw rad.

@@ -16,6 +16,7 @@ from sim.env_options import episode
 from sim.lidar import Lms221Config
 from sim.seeds import Seeds
 from sim.simulation import Simulation
+from slam._jit import njit
 from slam.errors import InvalidValueError
 from slam.frames import Frame, LaserSpec
 
@@ -36,6 +37,19 @@ def _observation_space(spec: LaserSpec) -> spaces.Dict:
             "time": spaces.Box(0.0, 1e9, (), np.float64),
         }
     )
+
+
+@njit
+def _told(
+    ranges: NDArray[np.float32], least: float, most: float
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Finite ranges, and which are measurements, as ``Scan.valid``."""
+    out, valid = np.empty(ranges.size, np.float32), np.empty(ranges.size, np.uint8)
+    for i in range(ranges.size):
+        fits = least <= ranges[i] <= most
+        valid[i] = fits
+        out[i] = ranges[i] if fits else most
+    return out, valid
 
 
 class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -177,7 +191,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def act(self, action: NDArray[np.float32]) -> tuple[Frame, float, bool, bool]:
         """What ``step`` does, before it is dressed up as observation and info."""
-        v, omega = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0).tolist()
+        v, omega = (min(max(float(part), -1.0), 1.0) for part in action)
         simulation = self.simulation
         simulation.world.set_command(v * V_MAX_MPS, omega * OMEGA_MAX_RADPS)
         frame = simulation.observe()
@@ -201,10 +215,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """What the robot knows by a frame of this environment's simulation."""
         scan = frame.scan
         assert scan is not None  # a simulation's frames always carry one
-        valid = scan.valid
+        ranges, valid = _told(scan.ranges, scan.spec.range_min, scan.spec.range_max)
         return {
-            "ranges": np.where(valid, scan.ranges, np.float32(scan.spec.range_max)),
-            "valid": valid.astype(np.uint8),
+            "ranges": ranges,
+            "valid": valid,
             "encoders": self.simulation.encoders.ticks,
             "time": np.array(self.simulation.world.time_ns * 1e-9),
         }

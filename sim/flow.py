@@ -175,6 +175,11 @@ class Field(NamedTuple):
     cell: float
 
 
+def nowhere() -> Field:
+    """The field of a floor without goals."""
+    return Field(np.zeros((0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0)), 0.0, 0.0, 1.0)
+
+
 @njit
 def clearance_at(field: Field, x: float, y: float) -> float:
     """Clearance by bilinear interpolation, m; outside the floor -1."""

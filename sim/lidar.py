@@ -32,6 +32,7 @@ from sim.lidar_config import (
 )
 from sim.lidar_receiver import ScanResult, SignalModel, spot_of
 from sim.lidar_surfaces import geom_reflectivity, glass_geoms, polished_geoms
+from sim.windows import Noted
 from slam import se2
 from slam.errors import InvalidValueError
 
@@ -53,6 +54,8 @@ class Lms221:
     ``rng`` seeds one stream of draws for each effect; every scan takes the same number from each,
     whatever is hit, so that a run's noise depends neither on what moves in the world nor on which
     other effects are on.
+
+    ``marks`` (steps + 1,): whether poses are noted when that many steps of a scan are over.
     """
 
     def __init__(
@@ -94,6 +97,8 @@ class Lms221:
         room = self.spec.n_beams if bounces else 0
         self._mirrored = (np.empty(room), np.empty(room, dtype=np.int64), np.empty(room))
         self._fans = self._plan()
+        step = np.arange(self.config.steps + 1)
+        self.marks = (step % STEPS_PER_TURN <= STEPS_PER_SWEEP) & (step < self.config.steps)
 
     def _plan(self) -> FanPlan:
         """One fan for each turn of the mirror: a sweep is two physics steps, with three ends."""
@@ -117,21 +122,24 @@ class Lms221:
 
         ``data`` must have fresh kinematics on entry, and after every ``advance``.
         """
-        caster = self.caster
-        for turn in range(self.config.turns):
-            if turn == 0:
-                caster.start(data)
-            else:
-                caster.note()
-            for _ in range(STEPS_PER_SWEEP):
-                advance()
-                caster.note()
-            for _ in range(STEPS_PER_TURN - STEPS_PER_SWEEP):
-                advance()
-        caster.cast(self._fans)
+        self.begin(data)
+        for due in self.marks[1:].tolist():
+            advance()
+            if due:
+                self.caster.note()
+        return self.finish()
+
+    def begin(self, data: mujoco.MjData) -> Noted:
+        """Start a scan; whoever advances the world calls ``note`` with this where ``marks`` say."""
+        self.caster.start(data)
+        return self.caster.noted
+
+    def finish(self) -> ScanResult:
+        """The scan that was begun, once ``config.steps`` have passed."""
+        self.caster.cast(self._fans)
         if self._mirrored[0].size:
-            caster.mirror(self._polished, self._mirrored)
-        return self._signal.scan(caster.hits, self._mirrored)
+            self.caster.mirror(self._polished, self._mirrored)
+        return self._signal.scan(self.caster.hits, self._mirrored)
 
 
 def _check_timestep(model: mujoco.MjModel) -> None:

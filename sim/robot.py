@@ -49,8 +49,9 @@ def toward(value: float, target: float, step: float) -> float:
 
 
 @njit
-def ramp(state: NDArray[np.float64], speed_step: float, turn_step: float, half: float) -> None:
-    """One tick of the ramp, and the wheel speeds that follow; ``half`` m is half the track."""
+def ramp(state: NDArray[np.float64], limits: NDArray[np.float64]) -> None:
+    """One tick of the ramp, and the wheel speeds that follow; ``limits`` as ``Drive.limits``."""
+    speed_step, turn_step, half = limits
     state[2] = toward(state[2], state[0], speed_step)
     state[3] = toward(state[3], state[1], turn_step)
     state[6], state[7] = state[2] - half * state[3], state[2] + half * state[3]
@@ -64,16 +65,19 @@ def roll(state: NDArray[np.float64], duration: float) -> None:
 
 
 class Drive:
-    """Ramp and wheels of the body ``robot/base``. State: ``state`` (8,) float64.
+    """Ramp and wheels of the body ``robot/base``, moved on by ``sim.substeps``.
 
-    ``state`` = commanded v, omega; ramped v, omega; travel left, right m; speed left, right m/s.
+    state   (8,) commanded v, omega; ramped v, omega; travel left, right m; speed left, right m/s
+    tyres   (2,) actuators left, right, which take the wheels' surface speeds
+    limits  (3,) change of v and omega in a tick of ``tick`` s at most, half the track m
     """
 
-    def __init__(self, model: mujoco.MjModel, config: DriveConfig) -> None:
+    def __init__(self, model: mujoco.MjModel, config: DriveConfig, tick: float) -> None:
         self.config = config
         self.state = np.zeros(8)
-        self._left = int(model.actuator("robot/tyre_l").id)
-        self._right = int(model.actuator("robot/tyre_r").id)
+        names = ("robot/tyre_l", "robot/tyre_r")
+        self.tyres = np.array([model.actuator(name).id for name in names], dtype=np.int64)
+        self.limits = np.array([config.accel * tick, config.alpha * tick, 0.5 * config.track])
 
     def command(self, v: float, omega: float) -> None:
         """Ask for a twist, m/s and rad/s; clipped to the limits, reached by the ramp."""
@@ -82,16 +86,6 @@ class Drive:
         c = self.config
         self.state[0] = min(max(v, -c.v_max), c.v_max)
         self.state[1] = min(max(omega, -c.omega_max), c.omega_max)
-
-    def control(self, tick: float, ctrl: NDArray[np.float64]) -> None:
-        """Ramp for ``tick`` s and write the wheel surface speeds into ``ctrl``."""
-        c = self.config
-        ramp(self.state, c.accel * tick, c.alpha * tick, 0.5 * c.track)
-        ctrl[self._left], ctrl[self._right] = self.state[6], self.state[7]
-
-    def roll(self, duration: float) -> None:
-        """Let the wheels turn for ``duration`` s at their present speed."""
-        roll(self.state, duration)
 
     @property
     def travel_m(self) -> NDArray[np.float64]:

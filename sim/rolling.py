@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -36,25 +37,31 @@ TAU_S = 0.08  # time constant of the push
 ACCEL_MAX = 8.0  # m/s2, bounds the force
 
 
-@njit
-def roll(
-    time: float,
-    tick: float,
-    share: int,
-    ranks: NDArray[np.int64],
-    counters: NDArray[np.uint64],
-    state: Float,
-    bodies: Float,
-    dofs: NDArray[np.int64],
-    qvel: Float,
-    qfrc: Float,
-) -> None:
-    """Write the generalised forces on all chairs at ``time``; ``share`` of them are rolled.
+class Rolled(NamedTuple):
+    """What is rolled, n chairs.
 
-    ranks   (n,) place of each chair in the order of turns
-    bodies  (n, 4) mass kg, yaw inertia kg m2, friction of slides N, of yaw N m
+    share     how many of them at once
+    ranks     (n,) place of each chair in the order of turns
+    counters  (n,) generators; state (n, 5) in the columns named above
+    bodies    (n, 4) mass kg, yaw inertia kg m2, friction of slides N, of yaw N m
+    dofs      (n,) first of each one's three
     """
+
+    share: int
+    ranks: NDArray[np.int64]
+    counters: NDArray[np.uint64]
+    state: Float
+    bodies: Float
+    dofs: NDArray[np.int64]
+
+
+@njit
+def roll(time: float, tick: float, rolled: Rolled, qvel: Float, qfrc: Float) -> None:
+    """Write the generalised forces on all chairs at ``time`` s into ``qfrc``."""
+    share, ranks, counters, state, bodies, dofs = rolled
     n = len(dofs)
+    if share == 0:
+        return
     cycle = TURN_S * n / share
     for i in range(n):
         dof, row = dofs[i], state[i]
@@ -90,7 +97,7 @@ def roll(
 
 
 class Rolling:
-    """Chairs (or whatever rolls) of one model, ``share`` of them on the move at any time."""
+    """Chairs (or whatever rolls) of one model, ``share`` of them at any time, as ``table``."""
 
     def __init__(
         self,
@@ -104,30 +111,13 @@ class Rolling:
             raise InvalidValueError(f"moving_share must lie in [0, 1], got {share}")
         self.names = tuple(names)
         n = len(self.names)
-        self.share = round(share * n)  # chairs at once
         self.counters = counters[:n].copy()
         self.state = np.full((n, 5), -math.inf)
-        dofs, self._bodies = inertia_of(model, self.names)
-        self._dofs = dofs
+        dofs, bodies = inertia_of(model, self.names)
         luck = [uniform(self.counters, i) for i in range(n)]
-        self._ranks = np.empty(n, dtype=np.int64)
-        self._ranks[np.argsort(luck, kind="stable")] = np.arange(n)
-
-    def control(self, time: float, tick: float, data: mujoco.MjData) -> None:
-        """Write the forces at ``time`` s into ``qfrc_applied``."""
-        if self.share:
-            roll(
-                time,
-                tick,
-                self.share,
-                self._ranks,
-                self.counters,
-                self.state,
-                self._bodies,
-                self._dofs,
-                data.qvel,
-                data.qfrc_applied,
-            )
+        ranks = np.empty(n, dtype=np.int64)
+        ranks[np.argsort(luck, kind="stable")] = np.arange(n)
+        self.table = Rolled(round(share * n), ranks, self.counters, self.state, bodies, dofs)
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""

@@ -20,6 +20,7 @@ from sim.odometry import WheelOdometry
 from sim.pilot import Pilot
 from sim.robot import DriveConfig
 from sim.seeds import Seeds
+from sim.substeps import Watch, plain
 from sim.tag_cameras import TagCameras, TagReading
 from sim.world import SUBSTEPS_PER_S, World
 from slam import se2
@@ -66,10 +67,10 @@ class ScanTiming:
         return se2.interpolate(path[k], path[k + 1], self.first - k)
 
 
-def _at(travel: Float, step: float) -> Float:
+def _at(travel: Float, step: float) -> tuple[float, float]:
     k = min(int(step), len(travel) - 2)
-    between: Float = travel[k] + (step - k) * (travel[k + 1] - travel[k])
-    return between
+    (left, right), (to_left, to_right) = travel[k : k + 2].tolist()
+    return left + (step - k) * (to_left - left), right + (step - k) * (to_right - right)
 
 
 class Simulation:
@@ -126,8 +127,9 @@ class Simulation:
         steps = self.laser.config.steps
         self.path: Float = np.zeros((steps + 1, 3))
         self._travel: Float = np.zeros((steps + 1, 2))
-        self._rows = list(zip(self.path, self._travel, strict=True))
-        self._step = 0
+        self._watch: Any = None
+        # With ceiling cameras the world stops after every step for them to look.
+        self._stops = range(1, steps + 1) if self._tags else (steps,)
 
     def _tag_cameras(self, tags: str) -> TagCameras | None:
         if tags not in ("truth", "camera"):
@@ -153,14 +155,18 @@ class Simulation:
         return self.laser.config.steps / SUBSTEPS_PER_S
 
     def _advance(self) -> None:
-        self.world.substep()
-        self._step += 1
-        self._note()
-        if self._tags is not None:
-            self._tags.note(self.world.time_ns, self.world.data)
-
-    def _note(self) -> None:
-        self.world.read_robot(*self._rows[self._step])
+        """Let the time of one scan pass."""
+        world = self.world
+        world.read_robot(self.path[0], self._travel[0])
+        noted = self.laser.begin(world.data)
+        if self._watch is None:
+            self._watch = plain(Watch(self.laser.marks, noted, self.path, self._travel))
+        first = 0
+        for stop in self._stops:
+            world.advance(first, stop, self._watch)
+            if self._tags is not None:
+                self._tags.note(world.time_ns, world.data)
+            first = stop
 
     def observe(self) -> Frame:
         """Let one scan's worth of time pass under the present command; the frame it gives.
@@ -169,9 +175,8 @@ class Simulation:
         period before the world's present: nobody can know a scan before it is over.
         """
         stamp_ns = self.world.time_ns + self._timing.offset_ns
-        self._step = 0
-        self._note()
-        result = self.laser.observe(self._advance, self.world.data)
+        self._advance()
+        result = self.laser.finish()
         self.contacts = self.world.take_contacts()
         touched = bool(self.contacts)
         self.frame = Frame(

@@ -3,14 +3,19 @@
 
 What a scanner below the knee sees of it: two shanks that stand still in front of a chair's column,
 and a chair that comes along when its sitter shifts. Sitter and chair do not collide with each other
-from the moment one sits down until they are apart again (``People`` switches the hull).
+from the moment one sits down until they are apart again (``dress``).
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sim.flow import Field, clearance_at
+from sim.gait import HIP, SEAT_HEIGHT
 from sim.manners import (
     BLOCKED,
     CHAIR,
@@ -26,6 +31,8 @@ from sim.manners import (
     WALKING,
     WALKS,
     Crowd,
+    Float,
+    Int,
     R,
     U,
     V,
@@ -42,6 +49,36 @@ NEAR = 0.08  # m between hulls from where one turns and sits down
 ROOM = 0.18  # m of clearance a chair needs, else it is tucked under a desk
 PACE = 0.7  # m/s to the chair
 GIVE_UP_S = 1.5
+PLANAR_BIT = 2  # contype of chairs, bins and the robot
+
+
+class Hulls(NamedTuple):
+    """The parts of the model that follow who sits; derived from the state, so never saved.
+
+    geoms (n,) hull of each person; bits (n, 2) its contype and conaffinity; looks (n,) body that is
+    seen, -1 none; heights (n,) m of that; then the model's own arrays, which are written
+    """
+
+    geoms: Int
+    bits: NDArray[np.int32]
+    looks: Int
+    heights: Float
+    contype: NDArray[np.int32]
+    affinity: NDArray[np.int32]
+    body_pos: Float
+
+
+@njit
+def dress(crowd: Crowd, hulls: Hulls) -> None:
+    """Who has a chair, and no longer walks to it, meets walls, people and doors only; and sinks."""
+    for i in range(len(hulls.geoms)):
+        geom, look = hulls.geoms[i], hulls.looks[i]
+        off = crowd.task[i, SEAT] >= 0 and crowd.task[i, WALKING] != TO_SEAT
+        hulls.contype[geom] = 0 if off else hulls.bits[i, 0]
+        hulls.affinity[geom] = hulls.bits[i, 1] & ~PLANAR_BIT if off else hulls.bits[i, 1]
+        if look >= 0:
+            sunk = (HIP - SEAT_HEIGHT) * crowd.state[i, SIT]
+            hulls.body_pos[look, 2] = hulls.heights[i] - sunk
 
 
 @njit

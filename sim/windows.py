@@ -10,6 +10,7 @@ tests instead of one for every geom. Bounds are generous by ``SLACK``; the exact
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,26 +50,34 @@ from slam._jit import njit
 BUCKETS = 64
 
 
-@njit
-def note(
-    ids: Int,
-    rows: Int,
-    xpos: Float,
-    xmat: Float,
-    site_xpos: Float,
-    site_xmat: Float,
-    site: int,
-    poses: Float,
-    lasers: Float,
-    slot: int,
-) -> None:
-    """Take over where the geoms ``ids[rows]`` and the laser are now.
+class Noted(NamedTuple):
+    """Where things were at some moments of a scan.
 
-    xpos...  ``geom_xpos``, ``geom_xmat``, ``site_xpos``, ``site_xmat`` of the model's data; not as
-             a tuple, which costs as much as the work when called from Python
-    site     of the laser, -1 for none
-    poses    (slots, n, 12): position, then matrix by rows; ``lasers`` (slots, 3): x, y, yaw
+    ids, rows  geoms of the caster, and which of these are noted
+    xpos...    ``geom_xpos``, ``geom_xmat``, ``site_xpos``, ``site_xmat`` of the model's data
+    site       of the laser, -1 for none
+    poses      (slots, n, 12): position, then matrix by rows; ``lasers`` (slots, 3): x, y, yaw
+    filled     (1,) number of slots
     """
+
+    ids: Int
+    rows: Int
+    xpos: Float
+    xmat: Float
+    site_xpos: Float
+    site_xmat: Float
+    site: int
+    poses: Float
+    lasers: Float
+    filled: Int
+
+
+@njit
+def note(noted: Noted) -> None:
+    """Take over where geoms and laser are now, into the next slot."""
+    ids, rows, xpos, xmat, site_xpos, site_xmat, site, poses, lasers, filled = noted
+    slot = filled[0]
+    filled[0] += 1
     for row in range(rows.size):
         j = rows[row]
         g = ids[j]

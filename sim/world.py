@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The room that moves: one MuJoCo model, its actors, and one substep of 1/300 s at a time.
+"""The room that moves: one MuJoCo model and its actors, in substeps of 1/300 s.
 
-Order of a substep: at every fourth one the actors decide (people, doors, shoves, drive), then one
-``mj_step``, then the limbs are posed and the kinematics made fresh, so that whoever looks between
-two substeps (a scanner, a film, ``save_state``) sees poses of that very instant.
+What a substep is, is in ``sim.substeps``. Whoever moves things by hand (``data.qpos``) between two
+of them calls ``mj_forward`` then.
 """
 
 from __future__ import annotations
@@ -17,22 +16,23 @@ from numpy.typing import NDArray
 
 from scenes import build
 from scenes.scene import Scene
-from sim import state
+from sim import state, substeps
 from sim.bodies import Bodies
 from sim.castors import checked_level, stand_on_castors
-from sim.chairs import pushers
+from sim.chairs import pushers, tables
 from sim.contacts import Contact, RobotContacts
 from sim.doors import Doors
 from sim.dynamism import Dynamism
+from sim.engine import engine
 from sim.people import People
 from sim.robot import Drive, DriveConfig
 from sim.seeds import Seeds
+from sim.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from slam.errors import InvalidValueError
 
+__all__ = ["SUBSTEPS_PER_S", "SUBSTEPS_PER_TICK", "World"]
+
 Float = NDArray[np.float64]
-SUBSTEPS_PER_S = 300
-SUBSTEPS_PER_TICK = 4  # one mirror turn of the LMS-221: 13.33 ms
-_NOWHERE = np.array([1e9, 1e9, 0.0])
 MOVING_SPEED = 0.02  # m/s; a mover faster than this counts as moving
 
 
@@ -71,11 +71,11 @@ class World:
         self.model: mujoco.MjModel = self.scene.compile()
         self.data = mujoco.MjData(self.model)
         self.mover_names = tuple(m.name for m in self.scene.movers)
-        self.step_count = 0
+        self._clock = np.zeros(1, dtype=np.int64)
         self.bodies = Bodies(self.model, self.scene)
         self._contacts = RobotContacts(self.model, self.bodies)
         self.drive_config = drive or DriveConfig()
-        self._drive = Drive(self.model, self.drive_config)
+        self._drive = Drive(self.model, self.drive_config, SUBSTEPS_PER_TICK / SUBSTEPS_PER_S)
         self._shoves = pushers(self.model, self.scene.movers, self.rates, self.seeds)
         self._doors = Doors(
             self.model,
@@ -98,6 +98,10 @@ class World:
             self.bodies.place_robot(self.data, start)
         self.people.start(self.data)
         mujoco.mj_forward(self.model, self.data)
+        self._room = self._tables()
+        self._unseen = substeps.unseen(2)
+        substeps.decide_first(self._room)
+        mujoco.mj_step1(self.model, self.data)
 
     def _built(self, scene: Scene | str, options: dict[str, Any]) -> Scene:
         if isinstance(scene, str):
@@ -110,6 +114,22 @@ class World:
         """Movers whose kind starts so: "chair" means both sorts."""
         return [m.name for m in self.scene.movers if m.kind.startswith(kind)]
 
+    def _tables(self) -> Any:
+        """Clock, engine, robot, physics and actors, as the kernels of ``sim.substeps`` take them.
+
+        All are views of the live arrays.
+        """
+        data, drive = self.data, self._drive
+        at, dof = (int(a[0]) for a in self.bodies.addresses(["robot"]))
+        robot = substeps.Robot(
+            (at, dof), data.qfrc_constraint, drive.state, drive.tyres, drive.limits
+        )
+        mocap = (data.mocap_pos, data.mocap_quat)
+        physics = substeps.Physics(data.qpos, data.qvel, data.ctrl, data.qfrc_applied, mocap)
+        shoved, rolled = tables(self.model, self._shoves)
+        actors = substeps.Actors(self.people.table, self._doors.leaves, shoved, rolled)
+        return substeps.plain((self._clock, engine(self.model, data), robot, physics, actors))
+
     def _counters(self, stream: str) -> NDArray[np.uint64]:
         return self.seeds.counters(stream, len(self.scene.movers))
 
@@ -120,27 +140,21 @@ class World:
         """Time since the start, ns: step k is k * 1e9 / 300, rounded to the nearest."""
         return (self.step_count * 10_000_000 + 1) // 3
 
+    @property
+    def step_count(self) -> int:
+        """Substeps made since the start."""
+        return int(self._clock[0])
+
     def substep(self) -> None:
         """Advance by 1/300 s and leave poses (``xpos``, ``geom_xpos``, ...) of the new instant."""
-        if self.step_count % SUBSTEPS_PER_TICK == 0:
-            self._control()
-        mujoco.mj_step(self.model, self.data)
-        self.step_count += 1
-        self._drive.roll(1.0 / SUBSTEPS_PER_S)
-        self.people.pose_limbs(1.0 / SUBSTEPS_PER_S)
-        mujoco.mj_kinematics(self.model, self.data)
-        self._contacts.watch(self.data)
+        self.advance(0, 1, self._unseen)
 
-    def _control(self) -> None:
-        time, tick = self.step_count / SUBSTEPS_PER_S, SUBSTEPS_PER_TICK / SUBSTEPS_PER_S
-        self.people.control(time, tick, self.data)
-        self._doors.control(time, self._robot_or_nowhere(), self.data)
-        for shoves in self._shoves.values():
-            shoves.control(time, tick, self.data)
-        self._drive.control(tick, self.data.ctrl)
-
-    def _robot_or_nowhere(self) -> Float:
-        return _NOWHERE if self.bodies.robot is None else self.bodies.robot_pose(self.data)
+    def advance(self, first: int, last: int, watch: Any) -> None:
+        """Make the substeps that end at rows ``first + 1`` to ``last`` of a ``plain`` ``Watch``."""
+        row = substeps.advance(first, last, False, self._room, watch)
+        while row < last:
+            self._contacts.watch(self.data)
+            row = substeps.advance(row, last, True, self._room, watch)
 
     # -- the robot --------------------------------------------------------------------------
 
@@ -235,7 +249,7 @@ class World:
                 raise InvalidValueError(f"the state has no '{name}' of shape {array.shape}")
         for name, array in live.items():
             array[...] = arrays[name]
-        self.step_count = int(steps)
+        self._clock[0] = steps
         self.people.dress()
         self.bodies.restore_physics(self.data, arrays)
         self._contacts.take()

@@ -45,8 +45,11 @@ def frozen(
         array = np.array(value, dtype=dtype) if dtype is np.float64 else _cast(value, dtype)
     except (TypeError, ValueError, ArithmeticError) as error:
         raise InvalidValueError(f"{owner}.{name} must be numeric: {error}") from error
-    if array.ndim != len(shape) or any(
-        want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
+    if array.shape != shape and (
+        array.ndim != len(shape)
+        or any(
+            want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
+        )
     ):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         raise InvalidValueError(f"{owner}.{name} must have shape {wanted}, got {array.shape}")
@@ -57,6 +60,8 @@ def frozen(
 def _cast(value: ArrayLike, dtype: Any) -> NDArray[Any]:
     """A copy in a type that may not hold every number: losing more than digits is an error."""
     raw = np.asarray(value)
+    if raw.dtype == dtype:
+        return raw.copy()
     if np.issubdtype(dtype, np.integer) and raw.size and raw.dtype.kind not in "iub":
         raise ValueError(f"expected whole numbers, got {raw.dtype}")
     with np.errstate(over="raise", invalid="raise"):
@@ -68,7 +73,10 @@ def _cast(value: ArrayLike, dtype: Any) -> NDArray[Any]:
 
 def finite(owner: str, name: str, array: NDArray[Any]) -> None:
     """Raise ``InvalidValueError`` when any entry is NaN or infinite."""
-    if not np.isfinite(array).all():
+    # For the few numbers of a pose NumPy costs more than scalars.
+    few = array.size <= 9
+    fine = all(map(math.isfinite, array.ravel().tolist())) if few else np.isfinite(array).all()
+    if not fine:
         raise InvalidValueError(f"{owner}.{name} must be finite, got {array.tolist()!r:.200}")
 
 
@@ -79,7 +87,9 @@ def pose(owner: str, name: str, value: ArrayLike) -> Float:
     return array
 
 
-_OFF_DIAGONAL = ((0, 1), (0, 2), (1, 2), (1, 0), (2, 0), (2, 1))
+def _close(a: float, b: float) -> bool:
+    """Equal but for rounding."""
+    return abs(a - b) <= 1e-9 + 1e-6 * min(abs(a), abs(b))
 
 
 def covariance(owner: str, name: str, value: ArrayLike) -> Float:
@@ -87,8 +97,10 @@ def covariance(owner: str, name: str, value: ArrayLike) -> Float:
     array = frozen(owner, name, value, (3, 3))
     finite(owner, name, array)
     rows = array.tolist()  # scalars: np.allclose on nine numbers costs more than a whole motion
-    if min(rows[0][0], rows[1][1], rows[2][2]) < 0.0 or any(
-        abs(rows[i][j] - rows[j][i]) > 1e-9 + 1e-6 * abs(rows[j][i]) for i, j in _OFF_DIAGONAL
+    if min(rows[0][0], rows[1][1], rows[2][2]) < 0.0 or not (
+        _close(rows[0][1], rows[1][0])
+        and _close(rows[0][2], rows[2][0])
+        and _close(rows[1][2], rows[2][1])
     ):
         raise InvalidValueError(
             f"{owner}.{name} must be symmetric with variances >= 0, got {array.tolist()}"
@@ -213,7 +225,7 @@ class Scan(ByContent):
         _stamp("Scan", self.stamp_ns)
         n = self.spec.n_beams
         ranges = frozen("Scan", "ranges", self.ranges, (n,), np.float32)
-        if np.any(ranges < 0.0):
+        if (ranges < 0.0).any():
             bad = int(np.flatnonzero(ranges < 0.0)[0])
             raise InvalidValueError(
                 f"Scan.ranges[{bad}] must be >= 0 m, inf (no return) or NaN (error), "

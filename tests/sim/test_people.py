@@ -37,7 +37,7 @@ def walk() -> dict[str, np.ndarray | World]:
         if k % 30 == 0:
             now = world.mover_poses()[_rows(world, "person")]
             poses.append(now)
-            clearances.append([clearance_at(people.field, x, y) for x, y, _ in now])
+            clearances.append([clearance_at(people.table.field, x, y) for x, y, _ in now])
             tasks.append(people.crowd.task.copy())
     return {
         "world": world,
@@ -143,7 +143,7 @@ def test_a_closed_door_opens_for_a_person_and_closes_behind():
         world.model.qpos_spring[at] = -0.2
         world.data.qpos[at] = 0.0
     world._doors._closers[:, 4] = 0.0
-    world._doors._rate = 0.0
+    world._doors.leaves.rates[:] = 0.0
     world._doors.schedule[:, :3] = math.inf, -math.inf, 0.0
     rooms, opened = set(), set()
     for k in range(60 * SUBSTEPS_PER_S):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sim import state
-from sim.chairs import Shoves
+from sim.chairs import Shoves, shove
 from sim.dynamism import Dynamism
 from sim.robot import DriveConfig
 from sim.seeds import Seeds
@@ -170,7 +170,7 @@ def test_a_shove_gives_the_speed_that_was_drawn(speed):
     fastest = 0.0
     for k in range(300):
         if k % 4 == 0:
-            shoves.control(k / 300, 4 / 300, world.data)
+            shove(k / 300, 4 / 300, shoves.table, world.data.qfrc_applied)
         world.substep()
         fastest = max(fastest, math.hypot(*world.data.qvel[dof : dof + 2]))
     assert 0.8 * speed < fastest < 1.05 * speed  # damping takes a little during the shove

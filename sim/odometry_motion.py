@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One motion of the wheels and what it does to pose, increment and covariance, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import njit
+
+Float = NDArray[np.float64]
+Vec3 = tuple[float, float, float]
+
+# What tyres creep in one scan while the encoders stand still, and what keeps a covariance
+# invertible: (20 um)^2 and (20 urad)^2.
+FLOOR = 4e-10
+SLIP_MIN, SLIP_MAX = math.radians(1.0), math.radians(3.0)  # fidelity note, 2.4
+SLIP_MEAN_SQUARE = (SLIP_MIN**2 + SLIP_MIN * SLIP_MAX + SLIP_MAX**2) / 3.0
+
+# Parameters of a run: variances per metre and per radian, slips per metre, ticks per metre (0 for
+# none), m between the true and between the nominal wheels, reported metres per metre of each rim.
+TRANS_M, TRANS_RAD, ROT_M, ROT_RAD, SIDE_M, SLIP, SLIP_CONTACT = range(7)
+TICKS, TRACK, NOMINAL, GAIN = 7, 8, 9, 10
+REPORTED, COUNTED, TRUE = 0, 1, 2  # rows of the wheels
+NOW, AT_STAMP, INCREMENT = 0, 1, 2  # rows of the poses
+
+
+@njit
+def _turned(distance: float, angle: float) -> tuple[float, float, float, float]:
+    """(dx, dy) of an arc of that length and angle, and d(dx)/d(angle), d(dy)/d(angle)."""
+    if abs(angle) < 1e-4:
+        half = 0.5 * angle
+        return distance, distance * half, -distance * angle / 3.0, 0.5 * distance
+    s, c = math.sin(angle), math.cos(angle)
+    dx, dy = distance * s / angle, distance * (1.0 - c) / angle
+    return dx, dy, (distance * c - dx) / angle, (distance * s - dy) / angle
+
+
+@njit
+def _chain(pose: Float, bx: float, by: float, angle: float) -> None:
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    pose[0] += c * bx - s * by
+    pose[1] += s * bx + c * by
+    pose[2] += angle
+
+
+@njit
+def _accumulate(
+    increment: Float, random: Float, systematic: Float, step: Vec3, variances: Vec3, track: float
+) -> None:
+    """Chain one small motion and its error onto the increment since the last frame, in place.
+
+    increment   (3,) x, y, theta in the frame of the increment's start
+    random      (3, 3) covariance of those three numbers by the random part
+    systematic  (3, 3) their derivatives by Es - 1, Eb - 1, Ed - 1
+    step        distance m, side m, angle rad; ``variances`` of these three
+
+    First order, as ``se2.propagate``: F P F' + G Q G' with the Jacobians of composition.
+    """
+    distance, side, angle = step
+    bx, by, bx_angle, by_angle = _turned(distance, angle)
+    unit_x, unit_y, _, _ = _turned(1.0, angle)
+    c, s = math.cos(increment[2]), math.sin(increment[2])
+    carry = np.eye(3)
+    carry[0, 2] = -s * bx - c * (by + side)
+    carry[1, 2] = c * bx - s * (by + side)
+    # Columns: what one unit of distance, side, angle does to the increment.
+    fresh = np.zeros((3, 3))
+    fresh[0, 0], fresh[1, 0] = c * unit_x - s * unit_y, s * unit_x + c * unit_y
+    fresh[0, 1], fresh[1, 1] = -s, c
+    fresh[0, 2], fresh[1, 2] = c * bx_angle - s * by_angle, s * bx_angle + c * by_angle
+    fresh[2, 2] = 1.0
+    # Rows distance, side, angle; columns Es, Eb, Ed (first order about 1).
+    by_parameter = np.zeros((3, 3))
+    by_parameter[0, 0], by_parameter[0, 2] = -distance, -0.25 * track * angle
+    by_parameter[2, 0], by_parameter[2, 1], by_parameter[2, 2] = -angle, angle, -distance / track
+    old_random, old_systematic = random.copy(), systematic.copy()
+    for i in range(3):
+        for j in range(3):
+            variance, derivative = 0.0, 0.0
+            for k in range(3):
+                variance += fresh[i, k] * variances[k] * fresh[j, k]
+                derivative += fresh[i, k] * by_parameter[k, j] + carry[i, k] * old_systematic[k, j]
+                for m in range(3):
+                    variance += carry[i, k] * old_random[k, m] * carry[j, m]
+            random[i, j] = variance
+            systematic[i, j] = derivative
+    _chain(increment, bx, by + side, angle)
+
+
+@njit
+def _draw(
+    distance: float, angle: float, contact: bool, p: Float, normals: Float, uniforms: Float
+) -> tuple[Vec3, Vec3]:
+    """(variances, drawn errors) of distance, side and angle; distance and angle without sign."""
+    trans = p[TRANS_M] * distance + p[TRANS_RAD] * angle
+    rot = p[ROT_M] * distance + p[ROT_RAD] * angle
+    side = p[SIDE_M] * distance
+    chance = 1.0 - math.exp(-(p[SLIP] + (p[SLIP_CONTACT] if contact else 0.0)) * distance)
+    size = SLIP_MIN + (SLIP_MAX - SLIP_MIN) * abs(2.0 * uniforms[1] - 1.0)
+    slip = math.copysign(size, uniforms[1] - 0.5) if uniforms[0] < chance else 0.0
+    noise = (
+        math.sqrt(trans) * normals[0],
+        math.sqrt(side) * normals[1],
+        math.sqrt(rot) * normals[2] + slip,
+    )
+    rot += chance * SLIP_MEAN_SQUARE
+    # An extra length driven on an extra half turn: the one second-order term that matters,
+    # because nothing of first order is sideways but ``side``.
+    return (trans, side + 0.25 * trans * rot, rot), noise
+
+
+@njit
+def update(
+    travel: tuple[float, float],
+    contact: bool,
+    p: Float,
+    normals: Float,
+    uniforms: Float,
+    wheels: Float,
+    poses: Float,
+    spread: Float,
+) -> None:
+    """Advance all of a run's state to the true rim travel (left m, right m).
+
+    p       parameters, in the columns named above
+    wheels  (3, 2) m of each rim: reported before ticks, after ticks, true
+    poses   (3, 3) now, at the last stamp, increment since then
+    spread  (3, 3, 3) random and systematic part of ``_accumulate``, covariance at the stamp
+    """
+    dl, dr = travel[0] - wheels[TRUE, 0], travel[1] - wheels[TRUE, 1]
+    distance, angle = 0.5 * (dl + dr), (dr - dl) / p[TRACK]
+    variances, noise = _draw(abs(distance), abs(angle), contact, p, normals, uniforms)
+    half, counted = 0.5 * p[NOMINAL] * noise[2], np.empty(2)
+    for k in range(2):
+        wheels[TRUE, k] = travel[k]
+        rim = p[GAIN] * dl + noise[0] - half if k == 0 else p[GAIN + 1] * dr + noise[0] + half
+        wheels[REPORTED, k] += rim
+        after = wheels[REPORTED, k]
+        if p[TICKS] > 0.0:
+            after = math.floor(after * p[TICKS] + 0.5) / p[TICKS]
+        counted[k] = after - wheels[COUNTED, k]
+        wheels[COUNTED, k] = after
+    turned = (counted[1] - counted[0]) / p[NOMINAL]
+    _step_pose(poses[NOW], 0.5 * (counted[0] + counted[1]), noise[1], turned)
+    _accumulate(poses[INCREMENT], spread[0], spread[1], (distance, 0.0, angle), variances, p[TRACK])
+
+
+@njit
+def close(poses: Float, spread: Float, variances: Vec3) -> None:
+    """End the increment here: its covariance, then nothing moved.
+
+    random + systematic diag(variances) systematic' + floor, exactly symmetric.
+    """
+    random, systematic, out = spread[0], spread[1], spread[2]
+    for i in range(3):
+        for j in range(i + 1):
+            total = 0.5 * (random[i, j] + random[j, i])
+            for k in range(3):
+                total += systematic[i, k] * variances[k] * systematic[j, k]
+            out[i, j] = out[j, i] = total
+        out[i, i] += FLOOR
+    poses[AT_STAMP] = poses[NOW]
+    poses[INCREMENT], spread[:2] = 0.0, 0.0
+
+
+@njit
+def _step_pose(pose: Float, distance: float, side: float, angle: float) -> None:
+    bx, by, _, _ = _turned(distance, angle)
+    _chain(pose, bx, by + side, angle)
