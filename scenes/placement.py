@@ -9,6 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from slam._jit import njit
+
 Float = NDArray[np.float64]
 Rect = tuple[float, float, float, float]
 
@@ -16,20 +18,17 @@ MAX_BATCHES = 200
 BATCH = 32
 
 
+@njit
 def gap_to_boxes(points: Float, boxes: Float) -> Float:
-    """(n,) m from each point (n, 2) to the nearest box (m, 5); 0 inside, inf without boxes.
-
-    Only elementwise + - * / sqrt on arrays, so that a layout is the same on every CPU.
-    """
-    if not len(boxes):
-        return np.full(len(points), np.inf)
-    cos = np.array([math.cos(yaw) for yaw in boxes[:, 4].tolist()])
-    sin = np.array([math.sin(yaw) for yaw in boxes[:, 4].tolist()])
-    dx = points[:, None, 0] - boxes[None, :, 0]
-    dy = points[:, None, 1] - boxes[None, :, 1]
-    out_x = np.maximum(np.abs(dx * cos + dy * sin) - boxes[None, :, 2], 0.0)
-    out_y = np.maximum(np.abs(dy * cos - dx * sin) - boxes[None, :, 3], 0.0)
-    gaps: Float = np.sqrt(out_x * out_x + out_y * out_y).min(axis=1)
+    """(n,) m from each point (n, 2) to the nearest box (m, 5); 0 inside, inf without boxes."""
+    gaps = np.full(len(points), np.inf)
+    for k in range(len(boxes)):
+        cos, sin = math.cos(boxes[k, 4]), math.sin(boxes[k, 4])
+        for i in range(len(points)):
+            dx, dy = points[i, 0] - boxes[k, 0], points[i, 1] - boxes[k, 1]
+            out_x = max(abs(dx * cos + dy * sin) - boxes[k, 2], 0.0)
+            out_y = max(abs(dy * cos - dx * sin) - boxes[k, 3], 0.0)
+            gaps[i] = min(gaps[i], math.sqrt(out_x * out_x + out_y * out_y))
     return gaps
 
 

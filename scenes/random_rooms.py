@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 
 import cv2
 import numpy as np
@@ -22,6 +23,7 @@ from scenes.plan import Plan
 from scenes.recipe import Draws, count, finish, free_floor, hang_doors, scatter, seat_chairs
 from scenes.registry import register
 from scenes.scene import Pose, Scene, within
+from slam._jit import njit
 
 DEPTH = 0.7  # of the width
 WALL_HALF, OUTER_HALF = 0.06, 0.08
@@ -184,7 +186,7 @@ class _Room:
 
     def _accept(self, part: str, pose: Pose) -> bool:
         """Put the part there unless it is in the way."""
-        boxes = _footprint(part, pose)
+        boxes = _footprint(_prints(part), pose)
         if not self._inside(boxes):
             return False
         keep = np.array([(0.0, 0.0), *self._doors])
@@ -227,31 +229,40 @@ class _Room:
         return home != 0 and all(label(*door) == home for door in self._doors)
 
 
-def _footprint(part: str, pose: Pose) -> NDArray[np.float64]:
-    """(n, 5) boxes of a part."""
-    rows = [
-        (moved(pose, mark.pose), mark.half)
-        for mark in part_marks(part)
-        if mark.words[0].startswith("footprint")
-    ]
-    return np.array([[place[0], place[1], *half, place[2]] for place, half in rows])
+@cache
+def _prints(part: str) -> NDArray[np.float64]:
+    """(n, 5) boxes of a part in its own frame: cx, cy, half x, half y m, yaw rad."""
+    marks = [mark for mark in part_marks(part) if mark.words[0].startswith("footprint")]
+    return np.array([[*mark.pose[:2], *mark.half, mark.pose[2]] for mark in marks])
 
 
+@cache
 def _extent(part: str) -> tuple[float, float]:
     """Half its width, and how far its back lies from its origin, m."""
-    marks = [m for m in part_marks(part) if m.words[0].startswith("footprint")]
-    return (
-        max(abs(m.pose[0]) + m.half[0] for m in marks),
-        max(m.pose[1] + m.half[1] for m in marks),
-    )
+    boxes = _prints(part)
+    return float((abs(boxes[:, 0]) + boxes[:, 2]).max()), float((boxes[:, 1] + boxes[:, 3]).max())
 
 
+@njit
+def _footprint(prints: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:
+    """(n, 5) boxes of a part that stands at ``pose``."""
+    x, y, yaw = pose
+    boxes, cos, sin = prints.copy(), math.cos(yaw), math.sin(yaw)
+    for k in range(len(boxes)):
+        boxes[k, 0] = x + cos * prints[k, 0] - sin * prints[k, 1]
+        boxes[k, 1] = y + sin * prints[k, 0] + cos * prints[k, 1]
+        boxes[k, 4] = yaw + prints[k, 4]
+    return boxes
+
+
+@njit
 def _outline(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     """(9 n, 2) corners, middles of sides and centres; furniture is no longer than thrice a gap."""
-    points = [
-        moved((x, y, yaw), (i * a, j * b, 0.0))[:2]
-        for x, y, a, b, yaw in boxes.tolist()
-        for i in (-1.0, 0.0, 1.0)
-        for j in (-1.0, 0.0, 1.0)
-    ]
-    return np.array(points)
+    points = np.empty((9 * len(boxes), 2))
+    for k in range(len(boxes)):
+        cos, sin = math.cos(boxes[k, 4]), math.sin(boxes[k, 4])
+        for i in range(9):
+            u, v = (i // 3 - 1) * boxes[k, 2], (i % 3 - 1) * boxes[k, 3]
+            points[9 * k + i, 0] = boxes[k, 0] + cos * u - sin * v
+            points[9 * k + i, 1] = boxes[k, 1] + sin * u + cos * v
+    return points
