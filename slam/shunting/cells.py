@@ -29,9 +29,11 @@ class Cells(NamedTuple):
     x           (S, 8, 8) float32: short-term activity, Eq. (8), in [0, 1); indexed [slot, row, col]
     y           (S, 8, 8) float32: long-term trace, the running mean of the input
     age         (S, 8, 8) float32: s of looking that ``y`` averages over
+    facing      (S, 8, 8) uint8: the way the surface faces that was traced there (``surfaces.face``)
     free        (S,) int32: stack of unused slots
     scratch_of  (S,) int32: row of ``impression`` of a slot the present scan touches, else -1
     impression  (T, 8, 8) float32: I of the present scan
+    faced       (T, 8, 8) uint8: the way the surface faces that makes the impression
     touched     (T, 3) int32: slot with an impression, block index (x, y)
     counts      (2,) int64: unused slots, touched blocks
     """
@@ -41,9 +43,11 @@ class Cells(NamedTuple):
     x: NDArray[np.float32]
     y: NDArray[np.float32]
     age: NDArray[np.float32]
+    facing: NDArray[np.uint8]
     free: NDArray[np.int32]
     scratch_of: NDArray[np.int32]
     impression: NDArray[np.float32]
+    faced: NDArray[np.uint8]
     touched: NDArray[np.int32]
     counts: NDArray[np.int64]
 
@@ -57,9 +61,11 @@ def no_cells() -> Cells:
         x=np.zeros(shape, np.float32),
         y=np.zeros(shape, np.float32),
         age=np.zeros(shape, np.float32),
+        facing=np.zeros(shape, np.uint8),
         free=np.arange(_FIRST_SLOTS, dtype=np.int32)[::-1].copy(),
         scratch_of=np.full(_FIRST_SLOTS, -1, np.int32),
         impression=np.zeros((_FIRST_TOUCHED, SIDE, SIDE), np.float32),
+        faced=np.zeros((_FIRST_TOUCHED, SIDE, SIDE), np.uint8),
         touched=np.zeros((_FIRST_TOUCHED, 3), np.int32),
         counts=np.array([_FIRST_SLOTS, 0], np.int64),
     )
@@ -68,18 +74,19 @@ def no_cells() -> Cells:
 def with_room(old: Cells) -> Cells:
     """More of what ran out: slots in the pool, or scratch for impressions.
 
-    The pool grows by an eighth, so that little of it is ever unused.
+    The pool grows by a sixteenth, so that little of it is ever unused.
     """
     cells = old
     if old.counts[FREE_COUNT] == 0:
         slots = len(old.free)
-        more = max(64, slots // 8)
+        more = max(64, slots // 16)
         free = np.zeros(slots + more, np.int32)
         free[:more] = np.arange(slots + more - 1, slots - 1, -1)
         cells = cells._replace(
             x=_longer(old.x, more, 0),
             y=_longer(old.y, more, 0),
             age=_longer(old.age, more, 0),
+            facing=_longer(old.facing, more, 0),
             free=free,
             scratch_of=_longer(old.scratch_of, more, -1),
         )
@@ -87,7 +94,9 @@ def with_room(old: Cells) -> Cells:
     if old.counts[TOUCHED_COUNT] == len(old.touched):
         more = len(old.touched) // 2
         cells = cells._replace(
-            impression=_longer(old.impression, more, 0), touched=_longer(old.touched, more, 0)
+            impression=_longer(old.impression, more, 0),
+            faced=_longer(old.faced, more, 0),
+            touched=_longer(old.touched, more, 0),
         )
     return cells
 

@@ -21,7 +21,7 @@ from slam.seen import FREE_WITHOUT_RETURN_M
 from slam.shunting.cells import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.network import Network
-from slam.shunting.surfaces import join, unveiled
+from slam.shunting.surfaces import face, join, turned_face, unveiled
 from slam.shunting.visibility import View, view_of_beams, view_of_features
 
 SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
@@ -43,6 +43,7 @@ class Observations:
     tangents      (n, 2) unit direction of the surface where it goes on both ways, else 0
     joined        (n,) bool: the surface goes on to the next point. Without it the dots of a wall
                   seen at a grazing angle match themselves where the robot stood before
+    facings       (n,) uint8: the way the surface faces, see ``surfaces.face``; 0: unknown
     view          what is seen to be empty
     T_robot_laser (3,) origin of ``view``
     """
@@ -52,6 +53,7 @@ class Observations:
     weights: Float
     tangents: Float
     joined: NDArray[np.bool_]
+    facings: NDArray[np.uint8]
     view: View
     T_robot_laser: Float
 
@@ -143,6 +145,8 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
     clear = np.zeros(count, np.bool_)
     if unveiled(points, beams, spec.T_robot_laser, onward, clear) < count:
         points, onward, tangents = points[clear], onward[clear], tangents[clear]
+    facings = np.zeros(len(points), np.uint8)
+    face(points, spec.T_robot_laser, onward, facings)
     variance = max(SIGMA_CELLS * config.cell_m, SENSOR_SIGMA_M) ** 2
     covariances = np.zeros((len(points), 3))
     covariances[:, 0] = covariances[:, 2] = variance
@@ -155,6 +159,7 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
         weights=weights,
         tangents=tangents,
         joined=onward,
+        facings=facings,
         view=view,
         T_robot_laser=spec.T_robot_laser,
     )
@@ -173,6 +178,7 @@ def from_features(features: Features, config: ShuntingConfig) -> Observations:
         weights=np.ones(len(covariances)),
         tangents=np.zeros((len(covariances), 2)),
         joined=np.zeros(len(covariances), np.bool_),
+        facings=np.zeros(len(covariances), np.uint8),
         view=view_of_features(points[near], config.cell_m),
         T_robot_laser=np.zeros(3),
     )
@@ -186,6 +192,7 @@ def joined(first: Observations, second: Observations) -> Observations:
         weights=np.concatenate([first.weights, second.weights]),
         tangents=np.concatenate([first.tangents, second.tangents]),
         joined=np.concatenate([first.joined, second.joined]),
+        facings=np.concatenate([first.facings, second.facings]),
         view=first.view,
         T_robot_laser=first.T_robot_laser,
     )
@@ -207,6 +214,7 @@ def _touch(cells: Cells, column: int, row: int) -> int:
         cells.x[slot] = 0.0
         cells.y[slot] = 0.0
         cells.age[slot] = 0.0
+        cells.facing[slot] = 0
         cells.scratch_of[slot] = -1
     scratch = cells.counts[TOUCHED_COUNT]
     if scratch == len(cells.touched):
@@ -217,11 +225,14 @@ def _touch(cells: Cells, column: int, row: int) -> int:
     cells.touched[scratch, 2] = row + cells.corner[1]
     cells.scratch_of[slot] = scratch
     cells.impression[scratch] = 0.0
+    cells.faced[scratch] = 0
     return int(scratch)
 
 
 @njit
-def _stamp_point(cells: Cells, u: float, v: float, a: float, b: float, d: float) -> bool:
+def _stamp_point(
+    cells: Cells, u: float, v: float, a: float, b: float, d: float, faced: int
+) -> bool:
     """Gaussian with covariance [[a, b], [b, d]] about (u, v), in cells."""
     det = a * d - b * b
     wide = math.sqrt(FAINT * max(a, d))
@@ -248,13 +259,17 @@ def _stamp_point(cells: Cells, u: float, v: float, a: float, b: float, d: float)
                 for i in range(first, last + 1):
                     du = i - u
                     m = min(whole + du * (part + pa * du), FAINT)
-                    value = max(BELL[int(m * FINE)], cells.impression[scratch, j & MASK, i & MASK])
-                    cells.impression[scratch, j & MASK, i & MASK] = value
+                    value = BELL[int(m * FINE)]
+                    if value > cells.impression[scratch, j & MASK, i & MASK]:
+                        cells.impression[scratch, j & MASK, i & MASK] = value
+                        cells.faced[scratch, j & MASK, i & MASK] = faced
     return True
 
 
 @njit
-def _stamp_stretch(cells: Cells, u: float, v: float, du: float, dv: float, variance: float) -> bool:
+def _stamp_stretch(
+    cells: Cells, u: float, v: float, du: float, dv: float, variance: float, faced: int
+) -> bool:
     """Gaussian ridge about the stretch from (u, v) to (u + du, v + dv), in cells."""
     square = du * du + dv * dv
     flat = abs(du) >= abs(dv)
@@ -283,6 +298,7 @@ def _stamp_stretch(cells: Cells, u: float, v: float, du: float, dv: float, varia
             value = BELL[int(m * FINE)]
             if value > cells.impression[scratch, j & MASK, i & MASK]:
                 cells.impression[scratch, j & MASK, i & MASK] = value
+                cells.faced[scratch, j & MASK, i & MASK] = faced
     return True
 
 
@@ -292,6 +308,7 @@ def _stamp(
     points: NDArray[np.float64],
     covariances: NDArray[np.float64],
     joined: NDArray[np.bool_],
+    facings: NDArray[np.uint8],
     theta: float,
     cell: float,
     start: int,
@@ -308,11 +325,12 @@ def _stamp(
         b = (c * s * (xx - yy) + (c * c - s * s) * xy) * scale
         d = (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale
         u, v = points[k, 0] / cell - 0.5, points[k, 1] / cell - 0.5
-        if not _stamp_point(cells, u, v, a, b, d):
+        faced = turned_face(facings[k], theta)
+        if not _stamp_point(cells, u, v, a, b, d, faced):
             return k
         if joined[k]:
             du, dv = points[k + 1, 0] / cell - 0.5 - u, points[k + 1, 1] / cell - 0.5 - v
-            if du * du + dv * dv > 1.0 and not _stamp_stretch(cells, u, v, du, dv, a):
+            if du * du + dv * dv > 1.0 and not _stamp_stretch(cells, u, v, du, dv, a, faced):
                 return k
     return len(points)
 
@@ -335,6 +353,7 @@ def stamp(network: Network, observations: Observations, T_map_robot: Float) -> N
             points_map,
             observations.covariances,
             observations.joined,
+            observations.facings,
             float(T_map_robot[2]),
             network.cell,
             done,

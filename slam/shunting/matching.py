@@ -14,7 +14,7 @@ from slam.shunting.config import ShuntingConfig
 from slam.shunting.impressions import Observations
 from slam.shunting.motion import inverted, turned
 from slam.shunting.network import Network
-from slam.shunting.overlap import Reward, refine
+from slam.shunting.overlap import Reward, Seen, refine
 from slam.shunting.search import SearchWindow, search
 
 FEW = 90  # observations are enough to come near
@@ -32,6 +32,17 @@ def _spread(points_robot: Float, T_map_robot: Float, covariance: Float) -> Float
             yy + 2.0 * yt * x + tt * x * x,
         ],
         axis=1,
+    )
+
+
+def seen_by(observations: Observations) -> Seen:
+    """The arrays of ``observations``."""
+    return Seen(
+        observations.points_robot,
+        observations.covariances,
+        observations.weights,
+        observations.tangents,
+        observations.facings,
     )
 
 
@@ -76,6 +87,7 @@ class Matcher:
         precision: Float,
     ) -> Match:
         """The local optimum reached from ``start``; the reward's weight falls with the match."""
+        seen = seen_by(observations)
         full = float(observations.weights.sum())
         pose = np.array(start, dtype=np.float64)
         information = np.zeros((3, 3))
@@ -84,10 +96,7 @@ class Matcher:
             rewarded, prior, count = refine(
                 network.cells,
                 self.reward,
-                observations.points_robot,
-                observations.covariances,
-                observations.weights,
-                observations.tangents,
+                seen,
                 pose,
                 prediction,
                 precision,
@@ -132,10 +141,13 @@ class Matcher:
         refine(
             network.cells,
             self.reward,
-            np.ascontiguousarray(few),
-            observations.covariances[::every] + spread,
-            np.ascontiguousarray(observations.weights[::every]) * every,
-            np.ascontiguousarray(observations.tangents[::every]),
+            Seen(
+                np.ascontiguousarray(few),
+                observations.covariances[::every] + spread,
+                np.ascontiguousarray(observations.weights[::every]) * every,
+                np.ascontiguousarray(observations.tangents[::every]),
+                np.ascontiguousarray(observations.facings[::every]),
+            ),
             pose,
             prediction,
             inverted(covariance),

@@ -63,6 +63,7 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
             cells.x[slot] = 0.0
             cells.y[slot] = 0.0
             cells.age[slot] = 0.0
+            cells.facing[slot] = 0
             cells.scratch_of[slot] = -1
     return True
 

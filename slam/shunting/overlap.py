@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from slam._jit import njit
 from slam.shunting.cells import MASK, SHIFT, Cells
+from slam.shunting.surfaces import opposite, turned_face
 
 MATCHED_OVERLAP = 0.15  # an observation that overlaps the map less is not matched
 ENOUGH = 1e-4  # expected rise of the score below which climbing ends
@@ -35,6 +36,16 @@ class Reward(NamedTuple):
     logarithm: bool
 
 
+class Seen(NamedTuple):
+    """Observations as the kernels see them; fields as in ``Observations``."""
+
+    points: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    tangents: NDArray[np.float64]
+    facings: NDArray[np.uint8]
+
+
 @njit
 def _overlap(
     cells: Cells,
@@ -42,12 +53,14 @@ def _overlap(
     u: float,
     v: float,
     cov: tuple[float, float, float],
+    faced: int,
     out: NDArray[np.float64],
 ) -> None:
     """Overlap f of a Gaussian at (u, v) with the map, its gradient and its negative curvature.
 
     (u, v) and ``cov`` (xx, xy, yy) are in cells, neuron (i, j) lies at (i, j). f is the sum over
-    neurons of Gaussian times activity, divided so that a lone landmark scores 1 on itself.
+    neurons of Gaussian times activity, divided so that a lone landmark scores 1 on itself. Neurons
+    of a surface that faces away from the observed one (``faced``) do not count.
     ``out``: f, df/du, df/dv, -d2f/du2, -d2f/dudv, -d2f/dv2.
     """
     a, b, d = cov
@@ -82,6 +95,8 @@ def _overlap(
                 if slot >= 0:
                     x, y = cells.x[slot, j & MASK, i & MASK], cells.y[slot, j & MASK, i & MASK]
                     value = kernel * (y + (1.0 - y) * reward.short_term * x)
+                    if opposite(faced, cells.facing[slot, j & MASK, i & MASK]):
+                        value = 0.0
                     s0 += value
                     value *= offset
                     s1 += value
@@ -113,10 +128,7 @@ def _overlap(
 def evaluate(
     cells: Cells,
     reward: Reward,
-    points: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    tangents: NDArray[np.float64],
+    seen: Seen,
     pose: NDArray[np.float64],
     gradient: NDArray[np.float64],
     along: NDArray[np.float64],
@@ -135,29 +147,29 @@ def evaluate(
     out = np.empty(6)
     scale = 1.0 / reward.cell
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    for k in range(len(points)):
-        rx = c * points[k, 0] - s * points[k, 1]
-        ry = s * points[k, 0] + c * points[k, 1]
-        xx, xy, yy = covariances[k, 0], covariances[k, 1], covariances[k, 2]
+    for k in range(len(seen.points)):
+        rx = c * seen.points[k, 0] - s * seen.points[k, 1]
+        ry = s * seen.points[k, 0] + c * seen.points[k, 1]
+        xx, xy, yy = seen.covariances[k, 0], seen.covariances[k, 1], seen.covariances[k, 2]
         cov = (
             (c * c * xx - 2.0 * c * s * xy + s * s * yy) * scale * scale,
             (c * s * (xx - yy) + (c * c - s * s) * xy) * scale * scale,
             (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale * scale,
         )
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
-        _overlap(cells, reward, u, v, cov, out)
+        _overlap(cells, reward, u, v, cov, turned_face(seen.facings[k], pose[2]), out)
         f = out[0]
         if f > MATCHED_OVERLAP:
-            matched += weights[k]
+            matched += seen.weights[k]
         gx, gy = out[1] * scale, out[2] * scale
         a, b, d = out[3] * scale * scale, out[4] * scale * scale, out[5] * scale * scale
         if reward.logarithm:
             inverse = 1.0 / (LOG_FLOOR + f)
-            score += weights[k] * math.log(LOG_FLOOR + f)
+            score += seen.weights[k] * math.log(LOG_FLOOR + f)
             gx, gy = gx * inverse, gy * inverse
             a, b, d = a * inverse + gx * gx, b * inverse + gx * gy, d * inverse + gy * gy
         else:
-            score += weights[k] * f
+            score += seen.weights[k] * f
         # keep the positive part of [[a, b], [b, d]]
         mean, half = 0.5 * (a + d), 0.5 * (a - d)
         radius = math.sqrt(half * half + b * b)
@@ -167,13 +179,13 @@ def evaluate(
         elif low < 0.0:
             keep = high / (2.0 * radius)
             a, b, d = keep * (half + radius), keep * b, keep * (radius - half)
-        w = weights[k]
+        w = seen.weights[k]
         gx, gy, a, b, d = w * gx, w * gy, w * a, w * b, w * d
         gradient[0] += gx
         gradient[1] += gy
         gradient[2] += gy * rx - gx * ry
-        tx = c * tangents[k, 0] - s * tangents[k, 1]
-        ty = s * tangents[k, 0] + c * tangents[k, 1]
+        tx = c * seen.tangents[k, 0] - s * seen.tangents[k, 1]
+        ty = s * seen.tangents[k, 0] + c * seen.tangents[k, 1]
         slope = gx * tx + gy * ty
         along[0] += slope * tx
         along[1] += slope * ty
@@ -229,10 +241,7 @@ def _solve(
 def refine(
     cells: Cells,
     reward: Reward,
-    points: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    tangents: NDArray[np.float64],
+    seen: Seen,
     pose: NDArray[np.float64],
     prediction: NDArray[np.float64],
     precision: NDArray[np.float64],
@@ -249,9 +258,7 @@ def refine(
     gradient, along, slope, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     trial, trial_gradient, trial_along = np.empty(3), np.empty(3), np.empty(3)
     trial_information, H = np.empty((3, 3)), np.empty((3, 3))
-    rewarded, matched = evaluate(
-        cells, reward, points, covariances, weights, tangents, pose, gradient, along, information
-    )
+    rewarded, matched = evaluate(cells, reward, seen, pose, gradient, along, information)
     prior = _prior(pose, prediction, precision, slope)
     damping = 1e-3
     for _ in range(20):
@@ -265,8 +272,7 @@ def refine(
         for a in range(3):
             trial[a] = pose[a] + step[a]
         trial_rewarded, trial_matched = evaluate(
-            cells, reward, points, covariances, weights, tangents,
-            trial, trial_gradient, trial_along, trial_information,
+            cells, reward, seen, trial, trial_gradient, trial_along, trial_information,
         )  # fmt: skip
         older = along[0] * step[0] + along[1] * step[1] + along[2] * step[2]
         trial_prior = _prior(trial, prediction, precision, step)

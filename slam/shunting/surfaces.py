@@ -14,6 +14,11 @@ LONGEST_JOIN_M = 1.0
 LINE_HITS = 4  # evidence for a surface between hits farther apart than ``NEAR_JOIN_CELLS``
 LIKE_STEPS = 4.0  # ratio of neighbouring steps along a surface, at most
 LINE_SLACK_M, LINE_SLACK = 0.04, 0.15  # m and share of a step, along the beam
+FACE_M = 0.1  # stretch to either side that tells which way a surface faces
+FACES, FACES_SEEN = (
+    128,
+    0x80,
+)  # directions told apart; a facing is FACES_SEEN | direction, 0: unknown
 MIXED_M = 1.5  # the receiver tells two surfaces farther apart than this from each other
 
 
@@ -87,6 +92,60 @@ def join(
             d = math.sqrt(dx * dx + dy * dy)
             if d > 0.0:
                 tangents[k, 0], tangents[k, 1] = dx / d, dy / d
+
+
+@njit
+def face(
+    points: NDArray[np.float64],
+    origin: NDArray[np.float64],
+    joined: NDArray[np.bool_],
+    out: NDArray[np.uint8],
+) -> None:
+    """The way the surface under each hit faces, in robot axes; 0 for a hit joined to none.
+
+    Averaged over ``FACE_M`` to either side: neighbouring hits near by are closer than their noise.
+    """
+    n = len(points)
+    for k in range(n):
+        first, last = k, k
+        while first > 0 and joined[first - 1] and _apart(points, first, k) < FACE_M:
+            first -= 1
+        while last < n - 1 and joined[last] and _apart(points, last, k) < FACE_M:
+            last += 1
+        out[k] = 0
+        if first == last:
+            continue
+        nx, ny = points[last, 1] - points[first, 1], points[first, 0] - points[last, 0]
+        bx, by = origin[0] - points[k, 0], origin[1] - points[k, 1]
+        if nx * bx + ny * by < 0.0:
+            nx, ny = -nx, -ny
+        out[k] = FACES_SEEN | (math.floor(math.atan2(ny, nx) / math.tau * FACES + 0.5) % FACES)
+
+
+@njit
+def turned_face(facing: int, theta: float) -> int:
+    """A facing in axes turned by -theta."""
+    if facing == 0:
+        return 0
+    return FACES_SEEN | ((int(facing) + math.floor(theta / math.tau * FACES + 0.5)) % FACES)
+
+
+@njit
+def opposite(one: int, other: int) -> bool:
+    """Whether two surfaces face away from each other, by more than 135 degrees; unknown: no.
+
+    The two faces of a thin wall are closer to each other than a wrong heading moves them.
+    """
+    if one == 0 or other == 0:
+        return False
+    apart = (int(one) - int(other)) & (FACES - 1)
+    return 3 * FACES < 8 * apart < 5 * FACES
+
+
+@njit
+def _apart(points: NDArray[np.float64], j: int, k: int) -> float:
+    dx, dy = points[j, 0] - points[k, 0], points[j, 1] - points[k, 1]
+    return math.sqrt(dx * dx + dy * dy)
 
 
 @njit

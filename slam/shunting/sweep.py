@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from slam._jit import njit
 from slam.shunting.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells
+from slam.shunting.surfaces import opposite
 from slam.shunting.visibility import View, block_is_hidden, seen_empty
 
 
@@ -116,6 +117,11 @@ def integrate(
                     given = cells.impression[scratch, jj, ii] if scratch >= 0 else np.float32(0.0)
                     if x == 0.0 and y == 0.0 and given == 0.0:
                         continue
+                    faced = cells.faced[scratch, jj, ii] if scratch >= 0 else 0
+                    behind = given > 0.0 and opposite(int(faced), cells.facing[slot, jj, ii])
+                    if behind and given <= y:  # the back of a known surface is hidden
+                        alive = True
+                        continue
                     if given == 0.0:
                         px = (i0 + ii + 0.5) * cell - ox
                         py = (j0 + jj + 0.5) * cell - oy
@@ -123,7 +129,7 @@ def integrate(
                             alive = True
                             continue
                         contradicted += y
-                    else:
+                    elif not behind:
                         confirmed += y * given
                     visited += 1
                     if not write:
@@ -145,6 +151,8 @@ def integrate(
                             y, age = np.float32(0.0), np.float32(0.0)
                         cells.y[slot, jj, ii] = y
                         cells.age[slot, jj, ii] = age
+                        if faced != 0 or y == 0.0:
+                            cells.facing[slot, jj, ii] = faced
                     if x > 0.0 or y > 0.0:
                         alive = True
             if write and not alive:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.frames import Features, Odometry, Scan
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import from_features, from_scan, stamp
-from slam.shunting.matching import Matcher
+from slam.shunting.impressions import Observations, from_features, from_scan, stamp
+from slam.shunting.matching import Matcher, seen_by
 from slam.shunting.motion import WIDEN, inverted, predict, turned
 from slam.shunting.network import Network
 from slam.shunting.overlap import evaluate
@@ -58,8 +58,7 @@ def test_gradient_and_curvature_agree_with_differences(objective: str) -> None:
     def score(pose: Array) -> tuple[float, Array, Array]:
         gradient, along, information = np.empty(3), np.empty(3), np.empty((3, 3))
         value, _ = evaluate(
-            network.cells, matcher.reward, seen.points_robot, seen.covariances, seen.weights,
-            seen.tangents, pose, gradient, along, information,
+            network.cells, matcher.reward, seen_by(seen), pose, gradient, along, information
         )  # fmt: skip
         return value, gradient, information
 
@@ -228,3 +227,33 @@ def test_small_matrices_agree_with_numpy() -> None:
     c, s = math.cos(0.7), math.sin(0.7)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_allclose(turned(m, 0.7), R @ m @ R.T, atol=1e-12)
+
+
+def test_the_other_face_of_a_thin_wall_does_not_count() -> None:
+    """A wall of 8 cm mapped from its south, then seen from its north and from its south again."""
+    spec = laser(181)
+    south, north = np.array([0.0, -1.5, math.pi / 2.0]), np.array([0.0, 1.5, -math.pi / 2.0])
+    wall = World2D(rectangle(-4.0, -0.04, 4.0, 0.04))
+
+    def seen_from(pose: Array) -> Observations:
+        poses = np.tile(se2.compose(pose, spec.T_robot_laser), (181, 1))
+        ranges = wall.ranges(0.0, poses, spec.angles, 80.0).astype(np.float32)
+        return from_scan(Scan(stamp_ns=0, ranges=ranges, spec=spec), np.zeros(3), CONFIG)
+
+    network = Network(CONFIG)
+    matcher = Matcher(CONFIG)
+    known = seen_from(south)
+    for _ in range(20):
+        stamp(network, known, south)
+        laser_pose = se2.compose(south, known.T_robot_laser)
+        network.integrate(known.view, laser_pose, 0.2, write=True)
+    firm = 1e6 * np.eye(3)
+    moved = north - np.array([0.0, 0.08, 0.0])  # where its two faces fall into one
+    assert matcher.climb(network, known, south, south, firm).matched > 0.95
+    assert matcher.climb(network, seen_from(north), moved, moved, firm).matched < 0.05
+    stamp(network, seen_from(north), moved)
+    confirmed, _, _ = network.integrate(
+        known.view, se2.compose(moved, spec.T_robot_laser), 0.2, write=False
+    )
+    network.release()
+    assert confirmed < 1.0

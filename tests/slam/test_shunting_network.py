@@ -33,6 +33,7 @@ def point(x: float, y: float, cell: float, view: View = BLIND) -> Observations:
         weights=np.ones(1),
         tangents=np.zeros((1, 2)),
         joined=np.zeros(1, np.bool_),
+        facings=np.zeros(1, np.uint8),
         view=view,
         T_robot_laser=np.zeros(3),
     )
