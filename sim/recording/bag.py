@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames into a rosbag2 with MCAP storage, written by the rosbags library, without ROS."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import struct
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+from scenes.scene import SCAN_HEIGHT, Mover
+from sim.recording import messages as ros
+from sim.recording.objects import Objects, ObjectsMessage
+from sim.recording.template import STORE
+from slam import se2
+from slam._jit import njit
+from slam.errors import InvalidValueError
+from slam.frames import NS_PER_S, Float, Frame, LaserSpec, Odometry
+
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
+VERSION = 8  # of metadata.yaml: the newest that older ROS 2 can read
+LEVEL = 1  # of zstd: 7 % larger than level 3, and 40 us a frame faster
+_OPTIONS = {
+    zstd.CompressionParameter.compression_level: LEVEL,
+    zstd.CompressionParameter.checksum_flag: 1,  # a flipped bit is an error, never another range
+}
+_FOREVER = QosTime(9223372036, 854775807)
+_LATCHED = Qos(
+    QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL,
+    _FOREVER, _FOREVER, QosLiveliness.AUTOMATIC, _FOREVER, False,
+)  # fmt: skip
+
+
+@njit
+def _accumulate(covariance: Float, theta: float, step: Float, increment: Float) -> None:
+    """``se2.propagate`` in place, without NumPy's matmul: F P F' + G Q G'."""
+    c, s = math.cos(theta), math.sin(theta)
+    carry, turn = np.eye(3), np.eye(3)
+    carry[0, 2], carry[1, 2] = -s * step[0] - c * step[1], c * step[0] - s * step[1]
+    turn[0, 0], turn[0, 1], turn[1, 0], turn[1, 1] = c, -s, s, c
+    out = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(3):
+                for m in range(3):
+                    total += carry[i, k] * covariance[k, m] * carry[j, m]
+                    total += turn[i, k] * increment[k, m] * turn[j, m]
+            out[i, j] = out[j, i] = total
+    covariance[:] = out
+
+
+class _Wheels:
+    """/odom, /tf and /odom_increment of one frame after another."""
+
+    def __init__(self) -> None:
+        self.odometry, self.increment = ros.OdometryMessage(), ros.IncrementMessage()
+        self.tf = ros.TransformMessage(ros.ODOM, ros.ROBOT)
+        self._covariance, self._known = np.zeros((3, 3)), True
+        self._last: Odometry | None = None
+
+    def next(self, now: Odometry) -> tuple[bytearray, bytearray, bytearray | None]:
+        """The messages of these three topics, the last only with an increment's covariance."""
+        last, self._last = self._last, now
+        dt, step, theta = 0.0, np.zeros(3), float(now.T_odom_robot[2])
+        if last is not None:
+            dt = (now.stamp_ns - last.stamp_ns) / NS_PER_S
+            step = se2.between(last.T_odom_robot, now.T_odom_robot)
+            theta = float(last.T_odom_robot[2])
+        spread = now.increment_covariance
+        self._known = self._known and spread is not None
+        if spread is not None:
+            _accumulate(self._covariance, theta, step, spread)
+        return (
+            self.odometry(now, self._covariance if self._known else None, dt),
+            self.tf(now.stamp_ns, now.T_odom_robot),
+            None if spread is None else self.increment(now.stamp_ns, step, spread),
+        )
+
+
+class BagWriter:
+    """Writes the folder ``path``: metadata.yaml and one .mcap; a context manager.
+
+    movers  of the scene, for /ground_truth/objects; labels, intensities: whether frames have them
+
+    The folder is whole only after the block ends without an exception. Attribute
+    ``messages_sha256``: of topic, stamp and uncompressed bytes of every message, in order.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        spec: LaserSpec,
+        *,
+        movers: Sequence[Mover] = (),
+        labels: bool = True,
+        intensities: bool = False,
+    ) -> None:
+        self.spec, turns = spec, ros.turns_of(spec)
+        turn_s = ros.turn_time_s(spec, turns)
+        self._scan = ros.ScanMessage(
+            spec, scan_time=turns * turn_s, first=0, stride=1, intensities=intensities
+        )
+        self._turns = [
+            ros.ScanMessage(
+                spec, scan_time=turn_s, first=k, stride=turns, intensities=intensities
+            )
+            for k in range(turns)
+        ]  # fmt: skip
+        self._wheels, self._truth = _Wheels(), ros.TruthMessage()
+        self._labels = ros.LabelsMessage(spec) if labels else None
+        self._objects = ObjectsMessage(movers) if movers else None
+        self._writer = Writer(path, version=VERSION, storage_plugin=StoragePlugin.MCAP)
+        self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        self._connections: dict[str, Any] = {}
+        self._hash = hashlib.sha256()
+        self._started = False
+
+    def __enter__(self) -> BagWriter:
+        self._writer.open()
+        storage: Any = self._writer.storage
+        storage.compressor = lambda chunk: zstd.compress(chunk, options=_OPTIONS)
+        scan, wheels = ros.ScanMessage.KIND, self._wheels
+        topics = {
+            "/tf_static": ros.TransformMessage.KIND,
+            "/tf": wheels.tf.KIND,
+            "/odom": wheels.odometry.KIND,
+            "/odom_increment": wheels.increment.KIND,
+            "/ground_truth/pose": ros.TruthMessage.KIND,
+            "/ground_truth/objects": ObjectsMessage.KIND if self._objects else "",
+            "/ground_truth/labels": ros.LabelsMessage.KIND if self._labels else "",
+            "/scan": scan,
+            "/scan_turn": scan,
+        }
+        for topic, kind in topics.items():
+            if kind:
+                latched = [_LATCHED] if topic == "/tf_static" else []
+                self._connections[topic] = self._writer.add_connection(
+                    topic, kind, typestore=STORE, offered_qos_profiles=latched
+                )
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._writer.__exit__(kind, error, trace)
+
+    def write(self, frame: Frame, objects: Objects | None = None) -> None:
+        """Append a frame; ``InvalidValueError`` for one without a scan or of another scanner."""
+        scan, stamp_ns = frame.scan, frame.stamp_ns
+        if scan is None or (scan.spec is not self.spec and scan.spec != self.spec):
+            raise InvalidValueError("a bag holds scans of one scanner: this frame has another one")
+        if not self._started:
+            self._started = True
+            mount = ros.TransformMessage(ros.ROBOT, ros.LASER, SCAN_HEIGHT)
+            self._put("/tf_static", stamp_ns, mount(stamp_ns, self.spec.T_robot_laser))
+        odometry, tf, increment = self._wheels.next(frame.odometry)
+        self._put("/tf", stamp_ns, tf)
+        self._put("/odom", stamp_ns, odometry)
+        if increment is not None:
+            self._put("/odom_increment", stamp_ns, increment)
+        if frame.truth is not None:
+            self._put("/ground_truth/pose", stamp_ns, self._truth(stamp_ns, frame.truth))
+        if self._objects is not None and objects is not None:
+            self._put("/ground_truth/objects", stamp_ns, self._objects(stamp_ns, objects))
+        if self._labels is not None and frame.labels is not None:
+            self._put("/ground_truth/labels", stamp_ns, self._labels(scan, frame.labels))
+        self._put("/scan", *self._scan(scan))
+        for turn in self._turns:
+            self._put("/scan_turn", *turn(scan))
+
+    def _put(self, topic: str, stamp_ns: int, data: bytearray) -> None:
+        self._writer.write(self._connections[topic], stamp_ns, data)  # type: ignore[arg-type]
+        self._hash.update(struct.pack("<qq", stamp_ns, len(data)) + topic.encode() + data)
+
+    @property
+    def messages_sha256(self) -> str:
+        """Hexadecimal."""
+        return self._hash.hexdigest()

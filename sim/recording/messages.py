@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a frame says, as ROS 2 messages.
+
+Stamps are those of the earliest beam. Frames are "odom", "base_link", "laser" (REP 105) and
+"world", in which the truth and the map of an episode are. LaserScan follows REP 117 (inf no return,
+NaN an error code) and, in its time fields, the driver of the LMS-200 family
+(ros-drivers/sicktoolbox_wrapper): ``scan_time`` is one turn of the mirror for a message of one
+turn, all its turns for a whole scan; ``time_increment`` is scan_time / (2 pi) * angle_increment.
+That is exact for a turn. For a whole interlaced scan it misleads, as that driver warns: half-degree
+neighbours are a mirror turn apart. Hence ``/scan_turn``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.recording.template import Marks, Template, header, message
+from slam import se2
+from slam.errors import InvalidValueError
+from slam.frames import NS_PER_S, BeamLabels, Float, LaserSpec, Odometry, Scan
+from slam.logs.ros_numbers import quaternion_of
+
+WORLD, ODOM, ROBOT, LASER = "world", "odom", "base_link", "laser"
+
+POINT = np.dtype(
+    [
+        ("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("body", "<i4"), ("displacement", "<f4"),
+        ("incidence", "<f4"), ("kind", "u1"), ("mixed", "u1"),
+    ]
+)  # fmt: skip
+_PER_M = np.float32(1024.0)  # points are rounded to 1 / 1024 m: more digits are noise to store
+_ROS_TYPES = {"<f4": 7, "<i4": 5, "|u1": 2}  # sensor_msgs/PointField
+
+
+def turns_of(spec: LaserSpec) -> int:
+    """Mirror turns of a scan: the beams of each turn are every n-th, evenly spaced in time.
+
+    Raises ``InvalidValueError`` for beam times that no number of turns explains.
+    """
+    offsets_ns = np.round(spec.beam_time_offsets * NS_PER_S)
+    for turns in range(1, min(9, spec.n_beams + 1)):
+        steps = offsets_ns[turns:] - offsets_ns[:-turns]
+        if steps.size == 0 or (steps.min() >= 0.0 and steps.max() - steps.min() <= 2.0):
+            return turns
+    raise InvalidValueError("LaserSpec.beam_time_offsets are not those of a turning mirror")
+
+
+def turn_time_s(spec: LaserSpec, turns: int) -> float:
+    """Seconds of one turn of the mirror; 0 where the beams have no times."""
+    if spec.n_beams <= turns:
+        return 0.0
+    last = ((spec.n_beams - 1) // turns) * turns
+    sweep = float(spec.beam_time_offsets[last])
+    return sweep * math.tau / (last * spec.angle_increment)
+
+
+class ScanMessage:
+    """sensor_msgs/LaserScan of every ``stride``-th beam from ``first`` on."""
+
+    KIND = "sensor_msgs/msg/LaserScan"
+
+    def __init__(
+        self, spec: LaserSpec, *, scan_time: float, first: int, stride: int, intensities: bool
+    ) -> None:
+        marks, beams = Marks(), slice(first, None, stride)
+        n = len(spec.beam_time_offsets[beams])
+        increment = stride * spec.angle_increment
+        start = float(spec.angles[first])
+        ranges, remissions = marks(n, np.float32), marks(n if intensities else 0, np.float32)
+        prototype = message(
+            self.KIND,
+            header=header(LASER),
+            angle_min=start,
+            angle_max=start + (n - 1) * increment,
+            angle_increment=increment,
+            time_increment=scan_time / math.tau * increment,
+            scan_time=scan_time,
+            range_min=spec.range_min,
+            range_max=spec.range_max,
+            ranges=ranges,
+            intensities=remissions,
+        )
+        self._beams, self._template = beams, Template(self.KIND, prototype)
+        self._ranges = self._template.view(ranges)
+        self._intensities = self._template.view(remissions) if intensities else None
+        self._offset_ns = round(float(spec.beam_time_offsets[first]) * NS_PER_S)
+
+    def __call__(self, scan: Scan) -> tuple[int, bytearray]:
+        """(stamp ns, message)."""
+        self._ranges[:] = scan.ranges[self._beams]
+        if self._intensities is not None and scan.intensities is not None:
+            self._intensities[:] = scan.intensities[self._beams]
+        stamp_ns = scan.stamp_ns + self._offset_ns
+        return stamp_ns, self._template.stamp(stamp_ns)
+
+
+def _pose(numbers: Float) -> object:
+    x, y, z, qx, qy, qz, qw = numbers.tolist()
+    return message(
+        "geometry_msgs/msg/Pose",
+        position=message("geometry_msgs/msg/Point", x=x, y=y, z=z),
+        orientation=message("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
+    )
+
+
+def _vector(numbers: Sequence[float]) -> object:
+    x, y, z = numbers
+    return message("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
+
+
+def _fill_pose(view: Float, pose: Float, z: float = 0.0) -> None:
+    x, y, theta = pose.tolist()
+    view[:] = (x, y, z, 0.0, 0.0, *quaternion_of(theta))
+
+
+_PLANAR = np.array([6 * i + j for i in (0, 1, 5) for j in (0, 1, 5)])  # x, y, yaw of a (6, 6)
+
+
+class OdometryMessage:
+    """nav_msgs/Odometry; its covariance is of the pose, accumulated since the first frame.
+
+    ``twist.covariance`` is that of the motion since the frame before over the squared time.
+    """
+
+    KIND = "nav_msgs/msg/Odometry"
+
+    def __init__(self) -> None:
+        marks = Marks()
+        pose, twist = marks(7), marks(6)
+        spread, twist_spread = marks(36), marks(36)
+        rates = twist.tolist()
+        prototype = message(
+            self.KIND,
+            header=header(ODOM),
+            child_frame_id=ROBOT,
+            pose=message(
+                "geometry_msgs/msg/PoseWithCovariance", pose=_pose(pose), covariance=spread
+            ),
+            twist=message(
+                "geometry_msgs/msg/TwistWithCovariance",
+                twist=message(
+                    "geometry_msgs/msg/Twist", linear=_vector(rates[:3]), angular=_vector(rates[3:])
+                ),
+                covariance=twist_spread,
+            ),
+        )
+        self._template = Template(self.KIND, prototype)
+        self._pose, self._twist = self._template.view(pose), self._template.view(twist)
+        self._spread = self._template.view(spread)
+        self._twist_spread = self._template.view(twist_spread)
+        for view in (self._twist, self._spread, self._twist_spread):
+            view[:] = 0.0
+
+    def __call__(self, odometry: Odometry, accumulated: Float | None, dt: float) -> bytearray:
+        """``accumulated`` (3, 3) in the odom frame; ``dt`` s since the frame before, 0 at first."""
+        _fill_pose(self._pose, odometry.T_odom_robot)
+        if odometry.twist is not None:
+            vx, vy, omega = odometry.twist.tolist()
+            self._twist[0], self._twist[1], self._twist[5] = vx, vy, omega
+        if accumulated is not None:
+            self._spread[_PLANAR] = accumulated.ravel()
+        if odometry.increment_covariance is not None and dt > 0.0:
+            self._twist_spread[_PLANAR] = odometry.increment_covariance.ravel() / (dt * dt)
+        return self._template.stamp(odometry.stamp_ns)
+
+
+class IncrementMessage:
+    """geometry_msgs/PoseWithCovarianceStamped: the motion since the frame before, in its frame."""
+
+    KIND = "geometry_msgs/msg/PoseWithCovarianceStamped"
+
+    def __init__(self) -> None:
+        marks = Marks()
+        pose, spread = marks(7), marks(36)
+        inner = message(
+            "geometry_msgs/msg/PoseWithCovariance", pose=_pose(pose), covariance=spread
+        )
+        self._template = Template(self.KIND, message(self.KIND, header=header(ROBOT), pose=inner))
+        self._pose, self._spread = self._template.view(pose), self._template.view(spread)
+        self._spread[:] = 0.0
+
+    def __call__(self, stamp_ns: int, T_previous_robot: Float, covariance: Float) -> bytearray:
+        """The covariance (3, 3) is in the previous robot frame."""
+        _fill_pose(self._pose, T_previous_robot)
+        self._spread[_PLANAR] = covariance.ravel()
+        return self._template.stamp(stamp_ns)
+
+
+class TransformMessage:
+    """tf2_msgs/TFMessage of one planar transform, ``height`` m up."""
+
+    KIND = "tf2_msgs/msg/TFMessage"
+
+    def __init__(self, parent: str, child: str, height: float = 0.0) -> None:
+        numbers = Marks()(7)
+        x, y, z, qx, qy, qz, qw = numbers.tolist()
+        transform = message(
+            "geometry_msgs/msg/Transform",
+            translation=_vector((x, y, z)),
+            rotation=message("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
+        )
+        stamped = message(
+            "geometry_msgs/msg/TransformStamped",
+            header=header(parent),
+            child_frame_id=child,
+            transform=transform,
+        )
+        self._template = Template(self.KIND, message(self.KIND, transforms=[stamped]))
+        self._numbers, self._height = self._template.view(numbers), height
+
+    def __call__(self, stamp_ns: int, T_parent_child: Float) -> bytearray:
+        """The transform at that time."""
+        _fill_pose(self._numbers, T_parent_child, self._height)
+        return self._template.stamp(stamp_ns)
+
+
+class TruthMessage:
+    """geometry_msgs/PoseStamped of the robot in the world."""
+
+    KIND = "geometry_msgs/msg/PoseStamped"
+
+    def __init__(self) -> None:
+        numbers = Marks()(7)
+        prototype = message(self.KIND, header=header(WORLD), pose=_pose(numbers))
+        self._template = Template(self.KIND, prototype)
+        self._pose = self._template.view(numbers)
+
+    def __call__(self, stamp_ns: int, T_world_robot: Float) -> bytearray:
+        """The true pose at that time."""
+        _fill_pose(self._pose, T_world_robot)
+        return self._template.stamp(stamp_ns)
+
+
+class LabelsMessage:
+    """sensor_msgs/PointCloud2 in the laser frame, one point a beam; NaN where nothing came back."""
+
+    KIND = "sensor_msgs/msg/PointCloud2"
+
+    def __init__(self, spec: LaserSpec) -> None:
+        n = spec.n_beams
+        data = Marks()(n * POINT.itemsize, np.uint8)
+        offsets = {name: POINT.fields[name][1] for name in POINT.names or ()}  # type: ignore[index]
+        fields = [
+            message(
+                "sensor_msgs/msg/PointField",
+                name=name,
+                offset=offset,
+                datatype=_ROS_TYPES[POINT[name].str],
+                count=1,
+            )
+            for name, offset in offsets.items()
+        ]
+        prototype = message(
+            self.KIND,
+            header=header(LASER),
+            height=1,
+            width=n,
+            fields=fields,
+            is_bigendian=False,
+            point_step=POINT.itemsize,
+            row_step=n * POINT.itemsize,
+            data=data,
+            is_dense=False,
+        )
+        self._template = Template(self.KIND, prototype)
+        self._points: NDArray[np.void] = self._template.view(data).view(POINT)
+        self._points["z"] = 0.0
+        # libm's cosines: NumPy's own change their last bit with the CPU.
+        self._cos = np.array([math.cos(a) for a in spec.angles.tolist()], dtype=np.float32)
+        self._sin = np.array([math.sin(a) for a in spec.angles.tolist()], dtype=np.float32)
+
+    def __call__(self, scan: Scan, labels: BeamLabels) -> bytearray:
+        """Labels of that scan."""
+        points, ranges = self._points, np.where(np.isfinite(scan.ranges), scan.ranges, np.nan)
+        points["x"] = np.round(ranges * self._cos * _PER_M) / _PER_M
+        points["y"] = np.round(ranges * self._sin * _PER_M) / _PER_M
+        points["body"], points["kind"] = labels.body, labels.kind
+        points["displacement"], points["incidence"] = labels.displacement, labels.incidence
+        points["mixed"] = labels.mixed
+        return self._template.stamp(scan.stamp_ns)
+
+
+def motion(before: Float | None, now: Float) -> Float:
+    """``T_previous_robot``; no motion at the first frame."""
+    return np.zeros(3) if before is None else se2.between(before, now)

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every chair, person, door and bin at each scan, as a visualization_msgs/MarkerArray."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.scene import Mover
+from sim.recording.messages import WORLD
+from sim.recording.template import Marks, Template, header, message
+from slam._jit import njit
+from slam.frames import Float
+
+LEAF_M = 0.04  # thickness of a door as drawn
+_HEIGHTS_M = {
+    "chair_swivel": 0.95, "chair_visitor": 0.85, "bin": 0.4, "trolley": 1.0, "pallet": 0.15,
+    "person": 1.75, "door": 2.0,
+}  # fmt: skip
+_RESTING, _MOVING = (0.55, 0.55, 0.6, 1.0), (0.9, 0.3, 0.1, 1.0)
+_CUBE, _CYLINDER = 1, 3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Objects:
+    """Where everything that can move is at one moment.
+
+    poses   (n, 3) m, m, rad in the world, as ``World.mover_poses``
+    moving  (n,) whether it moves just then
+    """
+
+    poses: Float
+    moving: NDArray[np.bool_]
+
+
+@njit
+def _place(poses: Float, reach: Float, heights: Float, out: Float) -> None:
+    """Position (m) and quaternion of each marker; the middle of a leaf is ``reach`` off its hinge."""
+    for k in range(len(poses)):
+        yaw = poses[k, 2]
+        out[k, 0] = poses[k, 0] + reach[k] * math.cos(yaw)
+        out[k, 1] = poses[k, 1] + reach[k] * math.sin(yaw)
+        out[k, 2] = 0.5 * heights[k]
+        out[k, 5], out[k, 6] = math.sin(0.5 * yaw), math.cos(0.5 * yaw)
+
+
+class ObjectsMessage:
+    """One marker for each mover but the robot, always in the same order.
+
+    ``ns`` its kind, ``id`` its place among the scene's movers, ``text`` its name, ``scale`` its
+    size (m), ``color`` orange while it moves and grey while it rests.
+    """
+
+    KIND = "visualization_msgs/msg/MarkerArray"
+
+    def __init__(self, movers: Sequence[Mover]) -> None:
+        self._rows = [k for k, mover in enumerate(movers) if mover.kind != "robot"]
+        shown = [movers[k] for k in self._rows]
+        marks, n = Marks(), len(shown)
+        poses, colors = marks(7 * n).reshape(n, 7), marks(4 * n, np.float32).reshape(n, 4)
+        self._heights = np.array([_HEIGHTS_M[mover.kind] for mover in shown])
+        self._reach = np.array([0.5 * m.radius if m.kind == "door" else 0.0 for m in shown])
+        markers = [
+            _marker(mover, row, pose, color)
+            for mover, row, pose, color in zip(shown, self._rows, poses, colors, strict=True)
+        ]
+        self._template = Template(self.KIND, message(self.KIND, markers=markers))
+        self._poses, self._colors = self._template.index(poses), self._template.index(colors)
+        self._placed = np.zeros((n, 7))
+        self._palette = np.array([_RESTING, _MOVING], dtype=np.float32)
+
+    def __call__(self, stamp_ns: int, objects: Objects) -> bytearray:
+        """All markers as of that time."""
+        raw, rows = self._template.raw, self._rows
+        if rows:
+            _place(objects.poses[rows], self._reach, self._heights, self._placed)
+            raw[self._poses] = self._placed.view(np.uint8)
+            colors = self._palette[objects.moving[rows].astype(np.int64)]
+            raw[self._colors] = colors.view(np.uint8)
+        return self._template.stamp(stamp_ns)
+
+
+def _marker(mover: Mover, row: int, pose: Float, color: NDArray[np.float32]) -> object:
+    x, y, z, qx, qy, qz, qw = pose.tolist()
+    r, g, b, a = color.tolist()
+    door, height = mover.kind == "door", _HEIGHTS_M[mover.kind]
+    wide, deep = (mover.radius, LEAF_M) if door else (2.0 * mover.radius, 2.0 * mover.radius)
+    none = np.zeros(0, dtype=np.uint8)
+    return message(
+        "visualization_msgs/msg/Marker",
+        header=header(WORLD),
+        ns=mover.kind,
+        id=row,
+        type=_CUBE if door else _CYLINDER,
+        action=0,
+        pose=message(
+            "geometry_msgs/msg/Pose",
+            position=message("geometry_msgs/msg/Point", x=x, y=y, z=z),
+            orientation=message("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
+        ),
+        scale=message("geometry_msgs/msg/Vector3", x=wide, y=deep, z=height),
+        color=message("std_msgs/msg/ColorRGBA", r=r, g=g, b=b, a=a),
+        lifetime=message("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
+        frame_locked=False,
+        points=[],
+        colors=[],
+        texture_resource="",
+        texture=message(
+            "sensor_msgs/msg/CompressedImage",
+            header=message(
+                "std_msgs/msg/Header",
+                stamp=message("builtin_interfaces/msg/Time", sec=0, nanosec=0),
+                frame_id="",
+            ),
+            format="",
+            data=none,
+        ),
+        uv_coordinates=[],
+        text=mover.name,
+        mesh_resource="",
+        mesh_file=message("visualization_msgs/msg/MeshFile", filename="", data=none),
+        mesh_use_embedded_materials=False,
+    )

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A ROS message of which only the numbers change: serialised once, then filled in place.
+
+Serialising field by field would cost more than simulating the scan. So the library serialises one
+prototype whose variable numbers are marks; where a mark is found in its bytes, there the numbers
+of every later message go. The layout stays the library's business.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.typesys import Stores, get_typestore
+
+_STAMP = (0x5EC0ACED, 0x3ABB0ACE)
+STORE = get_typestore(Stores.ROS2_HUMBLE)  # the types used here are the same in later ones
+
+
+def message(kind: str, **fields: Any) -> Any:
+    """A message by type name and fields: ``message("geometry_msgs/msg/Point", x=1.0, ...)``."""
+    return STORE.types[kind](**fields)
+
+
+def header(frame_id: str) -> Any:
+    """A std_msgs/Header with a stamp that ``Template.stamp`` finds."""
+    stamp = message("builtin_interfaces/msg/Time", sec=_STAMP[0], nanosec=_STAMP[1])
+    return message("std_msgs/msg/Header", stamp=stamp, frame_id=frame_id)
+
+
+class Marks:
+    """Unmistakable numbers, others at each call; floats that float32 holds exactly."""
+
+    def __init__(self) -> None:
+        self._rng = np.random.default_rng(0)
+
+    def __call__(self, n: int, dtype: Any = np.float64) -> NDArray[Any]:
+        """(n,) of them."""
+        if np.issubdtype(dtype, np.floating):
+            return (self._rng.integers(1 << 23, 1 << 24, n) / 4096.0).astype(dtype)
+        return self._rng.integers(1, 255, n).astype(dtype)
+
+
+class Template:
+    """The bytes of ``prototype``, a message of type ``kind``, ready to be written in ``data``."""
+
+    def __init__(self, kind: str, prototype: Any) -> None:
+        self.kind = kind
+        self.data = bytearray(STORE.serialize_cdr(prototype, kind))
+        self.raw = np.frombuffer(self.data, dtype=np.uint8)
+        self._stamps = [
+            np.frombuffer(self.data, "<u4", 2, at)
+            for at in self._places(np.array(_STAMP, dtype="<u4").tobytes())
+        ]
+
+    def _places(self, mark: bytes) -> list[int]:
+        places, at = [], self.data.find(mark)
+        while at >= 0:
+            places.append(at)
+            at = self.data.find(mark, at + 1)
+        return places
+
+    def view(self, mark: NDArray[Any]) -> NDArray[Any]:
+        """A window onto the numbers that ``mark`` stands for; what is written there is sent."""
+        (at,) = self._places(mark.tobytes())
+        return np.frombuffer(self.data, mark.dtype, mark.size, at)
+
+    def index(self, marks: NDArray[Any]) -> NDArray[np.int64]:
+        """(n, bytes) places in ``raw`` of n marks that lie apart, the rows of ``marks`` (n, k)."""
+        first = [place for row in marks for place in self._places(row.tobytes())]
+        at = np.array(first, dtype=np.int64).reshape(len(marks), 1)
+        return at + np.arange(marks.shape[1] * marks.itemsize)
+
+    def stamp(self, stamp_ns: int) -> bytearray:
+        """Set every stamp of the message; its bytes, valid until the next change."""
+        seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+        for view in self._stamps:
+            view[0], view[1] = seconds, nanoseconds
+        return self.data

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bags of ROS 2 (rosbag2 folder, .mcap, .db3) and ROS 1 (.bag) as frames, without ROS."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from slam.errors import InvalidValueError, LogFormatError
+from slam.frames import NS_PER_S, BeamLabels, Float, Frame, Odometry, Scan, Stream, StreamMetadata
+from slam.logs.bag_laser import Laser, mounting
+from slam.logs.bag_odometry import PoseTrack, Stamped, increment_covariance
+from slam.logs.bag_topics import SCAN, Bag, Topics, choose
+from slam.logs.ros_numbers import yaw_of
+
+PROBE_NS = 20 * NS_PER_S  # how far the transform to the laser is looked for
+PATIENCE_NS = 2 * NS_PER_S  # how long a scan waits for its odometry
+_PLANAR = np.array([[6 * i + j for j in (0, 1, 5)] for i in (0, 1, 5)])
+_log = logging.getLogger(__name__)
+
+
+def read_bag(
+    path: str | Path,
+    *,
+    scan: str | None = None,
+    odometry: str | None = None,
+    truth: str | None = None,
+    labels: bool = False,
+) -> Stream:
+    """A bag with a LaserScan and an Odometry topic as frames, one scan at a time from the disk.
+
+    Topics are guessed by type and name unless they are given. Odometry and truth (a PoseStamped or
+    Odometry topic with "truth" in its name) are interpolated to the stamp of each scan where none
+    has the very same stamp; scans outside the time of the odometry are dropped, and so are scans
+    whose stamps do not increase (both are counted in the log). ``labels`` reads
+    ``/ground_truth/labels`` of our own recordings, too.
+
+    An accumulated covariance of the odometry becomes that of each increment by the rule of
+    ``slam.logs.bag_odometry.increment_covariance``, unless the bag has it as it was
+    (``<odometry>_increment``). Beam times come from ``<scan>_turn`` where there is such a topic,
+    else from ``time_increment``. The mounting is that of the transforms from the odometry's child
+    frame to the scan's frame, or the robot's origin where the bag has none.
+
+    Raises ``LogFormatError`` that names the file for anything that is not such a bag.
+    """
+    path = Path(path)
+    with Bag(path) as bag:
+        topics = choose(bag, scan=scan, odometry=odometry, truth=truth, labels=labels)
+        laser = _probe(bag, topics)
+        count = bag.topics[topics.scan][1]
+        source = "rosbag1" if bag.is_ros1 else "rosbag2"
+    metadata = StreamMetadata(
+        source=source,
+        laser=laser.spec,
+        truth=topics.truth or "",
+        extra={"file": path.name, "scan": topics.scan, "odometry": topics.odometry},
+    )
+    return Stream(metadata=metadata, frames=lambda: _frames(path, topics, laser), length=count)
+
+
+@contextmanager
+def _about(path: Path, what: str) -> Iterator[None]:
+    """Values that cannot be are the file's fault here."""
+    try:
+        yield
+    except LogFormatError:
+        raise
+    except (InvalidValueError, ValueError, AttributeError, TypeError, OverflowError) as error:
+        raise LogFormatError(path, f"{what}: {error}") from error
+
+
+def _stamp_ns(message: Any, log_ns: int) -> int:
+    """Of the header; drivers that leave it empty get the time of the log."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec) or log_ns
+
+
+def _probe(bag: Bag, topics: Topics) -> Laser:
+    """The scanner, from the first messages of the bag."""
+    wanted = {topics.scan, topics.odometry, *topics.transforms}
+    if topics.turns is not None:
+        wanted.add(topics.turns)
+    transforms: dict[tuple[str, str], Any] = {}
+    scans, turns, robot, mount, start_ns = [], [], None, None, None
+    for topic, log_ns, message in bag.messages(wanted):
+        start_ns = log_ns if start_ns is None else start_ns
+        with _about(bag.path, f"topic {topic}"):
+            if topic == topics.scan:
+                scans = [*scans, message][:2]
+            elif topic == topics.turns and len(scans) == 1:
+                turns.append(message)
+            elif topic == topics.odometry:
+                robot = _frame_name(message.child_frame_id)
+            elif topic in topics.transforms:
+                for t in message.transforms:
+                    edge = (_frame_name(t.header.frame_id), _frame_name(t.child_frame_id))
+                    transforms[edge] = t.transform
+            if scans and robot is not None:
+                laser = _frame_name(scans[0].header.frame_id)
+                mount = mounting(transforms, robot, laser)
+                known = mount is not None or laser == robot or log_ns - start_ns > PROBE_NS
+                if known and (len(scans) > 1 or topics.turns is None):
+                    break
+    if not scans:
+        raise LogFormatError(bag.path, f"no scan on {topics.scan}")
+    if mount is None:
+        _log.info("%s: no transform to the laser, taken to be at the robot's origin", bag.path)
+    with _about(bag.path, f"topic {topics.scan}"):
+        return Laser(scans[0], turns, (np.zeros(3), False) if mount is None else mount)
+
+
+def _frame_name(name: str) -> str:
+    return name.lstrip("/")
+
+
+def _frames(path: Path, topics: Topics, laser: Laser) -> Iterator[Frame]:
+    names = (topics.scan, topics.odometry, topics.truth, topics.increment, topics.labels)
+    with Bag(path) as bag:
+        assembly = _Assembly(topics, laser)
+        for topic, log_ns, message in bag.messages({name for name in names if name}):
+            with _about(path, f"topic {topic}"):
+                assembly.take(topic, log_ns, message)
+                ready = assembly.ready(log_ns)
+            yield from ready
+        with _about(path, "at the end"):
+            ready = assembly.ready(None)
+        yield from ready
+    assembly.report(path)
+
+
+class _Assembly:
+    """Puts together what belongs to one stamp."""
+
+    def __init__(self, topics: Topics, laser: Laser) -> None:
+        self._topics, self._laser = topics, laser
+        self._scans: deque[tuple[Scan, int]] = deque()
+        self._odometry, self._truth = PoseTrack(), PoseTrack()
+        self._increments: dict[int, Float] = {}
+        self._labels: dict[int, BeamLabels] = {}
+        self._before: Stamped | None = None
+        self._last_ns: int | None = None
+        self._disordered = self._without_odometry = self._given = 0
+
+    def take(self, topic: str, log_ns: int, message: Any) -> None:
+        """One message of one of the topics."""
+        stamp_ns, topics = _stamp_ns(message, log_ns), self._topics
+        if topic == topics.scan:
+            scan = self._laser.scan(message, stamp_ns)
+            if self._last_ns is not None and scan.stamp_ns <= self._last_ns:
+                self._disordered += 1
+                return
+            self._last_ns = scan.stamp_ns
+            self._scans.append((scan, log_ns))
+        elif topic == topics.odometry:
+            self._odometry.add(_odometry(message, stamp_ns, topics.increment is None))
+        elif topic == topics.truth:
+            self._truth.add(_pose(message, stamp_ns))
+        elif topic == topics.increment:
+            self._increments[stamp_ns] = message.pose.covariance[_PLANAR]
+        elif topic == topics.labels:
+            self._labels[stamp_ns] = _labels(message)
+
+    def ready(self, now_ns: int | None) -> list[Frame]:
+        """Frames that are complete, or have waited long enough; None: nothing more comes."""
+        out = []
+        while self._scans:
+            scan, log_ns = self._scans[0]
+            late = now_ns is None or now_ns - log_ns > PATIENCE_NS
+            stamp_ns = scan.stamp_ns
+            complete = self._odometry.reaches(stamp_ns) and (
+                self._topics.truth is None or self._truth.reaches(stamp_ns)
+            )
+            if not (complete or late):
+                break
+            self._scans.popleft()
+            frame = self._frame(scan)
+            if frame is not None:
+                out.append(frame)
+        return out
+
+    def _frame(self, scan: Scan) -> Frame | None:
+        stamp_ns = scan.stamp_ns
+        now = self._odometry.at(stamp_ns)
+        if now is None:
+            self._without_odometry += 1
+            return None
+        if self._topics.increment is None:
+            spread = increment_covariance(self._before, now)
+        else:
+            spread = self._increments.pop(stamp_ns, None)
+        self._before = now
+        truth = self._truth.at(stamp_ns)
+        labels = self._labels.pop(stamp_ns, None)
+        if len(self._increments) > 1000 or len(self._labels) > 100:  # of scans that are not there
+            self._increments.clear()
+            self._labels.clear()
+        self._given += 1
+        return Frame(
+            stamp_ns=stamp_ns,
+            odometry=Odometry(
+                stamp_ns=stamp_ns,
+                T_odom_robot=now.pose,
+                increment_covariance=spread,
+                twist=now.twist,
+            ),
+            scan=scan,
+            truth=None if truth is None else truth.pose,
+            labels=labels,
+        )
+
+    def report(self, path: Path) -> None:
+        """Say what was left out."""
+        if self._disordered:
+            _log.warning("%s: %d scans whose time does not increase", path, self._disordered)
+        if self._without_odometry:
+            _log.warning("%s: %d scans without odometry", path, self._without_odometry)
+        if not self._given:
+            raise LogFormatError(path, "no scan lies within the time of the odometry")
+
+
+def _planar(pose: Any) -> Float:
+    p, q = pose.position, pose.orientation
+    if not math.isfinite(p.x + p.y + q.x + q.y + q.z + q.w):
+        raise InvalidValueError("a pose that is not finite")
+    return np.array([p.x, p.y, yaw_of(q.x, q.y, q.z, q.w)])
+
+
+def _pose(message: Any, stamp_ns: int) -> Stamped:
+    pose = message.pose
+    return Stamped(stamp_ns=stamp_ns, pose=_planar(getattr(pose, "pose", pose)))
+
+
+def _odometry(message: Any, stamp_ns: int, with_covariance: bool) -> Stamped:
+    twist = message.twist.twist
+    rates = np.array([twist.linear.x, twist.linear.y, twist.angular.z])
+    return Stamped(
+        stamp_ns=stamp_ns,
+        pose=_planar(message.pose.pose),
+        twist=rates if np.isfinite(rates).all() else None,
+        covariance=message.pose.covariance[_PLANAR] if with_covariance else None,
+    )
+
+
+def _labels(message: Any) -> BeamLabels:
+    """From the fields of our own recordings."""
+    formats = {field.name: (field.datatype, field.offset) for field in message.fields}
+    types = {7: "<f4", 5: "<i4", 2: "u1"}
+    wanted = ("body", "kind", "displacement", "incidence", "mixed")
+    missing = [name for name in wanted if name not in formats]
+    if missing:
+        raise InvalidValueError(f"labels without {', '.join(missing)}")
+    layout = np.dtype(
+        {
+            "names": wanted,
+            "formats": [types[formats[name][0]] for name in wanted],
+            "offsets": [formats[name][1] for name in wanted],
+            "itemsize": message.point_step,
+        }
+    )
+    points = np.frombuffer(message.data.tobytes(), dtype=layout)
+    return BeamLabels(
+        body=points["body"],
+        kind=points["kind"],
+        displacement=points["displacement"],
+        incidence=points["incidence"],
+        mixed=points["mixed"].astype(np.bool_),
+    )
+
+
+__all__ = ["SCAN", "read_bag"]

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bags opened by the rosbags library, with errors of our own, and which topics are read."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from slam.errors import LogFormatError, MobiliaError
+
+SCAN = "sensor_msgs/msg/LaserScan"
+ODOMETRY = "nav_msgs/msg/Odometry"
+INCREMENT = "geometry_msgs/msg/PoseWithCovarianceStamped"
+POSE = "geometry_msgs/msg/PoseStamped"
+CLOUD = "sensor_msgs/msg/PointCloud2"
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+_STORAGE = (".mcap", ".db3", ".bag")
+
+
+def is_bag(path: Path) -> bool:
+    """Whether ``path`` looks like a rosbag2 folder, an .mcap, a .db3 or a ROS 1 .bag."""
+    return (path / "metadata.yaml").exists() or path.suffix in _STORAGE
+
+
+@contextmanager
+def failing_as_ours(path: Path) -> Iterator[None]:
+    """Whatever the library raises on damaged bytes becomes a ``LogFormatError``."""
+    try:
+        yield
+    except MobiliaError:
+        raise
+    except FileNotFoundError as error:
+        raise LogFormatError(path, "no such file") from error
+    except OSError as error:
+        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
+    except Exception as error:  # noqa: BLE001  # parsers of foreign bytes fail in every way
+        text = " ".join(str(error).split())[:200] or type(error).__name__
+        raise LogFormatError(path, f"corrupt or truncated bag: {text}") from error
+
+
+class Bag:
+    """An open bag; a context manager. ``topics``: name -> (message type, count)."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.exists():
+            raise LogFormatError(path, "no such file")
+        with failing_as_ours(path):
+            self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+
+    def __enter__(self) -> Bag:
+        with failing_as_ours(self.path):
+            self._reader.open()
+            self.topics = {
+                name: (info.msgtype or "", info.msgcount)
+                for name, info in self._reader.topics.items()
+            }
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with failing_as_ours(self.path):
+            self._reader.close()
+
+    @property
+    def is_ros1(self) -> bool:
+        """Whether it is a bag of ROS 1."""
+        return not self._reader.is2
+
+    def raw(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
+        """(topic, type, log time ns, bytes) in the order of the log time; None: every topic."""
+        wanted = [c for c in self._reader.connections if topics is None or c.topic in topics]
+        if not wanted:
+            return
+        with failing_as_ours(self.path):
+            iterator = iter(self._reader.messages(connections=wanted))
+        while True:
+            with failing_as_ours(self.path):
+                item = next(iterator, None)
+            if item is None:
+                return
+            connection, log_ns, data = item
+            yield connection.topic, connection.msgtype, log_ns, data
+
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
+        """(topic, log time ns, message) of these topics."""
+        for topic, kind, log_ns, data in self.raw(topics):
+            with failing_as_ours(self.path):
+                decoded = self._reader.deserialize(data, kind)
+            yield topic, log_ns, decoded
+
+
+@dataclass(frozen=True, kw_only=True)
+class Topics:
+    """What is read; None where a bag does not have it."""
+
+    scan: str
+    odometry: str
+    truth: str | None
+    turns: str | None
+    increment: str | None
+    labels: str | None
+    transforms: tuple[str, ...]
+
+
+def choose(
+    bag: Bag, *, scan: str | None, odometry: str | None, truth: str | None, labels: bool
+) -> Topics:
+    """Topics by the names asked for, else by type and the likeliest name.
+
+    Raises ``LogFormatError`` that lists the bag's topics when there is no such topic, or when the
+    one asked for is of another type.
+    """
+    wanted_scan = _pick(bag, scan, (SCAN,), "scan")
+    wanted_odometry = _pick(bag, odometry, (ODOMETRY,), "odom")
+    turns = f"{wanted_scan}_turn"
+    increment = f"{wanted_odometry}_increment"
+    truths = [
+        name
+        for name, (kind, _) in sorted(bag.topics.items())
+        if kind in (POSE, ODOMETRY) and "truth" in name and name != wanted_odometry
+    ]
+    if truth is not None:
+        truths = [_pick(bag, truth, (POSE, ODOMETRY), "truth")]
+    return Topics(
+        scan=wanted_scan,
+        odometry=wanted_odometry,
+        truth=truths[0] if truths else None,
+        turns=turns if _kind(bag, turns) == SCAN else None,
+        increment=increment if _kind(bag, increment) == INCREMENT else None,
+        labels=_labels(bag) if labels else None,
+        transforms=tuple(n for n, (kind, _) in sorted(bag.topics.items()) if kind in TRANSFORMS),
+    )
+
+
+def _kind(bag: Bag, topic: str) -> str:
+    return bag.topics.get(topic, ("", 0))[0]
+
+
+def _labels(bag: Bag) -> str | None:
+    name = "/ground_truth/labels"
+    return name if _kind(bag, name) == CLOUD else None
+
+
+def _pick(bag: Bag, asked: str | None, kinds: tuple[str, ...], hint: str) -> str:
+    listed = ", ".join(f"{name} ({kind})" for name, (kind, _) in sorted(bag.topics.items()))
+    if asked is not None:
+        if asked not in bag.topics:
+            raise LogFormatError(bag.path, f"no topic {asked}; there are: {listed or 'none'}")
+        if _kind(bag, asked) not in kinds:
+            raise LogFormatError(
+                bag.path, f"topic {asked} is {_kind(bag, asked)}, expected {' or '.join(kinds)}"
+            )
+        return asked
+    found = [
+        (name != f"/{hint}", "truth" in name, hint not in name, name.endswith("_turn"), -count, name)
+        for name, (kind, count) in bag.topics.items()
+        if kind in kinds and count > 0
+    ]
+    if not found:
+        raise LogFormatError(
+            bag.path, f"no message of type {kinds[0]}; topics: {listed or 'none'}"
+        )
+    return min(found)[-1]
