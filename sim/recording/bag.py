@@ -7,7 +7,9 @@ import hashlib
 import math
 import struct
 import sys
+from collections import defaultdict
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -90,6 +92,38 @@ class _Wheels:
         )
 
 
+class _Chunks:
+    """Two open chunks of an MCAP: what a SLAM's score needs, and the bulk, which is most bytes.
+
+    Who reads only the former never unpacks the latter. The library keeps one open chunk; the two
+    take turns in that place.
+    """
+
+    def __init__(self, storage: Any) -> None:
+        storage.compressor = lambda chunk: zstd.compress(chunk, options=_OPTIONS)
+        self._storage = storage
+        bio = BytesIO()
+        bio.write(storage.chunk.bio.getvalue())  # types and topics come before any message
+        self._other = type(storage.chunk)(2**63 - 1, 0, bio, defaultdict(list))
+        self._bulk = False
+
+    def turn_to(self, bulk: bool) -> None:
+        """From now on, messages go to that chunk."""
+        if bulk != self._bulk:
+            self._bulk = bulk
+            self._storage.chunk, self._other = self._other, self._storage.chunk
+
+    def flush(self) -> None:
+        """Close both."""
+        for bulk in (True, False):
+            self.turn_to(bulk)
+            if self._storage.chunk.msgs:
+                self._storage.close_chunk()
+
+
+_LEAN = frozenset(("/scan", "/odom", "/odom_increment", "/ground_truth/pose"))
+
+
 class BagWriter:
     """Writes the folder ``path``: metadata.yaml and one .mcap; a context manager.
 
@@ -130,8 +164,6 @@ class BagWriter:
 
     def __enter__(self) -> BagWriter:
         self._writer.open()
-        storage: Any = self._writer.storage
-        storage.compressor = lambda chunk: zstd.compress(chunk, options=_OPTIONS)
         scan, wheels = ros.ScanMessage.KIND, self._wheels
         topics = {
             "/tf_static": ros.TransformMessage.KIND,
@@ -150,6 +182,7 @@ class BagWriter:
                 self._connections[topic] = self._writer.add_connection(
                     topic, kind, typestore=STORE, offered_qos_profiles=latched
                 )
+        self._chunks = _Chunks(self._writer.storage)
         return self
 
     def __exit__(
@@ -158,6 +191,8 @@ class BagWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        if error is None:
+            self._chunks.flush()
         self._writer.__exit__(kind, error, trace)
 
     def write(self, frame: Frame, objects: Objects | None = None) -> None:
@@ -185,6 +220,7 @@ class BagWriter:
             self._put("/scan_turn", *turn(scan))
 
     def _put(self, topic: str, stamp_ns: int, data: bytearray) -> None:
+        self._chunks.turn_to(topic not in _LEAN)
         self._writer.write(self._connections[topic], stamp_ns, data)  # type: ignore[arg-type]
         self._hash.update(struct.pack("<qq", stamp_ns, len(data)) + topic.encode() + data)
 

@@ -23,6 +23,7 @@ from slam.logs.ros_numbers import yaw_of
 PROBE_NS = 20 * NS_PER_S  # how far the transform to the laser is looked for
 PATIENCE_NS = 2 * NS_PER_S  # how long a scan waits for its odometry
 _PLANAR = np.array([[6 * i + j for j in (0, 1, 5)] for i in (0, 1, 5)])
+_IMPOSSIBLE = (InvalidValueError, ValueError, AttributeError, TypeError, OverflowError, KeyError)
 _log = logging.getLogger(__name__)
 
 
@@ -70,9 +71,7 @@ def _about(path: Path, what: str) -> Iterator[None]:
     """Values that cannot be are the file's fault here."""
     try:
         yield
-    except LogFormatError:
-        raise
-    except (InvalidValueError, ValueError, AttributeError, TypeError, OverflowError) as error:
+    except _IMPOSSIBLE as error:
         raise LogFormatError(path, f"{what}: {error}") from error
 
 
@@ -94,7 +93,7 @@ def _probe(bag: Bag, topics: Topics) -> Laser:
         with _about(bag.path, f"topic {topic}"):
             if topic == topics.scan:
                 scans = [*scans, message][:2]
-            elif topic == topics.turns and len(scans) == 1:
+            elif topic == topics.turns:
                 turns.append(message)
             elif topic == topics.odometry:
                 robot = _frame_name(message.child_frame_id)
@@ -113,6 +112,9 @@ def _probe(bag: Bag, topics: Topics) -> Laser:
     if mount is None:
         _log.info("%s: no transform to the laser, taken to be at the robot's origin", bag.path)
     with _about(bag.path, f"topic {topics.scan}"):
+        times = [_stamp_ns(scan, 0) for scan in scans]
+        end = times[1] if len(times) > 1 else math.inf
+        turns = [turn for turn in turns if times[0] <= _stamp_ns(turn, 0) < end]
         return Laser(scans[0], turns, (np.zeros(3), False) if mount is None else mount)
 
 
@@ -125,9 +127,11 @@ def _frames(path: Path, topics: Topics, laser: Laser) -> Iterator[Frame]:
     with Bag(path) as bag:
         assembly = _Assembly(topics, laser)
         for topic, log_ns, message in bag.messages({name for name in names if name}):
-            with _about(path, f"topic {topic}"):
+            try:
                 assembly.take(topic, log_ns, message)
                 ready = assembly.ready(log_ns)
+            except _IMPOSSIBLE as error:
+                raise LogFormatError(path, f"topic {topic}: {error}") from error
             yield from ready
         with _about(path, "at the end"):
             ready = assembly.ready(None)
@@ -174,16 +178,21 @@ class _Assembly:
             scan, log_ns = self._scans[0]
             late = now_ns is None or now_ns - log_ns > PATIENCE_NS
             stamp_ns = scan.stamp_ns
-            complete = self._odometry.reaches(stamp_ns) and (
-                self._topics.truth is None or self._truth.reaches(stamp_ns)
-            )
-            if not (complete or late):
+            if not (late or self._complete(stamp_ns)):
                 break
             self._scans.popleft()
             frame = self._frame(scan)
             if frame is not None:
                 out.append(frame)
         return out
+
+    def _complete(self, stamp_ns: int) -> bool:
+        topics = self._topics
+        return (
+            self._odometry.reaches(stamp_ns)
+            and (topics.truth is None or self._truth.reaches(stamp_ns))
+            and (topics.labels is None or stamp_ns in self._labels)
+        )
 
     def _frame(self, scan: Scan) -> Frame | None:
         stamp_ns = scan.stamp_ns

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Reader as ReaderOfRos1
+from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from slam.errors import LogFormatError, MobiliaError
@@ -20,6 +21,7 @@ INCREMENT = "geometry_msgs/msg/PoseWithCovarianceStamped"
 POSE = "geometry_msgs/msg/PoseStamped"
 CLOUD = "sensor_msgs/msg/PointCloud2"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+_ROS1, _ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 _STORAGE = (".mcap", ".db3", ".bag")
 
 
@@ -40,24 +42,35 @@ def failing_as_ours(path: Path) -> Iterator[None]:
     except OSError as error:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
     except Exception as error:  # noqa: BLE001  # parsers of foreign bytes fail in every way
-        text = " ".join(str(error).split())[:200] or type(error).__name__
-        raise LogFormatError(path, f"corrupt or truncated bag: {text}") from error
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, error: Exception) -> LogFormatError:
+    text = " ".join(str(error).split())[:200] or type(error).__name__
+    return LogFormatError(path, f"corrupt or truncated bag: {text}")
 
 
 class Bag:
-    """An open bag; a context manager. ``topics``: name -> (message type, count)."""
+    """An open bag; a context manager. ``topics``: name -> (message type, count).
+
+    Messages are decoded by the standard definitions of their types, whatever the bag itself says of
+    them: those read here are the same in every ROS 2, and compiling decoders for each bag anew
+    would take longer than reading a short one.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.is_ros1 = path.suffix == ".bag" and not path.is_dir()
         if not path.exists():
             raise LogFormatError(path, "no such file")
         with failing_as_ours(path):
-            self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+            self._reader: Any = ReaderOfRos1(path) if self.is_ros1 else Reader(_storage(path))
+        self._decode = _ROS1.deserialize_ros1 if self.is_ros1 else _ROS2.deserialize_cdr
 
     def __enter__(self) -> Bag:
         with failing_as_ours(self.path):
             self._reader.open()
-            self.topics = {
+            self.topics: dict[str, tuple[str, int]] = {
                 name: (info.msgtype or "", info.msgcount)
                 for name, info in self._reader.topics.items()
             }
@@ -67,32 +80,41 @@ class Bag:
         with failing_as_ours(self.path):
             self._reader.close()
 
-    @property
-    def is_ros1(self) -> bool:
-        """Whether it is a bag of ROS 1."""
-        return not self._reader.is2
-
     def raw(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
         """(topic, type, log time ns, bytes) in the order of the log time; None: every topic."""
-        wanted = [c for c in self._reader.connections if topics is None or c.topic in topics]
-        if not wanted:
-            return
-        with failing_as_ours(self.path):
-            iterator = iter(self._reader.messages(connections=wanted))
-        while True:
-            with failing_as_ours(self.path):
-                item = next(iterator, None)
-            if item is None:
-                return
-            connection, log_ns, data = item
+        for connection, log_ns, data in self._messages(topics):
             yield connection.topic, connection.msgtype, log_ns, data
 
     def messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
         """(topic, log time ns, message) of these topics."""
-        for topic, kind, log_ns, data in self.raw(topics):
-            with failing_as_ours(self.path):
-                decoded = self._reader.deserialize(data, kind)
-            yield topic, log_ns, decoded
+        for connection, log_ns, data in self._messages(topics):
+            try:
+                decoded = self._decode(data, connection.msgtype)
+            except Exception as error:  # noqa: BLE001  # see failing_as_ours
+                raise _damaged(self.path, error) from error
+            yield connection.topic, log_ns, decoded
+
+    def _messages(self, topics: Collection[str] | None) -> Iterator[tuple[Any, int, bytes]]:
+        wanted = [c for c in self._reader.connections if topics is None or c.topic in topics]
+        if not wanted:
+            return
+        iterator: Iterator[Any] = iter(())
+        with failing_as_ours(self.path):
+            iterator = iter(self._reader.messages(connections=wanted))
+        while True:
+            try:
+                item = next(iterator, None)
+            except Exception as error:  # noqa: BLE001  # see failing_as_ours
+                raise _damaged(self.path, error) from error
+            if item is None:
+                return
+            yield item
+
+
+def _storage(path: Path) -> Path:
+    """The only .mcap of a folder instead of the folder: it says all, and sooner than the YAML."""
+    files = list(path.glob("*.mcap")) if path.is_dir() else []
+    return files[0] if len(files) == 1 else path
 
 
 @dataclass(frozen=True, kw_only=True)
