@@ -14,10 +14,13 @@ from scripts import interrupt
 from scripts.bench import bench
 from scripts.console import console, fail, note
 from scripts.demo import demo
+from scripts.export import export
+from scripts.generate import generate
 from scripts.listing import listing
 from scripts.reproduce.verb import reproduce
 from scripts.run import run
 from scripts.sensor_card import sensor_card
+from scripts.verify import verify
 from sim import gl
 from slam.errors import MobiliaError
 
@@ -36,6 +39,9 @@ app = typer.Typer(
 )
 app.command("demo")(demo)
 app.command("run")(run)
+app.command("generate")(generate)
+app.command("verify")(verify)
+app.command("export")(export)
 app.command("list")(listing)
 app.command("bench")(bench)
 app.command("sensor-card")(sensor_card)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sim.labels import BeamLabeller
 from sim.lidar import Lms221, ScanResult
+from sim.moments import Moment
 from sim.world import SUBSTEPS_PER_S, World
 from slam._jit import njit
 from slam.frames import Float, Frame, Odometry, Scan
@@ -27,15 +28,16 @@ _HULLS = np.array([1, 1, 1, 0, 1, 0], dtype=np.uint8)  # geom groups a ray sees
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Drive:
-    """A recorded drive through the dynamic version.
+    """A recorded drive through the dynamic version, of n scans.
 
-    frames  as observed, n of them
+    stamps_ns, truths  n each: of the frames that were observed
     path    (n, steps + 1, 3) m, m, rad: the robot at each physics step of each scan
-    qpos    (n, nq) of everything at the end of each scan
+    qpos    (n, nq) of everything at the start of each scan
     rests   (n, movers) whether it rested then
     """
 
-    frames: tuple[Frame, ...]
+    stamps_ns: list[int]
+    truths: list[Float]
     path: Float
     qpos: Float
     rests: NDArray[np.bool_]
@@ -121,26 +123,27 @@ class TwinRoom:
             if not self._shapes.clear(k, poses[k])
         ]
 
-    def frames(
-        self, odometry: list[Odometry], truths: list[Float], *, moved: bool
-    ) -> Iterator[Frame]:
-        """All frames; with ``moved`` things are displaced while out of sight."""
+    def moments(self, odometry: list[Odometry], *, moved: bool) -> Iterator[Moment]:
+        """All of them; with ``moved`` things are displaced while out of sight."""
+        resting = np.zeros(len(self.world.scene.movers), dtype=np.bool_)
         period = self._laser.config.steps / SUBSTEPS_PER_S
         for k, path in enumerate(self._drive.path):
             self._put(path[0])
             if moved and k % round(LOOK_S / period) == 0:
                 self._displace(k)
+            poses = self.world.mover_poses()
             self._steps = iter(path[1:])
             result = self._laser.observe(lambda: self._put(next(self._steps)), self.world.data)
             self._saw(result, period)
             stamp_ns = odometry[k].stamp_ns
-            yield Frame(
+            frame = Frame(
                 stamp_ns=stamp_ns,
                 odometry=odometry[k],
                 scan=Scan(stamp_ns=stamp_ns, ranges=result.ranges, spec=self._laser.spec),
-                truth=truths[k],
+                truth=self._drive.truths[k],
                 labels=self._labeller.label(result) if self._labeller else None,
             )
+            yield Moment(frame=frame, poses=poses, moving=resting)
 
     def _saw(self, result: ScanResult, period: float) -> None:
         movers = self.world.bodies.mover_of_body[result.bodies[result.bodies >= 0]]

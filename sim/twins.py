@@ -8,7 +8,7 @@ recorded path is replayed kinematically, the robot carried along it, in two twin
 - **static**: everything as laid out at the start, for the whole run;
 - **semi-static**: things stand still whenever they can be seen, and are found elsewhere later. A
   mover takes the place it rests at in the dynamic version once it has been out of sight for
-  a second and that place is out of sight too. Same displacements, no motion.
+  ``sim.twin_room.UNSEEN_S`` and that place is out of sight too. Same displacements, no motion.
 
 The driver of the dynamic version also keeps clear of the places at the start, and a path that
 crosses a mover of the static twin is rejected for one with another tour. In the semi-static twin
@@ -19,7 +19,9 @@ the same to the bit in all three, as are the numbers drawn for the beams' noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,10 +29,10 @@ import numpy as np
 from sim.drive import TourConfig
 from sim.dynamism import Dynamism
 from sim.lidar import Lms221
+from sim.moments import Moment, toured
 from sim.odometry import WheelOdometry
-from sim.pilot import Pilot
 from sim.seeds import Seeds
-from sim.simulation import ScanTiming, Simulation, n_frames
+from sim.simulation import ScanTiming, Simulation
 from sim.twin_room import Drive, TwinRoom
 from sim.world import World
 from slam._jit import njit
@@ -54,65 +56,97 @@ def rolled(path: Float, track: float) -> Float:
     return out
 
 
-def twins(
-    scene: str = "office",
-    *,
-    seconds: float = 60.0,
-    seed: int | Seeds = 0,
-    dynamism: float | Dynamism = 0.5,
-    tour: TourConfig | None = None,
-    tries: int = 8,
-    **settings: Any,
-) -> dict[str, Stream]:
-    """Three streams, by the names in ``TWINS``: one path, one odometry, one noise.
+class Twins:
+    """A drive and its three versions, by the names in ``TWINS``: one path, odometry and noise.
 
     seconds   of driving                     tour  limits of the driver
     tries     tours tried until one keeps clear of everything in the static twin
     settings  as for ``Simulation``
 
+    The drive is remembered (1 to 2 KB a scan), frames are simulated anew at each ``moments``.
     Raises ``InvalidValueError`` when every tour crosses a mover, naming those of the last one.
     """
-    seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
-    labels = bool(settings.get("labels", False))
-    crossed: list[str] = []
-    for attempt in range(max(1, tries)):
-        own = seeds
-        if attempt > 0:
-            own = Seeds(**{**seeds.record(), "driving": seeds.integer("driving") + attempt})
-        simulation = Simulation(scene, seed=own, dynamism=dynamism, **settings)
-        drive = _driven(simulation, seconds, tour)
-        static = _twin(simulation, drive, labels=labels)
-        crossed = static.crosses()
-        if not crossed:
-            break
-    else:
-        raise InvalidValueError(
-            f"none of {tries} tours keeps clear of everything at the start; "
-            f"the last crosses {', '.join(crossed)}"
-        )
-    odometry, truths = _odometry(simulation, drive), [f.truth for f in drive.frames]
-    poses = [truth for truth in truths if truth is not None]
-    semi = _twin(simulation, drive, labels=labels)
-    frames = {
-        "dynamic": [_with(f, o) for f, o in zip(drive.frames, odometry, strict=True)],
-        "semi_static": list(semi.frames(odometry, poses, moved=True)),
-        "static": list(static.frames(odometry, poses, moved=False)),
+
+    def __init__(
+        self,
+        scene: str = "office",
+        *,
+        seconds: float = 60.0,
+        seed: int | Seeds = 0,
+        dynamism: float | Dynamism = 0.5,
+        tour: TourConfig | None = None,
+        tries: int = 8,
+        **settings: Any,
+    ) -> None:
+        seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
+        self._labels = bool(settings.get("labels", False))
+        crossed: list[str] = []
+        for attempt in range(max(1, tries)):
+            own = seeds
+            if attempt > 0:
+                own = Seeds(**{**seeds.record(), "driving": seeds.integer("driving") + attempt})
+            self._again = partial(Simulation, scene, seed=own, dynamism=dynamism, **settings)
+            self._tour = partial(_toured, seconds=seconds, config=tour)
+            self.simulation = self._again()
+            self._drive = _driven(self.simulation, self._tour(self.simulation))
+            crossed = _twin(self.simulation, self._drive, labels=False).crosses()
+            if not crossed:
+                break
+        else:
+            raise InvalidValueError(
+                f"none of {tries} tours keeps clear of everything at the start; "
+                f"the last crosses {', '.join(crossed)}"
+            )
+        self._odometry = _odometry(self.simulation, self._drive)
+
+    def moments(self, name: str) -> Iterator[Moment]:
+        """One version of the drive."""
+        if name == "dynamic":
+            yield from self._dynamic()
+        else:
+            twin = _twin(self.simulation, self._drive, labels=self._labels)
+            yield from twin.moments(self._odometry, moved=name == "semi_static")
+
+    def _dynamic(self) -> Iterator[Moment]:
+        moments = self._tour(self._again())
+        for moment, odometry in zip(moments, self._odometry, strict=True):
+            yield replace(moment, frame=_with(moment.frame, odometry))
+
+
+def twins(scene: str = "office", **settings: Any) -> dict[str, Stream]:
+    """Three streams by name, held in memory; ``settings`` as for ``Twins``."""
+    made = Twins(scene, **settings)
+    metadata = made.simulation.metadata()
+    return {
+        name: _stream(metadata, name, [moment.frame for moment in made.moments(name)])
+        for name in TWINS
     }
-    return {name: _stream(simulation.metadata(), name, frames[name]) for name in TWINS}
 
 
-def _driven(simulation: Simulation, seconds: float, config: TourConfig | None) -> Drive:
-    world = simulation.world
-    pilot = Pilot(world, config, keep_out=world.mover_poses())
-    frames, path, qpos, rests = [], [], [], []
-    for _ in range(n_frames(seconds, simulation.scan_period_s)):
-        world.set_command(*pilot.command(simulation.scan_period_s))
-        qpos.append(world.data.qpos.copy())
-        rests.append(~world.movers_moving())
-        frames.append(simulation.observe())
+def _toured(
+    simulation: Simulation, *, seconds: float, config: TourConfig | None
+) -> Iterator[Moment]:
+    """A tour that also keeps clear of the places at the start."""
+    return toured(simulation, seconds, config, keep_out=simulation.world.mover_poses())
+
+
+def _driven(simulation: Simulation, moments: Iterator[Moment]) -> Drive:
+    stamps_ns, truths, path, qpos, rests = [], [], [], [], []
+    before = simulation.world.data.qpos.copy()
+    for moment in moments:
+        if moment.frame.truth is not None:
+            truths.append(moment.frame.truth)
+        stamps_ns.append(moment.frame.stamp_ns)
+        qpos.append(before)
+        rests.append(~moment.moving)
         path.append(simulation.path.copy())
+        before = simulation.world.data.qpos.copy()
     return Drive(
-        frames=tuple(frames), path=np.array(path), qpos=np.array(qpos), rests=np.array(rests)
+        stamps_ns=stamps_ns,
+        truths=truths,
+        path=np.array(path),
+        qpos=np.array(qpos),
+        rests=np.array(rests),
     )
 
 
@@ -136,7 +170,7 @@ def _odometry(simulation: Simulation, drive: Drive) -> list[Odometry]:
     timing = ScanTiming.of(simulation.laser)
     return [
         timing.odometry(
-            encoders, travel[k * steps : (k + 1) * steps + 1], drive.frames[k].stamp_ns, False
+            encoders, travel[k * steps : (k + 1) * steps + 1], drive.stamps_ns[k], False
         )
         for k in range(n)
     ]

@@ -12,29 +12,37 @@ from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from scenes.scene import SCAN_HEIGHT, Mover
+from sim.moments import Moment
 from sim.recording import messages as ros
-from sim.recording.objects import Objects, ObjectsMessage
+from sim.recording.objects import ObjectsMessage
 from sim.recording.template import STORE
 from slam import se2
 from slam._jit import njit
 from slam.errors import InvalidValueError
-from slam.frames import NS_PER_S, Float, Frame, LaserSpec, Odometry
+from slam.frames import NS_PER_S, Float, LaserSpec, Odometry
 
 if sys.version_info >= (3, 14):
     from compression import zstd
 else:
     from backports import zstd
 
-VERSION = 8  # of metadata.yaml: the newest that older ROS 2 can read
+VERSION: Literal[8] = 8  # of metadata.yaml: the newest that older ROS 2 can read
 LEVEL = 1  # of zstd: 7 % larger than level 3, and 40 us a frame faster
-_OPTIONS = {
+_OPTIONS: dict[int, int] = {
     zstd.CompressionParameter.compression_level: LEVEL,
     zstd.CompressionParameter.checksum_flag: 1,  # a flipped bit is an error, never another range
 }
@@ -124,13 +132,37 @@ class _Chunks:
 _LEAN = frozenset(("/scan", "/odom", "/odom_increment", "/ground_truth/pose"))
 
 
+class MessageHash:
+    """SHA-256 of the uncompressed messages of a bag: stamps and bytes, topic by topic.
+
+    It does not depend on how messages are packed, nor on the order of topics at one stamp.
+    """
+
+    def __init__(self) -> None:
+        self._topics: dict[str, Any] = {}
+
+    def take(self, topic: str, stamp_ns: int, data: bytes | bytearray) -> None:
+        """The next message of its topic."""
+        if topic not in self._topics:
+            self._topics[topic] = hashlib.sha256(topic.encode())
+        digest = self._topics[topic]
+        digest.update(struct.pack("<qq", stamp_ns, len(data)))
+        digest.update(data)
+
+    def hexdigest(self) -> str:
+        """Of everything so far."""
+        parts = [digest.hexdigest() for _, digest in sorted(self._topics.items())]
+        return hashlib.sha256("".join(parts).encode()).hexdigest()
+
+
 class BagWriter:
     """Writes the folder ``path``: metadata.yaml and one .mcap; a context manager.
 
-    movers  of the scene, for /ground_truth/objects; labels, intensities: whether frames have them
+    movers    of the scene, for /ground_truth/objects
+    height_m  of the scanner, for /tf_static
+    labels, intensities  whether frames have them
 
-    The folder is whole only after the block ends without an exception. Attribute
-    ``messages_sha256``: of topic, stamp and uncompressed bytes of every message, in order.
+    The folder is whole only after the block ends without an exception.
     """
 
     def __init__(
@@ -139,6 +171,7 @@ class BagWriter:
         spec: LaserSpec,
         *,
         movers: Sequence[Mover] = (),
+        height_m: float = SCAN_HEIGHT,
         labels: bool = True,
         intensities: bool = False,
     ) -> None:
@@ -153,13 +186,14 @@ class BagWriter:
             )
             for k in range(turns)
         ]  # fmt: skip
+        self._mount = ros.TransformMessage(ros.ROBOT, ros.LASER, height_m)
         self._wheels, self._truth = _Wheels(), ros.TruthMessage()
         self._labels = ros.LabelsMessage(spec) if labels else None
         self._objects = ObjectsMessage(movers) if movers else None
         self._writer = Writer(path, version=VERSION, storage_plugin=StoragePlugin.MCAP)
         self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         self._connections: dict[str, Any] = {}
-        self._hash = hashlib.sha256()
+        self._hash = MessageHash()
         self._started = False
 
     def __enter__(self) -> BagWriter:
@@ -195,15 +229,15 @@ class BagWriter:
             self._chunks.flush()
         self._writer.__exit__(kind, error, trace)
 
-    def write(self, frame: Frame, objects: Objects | None = None) -> None:
+    def write(self, moment: Moment) -> None:
         """Append a frame; ``InvalidValueError`` for one without a scan or of another scanner."""
+        frame = moment.frame
         scan, stamp_ns = frame.scan, frame.stamp_ns
         if scan is None or (scan.spec is not self.spec and scan.spec != self.spec):
             raise InvalidValueError("a bag holds scans of one scanner: this frame has another one")
         if not self._started:
             self._started = True
-            mount = ros.TransformMessage(ros.ROBOT, ros.LASER, SCAN_HEIGHT)
-            self._put("/tf_static", stamp_ns, mount(stamp_ns, self.spec.T_robot_laser))
+            self._put("/tf_static", stamp_ns, self._mount(stamp_ns, self.spec.T_robot_laser))
         odometry, tf, increment = self._wheels.next(frame.odometry)
         self._put("/tf", stamp_ns, tf)
         self._put("/odom", stamp_ns, odometry)
@@ -211,8 +245,9 @@ class BagWriter:
             self._put("/odom_increment", stamp_ns, increment)
         if frame.truth is not None:
             self._put("/ground_truth/pose", stamp_ns, self._truth(stamp_ns, frame.truth))
-        if self._objects is not None and objects is not None:
-            self._put("/ground_truth/objects", stamp_ns, self._objects(stamp_ns, objects))
+        if self._objects is not None:
+            markers = self._objects(stamp_ns, moment.poses, moment.moving)
+            self._put("/ground_truth/objects", stamp_ns, markers)
         if self._labels is not None and frame.labels is not None:
             self._put("/ground_truth/labels", stamp_ns, self._labels(scan, frame.labels))
         self._put("/scan", *self._scan(scan))
@@ -222,9 +257,9 @@ class BagWriter:
     def _put(self, topic: str, stamp_ns: int, data: bytearray) -> None:
         self._chunks.turn_to(topic not in _LEAN)
         self._writer.write(self._connections[topic], stamp_ns, data)  # type: ignore[arg-type]
-        self._hash.update(struct.pack("<qq", stamp_ns, len(data)) + topic.encode() + data)
+        self._hash.take(topic, stamp_ns, data)
 
     @property
     def messages_sha256(self) -> str:
-        """Hexadecimal."""
+        """Of all messages so far (``MessageHash``)."""
         return self._hash.hexdigest()

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.recording.template import Marks, Template, header, message
-from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, BeamLabels, Float, LaserSpec, Odometry, Scan
 from slam.logs.ros_numbers import quaternion_of
@@ -176,9 +175,7 @@ class IncrementMessage:
     def __init__(self) -> None:
         marks = Marks()
         pose, spread = marks(7), marks(36)
-        inner = message(
-            "geometry_msgs/msg/PoseWithCovariance", pose=_pose(pose), covariance=spread
-        )
+        inner = message("geometry_msgs/msg/PoseWithCovariance", pose=_pose(pose), covariance=spread)
         self._template = Template(self.KIND, message(self.KIND, header=header(ROBOT), pose=inner))
         self._pose, self._spread = self._template.view(pose), self._template.view(spread)
         self._spread[:] = 0.0
@@ -282,8 +279,3 @@ class LabelsMessage:
         points["displacement"], points["incidence"] = labels.displacement, labels.incidence
         points["mixed"] = labels.mixed
         return self._template.stamp(scan.stamp_ns)
-
-
-def motion(before: Float | None, now: Float) -> Float:
-    """``T_previous_robot``; no motion at the first frame."""
-    return np.zeros(3) if before is None else se2.between(before, now)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,21 +24,9 @@ _RESTING, _MOVING = (0.55, 0.55, 0.6, 1.0), (0.9, 0.3, 0.1, 1.0)
 _CUBE, _CYLINDER = 1, 3
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Objects:
-    """Where everything that can move is at one moment.
-
-    poses   (n, 3) m, m, rad in the world, as ``World.mover_poses``
-    moving  (n,) whether it moves just then
-    """
-
-    poses: Float
-    moving: NDArray[np.bool_]
-
-
 @njit
 def _place(poses: Float, reach: Float, heights: Float, out: Float) -> None:
-    """Position (m) and quaternion of each marker; the middle of a leaf is ``reach`` off its hinge."""
+    """Position (m) and quaternion of each marker; a leaf's middle is ``reach`` off its hinge."""
     for k in range(len(poses)):
         yaw = poses[k, 2]
         out[k, 0] = poses[k, 0] + reach[k] * math.cos(yaw)
@@ -73,13 +60,13 @@ class ObjectsMessage:
         self._placed = np.zeros((n, 7))
         self._palette = np.array([_RESTING, _MOVING], dtype=np.float32)
 
-    def __call__(self, stamp_ns: int, objects: Objects) -> bytearray:
-        """All markers as of that time."""
+    def __call__(self, stamp_ns: int, all_poses: Float, moving: NDArray[np.bool_]) -> bytearray:
+        """All markers as of that time; both arrays in the order of the scene's movers."""
         raw, rows = self._template.raw, self._rows
         if rows:
-            _place(objects.poses[rows], self._reach, self._heights, self._placed)
+            _place(all_poses[rows], self._reach, self._heights, self._placed)
             raw[self._poses] = self._placed.view(np.uint8)
-            colors = self._palette[objects.moving[rows].astype(np.int64)]
+            colors = self._palette[moving[rows].astype(np.int64)]
             raw[self._colors] = colors.view(np.uint8)
         return self._template.stamp(stamp_ns)
 

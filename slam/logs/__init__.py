@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Readers of recorded logs: one function each, path -> Stream."""
 
+from slam.logs.bag import read_bag
 from slam.logs.carmen import read_carmen
 from slam.logs.carmen_writer import write_carmen
 from slam.logs.open import open_log
 from slam.logs.victoria_park import read_victoria_park
 
-__all__ = ["open_log", "read_carmen", "read_victoria_park", "write_carmen"]
+__all__ = ["open_log", "read_bag", "read_carmen", "read_victoria_park", "write_carmen"]

@@ -87,7 +87,9 @@ def _probe(bag: Bag, topics: Topics) -> Laser:
     if topics.turns is not None:
         wanted.add(topics.turns)
     transforms: dict[tuple[str, str], Any] = {}
-    scans, turns, robot, mount, start_ns = [], [], None, None, None
+    scans: list[Any] = []
+    turns: list[Any] = []
+    robot, mount, start_ns = None, None, None
     for topic, log_ns, message in bag.messages(wanted):
         start_ns = log_ns if start_ns is None else start_ns
         with _about(bag.path, f"topic {topic}"):

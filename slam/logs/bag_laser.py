@@ -94,11 +94,10 @@ def _line_times(message: Any) -> Float:
     if not math.isfinite(step) or abs(step) > 1.0:
         raise InvalidValueError(f"time_increment of {step} s")
     period = _mirror_period(message)
+    count: Float = np.arange(len(message.ranges), dtype=np.float64)
     if period > 0.0:
-        degrees = np.arange(len(message.ranges)) * _degrees(message.angle_increment)
-        times: Float = degrees / 360.0 * period
-        return times
-    return np.arange(len(message.ranges)) * step
+        return count * _degrees(message.angle_increment) / 360.0 * period
+    return count * step
 
 
 def _turn_times(whole: Any, turns: Sequence[Any]) -> Float:

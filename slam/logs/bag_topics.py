@@ -41,7 +41,7 @@ def failing_as_ours(path: Path) -> Iterator[None]:
         raise LogFormatError(path, "no such file") from error
     except OSError as error:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # noqa: BLE001  # parsers of foreign bytes fail in every way
+    except Exception as error:  # parsers of foreign bytes fail in every way
         raise _damaged(path, error) from error
 
 
@@ -90,7 +90,7 @@ class Bag:
         for connection, log_ns, data in self._messages(topics):
             try:
                 decoded = self._decode(data, connection.msgtype)
-            except Exception as error:  # noqa: BLE001  # see failing_as_ours
+            except Exception as error:  # see failing_as_ours
                 raise _damaged(self.path, error) from error
             yield connection.topic, log_ns, decoded
 
@@ -104,7 +104,7 @@ class Bag:
         while True:
             try:
                 item = next(iterator, None)
-            except Exception as error:  # noqa: BLE001  # see failing_as_ours
+            except Exception as error:  # see failing_as_ours
                 raise _damaged(self.path, error) from error
             if item is None:
                 return
@@ -180,12 +180,17 @@ def _pick(bag: Bag, asked: str | None, kinds: tuple[str, ...], hint: str) -> str
             )
         return asked
     found = [
-        (name != f"/{hint}", "truth" in name, hint not in name, name.endswith("_turn"), -count, name)
+        (
+            name != f"/{hint}",
+            "truth" in name,
+            hint not in name,
+            name.endswith("_turn"),
+            -count,
+            name,
+        )
         for name, (kind, count) in bag.topics.items()
         if kind in kinds and count > 0
     ]
     if not found:
-        raise LogFormatError(
-            bag.path, f"no message of type {kinds[0]}; topics: {listed or 'none'}"
-        )
+        raise LogFormatError(bag.path, f"no message of type {kinds[0]}; topics: {listed or 'none'}")
     return min(found)[-1]

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from slam.errors import LogFormatError
 from slam.frames import Stream
+from slam.logs.bag import read_bag
+from slam.logs.bag_topics import is_bag
 from slam.logs.carmen import read_carmen
 from slam.logs.carmen_messages import KNOWN_NAMES
 from slam.logs.text import numbered_lines
@@ -34,6 +36,11 @@ def _is_carmen(path: Path) -> bool:
 
 
 FORMATS: tuple[LogFormat, ...] = (
+    LogFormat(
+        description="bag of ROS 2 (its folder, .mcap or .db3) or of ROS 1 (.bag)",
+        recognises=is_bag,
+        read=read_bag,
+    ),
     LogFormat(
         description="Victoria Park (its folder, features_*.mat or rfs_measurements.dat)",
         recognises=is_victoria_park,

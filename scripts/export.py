@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia export``: an episode, or any bag, in the formats of others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from rich.markup import escape
+
+from scripts.console import console
+from slam.errors import InvalidValueError
+from slam.files import replacing
+from slam.frames import Frame, Stream
+from slam.logs import open_log, read_bag, write_carmen
+from slam.logs.bag_topics import is_bag
+from slam.trajectory import Trajectory, write_tum
+
+
+def export(
+    episode: Annotated[Path, typer.Argument(help="An episode, a bag or any other log.")],
+    to: Annotated[str, typer.Option(help="tum, carmen or npz.")],
+    out: Annotated[
+        Path | None, typer.Option(help="File to write; default beside the episode.")
+    ] = None,
+) -> None:
+    """Write an episode as TUM trajectories, as a CARMEN log or as NumPy arrays.
+
+    tum: the odometry, and the truth beside it. carmen: scans, odometry, true poses. npz:
+    everything, labels too, as arrays by name.
+    """
+    writers: dict[str, Callable[[Path, Stream], list[Path]]] = {
+        "tum": _tum, "carmen": _carmen, "npz": _npz,
+    }  # fmt: skip
+    if to not in writers:
+        raise InvalidValueError(f"--to must be one of {', '.join(writers)}, got {to!r}")
+    stream = read_bag(episode, labels=True) if is_bag(episode) else open_log(episode)
+    suffix = {"tum": ".tum", "carmen": ".log.gz", "npz": ".npz"}[to]
+    plain = episode.absolute()
+    target = out or plain.with_name(plain.name.split(".log")[0] + suffix)
+    for path in writers[to](target, stream):
+        console.print(escape(str(path)), soft_wrap=True)
+
+
+def _tum(target: Path, stream: Stream) -> list[Path]:
+    stamps, odometry, truth = [], [], []
+    for frame in stream:
+        stamps.append(frame.stamp_ns)
+        odometry.append(frame.odometry.T_odom_robot)
+        truth.append(frame.truth)
+    written = [target]
+    at = np.array(stamps)
+    write_tum(target, Trajectory(stamps_ns=at, poses=np.array(odometry)))
+    known = [k for k, pose in enumerate(truth) if pose is not None]
+    if known:
+        written.append(target.with_name(f"{target.stem}_truth{target.suffix}"))
+        poses = np.array([truth[k] for k in known])
+        write_tum(written[-1], Trajectory(stamps_ns=at[known], poses=poses))
+    return written
+
+
+def _carmen(target: Path, stream: Stream) -> list[Path]:
+    write_carmen(target, stream)
+    return [target]
+
+
+def _npz(target: Path, stream: Stream) -> list[Path]:
+    frames = list(stream)
+    if not frames or frames[0].scan is None:
+        raise InvalidValueError("npz holds scans: this log has none")
+    spec = frames[0].scan.spec
+    arrays = {
+        "stamps_ns": np.array([f.stamp_ns for f in frames]),
+        "T_odom_robot": np.array([f.odometry.T_odom_robot for f in frames]),
+        "ranges": np.array([f.scan.ranges for f in frames if f.scan is not None]),
+        "angles": spec.angles,
+        "beam_time_offsets": spec.beam_time_offsets,
+        "range_min_max": np.array([spec.range_min, spec.range_max]),
+        "T_robot_laser": spec.T_robot_laser,
+        **_optional(frames),
+    }
+    with replacing(target) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **arrays)
+    return [target]
+
+
+def _optional(frames: list[Frame]) -> dict[str, NDArray[Any]]:
+    """What every frame has, of what it need not have."""
+    arrays = {}
+    if all(f.odometry.increment_covariance is not None for f in frames):
+        covariances = [f.odometry.increment_covariance for f in frames]
+        arrays["increment_covariance"] = np.array(covariances)
+    if all(f.odometry.twist is not None for f in frames):
+        arrays["twist"] = np.array([f.odometry.twist for f in frames])
+    if all(f.truth is not None for f in frames):
+        arrays["T_world_robot"] = np.array([f.truth for f in frames])
+    if all(f.labels is not None for f in frames):
+        for name in ("body", "kind", "displacement", "incidence", "mixed"):
+            arrays[f"label_{name}"] = np.array([getattr(f.labels, name) for f in frames])
+    return arrays

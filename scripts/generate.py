@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia generate``: a dataset of episodes in rooms that move."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.markup import escape
+from rich.progress import Progress
+from rich.table import Table
+
+from scripts import interrupt, workers
+from scripts.console import console, note, progress
+from sim.recording.dataset import Dataset, Plan, writing
+from sim.recording.episode import record
+from sim.recording.recipe import RECIPE, Recipe, read_recipe
+from slam.errors import InvalidValueError
+
+MAX_SWEEP = 1000
+SCANS_PER_S = 37.5  # of the bar, at half a degree
+
+
+def generate(
+    scene: Annotated[str, typer.Argument(help="A scene by name, or module:function.")],
+    out: Annotated[Path, typer.Option(help="Folder of the dataset.")],
+    dynamism: Annotated[float, typer.Option(help="How much the room moves, 0 to 1.")] = 0.5,
+    dynamism_sweep: Annotated[
+        str, typer.Option(help="Several instead, each with the same seeds: start:stop:step.")
+    ] = "",
+    episodes: Annotated[int, typer.Option(help="Episodes (at each dynamism).")] = 1,
+    seconds: Annotated[float, typer.Option(help="Length of an episode, s.")] = 60.0,
+    seed: Annotated[int, typer.Option(help="Of the first episode; the next has the next.")] = 0,
+    twins: Annotated[
+        bool, typer.Option("--twins", help="Each episode also semi-static and static, same path.")
+    ] = False,
+    jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
+    cluster: Annotated[
+        str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
+    ] = None,
+    scanner: Annotated[str, typer.Option(help="full, noise (statistical only) or ideal.")] = "full",
+) -> None:
+    """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
+
+    Killed at any time, the same command goes on: whole episodes stay, and the folder ends with the
+    same bytes.
+
+    [bold]mobilia generate office --dynamism 0.5 --episodes 4 --seconds 20 --out data[/bold]
+    """
+    levels = sweep(dynamism_sweep) if dynamism_sweep else (dynamism,)
+    first = Recipe(scene=scene, seed=seed, dynamism=levels[0], seconds=seconds, scanner=scanner)
+    plan = Plan(recipe=first, dynamisms=levels, episodes=episodes, twins=twins)
+    with writing(out, plan) as dataset:
+        missing, notes = dataset.missing()
+        for line in notes:
+            note(line)
+        started = time.perf_counter()
+        _make(dataset, missing, jobs, cluster)
+        dataset.finish()
+        spent = time.perf_counter() - started
+    console.print(_summary(dataset, len(missing), spent))
+    console.print(f"{escape(str(out))}: check it with [bold]mobilia verify[/bold]", soft_wrap=True)
+
+
+def sweep(text: str) -> tuple[float, ...]:
+    """``0:1:0.25`` -> (0, 0.25, 0.5, 0.75, 1); ``InvalidValueError`` for anything else."""
+    try:
+        start, stop, step = (float(word) for word in text.split(":"))
+    except ValueError:
+        raise InvalidValueError(f"--dynamism-sweep must be start:stop:step, got {text!r}") from None
+    if not (step > 0.0 and 0.0 <= start <= stop <= 1.0):
+        raise InvalidValueError(
+            f"--dynamism-sweep needs step > 0 and 0 <= start <= stop <= 1, got {text!r}"
+        )
+    count = int((stop - start) / step + 1e-9) + 1
+    if count > MAX_SWEEP:
+        raise InvalidValueError(f"--dynamism-sweep {text!r}: {count} levels, at most {MAX_SWEEP}")
+    return tuple(round(start + k * step, 9) for k in range(count))
+
+
+def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | None) -> None:
+    """Every missing episode, with a bar: episodes, simulated seconds a second, time left."""
+    total, length_s = len(dataset.plan.jobs()), dataset.plan.recipe.seconds
+    alone = cluster is None and (jobs == 1 or len(missing) < 2)
+    with progress() as bar:
+        meter = _Meter(bar, total=total, done=total - len(missing), length_s=length_s)
+        note_frame = meter.frame if alone else None
+        call = partial(_one, dataset.path, note_frame)
+        for _ in workers.each(call, missing, jobs=jobs, cluster=cluster, shared=dataset.path):
+            meter.episode()
+
+
+def _one(folder: Path, note_frame: Callable[[], None] | None, recipe: Recipe) -> None:
+    """A job, here or in a worker."""
+    record(recipe, folder, note=note_frame or (lambda: None))
+
+
+class _Meter:
+    """The progress bar; counts in simulated seconds."""
+
+    def __init__(self, bar: Progress, *, total: int, done: int, length_s: float) -> None:
+        self._bar, self._total, self._done, self._length_s = bar, total, done, length_s
+        self._frames, self._before, self._started = 0, done, time.perf_counter()
+        self._task = bar.add_task(
+            "generating", unit="", total=total * length_s, completed=int(done * length_s)
+        )
+
+    def frame(self) -> None:
+        """One more scan of the episode that is being made here."""
+        self._frames += 1
+        if self._frames % 25 == 0:
+            self._show(min(self._frames / SCANS_PER_S, self._length_s))
+
+    def episode(self) -> None:
+        """One more episode."""
+        self._done, self._frames = self._done + 1, 0
+        self._show(0.0)
+
+    def _show(self, begun_s: float) -> None:
+        interrupt.check()
+        seconds = (self._done - self._before) * self._length_s + begun_s
+        rate = seconds / max(time.perf_counter() - self._started, 1e-3)
+        unit = f"{self._done}/{self._total} episodes, {rate:.1f} s simulated per s"
+        self._bar.update(self._task, completed=self._before * self._length_s + seconds, unit=unit)
+
+
+def _summary(dataset: Dataset, made: int, spent_s: float) -> Table:
+    """Episodes, frames, distance, what returns came from, bytes: a row for each dynamism."""
+    plan = dataset.plan
+    table = Table(
+        title=escape(f"{plan.recipe.scene}: {made} of {len(plan.jobs())} made now"),
+        title_justify="left",
+        caption=f"{spent_s:.1f} s",
+    )
+    headings = ("dynamism", "episodes", "frames", "driven, m", "moving", "semi-static", "static")
+    for heading in (*headings, "MB"):
+        table.add_column(heading, justify="right")
+    for level in plan.dynamisms:
+        jobs = [job for job in plan.jobs() if job.dynamism == level]
+        folders = [dataset.path / name for job in jobs for name in plan.folders(job)]
+        table.add_row(f"{level:g}", *_row(folders))
+    return table
+
+
+def _row(folders: list[Path]) -> list[str]:
+    results: list[Any] = [read_recipe(folder / RECIPE).result for folder in folders]
+    returns = {
+        name: sum(int(result["returns"][name]) for result in results)
+        for name in ("moving", "semi_static", "static")
+    }
+    beams = max(sum(returns.values()), 1)
+    size = sum(file.stat().st_size for folder in folders for file in folder.iterdir())
+    return [
+        str(len(folders)),
+        str(sum(int(result["frames"]) for result in results)),
+        f"{sum(float(result['distance_m']) for result in results):.1f}",
+        *(f"{100.0 * count / beams:.1f} %" for count in returns.values()),
+        f"{size / 1e6:.1f}",
+    ]

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames with what a recording also holds: where everything was at the stamp."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.drive import TourConfig
+from sim.pilot import Pilot
+from sim.simulation import Simulation, n_frames
+from slam.frames import Float, Frame
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Moment:
+    """A frame, and every mover of the scene at the start of its scan.
+
+    poses   (n, 3) m, m, rad in the world, as ``World.mover_poses``
+    moving  (n,) whether it moves just then
+    """
+
+    frame: Frame
+    poses: Float
+    moving: NDArray[np.bool_]
+
+
+def toured(
+    simulation: Simulation,
+    seconds: float,
+    config: TourConfig | None = None,
+    *,
+    keep_out: Float | None = None,
+) -> Iterator[Moment]:
+    """``sim.simulation.tour``, moment by moment; ``keep_out`` as for ``Pilot``."""
+    world = simulation.world
+    pilot = Pilot(world, config, keep_out=keep_out)
+    for _ in range(n_frames(seconds, simulation.scan_period_s)):
+        world.set_command(*pilot.command(simulation.scan_period_s))
+        poses, moving = world.mover_poses(), world.movers_moving()
+        yield Moment(frame=simulation.observe(), poses=poses, moving=moving)

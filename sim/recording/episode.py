@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One episode from its recipe: simulated, written, and put in its place when it is whole."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import socket
+from array import array
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim.moments import Moment, toured
+from sim.recording.bag import BagWriter
+from sim.recording.recipe import RECIPE, Recipe, write_recipe
+from sim.recording.relations import write_relations
+from sim.recording.sums import write_sums
+from sim.simulation import Simulation
+from sim.twins import TWINS, Twins
+from slam.errors import OutputError
+from slam.frames import BeamClass, Frame
+from slam.maps import write_map
+from slam.trajectory import Trajectory, write_tum
+
+PART = ".part"
+Result = dict[str, Any]
+
+
+class _Summary:
+    """What is said of an episode; 32 bytes a frame are all that it keeps."""
+
+    def __init__(self) -> None:
+        self._stamps, self._poses = array("q"), array("d")
+        self._classes = np.zeros(len(BeamClass), dtype=np.int64)
+        self._distance_m = 0.0
+
+    def take(self, frame: Frame) -> None:
+        """Count a frame."""
+        if frame.truth is not None:
+            pose = frame.truth.tolist()
+            if self._poses:
+                x, y = self._poses[-3:-1]
+                self._distance_m += math.hypot(pose[0] - x, pose[1] - y)
+            self._stamps.append(frame.stamp_ns)
+            self._poses.extend(pose)
+        if frame.labels is not None:
+            self._classes += np.bincount(frame.labels.kind, minlength=len(BeamClass))
+
+    def truth(self) -> Trajectory:
+        """The true poses so far."""
+        poses = np.array(self._poses).reshape(-1, 3)
+        return Trajectory(stamps_ns=np.array(self._stamps), poses=poses)
+
+    def result(self) -> Result:
+        """Numbers for the recipe: how many frames, m driven, returns by what they came from."""
+        names = (BeamClass.STATIC, BeamClass.SEMI_STATIC, BeamClass.MOVING)
+        return {
+            "frames": len(self._stamps),
+            "distance_m": round(self._distance_m, 6),
+            "returns": {c.name.lower(): int(self._classes[c]) for c in names},
+        }
+
+
+def record(
+    recipe: Recipe, parent: Path, *, note: Callable[[], None] = lambda: None
+) -> dict[str, Result]:
+    """Make the episode's folder in ``parent``, or the folders of all three twins.
+
+    A recipe whose ``twin`` is "dynamic" makes the other two as well: one drive makes all three.
+    ``note`` is called after each frame. Folders appear when they are whole; one that is there
+    already is left as it is. Returns the results by folder name. Raises ``OutputError`` naming the
+    folder that cannot be written.
+    """
+    if not recipe.twin:
+        simulation = Simulation(**recipe.simulation())
+        moments = toured(simulation, recipe.seconds)
+        return {recipe.name: _write(recipe, parent, simulation, moments, note)}
+    twins = Twins(**recipe.simulation(), seconds=recipe.seconds)
+    results = {}
+    for name in TWINS:
+        own = recipe.of_twin(name)
+        moments = twins.moments(name)
+        results[own.name] = _write(own, parent, twins.simulation, moments, note)
+    return results
+
+
+def _write(
+    recipe: Recipe,
+    parent: Path,
+    simulation: Simulation,
+    moments: Iterator[Moment],
+    note: Callable[[], None],
+) -> Result:
+    scene, summary = simulation.world.scene, _Summary()
+    with _whole(parent / recipe.name) as folder:
+        bag = BagWriter(folder, simulation.spec, movers=scene.movers, height_m=scene.scan_height_m)
+        with bag:
+            for moment in moments:
+                bag.write(moment)
+                summary.take(moment.frame)
+                note()
+        truth = summary.truth()
+        write_tum(folder / "trajectory.tum", truth)
+        write_relations(folder / "relations.txt", truth)
+        write_map(folder / "map", scene.static_map)
+        result = {**summary.result(), "messages_sha256": bag.messages_sha256}
+        write_recipe(folder / RECIPE, recipe, result)
+        write_sums(folder)
+        size = sum(file.stat().st_size for file in folder.iterdir())
+    return {**result, "bytes": size}
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[Path]:
+    """A folder of that name somewhere else, moved onto ``path`` when the block succeeds."""
+    aside = path.parent / f".{path.name}.{socket.gethostname()}.{os.getpid()}{PART}"
+    try:
+        try:
+            shutil.rmtree(aside, ignore_errors=True)
+            aside.mkdir()
+            yield aside / path.name
+            if path.exists():  # somebody else was faster, with the same bytes
+                return
+            (aside / path.name).rename(path)
+        finally:
+            shutil.rmtree(aside, ignore_errors=True)
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error

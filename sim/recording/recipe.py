@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The recipe of an episode: about 1 KB from which the same bytes can be made again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim.dynamism import Dynamism
+from sim.lidar_config import Lms221Config
+from sim.odometry_config import PRESETS
+from sim.seeds import Seeds
+from sim.twins import TWINS
+from slam.errors import InvalidValueError, LogFormatError
+from slam.files import write_text
+
+RECIPE = "recipe.json"
+SCHEMA = 1
+MAX_BYTES = 1 << 16
+MAX_SECONDS = 86_400.0
+SCANNERS = {"full": Lms221Config, "noise": Lms221Config.noise_only, "ideal": Lms221Config.ideal}
+_DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "rosbags")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """What decides an episode.
+
+    scene       registered name or ``module:function``; ``options`` of it, e.g. n_chairs
+    seed        whole number >= 0
+    dynamism    knob in [0, 1]
+    seconds     of driving
+    scanner     "full" (every effect), "noise" (the statistical error alone) or "ideal"
+    resolution_deg, range_mode  of the scanner (``Lms221Config``)
+    odometry    preset of the wheel encoders
+    twin        "", or which one of a drive's three versions (``sim.twins``)
+    """
+
+    scene: str
+    seed: int
+    dynamism: float
+    seconds: float
+    scanner: str = "full"
+    resolution_deg: float = 0.5
+    range_mode: str = "80m"
+    odometry: str = "pioneer3dx"
+    twin: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.scene, str) or not self.scene:
+            raise InvalidValueError(f"Recipe.scene must be a name, got {self.scene!r}")
+        Seeds(self.seed)
+        Dynamism.from_knob(self.dynamism)
+        if isinstance(self.seconds, bool) or not isinstance(self.seconds, (int, float)):
+            raise InvalidValueError(f"Recipe.seconds must be a number, got {self.seconds!r}")
+        if not 0.0 < self.seconds <= MAX_SECONDS:
+            raise InvalidValueError(
+                f"Recipe.seconds must be > 0 and at most {MAX_SECONDS:g}, got {self.seconds}"
+            )
+        for name, known in (("scanner", SCANNERS), ("odometry", PRESETS), ("twin", ("", *TWINS))):
+            value = getattr(self, name)
+            if not isinstance(value, str) or value not in known:
+                raise InvalidValueError(
+                    f"Recipe.{name} must be one of {', '.join(map(repr, known))}, got {value!r}"
+                )
+        if not isinstance(self.options, Mapping):
+            raise InvalidValueError(f"Recipe.options must be a mapping, got {self.options!r}")
+        self.laser()
+
+    def laser(self) -> Lms221Config:
+        """How the scanner is set."""
+        return SCANNERS[self.scanner](
+            resolution_deg=self.resolution_deg, range_mode=self.range_mode
+        )
+
+    def simulation(self) -> dict[str, Any]:
+        """Arguments of ``Simulation``."""
+        return {
+            "scene": self.scene,
+            "seed": self.seed,
+            "dynamism": self.dynamism,
+            "laser": self.laser(),
+            "odometry": self.odometry,
+            "labels": True,
+            **self.options,
+        }
+
+    def of_twin(self, twin: str) -> Recipe:
+        """The same for another version of its drive."""
+        return replace(self, twin=twin)
+
+    @property
+    def name(self) -> str:
+        """Of the episode's folder: ``office-d0.50-s0001``, with the twin's name at the end."""
+        scene = re.sub(r"[^A-Za-z0-9_.]+", "-", self.scene).strip("-.")
+        twin = f"-{self.twin}" if self.twin else ""
+        return f"{scene}-d{self.dynamism:.4g}-s{self.seed:04d}{twin}"
+
+    @property
+    def sha256(self) -> str:
+        """Of everything that decides the episode, whoever makes it."""
+        text = json.dumps({"schema": SCHEMA, **asdict(self)}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def made_with() -> dict[str, Any]:
+    """Everything about this machine that can change a bit: versions, and what its CPU can do."""
+    versions = {}
+    for name in _DEPENDENCIES:
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            versions[name] = "not installed"
+    numpy: Any = np.show_config(mode="dicts")
+    found = sorted(numpy["SIMD Extensions"].get("found", ()))
+    disabled = os.environ.get("NPY_DISABLE_CPU_FEATURES", "").replace(",", " ").split()
+    return {
+        "versions": versions,
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+        "libc": "-".join(platform.libc_ver()),
+        "cpu": " ".join(name for name in found if name not in disabled),
+    }
+
+
+def write_recipe(path: Path, recipe: Recipe, result: Mapping[str, Any]) -> None:
+    """``result``: what came out, the hash of the messages among it."""
+    text = {
+        "schema": SCHEMA,
+        "recipe": asdict(recipe),
+        "recipe_sha256": recipe.sha256,
+        "made_with": made_with(),
+        "result": dict(result),
+    }
+    write_text(path, json.dumps(text, indent=1, sort_keys=True, allow_nan=False) + "\n")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Made:
+    """A recipe that was carried out: by whom, and what came out."""
+
+    recipe: Recipe
+    made_with: Mapping[str, Any]
+    result: Mapping[str, Any]
+
+    def elsewhere(self) -> str:
+        """What is different here, in words; empty on the same versions and CPU."""
+        here, there = made_with(), self.made_with
+        changes = []
+        for name in ("python", "machine", "libc", "cpu"):
+            if here[name] != there.get(name):
+                changes.append(f"{name} {there.get(name)} then, {here[name]} now")
+        then = there.get("versions")
+        then = then if isinstance(then, Mapping) else {}
+        for name, version in here["versions"].items():
+            if version != then.get(name):
+                changes.append(f"{name} {then.get(name)} then, {version} now")
+        return "; ".join(changes)
+
+
+def read_recipe(path: Path) -> Made:
+    """Inverse of ``write_recipe``; ``LogFormatError`` that names the file for anything else."""
+    try:
+        with path.open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+        if len(raw) > MAX_BYTES:
+            raise LogFormatError(path, f"more than {MAX_BYTES} bytes: no recipe")
+        data = json.loads(raw.decode("utf-8"), parse_constant=_refuse)
+    except OSError as error:
+        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:
+        raise LogFormatError(path, f"no recipe: {error}") from error
+    wanted = ("schema", "recipe", "recipe_sha256", "made_with", "result")
+    if not isinstance(data, dict) or any(name not in data for name in wanted):
+        raise LogFormatError(path, f"no recipe: expected {', '.join(wanted)}")
+    if data["schema"] != SCHEMA:
+        raise LogFormatError(path, f"recipe of schema {data['schema']!r}, expected {SCHEMA}")
+    parts = [data["recipe"], data["made_with"], data["result"]]
+    if not all(isinstance(part, dict) for part in parts):
+        raise LogFormatError(path, "no recipe: its parts are no objects")
+    unknown = sorted(set(parts[0]) - {f.name for f in fields(Recipe)})
+    if unknown:
+        raise LogFormatError(path, f"unknown key {unknown[0]!r} in the recipe")
+    try:
+        recipe = Recipe(**parts[0])
+    except (InvalidValueError, TypeError) as error:
+        raise LogFormatError(path, f"no recipe: {error}") from error
+    if recipe.sha256 != data["recipe_sha256"]:
+        raise LogFormatError(path, "damaged: recipe_sha256 is not that of the recipe")
+    return Made(recipe=recipe, made_with=parts[1], result=parts[2])
+
+
+def _refuse(constant: str) -> float:
+    raise ValueError(f"{constant} is no JSON number")
