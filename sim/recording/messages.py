@@ -31,6 +31,7 @@ POINT = np.dtype(
         ("incidence", "<f4"), ("kind", "u1"), ("mixed", "u1"),
     ]
 )  # fmt: skip
+UNKNOWN = -1.0  # first entry of a covariance: there is no such measurement (sensor_msgs/Imu)
 _PER_M = np.float32(1024.0)  # points are rounded to 1 / 1024 m: more digits are noise to store
 _ROS_TYPES = {"<f4": 7, "<i4": 5, "|u1": 2}  # sensor_msgs/PointField
 
@@ -54,7 +55,14 @@ def turn_time_s(spec: LaserSpec, turns: int) -> float:
         return 0.0
     last = ((spec.n_beams - 1) // turns) * turns
     sweep = float(spec.beam_time_offsets[last])
-    return sweep * math.tau / (last * spec.angle_increment)
+    if sweep <= 0.0:
+        return 0.0
+    turn = sweep * math.tau / (last * spec.angle_increment)
+    for digits in range(9):  # offsets are whole nanoseconds: the roundest rate that they can mean
+        rate = round(1.0 / turn, digits)
+        if rate > 0.0 and abs(1.0 / rate - turn) <= turn * 1e-9 / sweep:
+            return 1.0 / rate
+    return turn
 
 
 class ScanMessage:
@@ -122,7 +130,8 @@ _PLANAR = np.array([6 * i + j for i in (0, 1, 5) for j in (0, 1, 5)])  # x, y, y
 class OdometryMessage:
     """nav_msgs/Odometry; its covariance is of the pose, accumulated since the first frame.
 
-    ``twist.covariance`` is that of the motion since the frame before over the squared time.
+    ``twist.covariance`` is that of the motion since the frame before over the squared time; its
+    first entry is -1 where the twist is unknown, as in sensor_msgs/Imu.
     """
 
     KIND = "nav_msgs/msg/Odometry"
@@ -162,7 +171,9 @@ class OdometryMessage:
             self._twist[0], self._twist[1], self._twist[5] = vx, vy, omega
         if accumulated is not None:
             self._spread[_PLANAR] = accumulated.ravel()
-        if odometry.increment_covariance is not None and dt > 0.0:
+        if odometry.twist is None:
+            self._twist_spread[0] = UNKNOWN
+        elif odometry.increment_covariance is not None and dt > 0.0:
             self._twist_spread[_PLANAR] = odometry.increment_covariance.ravel() / (dt * dt)
         return self._template.stamp(odometry.stamp_ns)
 

@@ -250,11 +250,12 @@ def _pose(message: Any, stamp_ns: int) -> Stamped:
 
 def _odometry(message: Any, stamp_ns: int, with_covariance: bool) -> Stamped:
     twist = message.twist.twist
+    known = message.twist.covariance[0] != -1.0  # the convention of sensor_msgs/Imu
     rates = np.array([twist.linear.x, twist.linear.y, twist.angular.z])
     return Stamped(
         stamp_ns=stamp_ns,
         pose=_planar(message.pose.pose),
-        twist=rates if np.isfinite(rates).all() else None,
+        twist=rates if known and np.isfinite(rates).all() else None,
         covariance=message.pose.covariance[_PLANAR] if with_covariance else None,
     )
 

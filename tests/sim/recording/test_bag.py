@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded episode is what was seen live, for our reader and for those of others."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import tracemalloc
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from sim.lidar import Lms221Config
+from sim.moments import Moment, toured
+from sim.recording.bag import BagWriter, _accumulate
+from sim.recording.messages import turns_of
+from sim.recording.relations import pairs
+from sim.simulation import Simulation
+from slam import create, metrics, se2
+from slam.errors import InvalidValueError
+from slam.frames import NS_PER_S, BeamClass, Frame, LaserSpec, Odometry, Scan
+from slam.logs import read_bag
+from slam.maps import read_map
+from slam.trajectory import read_tum
+
+
+@pytest.fixture(scope="session")
+def decoded(recorded) -> dict[str, list[Any]]:
+    """Every message by topic, as the MCAP library of others decodes it."""
+    out: dict[str, list[Any]] = defaultdict(list)
+    with next(recorded.path.glob("*.mcap")).open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        for schema, channel, message, ros in reader.iter_decoded_messages():
+            out[channel.topic].append((schema.name, message.log_time, ros))
+    return out
+
+
+def test_frames_read_back_are_those_seen_live(recorded):
+    stream = read_bag(recorded.path, labels=True)
+    live = [moment.frame for moment in recorded.moments]
+    assert list(stream) == live
+    assert list(stream) == live  # and again
+    assert stream.metadata.laser == recorded.simulation.spec
+    without = next(iter(read_bag(recorded.path)))
+    assert without.labels is None
+    assert without.truth is not None
+
+
+def test_estimates_are_the_same_to_the_byte(recorded):
+    live, read = create("shunting"), create("shunting")
+    for moment, frame in zip(recorded.moments, read_bag(recorded.path), strict=True):
+        ours = live.update(moment.frame.without_truth())
+        theirs = read.update(frame.without_truth())
+        assert ours.T_map_robot.tobytes() == theirs.T_map_robot.tobytes()
+        assert ours.covariance.tobytes() == theirs.covariance.tobytes()
+
+
+@pytest.mark.parametrize("resolution_deg", [1.0, 0.5, 0.25])
+@pytest.mark.parametrize("fov_deg", [100, 180])
+@pytest.mark.parametrize("range_mode", ["8m", "80m"])
+def test_every_setting_of_the_scanner_is_rebuilt_exactly(
+    tmp_path, resolution_deg, fov_deg, range_mode
+):
+    config = Lms221Config.ideal(
+        resolution_deg=resolution_deg, fov_deg=fov_deg, range_mode=range_mode
+    )
+    spec = config.spec(np.array([0.02, 0.0, 0.0]))
+    assert turns_of(spec) == config.turns
+    frames = [plain_frame(spec, k * 53_333_333) for k in range(3)]
+    write(tmp_path / "bag", spec, frames)
+    stream = read_bag(tmp_path / "bag")
+    assert stream.metadata.laser == spec
+    assert list(stream) == frames
+
+
+def plain_frame(spec: LaserSpec, stamp_ns: int, intensities: bool = False) -> Frame:
+    ranges = np.linspace(1.0, 7.0, spec.n_beams, dtype=np.float32)
+    scan = Scan(
+        stamp_ns=stamp_ns,
+        ranges=ranges,
+        spec=spec,
+        intensities=ranges if intensities else None,
+    )
+    pose = np.array([stamp_ns * 1e-9, 0.1, 0.3])
+    return Frame(
+        stamp_ns=stamp_ns, odometry=Odometry(stamp_ns=stamp_ns, T_odom_robot=pose), scan=scan
+    )
+
+
+def write(path: Path, spec: LaserSpec, frames: list[Frame], **options: Any) -> BagWriter:
+    nobody = (np.zeros((0, 3)), np.zeros(0, dtype=np.bool_))
+    with BagWriter(path, spec, labels=False, **options) as bag:
+        for frame in frames:
+            bag.write(Moment(frame=frame, poses=nobody[0], moving=nobody[1]))
+    return bag
+
+
+def test_intensities_and_frames_without_truth_survive(tmp_path):
+    spec = Lms221Config().spec()
+    frames = [plain_frame(spec, k * 26_666_667, intensities=True) for k in range(3)]
+    write(tmp_path / "bag", spec, frames, intensities=True)
+    assert list(read_bag(tmp_path / "bag")) == frames
+
+
+def test_topics_are_standard_messages(decoded, recorded):
+    n = len(recorded.moments)
+    counts = {topic: (found[0][0], len(found)) for topic, found in decoded.items()}
+    assert counts == {
+        "/scan": ("sensor_msgs/msg/LaserScan", n),
+        "/scan_turn": ("sensor_msgs/msg/LaserScan", 2 * n),
+        "/odom": ("nav_msgs/msg/Odometry", n),
+        "/odom_increment": ("geometry_msgs/msg/PoseWithCovarianceStamped", n),
+        "/tf": ("tf2_msgs/msg/TFMessage", n),
+        "/tf_static": ("tf2_msgs/msg/TFMessage", 1),
+        "/ground_truth/pose": ("geometry_msgs/msg/PoseStamped", n),
+        "/ground_truth/objects": ("visualization_msgs/msg/MarkerArray", n),
+        "/ground_truth/labels": ("sensor_msgs/msg/PointCloud2", n),
+    }
+
+
+def test_scans_follow_rep_117_and_the_driver(decoded, recorded):
+    scan, turn = decoded["/scan"][0][2], decoded["/scan_turn"][1][2]
+    assert scan.header.frame_id == turn.header.frame_id == "laser"
+    assert scan.scan_time == pytest.approx(2 / 75)
+    assert turn.scan_time == pytest.approx(1 / 75)
+    assert turn.time_increment == pytest.approx(turn.scan_time / math.tau * math.radians(1.0))
+    for message in (scan, turn):
+        beams = len(message.ranges) - 1
+        assert message.angle_max == pytest.approx(
+            message.angle_min + beams * message.angle_increment, abs=1e-5
+        )
+    spec = recorded.simulation.spec
+    stamp = turn.header.stamp.sec * NS_PER_S + turn.header.stamp.nanosec
+    first = recorded.moments[0].frame.stamp_ns
+    assert stamp - first == round(spec.beam_time_offsets[1] * 1e9)
+    for k, moment in enumerate(recorded.moments):
+        ranges = np.array(decoded["/scan"][k][2].ranges, dtype=np.float32)
+        assert np.array_equal(ranges, moment.frame.scan.ranges, equal_nan=True)
+        assert not np.isneginf(ranges).any()
+    every = np.concatenate([m.frame.scan.ranges for m in recorded.moments])
+    assert np.isnan(every).any()  # the codes are really there
+
+
+def test_objects_stand_where_they_truly_are(decoded, recorded):
+    movers = recorded.simulation.world.scene.movers
+    moved = 0
+    for (_, stamp, array), moment in zip(
+        decoded["/ground_truth/objects"], recorded.moments, strict=True
+    ):
+        assert stamp == moment.frame.stamp_ns
+        assert len(array.markers) == len(movers) - 1
+        for marker in array.markers:
+            mover = movers[marker.id]
+            assert (marker.ns, marker.text) == (mover.kind, mover.name)
+            x, y, yaw = moment.poses[marker.id]
+            if mover.kind == "door":
+                continue
+            assert (marker.pose.position.x, marker.pose.position.y) == (x, y)
+            assert marker.scale.x == pytest.approx(2.0 * mover.radius)
+            q = marker.pose.orientation
+            assert abs(se2.wrap(2.0 * math.atan2(q.z, q.w) - yaw)) < 1e-12
+            moved += (marker.color.r > 0.8) and bool(moment.moving[marker.id])
+            assert (marker.color.r > 0.8) == bool(moment.moving[marker.id])
+    assert moved > 0
+
+
+def test_labels_lie_on_the_points_that_they_label(decoded, recorded):
+    kinds = set()
+    for (_, _, cloud), moment in zip(
+        decoded["/ground_truth/labels"], recorded.moments, strict=True
+    ):
+        dtype = np.dtype(
+            {
+                "names": [f.name for f in cloud.fields],
+                "formats": [{7: "<f4", 5: "<i4", 2: "u1"}[f.datatype] for f in cloud.fields],
+                "offsets": [f.offset for f in cloud.fields],
+                "itemsize": cloud.point_step,
+            }
+        )
+        points = np.frombuffer(bytes(cloud.data), dtype=dtype)
+        scan, labels = moment.frame.scan, moment.frame.labels
+        there = np.isfinite(scan.ranges)
+        assert np.array_equal(np.isfinite(points["x"]), there)
+        distance = np.hypot(points["x"], points["y"])[there]
+        assert np.abs(distance - scan.ranges[there]).max() < 2e-3
+        assert np.array_equal(points["body"], labels.body)
+        assert np.array_equal(points["kind"], labels.kind)
+        kinds |= set(points["kind"].tolist())
+    assert {int(BeamClass.STATIC), int(BeamClass.MOVING)} <= kinds
+
+
+def test_odometry_carries_the_covariance_accumulated_so_far(recorded, decoded):
+    covariance, before = np.zeros((3, 3)), None
+    for moment, (_, _, message) in zip(recorded.moments, decoded["/odom"], strict=True):
+        now = moment.frame.odometry
+        step = np.zeros(3) if before is None else se2.between(before, now.T_odom_robot)
+        start = now.T_odom_robot if before is None else before
+        covariance = se2.propagate(covariance, start, step, now.increment_covariance)
+        written = np.reshape(message.pose.covariance, (6, 6))[np.ix_((0, 1, 5), (0, 1, 5))]
+        np.testing.assert_allclose(written, covariance, rtol=1e-9, atol=1e-15)
+        before = now.T_odom_robot
+
+
+def test_accumulating_is_propagating():
+    rng = np.random.default_rng(0)
+    root, step_root = rng.normal(size=(2, 3, 3))
+    P, Q = root @ root.T, step_root @ step_root.T
+    pose, step = np.array([1.0, 2.0, 0.7]), np.array([0.3, -0.1, 0.2])
+    wanted = se2.propagate(P, pose, step, Q)
+    _accumulate(P, 0.7, step, Q)
+    np.testing.assert_allclose(P, wanted, rtol=1e-12)
+
+
+def test_the_files_beside_the_bag_hold_the_truth(recorded):
+    truth = read_tum(recorded.path / "trajectory.tum")
+    live = np.array([m.frame.truth for m in recorded.moments])
+    np.testing.assert_allclose(truth.poses, live, atol=1e-9)
+    raster = read_map(recorded.path / "map.yaml")
+    static = recorded.simulation.world.scene.static_map
+    assert np.array_equal(raster.values, static.values, equal_nan=True)
+    lines = (recorded.path / "relations.txt").read_text().splitlines()
+    assert len(lines) == len(pairs(truth)) > 0
+    t1, t2, x, y, z, roll, pitch, yaw = map(float, lines[0].split())
+    k1, k2 = (int(np.argmin(np.abs(truth.stamps_ns * 1e-9 - t))) for t in (t1, t2))
+    np.testing.assert_allclose((x, y, yaw), se2.between(live[k1], live[k2]), atol=1e-8)
+    assert (z, roll, pitch) == (0.0, 0.0, 0.0)
+
+
+def test_evo_reads_the_bag_and_the_tum_file(recorded, tmp_path):
+    """evo is GPL, so it runs as a program of its own; its error is ours."""
+    environment = {**os.environ, "HOME": str(tmp_path)}
+    code = (
+        "from evo.core import metrics, sync\n"
+        "from evo.tools import file_interface as files\n"
+        "from rosbags.rosbag2 import Reader\n"
+        f"with Reader({str(recorded.path)!r}) as bag:\n"
+        "    truth = files.read_bag_trajectory(bag, '/ground_truth/pose')\n"
+        "    odom = files.read_bag_trajectory(bag, '/odom')\n"
+        f"tum = files.read_tum_trajectory_file({str(recorded.path / 'trajectory.tum')!r})\n"
+        "assert tum.num_poses == truth.num_poses\n"
+        "odom.align_origin(truth)\n"
+        "ape = metrics.APE(metrics.PoseRelation.translation_part)\n"
+        "ape.process_data(sync.associate_trajectories(truth, odom))\n"
+        "print(ape.get_statistic(metrics.StatisticsType.rmse))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    theirs = float(done.stdout.split()[-1])
+    odometry = create("odometry")
+    for frame in read_bag(recorded.path):
+        odometry.update(frame)
+    ours = metrics.ate(odometry.trajectory(), read_tum(recorded.path / "trajectory.tum")).value
+    assert theirs == pytest.approx(ours, abs=1e-6)
+
+
+def test_memory_stays_flat_however_long_the_episode(tmp_path):
+    spec = Lms221Config().spec()
+
+    def peak(n: int) -> tuple[int, int]:
+        frames = (plain_frame(spec, k * 26_666_667) for k in range(n))
+        path = tmp_path / str(n)
+        tracemalloc.start()
+        write(path, spec, frames)
+        writing = tracemalloc.get_traced_memory()[1]
+        tracemalloc.reset_peak()
+        for _ in read_bag(path):
+            pass
+        reading = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return writing, reading
+
+    short, long = peak(400), peak(1600)
+    assert long[0] < short[0] + 3_000_000
+    assert long[1] < short[1] + 3_000_000
+
+
+def test_a_frame_of_another_scanner_or_without_a_scan_is_refused(tmp_path):
+    spec, other = Lms221Config().spec(), Lms221Config(resolution_deg=1.0).spec()
+    with pytest.raises(InvalidValueError, match="another one"):
+        write(tmp_path / "bag", spec, [plain_frame(other, 0)])
+    assert not list((tmp_path / "bag").glob("metadata.yaml"))
+
+
+def test_a_simulation_can_be_recorded_at_any_rate(tmp_path):
+    simulation = Simulation("arena", seed=1, laser=Lms221Config(resolution_deg=0.25), labels=True)
+    moments = list(toured(simulation, 0.4))
+    with BagWriter(tmp_path / "bag", simulation.spec) as bag:
+        for moment in moments:
+            bag.write(moment)
+    assert list(read_bag(tmp_path / "bag", labels=True)) == [m.frame for m in moments]
