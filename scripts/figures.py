@@ -11,14 +11,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from slam import se2
 from slam.files import replacing
 from slam.frames import NS_PER_S, Float
+from slam.shunting.layers import Changes
 from slam.system import Raster
 from slam.trajectory import Trajectory
 
 COLORS = {"shunting": "#ce2c3c", "odometry": "#de6e18", "truth": "#168c5a"}
+CHANGED = 0.45  # fainter differences: looks too few to tell
 _SPARE = ("#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f")
 
 
@@ -134,5 +137,31 @@ def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float
     ax.plot(track.poses[:, 0], track.poses[:, 1], "k-", lw=0.9, label="trajectory")
     ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title="Activities of the map")
     figure.colorbar(image, ax=ax, shrink=0.6, label="activity")
+    ax.legend(loc="upper left", frameon=False)
+    save(figure, path)
+
+
+def changes_picture(path: Path, raster: Raster, changes: Changes, track: Trajectory) -> None:
+    """What changed lately over what is there: appeared green, gone red, the rest grey."""
+    height, width = raster.values.shape
+    figure, axes = _axes(min(11.0, max(5.0, 5.5 * width / height + 2.0)), 6.5)
+    ax: Axes = axes[0]
+    ax.grid(visible=False)
+    ax.set_facecolor("#fafaf8")
+    x, y, _ = raster.T_map_origin
+    extent = (x, x + width * raster.resolution_m, y, y + height * raster.resolution_m)
+    ax.imshow(np.nan_to_num(raster.values), origin="lower", extent=extent, cmap="Greys", vmin=0.0,
+              vmax=2.0, interpolation="nearest")  # fmt: skip
+    for layer, cmap, label in (
+        (changes.gone, "Reds", "gone: in long-term memory, seen empty"),
+        (changes.appeared, "Greens", "new: not (yet) in long-term memory"),
+    ):
+        thick = maximum_filter(np.nan_to_num(layer.values), size=3)  # a chair's leg is two cells
+        clear = np.where(thick > CHANGED, thick, np.nan)
+        image = ax.imshow(clear, origin="lower", extent=extent, cmap=cmap, vmin=0.0, vmax=1.0,
+                          interpolation="nearest")  # fmt: skip
+        figure.colorbar(image, ax=ax, shrink=0.6, pad=0.02, label=label)
+    ax.plot(track.poses[:, 0], track.poses[:, 1], "k-", lw=0.9, label="trajectory")
+    ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title="What changed lately")
     ax.legend(loc="upper left", frameon=False)
     save(figure, path)

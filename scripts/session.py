@@ -24,6 +24,7 @@ from slam.files import write_text
 from slam.frames import Stream
 from slam.maps import write_map
 from slam.replay import Replay
+from slam.shunting import ShuntingSlam
 from slam.system import SlamSystem, create
 from slam.trajectory import write_tum
 
@@ -129,6 +130,12 @@ def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any])
     if raster is not None:
         write_map(folder / "map", show.seen.merge(raster))
         figures.map_picture(folder / "map.png", raster, online[show.primary], show.last_points_map)
+    system = replay.tracks[show.primary].system
+    if isinstance(system, ShuntingSlam):
+        system.save(folder / "map.npz")
+        changes = system.changes()
+        if raster is not None and changes is not None:
+            figures.changes_picture(folder / "changes.png", raster, changes, online[show.primary])
     write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
 
 
@@ -137,7 +144,7 @@ def file_name(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
 
 
-_WORTH_OPENING = ("film.mp4", "map.png", "trajectories.png", "errors.png")
+_WORTH_OPENING = ("film.mp4", "map.png", "changes.png", "trajectories.png", "errors.png")
 
 
 def _tell(outputs: Outputs) -> None:
@@ -146,6 +153,8 @@ def _tell(outputs: Outputs) -> None:
     others = ["results.json has every number", "trajectory_*.tum is for evo"]
     if (outputs.folder / "map.yaml").exists():
         others.append("map.yaml for map_server")
+    if (outputs.folder / "map.npz").exists():
+        others.append("map.npz for ShuntingSlam.load")
     first = escape(str(outputs.folder / there[0]))
     then = f", then {', '.join(there[1:])} beside it" if there[1:] else ""
     console.print(

@@ -170,6 +170,9 @@ class OccupancySlam(ShuntingSlam):
     def _new_network(self) -> Network:
         return Grid(self.config)
 
+    def changes(self) -> None:
+        """A grid has but one memory."""
+
     def map(self) -> Raster | None:
         """Probability of being occupied; NaN where nothing was ever seen."""
         grid = self.network

@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import Float, Frame, Odometry
+from slam.shunting import layers, memory
 from slam.shunting.belief import Belief
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.impressions import (
@@ -32,6 +35,7 @@ from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
 
 FIRST_LOOK_S = 1.0  # the first frame acts this long, so that the map is usable at once
+RESUMED_LOOK_S = 0.2  # of the first frame with a loaded map
 LONGEST_LOOK_S = 3.0  # however long ago the previous frame was
 WIDEST = SearchWindow(reach_m=0.6, turn_rad=0.5)
 GOOD_SHARE = 0.85  # of the usual matched fraction: below it the neighbourhood is searched
@@ -68,6 +72,7 @@ class ShuntingSlam:
         self.network = self._new_network()
         self._matcher = Matcher(self.config)
         self._before: Odometry | None = None
+        self._resumed: Float | None = None
         self._T_map_robot: Float = np.zeros(3)
         self._belief = Belief(self.config.cell_m)
         self._usual: deque[float] = deque(maxlen=50)
@@ -84,13 +89,13 @@ class ShuntingSlam:
 
     def update(self, frame: Frame) -> Estimate:
         """Predict, look, match, integrate."""
-        if self._before is None:
+        if self._before is None and self._resumed is None:
             return self._first(frame)
-        if frame.stamp_ns <= self._stamps[-1]:
+        if self._stamps and frame.stamp_ns <= self._stamps[-1]:
             raise InvalidValueError(
                 f"frames must come in order: {frame.stamp_ns} ns after {self._stamps[-1]} ns"
             )
-        prediction = predict(self._T_map_robot, self._before, frame.odometry)
+        prediction = self._predict(frame.odometry)
         observations = self._observe(frame, prediction.twist)
         if self._recovery is None:
             match = self._match(observations, prediction)
@@ -112,6 +117,19 @@ class ShuntingSlam:
         )
         self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
         return self._report(frame, match, "tracking")
+
+    def _predict(self, odometry: Odometry) -> Prediction:
+        """By odometry; on the first frame with a loaded map, where the robot was before."""
+        if self._before is not None:
+            return predict(self._T_map_robot, self._before, odometry)
+        assert self._resumed is not None
+        return Prediction(
+            T_map_robot=self._T_map_robot,
+            increment=np.zeros(3),
+            covariance=self._resumed,
+            twist=np.zeros(3) if odometry.twist is None else np.asarray(odometry.twist),
+            elapsed=RESUMED_LOOK_S,
+        )
 
     def _observe(self, frame: Frame, twist: Float) -> Observations:
         if frame.scan is None and frame.features is None:
@@ -244,28 +262,56 @@ class ShuntingSlam:
         )
 
     def map(self) -> Raster | None:
-        """The larger of trace and short-term activity relative to saturation; NaN where no neuron
-        lives (never seen, or seen empty: the network does not tell these apart).
+        """What exists, from either memory; NaN where no neuron lives (never seen, or seen empty:
+        the network does not tell these apart).
         """
-        extent = self.network.extent()
-        if extent is None:
-            return None
-        cell = self.config.cell_m
-        i0, j0, i1, j1 = extent
-        x, y = self.window(
-            (i0 + 0.5) * cell, (j0 + 0.5) * cell, (i1 - 0.5) * cell, (j1 - 0.5) * cell
-        )
-        values = np.minimum(np.maximum(y, x / np.float32(self.config.saturation)), np.float32(1.0))
-        values[values == 0.0] = np.nan
-        return Raster(
-            values=values, resolution_m=cell, T_map_origin=np.array([i0 * cell, j0 * cell, 0.0])
-        )
+        return layers.existence(self.network)
+
+    def changes(self) -> layers.Changes | None:
+        """What appeared and what is gone lately; None without a map or a long-term memory."""
+        return layers.changes(self.network)
 
     def window(
         self, xmin: float, ymin: float, xmax: float, ymax: float
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Dense short-term x and long-term y of the neurons centred in the rectangle (map, m)."""
         return self.network.window(xmin, ymin, xmax, ymax)
+
+    def save(self, path: Path) -> None:
+        """Write map, knobs and pose to a file for ``load``; raises ``OutputError``."""
+        state = memory.State(
+            kind=type(self).__name__,
+            T_map_robot=self._T_map_robot,
+            covariance=self._belief.covariance,
+            usual=tuple(self._usual),
+            supports=tuple(self._supports),
+            tracked_s=self._tracked_s,
+            tracked=self._tracked,
+        )
+        memory.save(path, self.network, state)
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """A SLAM that goes on in the map of a file, with new odometry and a new clock.
+
+        The robot is looked for around where it was, then in the whole map. The trajectory begins
+        with the first frame. Raises ``LogFormatError`` for a file that is not one of ``save``.
+        """
+        config, state, arrays = memory.read(path)
+        if state.kind != cls.__name__:
+            raise LogFormatError(path, f"a map of {state.kind}, not of {cls.__name__}")
+        slam = cls.__new__(cls)
+        slam.config = config
+        warm_up()
+        slam.reset()
+        memory.fill(slam.network, arrays)
+        slam._T_map_robot = state.T_map_robot
+        slam._resumed = state.covariance + COARSE
+        slam._belief.relocated(state.covariance)
+        slam._usual.extend(state.usual)
+        slam._supports.extend(state.supports)
+        slam._tracked_s, slam._tracked = state.tracked_s, state.tracked
+        return slam
 
     def trajectory(self) -> Trajectory:
         """The poses with loops closed; the online ones up to 100 m of way, or without a loop."""

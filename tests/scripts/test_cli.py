@@ -46,7 +46,7 @@ def test_the_demo_leaves_everything_it_promises(finished):
     promised = {
         "film.mp4", "map.png", "map.pgm", "map.yaml", "trajectories.png", "errors.png",
         "trajectory_shunting.tum", "trajectory_odometry.tum", "trajectory_truth.tum",
-        "recipe.json", "results.json",
+        "recipe.json", "results.json", "changes.png", "map.npz",
     }  # fmt: skip
     assert promised <= {p.name for p in out.iterdir()}
     assert all(p.stat().st_size > 0 for p in out.iterdir())
