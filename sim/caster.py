@@ -1,11 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which geoms of a model a planar scanner can see, and how it casts on them.
-
-The candidates are chosen once: visible geoms (alpha above 0, not in the groups of collision hulls
-and of painted shadows, not on the scanner's own robot) whose height can meet the scan plane.
-Everything in a world of planar movers keeps its height, so the list holds for the whole run; what
-can change height (limbs, free bodies) is always kept.
-"""
+"""A scanner's beams cast on the geoms of one model, each at its own time."""
 
 from __future__ import annotations
 
@@ -17,18 +11,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import fan as fans
 from sim import raycast, windows
-from slam.errors import InvalidValueError
+from sim.candidates import candidates
 
 Float = NDArray[np.float64]
 Hits = tuple[Float, NDArray[np.int64], Float]
 
 MAX_SLOTS = 12  # the ends of the two physics steps of each of four sweeps
-
-HULL_GROUP = 3  # collision hulls: never seen by rays or cameras
-PAINT_GROUP = 5  # shadows painted on the floor: for cameras only
-UNSEEN_GROUPS = (HULL_GROUP, PAINT_GROUP)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,50 +40,6 @@ class Spot:
             length = math.sqrt(1.0 + left * left + up * up)
             out[k] = u, v, 1.0 / length, left / length, up / length, up
         return out
-
-
-def _name(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
-    return mujoco.mj_id2name(model, kind, index) or f"#{index}"
-
-
-def subtree(model: mujoco.MjModel, root: int) -> NDArray[np.bool_]:
-    """(nbody,) True for a body and all its descendants."""
-    inside = np.zeros(model.nbody, dtype=np.bool_)
-    inside[root] = True
-    for body in range(root + 1, model.nbody):
-        inside[body] = inside[model.body_parentid[body]]
-    return inside
-
-
-def _changes_height(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.bool_]:
-    """(nbody,) True where a joint or a mocap parent can lift or tip the body."""
-    out = np.zeros(model.nbody, dtype=np.bool_)
-    for body in range(1, model.nbody):
-        out[body] = out[model.body_parentid[body]] or model.body_mocapid[body] >= 0
-        first = model.body_jntadr[body]
-        for joint in range(first, first + model.body_jntnum[body]):
-            kind, vertical = model.jnt_type[joint], abs(data.xaxis[joint][2])
-            planar = (kind == mujoco.mjtJoint.mjJNT_SLIDE and vertical < 1e-9) or (
-                kind == mujoco.mjtJoint.mjJNT_HINGE and vertical > 1.0 - 1e-9
-            )
-            out[body] |= not planar
-    return out
-
-
-def _half_height(kind: int, size: Float, mat: Float) -> float:
-    """Half the vertical extent of a primitive with the given orientation, m."""
-    up = np.abs(mat[6:9])  # world z of the geom's own axes
-    if kind == fans.PLANE:
-        return 0.0 if up[2] > 1.0 - 1e-12 else math.inf
-    if kind == fans.SPHERE:
-        return float(size[0])
-    if kind == fans.CAPSULE:
-        return float(size[0] + size[1] * up[2])
-    if kind == fans.CYLINDER:
-        return float(size[1] * up[2] + size[0] * math.sqrt(max(0.0, 1.0 - up[2] * up[2])))
-    if kind == fans.ELLIPSOID:
-        return float(math.sqrt(float(((up * size) ** 2).sum())))
-    return float((up * size).sum())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,7 +84,7 @@ class Raycaster:
     Attributes: ``ids`` (n,) geom ids of the candidates; ``lasers`` (slots, 3) x, y, yaw of the
     laser at each ``note`` of the scan; after ``cast``, ``hits`` (ranges m, candidates, |cos| of
     the incidence), each (layers, beams, rays): inf, -1 and NaN for a miss, and ``fan`` (m, 7) the
-    beams in the world; after ``start``, ``noted`` for ``windows.note``.
+    beams in the world; after ``start``, ``noted``, the fields of ``windows.Noted``.
     """
 
     def __init__(
@@ -156,7 +101,8 @@ class Raycaster:
         self.spot = Spot() if spot is None else spot
         self.height = height
         passed = np.zeros(model.ngeom, dtype=np.bool_) if panes is None else panes
-        self.ids = self._candidates(model, robot, range_max, passed)
+        reach = self.spot.aperture + self.spot.divergence * range_max
+        self.ids, self.table = candidates(model, height, reach, robot, passed)
         self.layers = 2 if bool(passed[self.ids].any()) else 1
         n = self.ids.size
         self._rays = self.spot.rays()
@@ -178,49 +124,6 @@ class Raycaster:
         """Number of rays cast for each beam."""
         return len(self.spot.offsets)
 
-    def _candidates(
-        self,
-        model: mujoco.MjModel,
-        robot: str | None,
-        range_max: float,
-        panes: NDArray[np.bool_],
-    ) -> NDArray[np.int64]:
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        lifts = _changes_height(model, data)
-        own = np.zeros(model.nbody, dtype=np.bool_)
-        if robot is not None:
-            body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, robot)
-            if body < 0:
-                raise InvalidValueError(f"Raycaster.robot: the model has no body {robot!r}")
-            own = subtree(model, body)
-        reach = self.spot.aperture + self.spot.divergence * range_max
-        ids, rows = [], []
-        for geom in range(model.ngeom):
-            body = model.geom_bodyid[geom]
-            if own[body] or not _visible(model, geom):
-                continue
-            half, upright = _vertical_extent(model, data, geom, bool(lifts[body]))
-            # A level plane has no height: only a spot that spreads downwards meets it.
-            meets = abs(data.geom_xpos[geom][2] - self.height) <= half + reach
-            if not (lifts[body] or meets):
-                continue
-            kind = int(model.geom_type[geom])
-            if kind not in fans.PRIMITIVES:
-                raise InvalidValueError(
-                    f"geom {_name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)!r} is a "
-                    f"{mujoco.mjtGeom(kind).name[7:].lower()} at the height of the scanner "
-                    f"({self.height:g} m), expected a primitive (sphere, capsule, ellipsoid, "
-                    "cylinder, box or plane): put it in group "
-                    f"{HULL_GROUP} and add primitives for the laser to see"
-                )
-            ids.append(geom)
-            rows.append(
-                (kind, *model.geom_size[geom], half, float(upright), float(panes[geom]), body)
-            )
-        self.table = np.array(rows, dtype=np.float64).reshape(-1, 8)
-        return np.array(ids, dtype=np.int64)
-
     def start(self, data: mujoco.MjData) -> None:
         """Forget the last scan, and note where everything is; needs fresh kinematics."""
         self._filled[0] = 0
@@ -228,10 +131,10 @@ class Raycaster:
             self._seen = data
             views = (data.geom_xpos, data.geom_xmat, data.site_xpos, data.site_xmat)
             where = (*views, self._site, self.poses, self.lasers, self._filled)
-            windows.note(windows.Noted(self.ids, self._all, *where))
+            windows.note((self.ids, self._all, *where))
             self.poses[1:] = self.poses[0]  # what cannot move is never noted again
             windows.enclose(self.table, self._all, self.poses, 1, self.bounds)
-            self.noted = windows.Noted(self.ids, self._movable, *where)
+            self.noted = (self.ids, self._movable, *where)
             self._filled[0] = 0
         self.note()
 
@@ -269,25 +172,3 @@ class Raycaster:
             self.table, polished, self.poses, self.bounds, self.fan, self._plan.beams,
             self.height, self.hits, out,
         )  # fmt: skip
-
-
-def _visible(model: mujoco.MjModel, geom: int) -> bool:
-    """Rays see it: MuJoCo's own rule, and neither a collision hull nor paint."""
-    material = model.geom_matid[geom]
-    rgba = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
-    return bool(rgba[3] != 0.0) and model.geom_group[geom] not in UNSEEN_GROUPS
-
-
-def _vertical_extent(
-    model: mujoco.MjModel, data: mujoco.MjData, geom: int, lifts: bool
-) -> tuple[float, bool]:
-    """(half the height m, whether it is a box that stands upright for good)."""
-    kind, mat = int(model.geom_type[geom]), data.geom_xmat[geom]
-    bound = float(model.geom_rbound[geom])
-    if kind not in fans.PRIMITIVES:
-        # A mesh frame sits at its centre of mass; its bounding sphere is about its box's centre.
-        bound += float(np.abs(model.geom_aabb[geom][:3]).sum())
-        return bound, False
-    if lifts:
-        return (math.inf if kind == fans.PLANE else bound), False
-    return _half_height(kind, model.geom_size[geom], mat), bool(mat[8] > 1.0 - 1e-12)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -32,7 +33,6 @@ from sim.lidar_config import (
 )
 from sim.lidar_receiver import ScanResult, SignalModel, spot_of
 from sim.lidar_surfaces import geom_reflectivity, glass_geoms, polished_geoms
-from sim.windows import Noted
 from slam import se2
 from slam.errors import InvalidValueError
 
@@ -129,8 +129,8 @@ class Lms221:
                 self.caster.note()
         return self.finish()
 
-    def begin(self, data: mujoco.MjData) -> Noted:
-        """Start a scan; whoever advances the world calls ``note`` with this where ``marks`` say."""
+    def begin(self, data: mujoco.MjData) -> tuple[Any, ...]:
+        """Start a scan; who advances the world calls ``windows.note`` with this at ``marks``."""
         self.caster.start(data)
         return self.caster.noted
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from sim.caster import Spot
 from sim.lidar_signal import ERROR_STEP, NEEDED_STEP
+from slam._jit import njit
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
@@ -102,6 +103,17 @@ def needed_table() -> Float:
 _ERROR_WAVES = 5
 
 
+@njit
+def _waves(scale: float, shares: Float, lengths: Float, phases: Float) -> Float:
+    """Their sum every ``ERROR_STEP`` to 100 m."""
+    out = np.zeros(1001)
+    for k in range(out.size):
+        for share, length, phase in zip(shares, lengths, phases):  # noqa: B905  (Numba has no strict)
+            out[k] += share * math.sin(math.tau * k * ERROR_STEP / length + phase)
+        out[k] *= scale
+    return out
+
+
 def error_function(bound: float, rng: np.random.Generator) -> tuple[Float, float]:
     """A smooth random function of range, and a slope against reflectivity; sum within ``bound``.
 
@@ -113,12 +125,5 @@ def error_function(bound: float, rng: np.random.Generator) -> tuple[Float, float
     lengths = [2.0 * 15.0 ** draws[3 * k + 1] for k in range(_ERROR_WAVES)]
     phases = [math.tau * draws[3 * k + 2] for k in range(_ERROR_WAVES)]
     scale = 0.8 * bound / sum(shares)
-    by_range = [
-        scale
-        * sum(
-            share * math.sin(math.tau * k * ERROR_STEP / length + phase)
-            for share, length, phase in zip(shares, lengths, phases, strict=True)
-        )
-        for k in range(1001)
-    ]
-    return np.array(by_range), 0.2 * bound * (2.0 * draws[-1] - 1.0)
+    by_range = _waves(scale, np.array(shares), np.array(lengths), np.array(phases))
+    return by_range, 0.2 * bound * (2.0 * draws[-1] - 1.0)

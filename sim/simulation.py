@@ -20,7 +20,7 @@ from sim.odometry import WheelOdometry
 from sim.pilot import Pilot
 from sim.robot import DriveConfig
 from sim.seeds import Seeds
-from sim.substeps import Watch, plain
+from sim.substeps import plain
 from sim.tag_cameras import TagCameras, TagReading
 from sim.world import SUBSTEPS_PER_S, World
 from slam import se2
@@ -160,7 +160,7 @@ class Simulation:
         world.read_robot(self.path[0], self._travel[0])
         noted = self.laser.begin(world.data)
         if self._watch is None:
-            self._watch = plain(Watch(self.laser.marks, noted, self.path, self._travel))
+            self._watch = plain((self.laser.marks, noted, self.path, self._travel))
         first = 0
         for stop in self._stops:
             world.advance(first, stop, self._watch)

@@ -10,7 +10,7 @@ tests instead of one for every geom. Bounds are generous by ``SLACK``; the exact
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -73,8 +73,11 @@ class Noted(NamedTuple):
 
 
 @njit
-def note(noted: Noted) -> None:
-    """Take over where geoms and laser are now, into the next slot."""
+def note(noted: tuple[Any, ...]) -> None:
+    """Take over where geoms and laser are now, into the next slot.
+
+    noted  ``Noted``, from Python as a plain tuple: a named one costs more than the work
+    """
     ids, rows, xpos, xmat, site_xpos, site_xmat, site, poses, lasers, filled = noted
     slot = filled[0]
     filled[0] += 1
