@@ -27,18 +27,25 @@ FURNITURE = (
 
 
 @register("apartment")
-def apartment(seed: int, *, n_chairs: int | None = None, n_people: int | None = None) -> Scene:
-    """12 x 9 m, seven rooms of a flat: ``n_chairs`` (6) chairs, ``n_people`` (2) people."""
+def apartment(
+    seed: int, *, n_chairs: int | None = None, n_people: int | None = None, doors: str = "open"
+) -> Scene:
+    """12 x 9 m, seven rooms of a flat: ``n_chairs`` (6) chairs, ``n_people`` (2) people.
+
+    ``doors``: how they rest, "open", "ajar", "closed" or "mixed".
+    """
     n_chairs, n_people = count("n_chairs", n_chairs, 6), count("n_people", n_people, 2)
     draws = Draws(seed)
     plan = _plan()
     builder = Builder(plan)
-    hang_doors(builder, draws.doors)
+    hang_doors(builder, draws.doors, doors)
     put_bins(builder, draws.bins)
     floor = free_floor(builder)
     seat_chairs(builder, floor, plan.seats, n_chairs, draws)
     scatter(builder, floor, "person", n_people, draws, draws.people)
-    return finish(builder, "apartment", seed, {"n_chairs": n_chairs, "n_people": n_people})
+    return finish(
+        builder, "apartment", seed, {"n_chairs": n_chairs, "n_people": n_people, "doors": doors}
+    )
 
 
 @cache

@@ -15,6 +15,8 @@ from scenes.scene import Kind, Mover, Pose
 
 LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
 LEAF_HALF = 0.025  # m, half thickness of a door leaf with its trim
+LATCH = -0.2  # rad, where the closer of a door that rests closed would pull it: it stays shut
+WIDE = 1.25  # rad; whatever its rest, room is kept for a leaf this far open
 
 
 class Builder:
@@ -51,7 +53,8 @@ class Builder:
 
         def prepare(child: mujoco.MjSpec) -> None:
             joint = child.joint("hinge")
-            joint.springref, joint.axis = angle, [0.0, 0.0, turn]
+            joint.springref = angle if angle > 0.0 else LATCH
+            joint.axis = [0.0, 0.0, turn]
 
         self._parts.put("door", name, hinge, prepare)
         panel = part("door").geom("panel")
@@ -66,14 +69,16 @@ class Builder:
         return moved(self.initial[name], (0.5 * self._width(name), 0.0, 0.0))
 
     def leaf_box(self, name: str) -> list[float]:
-        """The leaf of a door at rest as a box: cx, cy, half_x, half_y, yaw."""
+        """The leaf of a door that stands open as a box: cx, cy, half_x, half_y, yaw."""
         x, y, yaw = self.initial[name]
         half = 0.5 * self._width(name)
-        centre = moved((x, y, yaw + self.door_angles[name] * self._turns[name]), (half, 0.0, 0.0))
+        centre = moved(
+            (x, y, yaw + max(self.door_angles[name], WIDE) * self._turns[name]), (half, 0.0, 0.0)
+        )
         return [centre[0], centre[1], half, LEAF_HALF, centre[2]]
 
     def leaf_boxes(self) -> NDArray[np.float64]:
-        """(n, 5) all leaves at rest."""
+        """(n, 5) all leaves, open."""
         return np.array([self.leaf_box(name) for name in self.door_angles]).reshape(-1, 5)
 
     def spec(self) -> mujoco.MjSpec:

@@ -26,23 +26,29 @@ FURNITURE = ("school_desk", "desk", "bookshelf", "cabinet", "plant")
 
 @register("classroom")
 def classroom(
-    seed: int, *, n_chairs: int | None = None, n_people: int | None = None, glass: bool = False
+    seed: int,
+    *,
+    n_chairs: int | None = None,
+    n_people: int | None = None,
+    glass: bool = False,
+    doors: str = "open",
 ) -> Scene:
     """18 x 10 m, two equal rooms and a corridor: ``n_chairs`` (34), ``n_people`` (4).
 
-    ``glass``: panes instead of walls between the rooms and the corridor.
+    ``glass``: panes instead of walls between the rooms and the corridor. ``doors``: how they
+    rest, "open", "ajar", "closed" or "mixed".
     """
     n_chairs, n_people = count("n_chairs", n_chairs, 34), count("n_people", n_people, 4)
     glass = switch("glass", glass)
     draws = Draws(seed)
     plan = _plan(glass)
     builder = Builder(plan)
-    hang_doors(builder, draws.doors)
+    hang_doors(builder, draws.doors, doors)
     put_bins(builder, draws.bins)
     floor = free_floor(builder)
     seat_chairs(builder, floor, plan.seats, n_chairs, draws)
     scatter(builder, floor, "person", n_people, draws, draws.people)
-    options = {"n_chairs": n_chairs, "n_people": n_people, "glass": glass}
+    options = {"n_chairs": n_chairs, "n_people": n_people, "glass": glass, "doors": doors}
     return finish(builder, "classroom", seed, options)
 
 

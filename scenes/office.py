@@ -26,23 +26,29 @@ FURNITURE = ("desk", "table", "bistro", "cabinet", "printer", "sofa", "plant")
 
 @register("office")
 def office(
-    seed: int, *, n_chairs: int | None = None, n_people: int | None = None, glass: bool = False
+    seed: int,
+    *,
+    n_chairs: int | None = None,
+    n_people: int | None = None,
+    glass: bool = False,
+    doors: str = "open",
 ) -> Scene:
     """20 x 12 m, ``n_chairs`` (24) chairs at desks and tables, ``n_people`` (6) people.
 
     ``glass``: the parapet between meeting room and lounge is a pane of glass down to the floor.
+    ``doors``: how they rest, "open", "ajar", "closed" or "mixed".
     """
     n_chairs, n_people = count("n_chairs", n_chairs, 24), count("n_people", n_people, 6)
     glass = switch("glass", glass)
     draws = Draws(seed)
     plan = _plan(glass)
     builder = Builder(plan)
-    hang_doors(builder, draws.doors)
+    hang_doors(builder, draws.doors, doors)
     put_bins(builder, draws.bins)
     floor = free_floor(builder)
     seat_chairs(builder, floor, plan.seats, n_chairs, draws)
     scatter(builder, floor, "person", n_people, draws, draws.people)
-    options = {"n_chairs": n_chairs, "n_people": n_people, "glass": glass}
+    options = {"n_chairs": n_chairs, "n_people": n_people, "glass": glass, "doors": doors}
     return finish(builder, "office", seed, options)
 
 

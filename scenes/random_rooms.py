@@ -54,11 +54,13 @@ def random_rooms(
     clutter: float = 0.6,
     n_chairs: int | None = None,
     n_people: int | None = None,
+    doors: str = "open",
 ) -> Scene:
     """A new floor plan per seed: ``size_m`` (14) wide, ``n_rooms`` (6), ``clutter`` (0.6) in 0..1.
 
     It is 0.7 ``size_m`` deep. ``clutter`` is the share of each room's furniture that is tried, and
-    sets ``n_chairs`` (2 + 3 per room at 1) and the bins. ``n_people`` (3).
+    sets ``n_chairs`` (2 + 3 per room at 1) and the bins. ``n_people`` (3). ``doors``: how they
+    rest, "open", "ajar", "closed" or "mixed".
     """
     size_m = within("size_m", size_m, 5.0, 40.0)
     clutter = within("clutter", clutter, 0.0, 1.0)
@@ -68,7 +70,7 @@ def random_rooms(
     draws = Draws(seed)
     plan = _plan(size_m, n_rooms, clutter, draws.rooms)
     builder = Builder(plan)
-    hang_doors(builder, draws.doors)
+    hang_doors(builder, draws.doors, doors)
     floor = free_floor(builder)
     scatter(builder, floor, "bin", round(0.7 * clutter * n_rooms), draws, draws.bins)
     seat_chairs(builder, floor, plan.seats, n_chairs, draws)
@@ -79,6 +81,7 @@ def random_rooms(
         "clutter": clutter,
         "n_chairs": n_chairs,
         "n_people": n_people,
+        "doors": doors,
     }
     return finish(builder, "random-rooms", seed, options)
 

@@ -19,7 +19,9 @@ MARGIN = 0.03  # m between things at the start
 DOORWAY_RADIUS = 0.65  # m kept clear around the middle of a doorway
 GOAL_RADIUS = 0.45  # m of free floor around a goal
 START_RADIUS = 0.7  # m of free floor around the robot
-REST_ANGLES = (1.25, 1.75)  # rad; doors rest open, so that every room can be reached at dynamism 0
+# rad; by default doors rest open, so that every room can be reached at dynamism 0
+REST_ANGLES = {"open": (1.25, 1.75), "ajar": (0.3, 0.9), "closed": (0.0, 0.0)}
+DOORS = (*REST_ANGLES, "mixed")
 MAX_COUNT = 400
 Spread = tuple[tuple[float, float], float, float]
 PULLED: Spread = ((0.0, 0.25), 0.12, 0.5)  # a chair: m back (least, most), m sideways, rad turned
@@ -81,10 +83,15 @@ def free_floor(builder: Builder) -> Floor:
     return floor
 
 
-def hang_doors(builder: Builder, rng: np.random.Generator) -> None:
-    """A door at each ``door:ROOM:left|right`` mark, at rest at a seeded angle."""
+def hang_doors(builder: Builder, rng: np.random.Generator, doors: str = "open") -> None:
+    """A door at each ``door:ROOM:left|right`` mark, whose closer brings it to a seeded angle.
+
+    doors  "open" (held open), "ajar", "closed", or "mixed": each door one of the three
+    """
+    choice("doors", doors, DOORS)
     for index, mark in enumerate(builder.plan.find("door")):
-        angle = float(rng.uniform(*REST_ANGLES))
+        rest = str(rng.choice(list(REST_ANGLES))) if doors == "mixed" else doors
+        angle = float(rng.uniform(*REST_ANGLES[rest]))
         builder.add_door(
             f"door{index}", mark.pose, clockwise=mark.words[2] == "right", angle=round(angle, 3)
         )

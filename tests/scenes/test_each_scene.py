@@ -94,6 +94,34 @@ def test_glass_stands_where_it_is_asked_for_and_is_on_the_true_map():
         assert glass.initial == solid.initial
 
 
+@pytest.mark.parametrize("name", ["office", "classroom", "apartment", "random-rooms"])
+def test_doors_rest_as_asked_for(name):
+    rests = {d: scenes.build(name, 3, doors=d).door_angles for d in ("open", "ajar", "closed")}
+    assert rests["open"] == built(name, 3).door_angles
+    assert all(1.2 < angle < 1.8 for angle in rests["open"].values())
+    assert all(0.2 < angle < 1.0 for angle in rests["ajar"].values())
+    assert set(rests["closed"].values()) == {0.0}
+    rooms = [scenes.build(name, seed, doors="mixed") for seed in range(4)]
+    mixed = [angle for room in rooms for angle in room.door_angles.values()]
+    assert min(mixed) == 0.0
+    assert max(mixed) > 1.2
+    with pytest.raises(InvalidValueError, match="doors must be one of"):
+        scenes.build(name, 3, doors="revolving")
+
+
+def test_a_closed_door_stays_shut_by_its_closer():
+    scene = scenes.build("office", 0, n_people=0, n_chairs=0, doors="closed")
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    scene.place(model, data)
+    door = int(model.joint("door0/hinge").qposadr[0])
+    data.qpos[door] = 1.0
+    for _ in range(3000):
+        mujoco.mj_step(model, data)
+    assert abs(data.qpos[door]) < 0.01
+    assert abs(data.qvel[model.joint("door0/hinge").dofadr[0]]) < 1e-3
+
+
 def test_a_corridor_looks_the_same_all_along_its_middle():
     raster = built("corridor", 0).static_map
     along = np.arange(-17.0, 17.0, 0.02) - raster.T_map_origin[0]
