@@ -12,11 +12,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
 from slam.frames import Float
+from slam.shunting.bounds import Lattice, Search, levels_of
 from slam.shunting.cells import SIDE
 from slam.shunting.network import Network
-from slam.shunting.search import bounds_of, descend, field_of, levels_of, place
+from slam.shunting.search import field_of, place
 
 PITCH_M = 0.12  # neurons are pooled up to this edge
 BESIDE = 0.7  # what a place beside structure is worth: poses are only tried every PITCH_M
@@ -27,29 +27,20 @@ WORTH = 0.6  # answers worse than this share of the best are dropped
 MAX_ACROSS = 40  # coarsest blocks along the map
 
 
-@njit
-def pooled(fine: NDArray[np.uint8], pool: int, out: NDArray[np.uint8]) -> None:
-    """out = the largest of ``pool`` x ``pool`` neighbouring values."""
-    for r in range(out.shape[0]):
-        for c in range(out.shape[1]):
-            value = 0
-            for a in range(r * pool, (r + 1) * pool):
-                for b in range(c * pool, (c + 1) * pool):
-                    value = max(value, int(fine[a, b]))
-            out[r, c] = value
+def _pooled(fine: NDArray[np.uint8], pool: int) -> NDArray[np.uint8]:
+    """The largest of ``pool`` x ``pool`` neighbouring values."""
+    rows, columns = fine.shape
+    blocks = fine.reshape(rows // pool, pool, columns // pool, pool)
+    largest: NDArray[np.uint8] = blocks.max(axis=(1, 3))
+    return largest
 
 
-@njit
-def spread(source: NDArray[np.uint8], beside: float, out: NDArray[np.uint8]) -> None:
-    """out = source, or ``beside`` times the largest of the eight values around."""
-    rows, columns = source.shape
-    for r in range(rows):
-        for c in range(columns):
-            around = 0
-            for a in range(max(r - 1, 0), min(r + 2, rows)):
-                for b in range(max(c - 1, 0), min(c + 2, columns)):
-                    around = max(around, int(source[a, b]))
-            out[r, c] = max(int(source[r, c]), int(beside * around))
+def _spread(source: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The source, or ``BESIDE`` times the largest of the eight values around."""
+    padded = np.pad(source, 1)
+    wide = np.maximum(np.maximum(padded[:, :-2], padded[:, 1:-1]), padded[:, 2:])
+    around = np.maximum(np.maximum(wide[:-2], wide[1:-1]), wide[2:])
+    return np.maximum(source, (BESIDE * around).astype(np.uint8))
 
 
 def _pooling(cell: float) -> int:
@@ -68,10 +59,8 @@ def _coarse_field(network: Network, short_term: float, pool: int) -> NDArray[np.
     coarse = np.zeros(((j1 - j0) // pool, (i1 - i0) // pool), np.uint8)
     for row in range(0, j1 - j0, SIDE):  # one row of blocks at a time keeps it small
         fine = field_of(network, short_term, i0, j0 + row, SIDE, i1 - i0)
-        pooled(fine, pool, coarse[row // pool : (row + SIDE) // pool])
-    out = np.empty_like(coarse)
-    spread(coarse, BESIDE, out)
-    return out
+        coarse[row // pool : (row + SIDE) // pool] = _pooled(fine, pool)
+    return _spread(coarse)
 
 
 def _headings(points: Float, pitch: float) -> Float:
@@ -121,7 +110,17 @@ def places(
     levels = levels_of(_cut(field, row, column, 2 * edge), depth)
     bases = np.empty((len(turns), len(chosen), 2), np.int32)
     place(chosen, middle, turns, pitch, column + i0 // pool, row + j0 // pool, bases)
-    return _answers(levels, bases, turns, (reach, pitch), middle, most)
+    lattice = Lattice(
+        levels=levels,
+        bases=bases,
+        turns=turns,
+        reach=reach,
+        pitch=pitch,
+        precision=np.zeros((3, 3)),
+        gain=1.0 / (255.0 * len(chosen)),
+        apart=(APART_M / pitch, APART_RAD),
+    )
+    return _answers(Search(lattice), lattice, middle, most)
 
 
 def _cut(field: NDArray[np.uint8], row: int, column: int, side: int) -> NDArray[np.uint8]:
@@ -134,32 +133,16 @@ def _cut(field: NDArray[np.uint8], row: int, column: int, side: int) -> NDArray[
     return out
 
 
-def _answers(
-    levels: NDArray[np.uint8],
-    bases: NDArray[np.int32],
-    turns: Float,
-    lattice: tuple[int, float],
-    middle: Float,
-    most: int,
-) -> list[Float]:
-    reach, pitch = lattice
-    free = np.zeros((3, 3))  # no prior
-    costs = np.zeros(len(turns))
-    gain = 1.0 / (255.0 * bases.shape[1])
-    bounds = bounds_of(levels[-1], bases, costs, reach, 1 << (len(levels) - 1), gain)
-    order = np.argsort(-bounds.ravel(), kind="stable")
-    taken = np.zeros((0, 3))
+def _answers(search: Search, lattice: Lattice, middle: Float, most: int) -> list[Float]:
     found: list[Float] = []
-    floor, best = -math.inf, np.zeros(3, np.int64)
+    floor, taken = -math.inf, np.zeros((0, 3))
     for _ in range(most):
-        apart = (taken, APART_M / pitch, APART_RAD)
-        score, _ = descend(
-            levels, bases, turns, costs, reach, pitch, free, gain, bounds, order, best, floor, apart
-        )
-        if score <= floor:
+        best = search.best(floor, taken)
+        if best.heading < 0:
             break
-        floor = max(floor, WORTH * score)
-        turn = float(turns[best[0]])
-        taken = np.vstack([taken, [float(best[1]), float(best[2]), turn]])
-        found.append(middle + np.array([best[1] * pitch, best[2] * pitch, turn]))
+        floor = max(floor, WORTH * best.score)
+        turn = float(lattice.turns[best.heading])
+        taken = np.vstack([taken, [float(best.column), float(best.row), turn]])
+        pitch = lattice.pitch
+        found.append(middle + np.array([best.column * pitch, best.row * pitch, turn]))
     return found

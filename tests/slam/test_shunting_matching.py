@@ -17,7 +17,7 @@ from slam.shunting.matching import Matcher, seen_by
 from slam.shunting.motion import WIDEN, inverted, predict, turned
 from slam.shunting.network import Network
 from slam.shunting.overlap import evaluate
-from slam.shunting.search import SearchWindow, branch_and_bound, levels_of
+from slam.shunting.search import SearchWindow
 from slam.shunting.surfaces import join
 from tests.world2d import World2D, arena, laser, rectangle
 
@@ -76,30 +76,6 @@ def test_gradient_and_curvature_agree_with_differences(objective: str) -> None:
     best = np.zeros(3)
     second = (score(best + step)[0] - 2.0 * score(best)[0] + score(best - step)[0]) / 4e-6
     assert -second == pytest.approx(score(best)[2][0, 0], rel=0.15)
-
-
-def test_branch_and_bound_equals_exhaustive_search() -> None:
-    rng = np.random.default_rng(11)
-    for case in range(200):
-        reach, headings, points = int(rng.integers(1, 12)), int(rng.integers(1, 6)), 12
-        field = (rng.random((64, 64)) ** 6 * 255.0).astype(np.uint8)
-        bases = rng.integers(20, 36, (headings, points, 2)).astype(np.int32)
-        turns = np.sort(rng.uniform(-0.3, 0.3, headings))
-        root = rng.normal(size=(3, 3))
-        precision = (root @ root.T + 0.1 * np.eye(3)) * float(rng.uniform(0.1, 20.0))
-        gain, cell = 0.01, 0.05
-        index = np.zeros(3, np.int64)
-        found, _ = branch_and_bound(
-            levels_of(field, 1 + case % 3), bases, turns, reach, cell, precision, gain, index
-        )
-        best = -math.inf
-        for h in range(headings):
-            for dj in range(-reach, reach + 1):
-                for di in range(-reach, reach + 1):
-                    total = int(field[bases[h, :, 1] + dj, bases[h, :, 0] + di].sum(dtype=int))
-                    e = np.array([di * cell, dj * cell, turns[h]])
-                    best = max(best, gain * total - 0.5 * float(e @ precision @ e))
-        assert found == pytest.approx(best, abs=1e-9)
 
 
 def test_climbing_finds_a_known_pose() -> None:
