@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from scenes.scene import SCAN_HEIGHT
 from sim.env_options import episode
-from sim.lidar import Lms221Config
+from sim.lidar import Lms221Config, ScanResult
 from sim.seeds import Seeds
 from sim.simulation import Simulation
 from slam._jit import njit
 from slam.errors import InvalidValueError
-from slam.frames import Frame, LaserSpec
+from slam.frames import LaserSpec
 
 V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
 GOAL_RADIUS_M = 0.4
@@ -178,23 +178,23 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._simulation.spec.n_beams != self._n_beams:
             self._n_beams = self._simulation.spec.n_beams
             self.observation_space = _observation_space(self._simulation.spec)
-        frame = self._simulation.observe()
+        scan = self._simulation.sense()
         self.goal_distance = self._goal_distance()
-        return self.observation(frame), self._info(frame)
+        return self._observation(scan), self._info()
 
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One scan under the given command."""
-        frame, reward, terminated, truncated = self.act(action)
-        return self.observation(frame), reward, terminated, truncated, self._info(frame)
+        observation, reward, terminated, truncated = self.act(action)
+        return observation, reward, terminated, truncated, self._info()
 
-    def act(self, action: NDArray[np.float32]) -> tuple[Frame, float, bool, bool]:
-        """What ``step`` does, before it is dressed up as observation and info."""
+    def act(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool]:
+        """``step`` without the info."""
         v, omega = (min(max(float(part), -1.0), 1.0) for part in action)
         simulation = self.simulation
         simulation.world.set_command(v * V_MAX_MPS, omega * OMEGA_MAX_RADPS)
-        frame = simulation.observe()
+        scan = simulation.sense()
         before, self.goal_distance = self.goal_distance, self._goal_distance()
         reward, terminated = 0.0, False
         if before is not None and self.goal_distance is not None:
@@ -203,7 +203,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self.terminate_on_collision and any(c.hard for c in simulation.contacts):
             terminated = True
         truncated = simulation.world.time_ns * 1e-9 >= self.time_limit_s
-        return frame, reward, terminated, truncated
+        return self._observation(scan), reward, terminated, truncated
 
     def _goal_distance(self) -> float | None:
         if self._goal is None:
@@ -211,11 +211,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         x, y, _ = self.simulation.world.robot_pose().tolist()
         return math.hypot(x - self._goal[0], y - self._goal[1])
 
-    def observation(self, frame: Frame) -> Observation:
-        """What the robot knows by a frame of this environment's simulation."""
-        scan = frame.scan
-        assert scan is not None  # a simulation's frames always carry one
-        ranges, valid = _told(scan.ranges, scan.spec.range_min, scan.spec.range_max)
+    def _observation(self, scan: ScanResult) -> Observation:
+        """What the robot knows by the scan that was just taken."""
+        spec = self.simulation.spec
+        ranges, valid = _told(scan.ranges, spec.range_min, spec.range_max)
         return {
             "ranges": ranges,
             "valid": valid,
@@ -223,8 +222,9 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "time": np.array(self.simulation.world.time_ns * 1e-9),
         }
 
-    def _info(self, frame: Frame) -> dict[str, Any]:
-        world = self.simulation.world
+    def _info(self) -> dict[str, Any]:
+        world, frame = self.simulation.world, self.simulation.frame
+        assert frame is not None  # a scan was just taken
         contacts = self.simulation.contacts
         return {
             "pose": world.robot_pose(),

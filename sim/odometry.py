@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import state
 from sim.odometry_config import PRESETS, OdometryConfig, preset
-from sim.odometry_motion import COUNTED, NOW, close, update
+from sim.odometry_motion import COUNTED, NOW, over_scan, update
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Odometry
@@ -40,7 +40,7 @@ class WheelOdometry:
     """Dead reckoning of one run.
 
     config  ``OdometryConfig`` or the name of a preset
-    rng     drawn from three times at birth and five times at each ``update``, whatever moves
+    rng     drawn from three times at birth, five times at each ``update``, ten at each scan
     track   m between the true wheels
     start   (3,) first pose in the odom frame
     errors  Es, Eb, Ed of a known unit, instead of drawn ones
@@ -134,26 +134,28 @@ class WheelOdometry:
         ):  # fmt: skip
             live[...] = arrays[name]
 
-    def begin_scan(self, travel: Sequence[float] | Float, *, contact: bool = False) -> None:
-        """Advance to the stamp of a scan (its earliest beam); closes the motion increment."""
-        self.update(travel, contact=contact)
-        close(self._poses, self._spread, self._systematic_variances)
+    def over_scan(self, travel: Float, first: float, last: float, *, contact: bool) -> None:
+        """Advance to the first beam of a scan, which closes the motion increment, and to the last.
 
-    def end_scan(
-        self,
-        travel: Sequence[float] | Float,
-        *,
-        stamp_ns: int,
-        sweep_s: float,
-        contact: bool = False,
-    ) -> Odometry:
-        """Advance to the last beam, ``sweep_s`` after the stamp; the reading for the frame.
+        travel       (steps + 1, 2) true rim travel m at the physics steps of the scan
+        first, last  when its first and last beam are, in steps
+        """
+        rng = self._rng
+        draws = (
+            rng.standard_normal(3), rng.random(2), rng.standard_normal(3), rng.random(2),
+        )  # fmt: skip
+        over_scan(
+            travel, (first, last), contact, self._parameters, draws, self._systematic_variances,
+            self._wheels, self._poses, self._spread,
+        )  # fmt: skip
+
+    def reading(self, *, stamp_ns: int, sweep_s: float) -> Odometry:
+        """For the frame of the scan that has just ended, ``sweep_s`` after its stamp.
 
         Pose and covariance are those of the stamp, the twist is the mean over the sweep.
         """
         if not sweep_s > 0.0:
             raise InvalidValueError(f"sweep_s must be > 0 s, got {sweep_s}")
-        self.update(travel, contact=contact)
         now, at_stamp, _ = self._poses
         x, y, theta = at_stamp.tolist()
         return Odometry(

@@ -170,3 +170,34 @@ def close(poses: Float, spread: Float, variances: Vec3) -> None:
 def _step_pose(pose: Float, distance: float, side: float, angle: float) -> None:
     bx, by, _, _ = _turned(distance, angle)
     _chain(pose, bx, by + side, angle)
+
+
+@njit
+def _at(travel: Float, step: float) -> tuple[float, float]:
+    """Between the rows of ``travel`` (steps + 1, 2)."""
+    k = min(int(step), len(travel) - 2)
+    part, left, right = step - k, travel[k, 0], travel[k, 1]
+    return left + part * (travel[k + 1, 0] - left), right + part * (travel[k + 1, 1] - right)
+
+
+@njit
+def over_scan(
+    travel: Float,
+    span: tuple[float, float],
+    contact: bool,
+    p: Float,
+    draws: tuple[Float, Float, Float, Float],
+    variances: Vec3,
+    wheels: Float,
+    poses: Float,
+    spread: Float,
+) -> None:
+    """Two updates: to the first beam of a scan, where the increment ends, and to the last.
+
+    travel  (steps + 1, 2) m rolled at the steps of the scan; ``span`` the steps of both beams
+    draws   normals and uniforms of the first update, then of the second
+    """
+    first, last = _at(travel, span[0]), _at(travel, span[1])
+    update(first, contact, p, draws[0], draws[1], wheels, poses, spread)
+    close(poses, spread, variances)
+    update(last, contact, p, draws[2], draws[3], wheels, poses, spread)

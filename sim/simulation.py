@@ -15,7 +15,7 @@ from sim.contacts import Contact
 from sim.drive import TourConfig
 from sim.dynamism import Dynamism
 from sim.labels import BeamLabeller
-from sim.lidar import Lms221, Lms221Config
+from sim.lidar import Lms221, Lms221Config, ScanResult
 from sim.odometry import WheelOdometry
 from sim.pilot import Pilot
 from sim.robot import DriveConfig
@@ -25,7 +25,7 @@ from sim.tag_cameras import TagCameras, TagReading
 from sim.world import SUBSTEPS_PER_S, World
 from slam import se2
 from slam.errors import InvalidValueError
-from slam.frames import Float, Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata
+from slam.frames import BeamLabels, Float, Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,10 +53,12 @@ class ScanTiming:
         self, encoders: WheelOdometry, travel: Float, stamp_ns: int, touched: bool
     ) -> Odometry:
         """Advance the encoders over a scan; ``travel`` (steps + 1, 2) m rolled at its steps."""
-        encoders.begin_scan(_at(travel, self.first), contact=touched)
-        return encoders.end_scan(
-            _at(travel, self.last), stamp_ns=stamp_ns, sweep_s=self.sweep_s, contact=touched
-        )
+        self.roll(encoders, travel, touched)
+        return encoders.reading(stamp_ns=stamp_ns, sweep_s=self.sweep_s)
+
+    def roll(self, encoders: WheelOdometry, travel: Float, touched: bool) -> None:
+        """The same without the reading."""
+        encoders.over_scan(travel, self.first, self.last, contact=touched)
 
     def truth(self, path: Float) -> Float:
         """(3,) pose at the first beam; ``path`` (steps + 1, 3)."""
@@ -65,12 +67,6 @@ class ScanTiming:
             x, y, theta = path[k].tolist()
             return np.array([x, y, se2.wrap(theta)])
         return se2.interpolate(path[k], path[k + 1], self.first - k)
-
-
-def _at(travel: Float, step: float) -> tuple[float, float]:
-    k = min(int(step), len(travel) - 2)
-    (left, right), (to_left, to_right) = travel[k : k + 2].tolist()
-    return left + (step - k) * (to_left - left), right + (step - k) * (to_right - right)
 
 
 class Simulation:
@@ -121,7 +117,10 @@ class Simulation:
         self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=drive.track)
         self._labeller = BeamLabeller(self.world) if labels else None
         self._tags = self._tag_cameras(tags)
-        self.frame: Frame | None = None  # the last one observed
+        self._stamp_ns = 0
+        self._scan: ScanResult | None = None
+        self._labels: BeamLabels | None = None
+        self._frame: Frame | None = None
         self.contacts: list[Contact] = []  # what the robot touched during the last scan
         self._timing = ScanTiming.of(self.laser)
         steps = self.laser.config.steps
@@ -174,19 +173,34 @@ class Simulation:
         The frame's stamp is that of the earliest beam, so its odometry and truth lie one scan
         period before the world's present: nobody can know a scan before it is over.
         """
-        stamp_ns = self.world.time_ns + self._timing.offset_ns
+        self.sense()
+        frame = self.frame
+        assert frame is not None
+        return frame
+
+    def sense(self) -> ScanResult:
+        """As ``observe``, without the frame, which ``frame`` makes when it is asked for."""
+        self._stamp_ns = self.world.time_ns + self._timing.offset_ns
         self._advance()
-        result = self.laser.finish()
+        self._scan, self._frame = self.laser.finish(), None
         self.contacts = self.world.take_contacts()
-        touched = bool(self.contacts)
-        self.frame = Frame(
-            stamp_ns=stamp_ns,
-            odometry=self._timing.odometry(self.encoders, self._travel, stamp_ns, touched),
-            scan=Scan(stamp_ns=stamp_ns, ranges=result.ranges, spec=self.spec),
-            truth=self._timing.truth(self.path),
-            labels=self._labeller.label(result) if self._labeller else None,
-        )
-        return self.frame
+        self._timing.roll(self.encoders, self._travel, bool(self.contacts))
+        self._labels = self._labeller.label(self._scan) if self._labeller else None
+        return self._scan
+
+    @property
+    def frame(self) -> Frame | None:
+        """Of the last scan; None before the first."""
+        if self._frame is None and self._scan is not None:
+            stamp_ns, sweep_s = self._stamp_ns, self._timing.sweep_s
+            self._frame = Frame(
+                stamp_ns=stamp_ns,
+                odometry=self.encoders.reading(stamp_ns=stamp_ns, sweep_s=sweep_s),
+                scan=Scan(stamp_ns=stamp_ns, ranges=self._scan.ranges, spec=self.spec),
+                truth=self._timing.truth(self.path),
+                labels=self._labels,
+            )
+        return self._frame
 
     def save_state(self) -> bytes:
         """World, scanner, encoders, labels, ceiling cameras: all that decides what comes next.
@@ -221,7 +235,7 @@ class Simulation:
             self._tags.load(arrays, words["tags"])
         if self._labeller is not None and len(arrays["seen"]):
             self._labeller.last_seen[...] = arrays["seen"]
-        self.contacts = []
+        self.contacts, self._scan, self._frame = [], None, None
 
     def metadata(self) -> StreamMetadata:
         """What a recording says about itself."""

@@ -43,8 +43,9 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
     and without options.
 
     ### Infos
-    ``pose`` (n, 3), ``goal_distance`` (n,) NaN without a goal, ``hard_collision`` (n,), ``frame``
-    (n,) objects; all with a mask of the same name and a leading "_", here always true.
+    ``pose`` (n, 3), ``goal_distance`` (n,) NaN without a goal, ``hard_collision`` (n,), and with
+    ``frames`` also ``frame`` (n,) objects; all with a mask of the same name and a leading "_", here
+    always true.
 
     ``settings`` are those of ``MobiliaEnv``; rendering is left to the single environment.
     """
@@ -55,6 +56,7 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         *,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         n_threads: int = 1,
+        frames: bool = False,
         **settings: Any,
     ) -> None:
         for name, value in (("num_envs", num_envs), ("n_threads", n_threads)):
@@ -62,6 +64,7 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
                 raise InvalidValueError(f"{name} must be a whole number >= 1, got {value!r}")
         self.num_envs = num_envs
         self.mode = _mode(autoreset_mode)
+        self._frames = frames
         self.metadata = {**MobiliaEnv.metadata, "autoreset_mode": self.mode}
         self.envs = [MobiliaEnv(**settings) for _ in range(num_envs)]
         self.single_observation_space = self.envs[0].observation_space
@@ -136,8 +139,8 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         if self._ended[i] and self.mode == AutoresetMode.NEXT_STEP:
             self._restart(i, None, None)
             return 0.0, False, False
-        frame, reward, terminated, truncated = self.envs[i].act(action)
-        self._keep(i, self.envs[i].observation(frame))
+        observation, reward, terminated, truncated = self.envs[i].act(action)
+        self._keep(i, observation)
         return reward, terminated, truncated
 
     def _start_over(self) -> dict[str, Any]:
@@ -154,15 +157,15 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
 
     def _infos(self, final: dict[str, Any] | None = None) -> dict[str, Any]:
         n, simulations = self.num_envs, [env.simulation for env in self.envs]
-        frames = np.empty(n, dtype=object)
-        frames[:] = [s.frame for s in simulations]
         distances = [env.goal_distance for env in self.envs]
         infos: dict[str, Any] = {
             "pose": np.array([s.world.robot_pose() for s in simulations]),
             "goal_distance": np.array([np.nan if d is None else d for d in distances]),
             "hard_collision": np.array([any(c.hard for c in s.contacts) for s in simulations]),
-            "frame": frames,
         }
+        if self._frames:
+            infos["frame"] = np.empty(n, dtype=object)
+            infos["frame"][:] = [s.frame for s in simulations]
         infos |= {f"_{name}": np.ones(n, dtype=np.bool_) for name in tuple(infos)}
         return infos | (final or {})
 

@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sim.odometry import OdometryConfig, WheelOdometry
 from slam import se2
 from slam.errors import InvalidValueError, UnknownNameError
+from slam.frames import Odometry
 
 TRACK = 0.33
 Float = NDArray[np.float64]
@@ -45,6 +46,14 @@ def run(config: OdometryConfig | str, travel: Float, seed: int, every: int = 1) 
     return odometry
 
 
+def scan(
+    odometry: WheelOdometry, first: ArrayLike, last: ArrayLike, *, stamp_ns: int, sweep_s: float
+) -> Odometry:
+    """The reading of a scan between whose first and last beam the rims roll from one to other."""
+    odometry.over_scan(np.array([first, last]), 0.0, 1.0, contact=False)
+    return odometry.reading(stamp_ns=stamp_ns, sweep_s=sweep_s)
+
+
 def increments(
     config: OdometryConfig | str, travel: Float, poses: Float, *, seed: int, every: int
 ) -> tuple[list[Float], list[Float]]:
@@ -56,8 +65,7 @@ def increments(
         if k % every:
             odometry.update(travel[k])
             continue
-        odometry.begin_scan(travel[k])
-        reading = odometry.end_scan(travel[k + 1], stamp_ns=k, sweep_s=0.02)
+        reading = scan(odometry, travel[k], travel[k + 1], stamp_ns=k, sweep_s=0.02)
         if before is not None:
             error = se2.between(before, reading.T_odom_robot) - se2.between(
                 poses[k - every], poses[k]
@@ -110,8 +118,7 @@ def test_covariance_matches_sampling_of_both_parts() -> None:
         for rims in travel[::10]:
             odometry.update(rims)
         ends.append(odometry.pose - np.array([*poses[-1][:2], 0.3 * 4.0]))
-        odometry.begin_scan(travel[-1])
-        reading = odometry.end_scan(travel[-1] + 1e-3, stamp_ns=0, sweep_s=0.02)
+        reading = scan(odometry, travel[-1], travel[-1] + 1e-3, stamp_ns=0, sweep_s=0.02)
         claimed = np.array(reading.increment_covariance)
     sampled = np.cov(np.array(ends).T)
     assert np.abs(sampled - claimed).max() < 0.12 * claimed.max()
@@ -163,13 +170,11 @@ def test_drift_on_an_office_tour_is_that_of_a_real_pioneer() -> None:
 def test_pose_is_that_of_the_stamp_and_twist_the_mean_over_the_sweep() -> None:
     travel, _ = drive(np.tile((0.6, 0.9), (40, 1)), rate=300.0)
     odometry = WheelOdometry("ideal", track=TRACK)
-    odometry.begin_scan(travel[0])
-    reading = odometry.end_scan(travel[6], stamp_ns=5, sweep_s=6 / 300)
+    reading = scan(odometry, travel[0], travel[6], stamp_ns=5, sweep_s=6 / 300)
     assert reading.stamp_ns == 5
     np.testing.assert_array_equal(reading.T_odom_robot, np.zeros(3))
     np.testing.assert_allclose(reading.twist, (0.6, 0.0, 0.9), atol=1e-9)
-    odometry.begin_scan(travel[8])
-    second = odometry.end_scan(travel[14], stamp_ns=6, sweep_s=6 / 300)
+    second = scan(odometry, travel[8], travel[14], stamp_ns=6, sweep_s=6 / 300)
     np.testing.assert_allclose(second.T_odom_robot, se2.exp((0.6, 0.0, 0.9), 8 / 300), atol=1e-12)
 
 
@@ -207,8 +212,7 @@ def test_the_seed_and_only_the_seed_decides_a_run_and_draws_are_fixed() -> None:
 def test_a_standing_robot_has_an_invertible_covariance_and_does_not_drift() -> None:
     odometry = WheelOdometry("pioneer3dx", np.random.default_rng(1))
     for k in range(3):
-        odometry.begin_scan((0.0, 0.0))
-        reading = odometry.end_scan((0.0, 0.0), stamp_ns=k, sweep_s=0.02)
+        reading = scan(odometry, (0.0, 0.0), (0.0, 0.0), stamp_ns=k, sweep_s=0.02)
     np.testing.assert_array_equal(reading.T_odom_robot, np.zeros(3))
     assert np.linalg.det(reading.increment_covariance) > 0.0
 

@@ -58,7 +58,7 @@ def test_it_is_the_single_environments_through_resets(mode, n_threads):
 
 
 def test_rooms_differ_and_the_seed_decides():
-    many = make()
+    many = make(frames=True)
     first, _ = many.reset(seed=1)
     again, infos = many.reset(seed=1)
     other, _ = many.reset(seed=2)
