@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes import look
-from scenes.assembly import Assembly, Mark, file_of, marks, moved, part_marks
+from scenes.assembly import Assembly, Mark, file_of, marks, moved, part_marks, quaternion
 from scenes.scene import Pose
 from scenes.views import add_cameras
 from slam.errors import InvalidValueError
@@ -26,6 +26,10 @@ JAMB_OFFSET = 0.04  # m from the plane of a hinge to the middle of its wall, awa
 WALL_HEIGHT = 1.1  # m, walls are cut there
 GLASS_HALF = 0.012  # m, half thickness of a pane
 HIDDEN = 3  # group of what collides and is seen by neither rays nor cameras
+APRON_HALF = 0.3  # m, to the height of the hulls' middle
+APRON = (
+    64  # contact bit of outlines of tables and racks, for chairs and loads: see parts/common.xml
+)
 
 
 class Plan:
@@ -91,8 +95,23 @@ class Plan:
             place = moved(pose, mark.pose)
             if mark.words[0].startswith("footprint"):
                 self._furniture.append([place[0], place[1], *mark.half, place[2]])
+                if mark.words[0] == "footprint_top":
+                    self._add_apron(place, mark.half)
             elif mark.words[0] == "seat":
                 self.seats.append(Mark(words=mark.words, pose=place, half=mark.half))
+
+    def _add_apron(self, place: Pose, half: tuple[float, float]) -> None:
+        """Keep chairs out from under a top, which their backs would stick through."""
+        self.spec.worldbody.add_geom(
+            name=f"apron:{len(self._furniture)}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=[place[0], place[1], APRON_HALF],
+            size=[*half, APRON_HALF],
+            quat=quaternion(place[2]),
+            contype=APRON,
+            conaffinity=0,
+            group=HIDDEN,
+        )
 
     def furnish_marks(self, parts: Sequence[str]) -> None:
         """Put each of these parts wherever a mark starts with its name."""

@@ -81,6 +81,32 @@ def test_walls_nobody_sees_still_hold_the_chairs(walls):
     assert data.body("chair0/base").xpos[0] > 4.5
 
 
+@pytest.mark.parametrize(("name", "under"), [("chair0", False), ("bin0", True), ("robot", True)])
+def test_what_has_a_back_stays_out_from_under_a_desk(name, under):
+    """Shoved at a desk's user side: a chair's back would stick through the top."""
+    scene = scenes.build("office", 1, n_chairs=3, n_people=0)
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    scene.place(model, data)
+    desk = model.body("desk0/base").id
+    mujoco.mj_kinematics(model, data)
+    to_desk = data.xmat[desk].reshape(3, 3)[:, 1]  # its user sits at -y
+    start = data.xpos[desk][:2] - 1.0 * to_desk[:2] - 0.2 * data.xmat[desk].reshape(3, 3)[:2, 0]
+    x = int(model.joint(f"{name}/x").qposadr[0])
+    dof = int(model.joint(f"{name}/x").dofadr[0])
+    data.qpos[x : x + 2] = start
+    data.qvel[dof : dof + 2] = 1.5 * to_desk[:2]
+    nearest, force = math.inf, {"chair0": 25.0, "bin0": 4.0, "robot": 250.0}[name]
+    for _ in range(600):
+        data.qfrc_applied[dof : dof + 2] = force * to_desk[:2]
+        mujoco.mj_step(model, data)
+        offset = data.qpos[x : x + 2] - data.xpos[desk][:2]
+        nearest = min(nearest, float(-offset @ to_desk[:2]))
+    edge, radius = 0.40, next(m.radius for m in scene.movers if m.name == name)
+    assert (nearest < edge) == under
+    assert under or nearest > edge + radius - 0.02
+
+
 def test_glass_stands_where_it_is_asked_for_and_is_on_the_true_map():
     for name, place in (("office", (3.6, 3.0)), ("classroom", (-4.4, -2.4))):
         solid, glass = (scenes.build(name, 0, glass=glass) for glass in (False, True))
