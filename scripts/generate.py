@@ -54,6 +54,7 @@ def generate(
     levels = sweep(dynamism_sweep) if dynamism_sweep else (dynamism,)
     first = Recipe(scene=scene, seed=seed, dynamism=levels[0], seconds=seconds, scanner=scanner)
     plan = Plan(recipe=first, dynamisms=levels, episodes=episodes, twins=twins)
+    workers.check_jobs(jobs)
     with writing(out, plan) as dataset:
         missing, notes = dataset.missing()
         for line in notes:

@@ -17,6 +17,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from slam.errors import InvalidValueError, MissingDependencyError, MobiliaError, OutputError
 from slam.files import write_text
 
+MAX_JOBS = 1024
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -37,8 +38,7 @@ def each(
 
     ``call`` must be a function of a module. An error of ours stops everything and is raised here.
     """
-    if isinstance(jobs, bool) or not 1 <= jobs <= 1024:
-        raise InvalidValueError(f"--jobs must be 1 to 1024, got {jobs}")
+    check_jobs(jobs)
     if cluster is None and (jobs == 1 or len(items) < 2):
         yield from map(call, items)
         return
@@ -64,6 +64,12 @@ def each(
             ) from error
         finally:
             results.close()
+
+
+def check_jobs(jobs: int) -> None:
+    """``InvalidValueError`` for a number of processes that cannot be."""
+    if isinstance(jobs, bool) or not 1 <= jobs <= MAX_JOBS:
+        raise InvalidValueError(f"--jobs must be 1 to {MAX_JOBS}, got {jobs}")
 
 
 def _guarded(call: Callable[[T], R], item: T) -> tuple[R | None, MobiliaError | None]:

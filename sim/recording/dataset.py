@@ -126,15 +126,20 @@ def writing(path: Path, plan: Plan) -> Iterator[Dataset]:
                 raise OutputError(f"{path} is being written by another process") from error
             try:
                 _claim(path, plan)
-                for torn in path.glob(f".*{PART}"):
-                    shutil.rmtree(torn, ignore_errors=True)
+                _clear(path)  # of what a killed run left
                 yield Dataset(path, plan)
             finally:
+                _clear(path)  # of what killed workers left
                 lock.unlink(missing_ok=True)
     except OutputError:
         raise
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def _clear(path: Path) -> None:
+    for torn in path.glob(f".*{PART}"):
+        shutil.rmtree(torn, ignore_errors=True)
 
 
 def _claim(path: Path, plan: Plan) -> None:

@@ -129,7 +129,7 @@ def _whole(path: Path) -> Iterator[Path]:
             (aside / path.name).rename(path)
         finally:
             shutil.rmtree(aside, ignore_errors=True)
-    except OutputError:
-        raise
     except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+        cause = error.__cause__ if isinstance(error, OutputError) else error
+        reason = getattr(cause, "strerror", None) or error
+        raise OutputError(f"cannot write {path}: {reason}") from error

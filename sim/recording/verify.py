@@ -43,12 +43,19 @@ def check_hashes(folder: Path) -> Finding:
             if name not in listed:
                 wrong[name] = f"{folder / SUMS} does not list {name}"
         repacked = bool(wrong) and all(name.endswith((".mcap", "metadata.yaml")) for name in wrong)
-        if repacked and messages_sha256(folder) == made.result.get("messages_sha256"):
+        if repacked and _has_its_messages(folder, made):
             return Finding(episode=folder.name, verdict="same messages", why="packed otherwise")
     except LogFormatError as error:
         wrong = {RECIPE: str(error)}
     verdict: Verdict = "damaged" if wrong else "whole"
     return Finding(episode=folder.name, verdict=verdict, why="; ".join(wrong.values()))
+
+
+def _has_its_messages(folder: Path, made: Made) -> bool:
+    try:
+        return messages_sha256(folder) == made.result.get("messages_sha256")
+    except LogFormatError:
+        return False
 
 
 def messages_sha256(folder: Path) -> str:
