@@ -108,6 +108,6 @@ def _possible(Q: Float) -> Float:
         out[i, i] = max(out[i, i], 0.0)
     for i in range(3):
         for j in range(i):
-            limit = math.sqrt(out[i, i] * out[j, j])
+            limit = math.sqrt(float(out[i, i])) * math.sqrt(float(out[j, j]))
             out[i, j] = out[j, i] = min(max(out[i, j], -limit), limit)
     return out

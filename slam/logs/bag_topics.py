@@ -11,7 +11,7 @@ from typing import Any
 
 from rosbags.rosbag1 import Reader as ReaderOfRos1
 from rosbags.rosbag2 import Reader
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from slam.errors import LogFormatError, MobiliaError
 
@@ -21,7 +21,9 @@ INCREMENT = "geometry_msgs/msg/PoseWithCovarianceStamped"
 POSE = "geometry_msgs/msg/PoseStamped"
 CLOUD = "sensor_msgs/msg/PointCloud2"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
-_ROS1, _ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+for _name in TRANSFORMS:  # the library's ROS 1 has none of the two
+    ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", _name))
 _STORAGE = (".mcap", ".db3", ".bag")
 
 
@@ -65,7 +67,7 @@ class Bag:
             raise LogFormatError(path, "no such file")
         with failing_as_ours(path):
             self._reader: Any = ReaderOfRos1(path) if self.is_ros1 else Reader(_storage(path))
-        self._decode = _ROS1.deserialize_ros1 if self.is_ros1 else _ROS2.deserialize_cdr
+        self._decode = ROS1.deserialize_ros1 if self.is_ros1 else ROS2.deserialize_cdr
 
     def __enter__(self) -> Bag:
         with failing_as_ours(self.path):
