@@ -8,13 +8,12 @@ ours at 25 %.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
+from scripts.reproduce.census import GATE_M, PEAK, Census, landmarks_of
 from scripts.reproduce.comparison import below_printed, paper_table
 from scripts.reproduce.paper_numbers import TABLE_2
 from scripts.reproduce.report import (
@@ -34,7 +33,6 @@ from scripts.reproduce.runs import (
     save_run,
     sign_test,
     spread,
-    statistics,
     truth_of,
 )
 from slam import create, metrics, se2
@@ -44,52 +42,13 @@ from slam.frames import Float, Frame
 from slam.points import PointWorld, PointWorldConfig
 from slam.replay import Track
 from slam.shunting.featured import FeaturedShuntingSlam
-from slam.shunting.peaks import peaks
 from slam.trajectory import Trajectory
 
 SHARES = (0.0, 0.10, 0.25, 0.50, 0.75, 0.90)
 PAPER_SHARE = 0.25
-GATE_M = 0.5  # an estimated landmark farther from every true one is spurious
-PEAK = 0.3  # activity from which a neuron counts as a landmark
 EVERY = 10  # steps between two looks at which landmarks there are
 SHUNTING: dict[str, Any] = {"cell_m": 0.03, "range_m": 12.5, "freeze_below": 0.0}
 NAMES = ("odometry", "EKF", "shunting", "known associations")
-
-
-@dataclass(eq=False)
-class Census:
-    """Which true static points a map has had, and has in the end."""
-
-    true: Float  # (n, 2) static points that were seen twice or more, in the first frame
-    ever: set[int] = field(default_factory=set)
-    now: set[int] = field(default_factory=set)
-    errors: Float = field(default_factory=lambda: np.zeros((0, 2)))
-    spurious: int = 0
-
-    def take(self, found: Float) -> None:
-        """Match what a map holds now, one to one, nearest sums first."""
-        self.now, self.errors, self.spurious = set(), np.zeros((0, 2)), len(found)
-        if len(found) == 0 or len(self.true) == 0:
-            return
-        away = found[:, None, :] - self.true[None, :, :]
-        distance = np.hypot(away[..., 0], away[..., 1])
-        rows, columns = linear_sum_assignment(np.minimum(distance, GATE_M))
-        good = distance[rows, columns] < GATE_M
-        rows, columns = rows[good], columns[good]
-        self.now = set(columns.tolist())
-        self.ever |= self.now
-        self.errors = away[rows, columns]
-        self.spurious = len(found) - len(rows)
-
-    def numbers(self) -> dict[str, Any]:
-        """Counts, and the paper's statistics of landmark errors."""
-        return {
-            "misses": len(self.true) - len(self.now),
-            "spurious": self.spurious,
-            "deleted by mistake": len(self.ever - self.now),
-            "true landmarks": len(self.true),
-            **statistics(self.errors, ("landmark x", "landmark y")),
-        }
 
 
 def with_known_associations(frames: Sequence[Frame], static: set[int]) -> tuple[Trajectory, Float]:
@@ -154,14 +113,6 @@ def _static_seen_twice(world: PointWorld, frames: Sequence[Frame]) -> set[int]:
         if frame.features is not None and frame.features.ids is not None:
             counts[frame.features.ids] += 1
     return set(np.flatnonzero((counts >= 2) & ~world.moving).tolist())
-
-
-def landmarks_of(system: object) -> Float:
-    """(n, 2) what a map calls landmarks: confirmed ones, or peaks of activity."""
-    if isinstance(system, EkfSlam):
-        return system.landmarks().points_map
-    assert isinstance(system, FeaturedShuntingSlam)
-    return peaks(system.network, PEAK)[0]
 
 
 def _counted(system: Any, frames: Sequence[Frame], true_points: Float) -> tuple[Track, Census]:
@@ -276,7 +227,9 @@ def fig8(run: Run) -> Any:
         ax.plot(*a[f"poses {name}"].T[:2], "--", color="#1f61be", lw=1.0, label="estimated path")
         ax.set(xlabel="x in m", ylabel="y in m", aspect="equal")
     draw_ellipses(axes[0], a["ellipses"], label="landmark, 3 σ")
-    image = draw_activities(axes[1], a["activities"], a["origin"], float(a["cell"]), "Greys")
+    image = draw_activities(
+        axes[1], a["activities"], a["origin"], float(a["cell"]), "Greys", swell=True
+    )
     figure.colorbar(image, ax=axes[1], shrink=0.6, label="activity")
     axes[0].set(title="(a) EKF with IPJC and landmark lifecycle")
     axes[1].set(title="(b) shunting map on features")

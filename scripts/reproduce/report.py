@@ -126,12 +126,15 @@ def draw_ellipses(ax: Axes, ellipses: Float, color: str = "black", label: str = 
     ax.plot(ellipses[:, 0], ellipses[:, 1], ".", color=color, ms=2.5, label=label)
 
 
-def draw_activities(ax: Axes, values: NDArray[Any], origin: Float, cell: float, cmap: str) -> Any:
-    """A map's activities (rows from the lowest y) as an image."""
+def draw_activities(
+    ax: Axes, values: NDArray[Any], origin: Float, cell: float, cmap: str, *, swell: bool = False
+) -> Any:
+    """A map's activities (rows from the lowest y) as an image; ``swell`` makes blobs of few
+    neurons, which would be less than a pixel, a 150th of the picture."""
     height, width = values.shape
     x, y = float(origin[0]), float(origin[1])
-    # a blob of few neurons would be less than a pixel: swell it to a 150th of the picture
-    swollen = maximum_filter(values.astype(np.float32), size=1 + 2 * (max(height, width) // 300))
+    size = 1 + 2 * (max(height, width) // 300) if swell else 1
+    swollen = maximum_filter(values.astype(np.float32), size=size)
     shown = np.where(swollen > 0.02, swollen, np.nan)
     return ax.imshow(
         shown, origin="lower", extent=(x, x + width * cell, y, y + height * cell), cmap=cmap,
@@ -152,7 +155,8 @@ def error_axes(seconds: Float, errors: Mapping[str, Float], title: str) -> Figur
         ax.axhline(0.0, color="black", lw=0.5)
         ax.set(ylabel=f"error of {unit}")
         sizes = [float(np.nanmax(np.abs(e[:, k]))) for e in errors.values()]
-        if max(sizes) > 15.0 * min(sizes) > 0.0:
+        sizes = [size for size in sizes if size > 0.0]
+        if sizes and max(sizes) > 15.0 * min(sizes):
             ax.set_yscale("symlog", linthresh=min(sizes))
     axes[0].set(title=title)
     axes[0].legend(frameon=False, ncols=4, fontsize=8)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import scripts
 import slam
 from scripts.jobs import Job
 from slam import metrics, se2
@@ -23,7 +23,10 @@ from slam.replay import Track
 from slam.system import SlamSystem
 from slam.trajectory import Trajectory
 
-SOURCES = (Path(slam.__file__).parent, Path(scripts.__file__).parent / "reproduce")
+_HERE = Path(__file__).parent
+_SLAM = Path(slam.__file__).parent
+SOURCES = (_SLAM, _HERE / "runs.py", _HERE / "census.py")
+SIMULATION = (_SLAM.parent / "sim", _SLAM.parent / "scenes")
 QUANTITIES = ("x", "y", "θ")
 
 
@@ -80,9 +83,12 @@ def load_run(path: Path) -> Run:
         return Run(numbers=json.loads(str(file["numbers"])), arrays=arrays)
 
 
-def job(name: str, call: Any, **arguments: Any) -> Job:
-    """A job whose result depends on the SLAMs and on this package."""
-    return Job(name=name, call=call, arguments=arguments, code=SOURCES)
+def job(name: str, call: Any, /, **arguments: Any) -> Job:
+    """A job whose result depends on the SLAMs, on the module of ``call`` and, with a scene, on the
+    simulator."""
+    module = Path(inspect.getfile(call))
+    code = (*SOURCES, module, *(SIMULATION if "scene" in arguments else ()))
+    return Job(name=name, call=call, arguments=arguments, code=code)
 
 
 def truth_of(frames: Sequence[Frame]) -> Trajectory:

@@ -1,0 +1,354 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Section 4.1: Victoria Park (Figs. 6 and 7, Table 1), against GPS and the known associations."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scripts.reproduce.census import Census, landmarks_of
+from scripts.reproduce.comparison import paper_table
+from scripts.reproduce.paper_numbers import TABLE_1
+from scripts.reproduce.report import (
+    COLORS,
+    Report,
+    draw_activities,
+    draw_ellipses,
+    error_axes,
+    new_figure,
+)
+from scripts.reproduce.runs import Plan, Run, job, save_run, statistics
+from slam import create, se2
+from slam.ekf.slam import EkfSlam
+from slam.errors import InvalidValueError
+from slam.frames import Float, Frame
+from slam.logs import victoria_graph
+from slam.logs.victoria_park import GpsTrack, read_gps, read_victoria_park
+from slam.metrics import fit_se2
+from slam.replay import Track
+from slam.trajectory import Trajectory
+
+FIRST_M = 100.0  # the fixes up to here turn and move GPS into the map
+FASTEST, SLACK_M, GIVE_UP_S = 8.0, 1.0, 5.0  # m/s: the truck drives 6.6 m/s at most
+GATE_M = 3.0  # between a landmark and the graph's
+LOOP_NEAR_M, LOOP_FAR_M = 2.0, 100.0  # the graph is in one place again, after this way
+EVERY = 100  # scans between two looks at which landmarks there are
+SHUNTING: dict[str, Any] = {
+    "cell_m": 0.3, "range_m": 30.0, "freeze_below": 0.0, "reward": 1.5, "trace_s": 10.0,
+}  # fmt: skip
+SYSTEMS: dict[str, tuple[str, dict[str, Any]]] = {
+    "odometry": ("odometry", {}),
+    "EKF": ("ekf", {"preset": "victoria_park"}),
+    "shunting": ("shunting-features", SHUNTING),
+    "shunting, paper preset": (
+        "shunting-features",
+        {"config": "paper", "cell_m": 0.3, "range_m": 30.0},
+    ),
+}
+WHERE = (
+    "victoria-park needs --data with the folder of the dataset: aa3_gpsx.mat, features_trees.mat "
+    "(XiaoLiSean/fastSLAM on GitHub has both) and graph_known_association.txt (borglab/gtsam: "
+    "examples/Data/victoria_park.txt)"
+)
+
+
+def good_fixes(gps: GpsTrack) -> NDArray[np.bool_]:
+    """The fixed rule for outliers: a fix the truck could have driven to from the last good one.
+
+    After ``GIVE_UP_S`` without a good one the next is taken as good.
+    """
+    good = np.zeros(len(gps.points), dtype=np.bool_)
+    last = -1
+    for k, (stamp_ns, point) in enumerate(zip(gps.stamps_ns.tolist(), gps.points, strict=True)):
+        if last >= 0:
+            dt = (stamp_ns - int(gps.stamps_ns[last])) * 1e-9
+            away = float(np.hypot(*(point - gps.points[last])))
+            if dt < GIVE_UP_S and away > SLACK_M + FASTEST * dt:
+                continue
+        good[k], last = True, k
+    return good
+
+
+def at_fixes(track: Trajectory, gps: GpsTrack) -> Float:
+    """(n, 2) positions of the laser at the fixes' times, linear between frames."""
+    return np.stack(
+        [np.interp(gps.stamps_ns, track.stamps_ns, track.poses[:, k]) for k in (0, 1)], axis=1
+    )
+
+
+def first_fit(track: Trajectory, gps: GpsTrack) -> Float:
+    """T_gps_map from the good fixes of the first ``FIRST_M`` of this track's own way."""
+    here = at_fixes(track, gps)
+    steps = np.hypot(*np.diff(here, axis=0).T)
+    first = good_fixes(gps) & (np.concatenate([[0.0], np.cumsum(steps)]) < FIRST_M)
+    return fit_se2(here[first], gps.points[first])
+
+
+def shape_fit(track: Trajectory, gps: GpsTrack) -> Float:
+    """T_gps_map from all good fixes, those beyond three times the median left out."""
+    here, good = at_fixes(track, gps), good_fixes(gps)
+    T = fit_se2(here[good], gps.points[good])
+    for _ in range(30):
+        away = np.hypot(*(se2.transform(T, here) - gps.points).T)
+        kept = good & (away < 3.0 * np.median(away[good]))
+        T = fit_se2(here[kept], gps.points[kept])
+    return T
+
+
+def loops(track: Trajectory) -> list[tuple[int, int]]:
+    """Pairs of frames at one place, a long way apart; one for each stretch of 10 m."""
+    steps = np.hypot(*np.diff(track.poses[:, :2], axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    chosen = [int(np.searchsorted(along, s)) for s in np.arange(0.0, along[-1], 10.0)]
+    out = []
+    for k in chosen:
+        away = np.hypot(*(track.poses[:, :2] - track.poses[k, :2]).T)
+        away[along > along[k] - LOOP_FAR_M] = np.inf
+        if away.min() < LOOP_NEAR_M:
+            out.append((int(away.argmin()), k))
+    return out
+
+
+def loop_errors(track: Trajectory, graph: Trajectory) -> Float:
+    """(n,) m: motion from the earlier to the later frame of a loop, against the graph's."""
+    errors = []
+    for a, b in loops(graph):
+        mine = se2.between(track.poses[a], track.poses[b])
+        told = se2.between(graph.poses[a], graph.poses[b])
+        errors.append(float(np.hypot(*(mine - told)[:2])))
+    return np.array(errors)
+
+
+def _read(data: str, scans: int) -> tuple[list[Frame], GpsTrack]:
+    frames = list(read_victoria_park(data))[: scans or None]
+    gps = read_gps(data)
+    within = (gps.stamps_ns >= frames[0].stamp_ns) & (gps.stamps_ns <= frames[-1].stamp_ns)
+    if within.sum() < 10:
+        raise InvalidValueError(f"{data} has fewer than 10 GPS fixes during the drive")
+    return frames, GpsTrack(stamps_ns=gps.stamps_ns[within], points=gps.points[within])
+
+
+def run_graph(path: Path, *, data: str, scans: int) -> None:
+    """Optimise the graph of known associations once."""
+    frames, _ = _read(data, scans)
+    graph = victoria_graph.read_graph(data).optimised()
+    track = victoria_graph.stamped(graph, frames)
+    arrays = {"poses": track.poses, "stamps": track.stamps_ns, "found": graph.landmarks_laser()}
+    save_run(path, {"sizes": [len(graph.landmarks)]}, arrays)
+
+
+def run_one(path: Path, *, name: str, data: str, scans: int) -> None:
+    """One SLAM over the drive; which landmarks it had at times, its map."""
+    frames, _ = _read(data, scans)
+    kind, options = SYSTEMS[name]
+    system = create(kind, **options)
+    track = Track(name=name, system=system)
+    sizes, found = [], [np.zeros((0, 2))]
+    for k, frame in enumerate(frames):
+        track.take(frame.without_truth())
+        if name != "odometry" and (k % EVERY == 0 or k == len(frames) - 1):
+            found.append(landmarks_of(system))
+            sizes.append(len(found[-1]))
+    online, final = track.online(), track.final()
+    arrays: dict[str, Any] = {
+        "poses": online.poses,
+        "stamps": online.stamps_ns,
+        "found": np.concatenate(found),
+    }
+    if final is not None:
+        arrays["final"] = final.poses
+    if isinstance(system, EkfSlam):
+        arrays["ellipses"] = system.landmarks().ellipses()
+    raster = track.map()
+    if raster is not None:
+        arrays |= {
+            "activities": np.nan_to_num(raster.values).astype(np.float16),
+            "origin": raster.T_map_origin,
+            "cell": raster.resolution_m,
+        }
+    lost = sum(not e.converged for e in track.estimates)
+    ms = float(np.median(track.durations_s)) * 1e3
+    save_run(path, {"sizes": sizes, "not converged": lost, "ms": ms}, arrays)
+
+
+def reproduce(plan: Plan) -> None:
+    """All SLAMs, the graph, the figures and the table."""
+    if plan.data is None:
+        raise InvalidValueError(WHERE)
+    report = Report("victoria-park", plan)
+    scans = max(150, int(900 * plan.scale)) if plan.quick else 0
+    data = str(plan.data)
+    _, gps = _read(data, scans)
+    names = ["odometry", "EKF", "shunting"] if plan.quick else list(SYSTEMS)
+    listed = [job("graph", run_graph, data=data, scans=scans)]
+    listed += [
+        job(name.replace(", ", "-").replace(" ", "-"), run_one, name=name, data=data, scans=scans)
+        for name in names
+    ]
+    runs = list(report.run(listed).values())
+    graph, by_name = runs[0], dict(zip(names, runs[1:], strict=True))
+    tracks = {"graph": _track(graph)} | {name: _track(run) for name, run in by_name.items()}
+    for name, run in by_name.items():
+        if "final" in run.arrays:
+            tracks[f"{name}, loops closed"] = _track(run, "final")
+    numbers = {name: _numbers(track, tracks["graph"], gps) for name, track in tracks.items()}
+    for name, run in by_name.items():
+        numbers[name] |= _landmark_numbers(run, graph, tracks[name], tracks["graph"], gps)
+    _page(report, numbers, gps)
+    report.figure("fig6", fig6(by_name, tracks, gps), "Fig. 6: maps over GPS (green)")
+    _fig7(report, tracks, gps)
+    report.recipe["shunting"] = SHUNTING
+    report.finish("Victoria Park (paper: section 4.1, Figs. 6 and 7, Table 1)")
+
+
+def _track(run: Run, key: str = "poses") -> Trajectory:
+    return Trajectory(stamps_ns=run.arrays["stamps"], poses=run.arrays[key])
+
+
+def _numbers(track: Trajectory, graph: Trajectory, gps: GpsTrack) -> dict[str, Any]:
+    good, here = good_fixes(gps), at_fixes(track, gps)
+    e = (se2.transform(first_fit(track, gps), here) - gps.points)[good]
+    shape = (se2.transform(shape_fit(track, gps), here) - gps.points)[good]
+    turned = se2.wrap_array(track.poses[:, 2] - graph.poses[:, 2])
+    closed = loop_errors(track, graph)
+    distance, shape_distance = np.hypot(*e.T), np.hypot(*shape.T)
+    return {
+        "rmse": float(np.sqrt((distance**2).mean())),
+        "median": float(np.median(distance)),
+        "p90": float(np.percentile(distance, 90)),
+        "shape median": float(np.median(shape_distance)),
+        "shape p90": float(np.percentile(shape_distance, 90)),
+        "loops": len(closed),
+        "loop median": float(np.median(closed)) if len(closed) else float("nan"),
+        "loop worst": float(closed.max()) if len(closed) else float("nan"),
+        **statistics(e, ("x", "y")),
+        **statistics(turned[:, None], ("θ",)),
+    }
+
+
+def _landmark_numbers(
+    run: Run, graph: Run, track: Trajectory, graph_track: Trajectory, gps: GpsTrack
+) -> dict[str, Any]:
+    """Landmarks against the graph's, both laid over GPS by their own first fixes."""
+    out = {"ms": run.numbers["ms"], "not converged": run.numbers["not converged"]}
+    if not run.numbers["sizes"]:
+        return out
+    T = se2.compose(se2.inverse(first_fit(graph_track, gps)), first_fit(track, gps))
+    seen = _in_reach(graph.arrays["found"], graph_track)
+    census = Census(seen)
+    ends = np.cumsum([0, *run.numbers["sizes"]])
+    for a, b in pairwise(ends.tolist()):
+        census.take(se2.transform(T, run.arrays["found"][a:b]), GATE_M)
+    return out | census.numbers() | {"landmarks": run.numbers["sizes"][-1]}
+
+
+def _in_reach(landmarks: Float, track: Trajectory) -> Float:
+    """Those of the graph that lie within 30 m of the way driven."""
+    way = track.poses[::10, :2]
+    away = np.hypot(*(landmarks[:, None, :] - way[None, :, :]).transpose(2, 0, 1))
+    near: Float = landmarks[away.min(axis=1) < 30.0]
+    return near
+
+
+def _page(report: Report, numbers: dict[str, dict[str, Any]], gps: GpsTrack) -> None:
+    good = good_fixes(gps)
+    report.heading("Positions against GPS")
+    report.say(
+        f"{len(good)} fixes, {int((~good).sum())} of them outliers by the rule (farther than "
+        f"{SLACK_M:g} m + {FASTEST:g} m/s from the last good one). GPS and log share a clock. "
+        f"Aligned by the good fixes of the first {FIRST_M:g} m only; “shape” is what remains after "
+        "a robust fit to all of them. Loops: motion between two visits of a place, against the "
+        "graph with known associations, optimised by least squares."
+    )
+    floor = numbers["graph"]
+    rows = []
+    for name, n in numbers.items():
+        values = [n["rmse"], n["median"], n["p90"], n["shape median"], n["shape p90"]]
+        values += [n["rmse"] / floor["rmse"], n["loop median"], n["loop worst"]]
+        rows.append([name, *(f"{v:.2f}" for v in values)])
+    head = ["", "RMSE, m", "median", "90 %", "shape median", "shape 90 %", "RMSE / graph's"]
+    report.table([*head, "loops median, m", "loops worst, m"], rows)
+    report.say(
+        f"{floor['loops']} loops. Target: shunting at most 1.2 times the graph: "
+        + ("met." if numbers["shunting"]["rmse"] <= 1.2 * floor["rmse"] else "**missed.**")
+    )
+    report.say(
+        "The graph's own associations are in part wrong and its odometry is trusted to 1 cm and "
+        "2 mrad a step, so it is no true floor: a SLAM can be nearer to GPS than it is. Cell, "
+        "reward and trace of the shunting SLAM for trunks at this scale were chosen on this very "
+        "drive, as the EKF's preset was; there is no second one to show them on."
+    )
+    report.heading("Table 1")
+    report.say(
+        "x and y against GPS (east, north), heading and landmarks against the graph "
+        f"(landmarks within {GATE_M:g} m). The paper does not say what its truth was."
+    )
+    names = [name for name in numbers if name not in ("odometry", "graph")]
+    paper_table(report, TABLE_1, [numbers], [*names, "graph"])
+    report.heading("Landmarks")
+    rows = []
+    for name, n in numbers.items():
+        if "misses" in n:
+            keys = ("landmarks", "misses", "spurious", "deleted by mistake", "not converged")
+            rows.append([name, *(str(n[key]) for key in keys), f"{n['ms']:.1f}"])
+    report.say(
+        "Against the graph's. Spurious: none of the graph's is near; the graph does not hold all "
+        "trees, so some of these are real. Deleted by mistake: once in the map, gone in the end."
+    )
+    head = ["", "in the map", "missed", "spurious", "deleted by mistake"]
+    report.table([*head, "scans not trusted", "CPU per scan, ms"], rows)
+
+
+def fig6(by_name: dict[str, Run], tracks: dict[str, Trajectory], gps: GpsTrack) -> Any:
+    """Both maps whole, and a square of each."""
+    figure, axes = new_figure(12.0, 11.0, rows=2, columns=2)
+    for column, name in enumerate(("EKF", "shunting")):
+        a, track = by_name[name].arrays, tracks[name]
+        T_map_gps = se2.inverse(first_fit(track, gps))
+        fixes = se2.transform(T_map_gps, gps.points[good_fixes(gps)])
+        middle = np.median(track.poses[:, :2], axis=0)
+        for row in range(2):
+            ax = axes[2 * row + column]
+            if "ellipses" in a:
+                draw_ellipses(ax, a["ellipses"], label="landmark, 3 σ")
+            else:
+                cell = float(a["cell"])
+                image = draw_activities(
+                    ax, a["activities"], a["origin"], cell, "Greys", swell=not row
+                )
+            ax.plot(*fixes.T, ".", color=COLORS["GPS"], ms=2.0, label="GPS")
+            ax.plot(*track.poses.T[:2], "-", color="#1f61be", lw=0.9, label="path")
+            ax.set(xlabel="x in m", ylabel="y in m", aspect="equal")
+            if row:
+                ax.set(xlim=middle[0] + np.array([-30, 30]), ylim=middle[1] + np.array([-30, 30]))
+            part = "zoomed" if row else "whole"
+            ax.set(title=f"({'abcd'[2 * row + column]}) {name}, {part}")
+    figure.colorbar(image, ax=axes[3], shrink=0.6, label="activity")
+    axes[0].legend(loc="best", fontsize=8)
+    return figure
+
+
+def _fig7(report: Report, tracks: dict[str, Trajectory], gps: GpsTrack) -> None:
+    """x and y over GPS, heading against the graph, at the good fixes."""
+    good = good_fixes(gps)
+    seconds = (gps.stamps_ns[good] - gps.stamps_ns[0]) * 1e-9
+    graph = _heading_at(tracks["graph"], gps)
+    errors = {}
+    for name in ("graph", "EKF", "shunting"):
+        e = se2.transform(first_fit(tracks[name], gps), at_fixes(tracks[name], gps)) - gps.points
+        turned = se2.wrap_array(_heading_at(tracks[name], gps) - graph)
+        errors[name] = np.column_stack([e, turned])[good]
+    report.figure(
+        "fig7",
+        error_axes(seconds, errors, "Victoria Park: x, y against GPS, heading against the graph"),
+        "Fig. 7: errors over time",
+    )
+
+
+def _heading_at(track: Trajectory, gps: GpsTrack) -> Float:
+    unwrapped = np.unwrap(track.poses[:, 2])
+    return np.interp(gps.stamps_ns, track.stamps_ns, unwrapped)

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The experiments end to end, as short as they can be, and the rules by which they score."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from scripts.reproduce import theory_data, victoria_park
+from scripts.reproduce.census import Census
+from scripts.reproduce.comparison import below_printed
+from scripts.reproduce.paper_numbers import TABLE_1, TABLE_2, TABLE_3
+from scripts.reproduce.runs import Plan, load_run, save_run, sign_test, spread, statistics
+from scripts.reproduce.verb import experiment
+from scripts.reproduce.verb import reproduce as verb
+from slam import se2
+from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+from slam.logs.victoria_graph import read_graph, stamped
+from slam.logs.victoria_park import GpsTrack, read_victoria_park, twist_of
+from slam.shunting.config import ShuntingConfig
+from slam.trajectory import Trajectory
+
+DT = 0.025
+
+
+def plan_in(folder: Path, **options) -> Plan:
+    return Plan(out=folder, quick=True, scale=0.01, **options)
+
+
+def write_park(folder: Path, duration_s: float = 36.0) -> None:
+    """A truck that circles among trees: detections, GPS, and the graph of what was seen."""
+    rng = np.random.default_rng(1)
+    times = 10.0 + DT * np.arange(round(duration_s / DT) + 1)
+    speed, steering = np.full(len(times), 4.0), np.full(len(times), 0.25)
+    trees = rng.uniform(-30.0, 40.0, (60, 2))
+    poses = [np.zeros(3)]
+    for v, a in zip(speed[:-1], steering[:-1], strict=True):
+        poses.append(se2.compose(poses[-1], se2.exp(twist_of(v, a), DT)))
+    scans = np.arange(0, len(times), 8)
+    cells = np.empty((1, len(scans)), dtype=object)
+    rear = se2.inverse([3.78, 0.5, 0.0])
+    lines, seen, before = [], {}, None
+    for k, at in enumerate(scans):
+        x, y = se2.transform(se2.inverse(poses[at]), trees).T
+        near = np.flatnonzero((np.hypot(x, y) < 25.0) & (np.abs(np.arctan2(y, x)) < 1.5))
+        bearings = np.arctan2(y[near], x[near]) + math.pi / 2.0
+        cells[0, k] = np.stack([np.hypot(x[near], y[near]), bearings, 0.3 * np.ones(len(near))])
+        axle = se2.compose(poses[at], rear)
+        if before is not None:
+            step = se2.between(before, axle)
+            numbers = " ".join(f"{v:.9f}" for v in step)
+            lines.append(f"ODOMETRY p{k - 1} p{k} {numbers} 1e-4 0 0 4e-6 0 4e-6")
+            for i in near[:3].tolist():
+                dx, dy = se2.transform(se2.inverse(axle), trees[i])
+                seen[i] = trees[i]
+                lines.append(f"LANDMARK p{k} l{i} {dx:.6f} {dy:.6f} 0.4 0 0.4")
+        before = axle
+    u = np.vstack([speed, steering])
+    park = {"TLsr": times[scans], "zt": cells, "time": times, "u": u}
+    savemat(folder / "features_trees.mat", park)
+    fixes = np.array([poses[k][:2] for k in scans]) + rng.normal(0.0, 0.3, (len(scans), 2))
+    fixes[20] += 50.0
+    gps = {"timeGps": 1000.0 * times[scans], "Lo_m": fixes[:, 0], "La_m": fixes[:, 1]}
+    savemat(folder / "aa3_gpsx.mat", gps)
+    (folder / "graph_known_association.txt").write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="module")
+def park(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("park")
+    write_park(folder)
+    return folder
+
+
+@pytest.mark.parametrize("name", ["landmarks", "theory", "chairs", "office"])
+def test_each_experiment_leaves_a_page_figures_and_a_recipe(name, tmp_path):
+    experiment(name)(plan_in(tmp_path))
+    whole(tmp_path / name)
+
+
+def test_the_synthetic_park_is_closed_by_both(tmp_path, park):
+    experiment("victoria-park")(plan_in(tmp_path, data=park))
+    page = whole(tmp_path / "victoria-park")
+    assert "1 of them outliers" in page
+    rmse = {}
+    for row in page.partition("## Table 1")[0].splitlines():
+        cells = [cell.strip() for cell in row.split("|")]
+        if len(cells) > 5 and cells[2][0].isdigit():
+            rmse[cells[1]] = float(cells[2])
+    assert {"odometry", "EKF", "shunting", "graph"} <= set(rmse)
+    assert max(rmse.values()) < 1.0
+
+
+def whole(folder: Path) -> str:
+    """The page of an experiment that left all it promises."""
+    page = (folder / "README.md").read_text()
+    pictures = sorted(path.stem for path in folder.glob("*.png"))
+    assert pictures == sorted(path.stem for path in folder.glob("*.svg"))
+    assert all(f"({name}.png)" in page for name in pictures)
+    assert "Wall time" in page
+    recipe = json.loads((folder / "recipe.json").read_text())
+    assert recipe["settings"]["plan"]["quick"] is True
+    assert {"machine", "wall_s"} <= set(recipe["settings"])
+    return page
+
+
+def test_without_the_data_it_says_where_to_get_it(tmp_path):
+    with pytest.raises(InvalidValueError, match=r"aa3_gpsx\.mat"):
+        experiment("victoria-park")(plan_in(tmp_path))
+    with pytest.raises(LogFormatError, match="no Victoria Park here"):
+        experiment("victoria-park")(plan_in(tmp_path, data=tmp_path))
+    with pytest.raises(UnknownNameError, match="no experiment is called 'nonsense'"):
+        verb(["nonsense"], out=tmp_path)
+
+
+def test_the_graph_is_stamped_by_the_distance_driven(park):
+    frames = list(read_victoria_park(park))
+    graph = read_graph(park)
+    track = stamped(graph, frames)
+    truth = np.array([frame.odometry.T_odom_robot for frame in frames])
+    np.testing.assert_allclose(track.poses[:, :2], truth[:, :2], atol=0.02)
+    np.testing.assert_allclose(se2.wrap_array(track.poses[:, 2] - truth[:, 2]), 0.0, atol=0.005)
+    again = graph.optimised()
+    np.testing.assert_allclose(again.poses, graph.poses, atol=1e-3)
+
+
+def test_outliers_are_fixes_nobody_could_have_driven_to():
+    stamps = np.arange(10, dtype=np.int64) * 200_000_000
+    points = np.column_stack([0.5 * np.arange(10), np.zeros(10)])
+    points[4] += [0.0, 30.0]
+    good = victoria_park.good_fixes(GpsTrack(stamps_ns=stamps, points=points))
+    assert good.tolist() == [True] * 4 + [False] + [True] * 5
+    # after a long gap anything goes
+    stamps = stamps + np.where(np.arange(10) >= 4, 10_000_000_000, 0)
+    good = victoria_park.good_fixes(GpsTrack(stamps_ns=stamps, points=points))
+    assert good[4]
+
+
+def test_loops_are_returns_after_a_long_way():
+    t = np.linspace(0.0, 4.0 * math.pi, 400)
+    poses = np.column_stack([30.0 * np.cos(t), 30.0 * np.sin(t), t])
+    track = Trajectory(stamps_ns=np.arange(400, dtype=np.int64), poses=poses)
+    pairs = victoria_park.loops(track)
+    assert pairs
+    for a, b in pairs:
+        assert np.hypot(*(poses[a] - poses[b])[:2]) < victoria_park.LOOP_NEAR_M
+        assert abs(b - a) > 100
+    np.testing.assert_allclose(victoria_park.loop_errors(track, track), 0.0, atol=1e-9)
+
+
+def test_census_counts_what_is_missed_spurious_and_deleted():
+    true = np.array([[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]])
+    census = Census(true)
+    census.take(true[:2] + 0.1)
+    census.take(np.array([[0.1, 0.0], [20.0, 0.0], [0.2, 0.0]]))
+    numbers = census.numbers()
+    assert numbers["misses"] == 2
+    assert numbers["spurious"] == 2
+    assert numbers["deleted by mistake"] == 1
+
+
+def test_statistics_are_the_papers_and_its_identity_holds():
+    e = np.random.default_rng(0).normal(0.3, 1.0, (50, 2))
+    s = statistics(e, ("x", "y"))
+    np.testing.assert_allclose(s["mean x"], e[:, 0].mean())
+    np.testing.assert_allclose(s["var_p y"], s["var_e y"] + 50 / 49 * s["mean y"] ** 2)
+    assert math.isnan(statistics(e[:1], ("x", "y"))["mean x"])
+
+
+def test_the_papers_printed_var_p_break_its_definition():
+    """Hence only means and var(e) are compared."""
+    broken = 0
+    for table in (TABLE_1, TABLE_2, TABLE_3):
+        for columns in table.values():
+            for mean, var_e, var_p in columns.values():
+                broken += abs(var_p - (var_e + mean**2)) > 0.1 * var_p
+    assert broken > 20
+
+
+def test_medians_and_sign_tests():
+    assert spread([1.0, 2.0, 3.0, math.nan]).median == 2.0
+    assert spread([]).text() == "–"
+    test = sign_test([1.0] * 17 + [3.0] * 3, [2.0] * 20)
+    assert (test.wins, test.losses) == (17, 3)
+    np.testing.assert_allclose(test.p, 0.00258, rtol=0.01)
+    assert sign_test([1.0], [1.0]).p == 1.0
+
+
+def test_short_falls_are_bold():
+    runs = [{"ours": {"mean x": 0.5, "var_e x": 0.001}}]
+    told = below_printed({"EKF": {}, "shunting": {"x": (0.1, 0.01, 0.0)}}, runs, "ours")
+    assert told[0].startswith("**x |mean(e)|")
+    assert not told[1].startswith("**")
+
+
+def test_runs_come_back_as_they_were(tmp_path):
+    numbers = {"a": {"b": math.nan, "θ": 1.5}}
+    save_run(tmp_path / "run.npz", numbers, {"poses": np.eye(3)})
+    run = load_run(tmp_path / "run.npz")
+    assert math.isnan(run.numbers["a"]["b"])
+    assert run.numbers["a"]["θ"] == 1.5
+    np.testing.assert_array_equal(run.arrays["poses"], np.eye(3))
+
+
+def test_multi_colour_sweeps_end_where_sequential_ones_do():
+    rng = np.random.default_rng(3)
+    inputs, start = rng.uniform(size=(8, 9)), rng.uniform(0.0, 0.5, (8, 9))
+    one, four = theory_data.two_sweeps(inputs, start, ShuntingConfig.paper(), 60, 0.5)
+    np.testing.assert_allclose(one[-1], four[-1], atol=1e-8)
+    assert np.abs(one[1] - four[1]).max() > 1e-4
+
+
+def test_activities_keep_the_shape_of_a_bell():
+    _, sections = theory_data.bell((1, 10, 40))
+    for section in sections.values():
+        top = int(section.argmax())
+        assert (np.diff(section[: top + 1]) >= 0.0).all()
+        assert (np.diff(section[top:]) <= 0.0).all()
