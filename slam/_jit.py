@@ -21,17 +21,18 @@ import numba
 
 _log = logging.getLogger(__name__)
 _cache_is_writable = True
+_OPTIONS = {"nogil": True, "no_cfunc_wrapper": True}
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
 def njit(function: Callable[P, R]) -> Callable[P, R]:
-    """``numba.njit(cache=True, nogil=True)``; without the cache where none can be written."""
+    """``numba.njit`` without the interpreter's lock, and with a cache where one can be written."""
     global _cache_is_writable
     if _cache_is_writable:
         try:
-            cached: Callable[P, R] = numba.njit(cache=True, nogil=True)(function)
+            cached: Callable[P, R] = numba.njit(cache=True, **_OPTIONS)(function)
             _watch_callees(cached, function)
             return cached
         except RuntimeError as error:  # "cannot cache function ...: no locator available"
@@ -42,7 +43,17 @@ def njit(function: Callable[P, R]) -> Callable[P, R]:
                 "no folder for compiled code can be written (set NUMBA_CACHE_DIR to one that can): "
                 "compiling anew, which takes some seconds in every process"
             )
-    compiled: Callable[P, R] = numba.njit(nogil=True)(function)
+    compiled: Callable[P, R] = numba.njit(**_OPTIONS)(function)
+    return compiled
+
+
+def inner(function: Callable[P, R]) -> Callable[P, R]:
+    """For kernels that only other kernels call: no entry from Python, no cache of their own.
+
+    They are compiled into each caller; leaving the rest out saves a fifth of a cold start.
+    """
+    compiled: Callable[P, R] = numba.njit(no_cpython_wrapper=True, **_OPTIONS)(function)
+    _watch_callees(compiled, function)
     return compiled
 
 

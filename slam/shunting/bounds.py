@@ -19,7 +19,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.frames import Float
 
 PARTS = 8  # the headings are dealt out to so many searches
@@ -84,7 +84,7 @@ def levels_of(field: NDArray[np.uint8], depth: int) -> NDArray[np.uint8]:
     return levels
 
 
-@njit
+@inner
 def _sum(level: NDArray[np.uint8], base: NDArray[np.int32], di: int, dj: int) -> int:
     """Sum of the level's values under the points (n, 2: column, row) shifted by (di, dj)."""
     total = 0
@@ -111,7 +111,7 @@ def _bound(
                 bounds[h, a, b] = gain * total - costs[h]
 
 
-@njit
+@inner
 def _is_apart(
     taken: NDArray[np.float64], apart: tuple[float, float], column: int, row: int, turn: float
 ) -> bool:

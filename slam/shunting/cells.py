@@ -12,8 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
-
 SIDE = 8  # neurons along a block's edge
 SHIFT, MASK = 3, 7  # i >> SHIFT is the block of neuron i, i & MASK its place inside
 
@@ -34,7 +32,7 @@ class Cells(NamedTuple):
     scratch_of  (S,) int32: row of ``impression`` of a slot the present scan touches, else -1
     impression  (T, 8, 8) float32: I of the present scan
     faced       (T, 8, 8) uint8: the way the surface faces that makes the impression
-    touched     (T, 3) int32: slot with an impression, block index (x, y)
+    touched     (T, 4) int32: slot with an impression, block index (x, y), 1 if it was born for it
     counts      (2,) int64: unused slots, touched blocks
     """
 
@@ -66,7 +64,7 @@ def no_cells() -> Cells:
         scratch_of=np.full(_FIRST_SLOTS, -1, np.int32),
         impression=np.zeros((_FIRST_TOUCHED, SIDE, SIDE), np.float32),
         faced=np.zeros((_FIRST_TOUCHED, SIDE, SIDE), np.uint8),
-        touched=np.zeros((_FIRST_TOUCHED, 3), np.int32),
+        touched=np.zeros((_FIRST_TOUCHED, 4), np.int32),
         counts=np.array([_FIRST_SLOTS, 0], np.int64),
     )
 
@@ -111,24 +109,21 @@ def living(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     return cells.directory[rows, columns], np.stack([columns, rows], axis=1) + cells.corner
 
 
-@njit
 def forget_impressions(cells: Cells) -> None:
     """Release the scratch of the present impressions; blocks that never came to life die."""
-    for k in range(cells.counts[TOUCHED_COUNT]):
-        slot = cells.touched[k, 0]
-        cells.scratch_of[slot] = -1
-        row, column = cells.touched[k, 2] - cells.corner[1], cells.touched[k, 1] - cells.corner[0]
-        if cells.directory[row, column] != slot:
-            continue
-        alive = False
-        for j in range(SIDE):
-            for i in range(SIDE):
-                alive |= cells.x[slot, j, i] != 0.0 or cells.age[slot, j, i] != 0.0
-        if not alive:
-            cells.directory[row, column] = -1
-            cells.free[cells.counts[FREE_COUNT]] = slot
-            cells.counts[FREE_COUNT] += 1
+    touched = cells.touched[: cells.counts[TOUCHED_COUNT]]
+    cells.scratch_of[touched[:, 0]] = -1
     cells.counts[TOUCHED_COUNT] = 0
+    born = touched[touched[:, 3] == 1]
+    if len(born) == 0:
+        return
+    slots, columns, rows = born[:, 0], born[:, 1] - cells.corner[0], born[:, 2] - cells.corner[1]
+    silent = ~(cells.x[slots].any(axis=(1, 2)) | cells.age[slots].any(axis=(1, 2)))
+    silent &= cells.directory[rows, columns] == slots  # what died in the update is free already
+    cells.directory[rows[silent], columns[silent]] = -1
+    unused, dead = int(cells.counts[FREE_COUNT]), slots[silent]
+    cells.free[unused : unused + len(dead)] = dead
+    cells.counts[FREE_COUNT] += len(dead)
 
 
 def dense(

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.frames import Features, Float, Scan
 from slam.seen import FREE_WITHOUT_RETURN_M
 from slam.shunting.cells import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells
@@ -198,24 +198,24 @@ def joined(first: Observations, second: Observations) -> Observations:
     )
 
 
-@njit
+@inner
 def _touch(cells: Cells, column: int, row: int) -> int:
     """Open a place for the impressions of a block, which is born if need be. -1: no room is left.
 
     The column and row are those of the directory.
     """
-    slot = cells.directory[row, column]
+    slot, born = cells.directory[row, column], 0
     if slot < 0:
         if cells.counts[FREE_COUNT] == 0:
             return -1
         cells.counts[FREE_COUNT] -= 1
         slot = cells.free[cells.counts[FREE_COUNT]]
         cells.directory[row, column] = slot
-        cells.x[slot] = 0.0
-        cells.y[slot] = 0.0
-        cells.age[slot] = 0.0
-        cells.facing[slot] = 0
-        cells.scratch_of[slot] = -1
+        cells.scratch_of[slot], born = -1, 1
+        for j in range(SIDE):
+            for i in range(SIDE):
+                cells.x[slot, j, i] = cells.y[slot, j, i] = cells.age[slot, j, i] = 0.0
+                cells.facing[slot, j, i] = 0
     scratch = cells.counts[TOUCHED_COUNT]
     if scratch == len(cells.touched):
         return -1
@@ -223,13 +223,16 @@ def _touch(cells: Cells, column: int, row: int) -> int:
     cells.touched[scratch, 0] = slot
     cells.touched[scratch, 1] = column + cells.corner[0]
     cells.touched[scratch, 2] = row + cells.corner[1]
+    cells.touched[scratch, 3] = born
     cells.scratch_of[slot] = scratch
-    cells.impression[scratch] = 0.0
-    cells.faced[scratch] = 0
+    for j in range(SIDE):
+        for i in range(SIDE):
+            cells.impression[scratch, j, i] = 0.0
+            cells.faced[scratch, j, i] = 0
     return int(scratch)
 
 
-@njit
+@inner
 def _stamp_point(
     cells: Cells, u: float, v: float, a: float, b: float, d: float, faced: int
 ) -> bool:
@@ -266,7 +269,7 @@ def _stamp_point(
     return True
 
 
-@njit
+@inner
 def _stamp_stretch(
     cells: Cells, u: float, v: float, du: float, dv: float, variance: float, faced: int
 ) -> bool:

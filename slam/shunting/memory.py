@@ -2,8 +2,8 @@
 """A SLAM's memory as a file: its knobs, the living neurons, and where the robot was.
 
 A NumPy archive (.npz) without pickled objects. ``header`` is JSON text with ``format``, ``version``
-and ``state``; ``places`` (n, 2) are the blocks' indices (x, y); ``x``, ``y`` and ``age`` (n, 8, 8)
-their neurons. Older readers refuse newer versions.
+and ``state``; ``places`` (n, 2) are the blocks' indices (x, y); ``x``, ``y``, ``age`` and
+``facing`` (n, 8, 8) their neurons. Older readers refuse newer versions.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from slam.shunting.config import ShuntingConfig
 from slam.shunting.network import Network
 
 FORMAT, VERSION = "mobilia shunting memory", 1
-_ARRAYS = ("places", "x", "y", "age")
+_ARRAYS = ("places", "x", "y", "age", "facing")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,6 +71,7 @@ def save(path: Path, network: Network, state: State) -> None:
             x=network.cells.x[slots],
             y=network.cells.y[slots],
             age=network.cells.age[slots],
+            facing=network.cells.facing[slots],
         )
 
 
@@ -108,6 +109,7 @@ def _check(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
         ("x", (n, SIDE, SIDE), np.float32),
         ("y", (n, SIDE, SIDE), np.float32),
         ("age", (n, SIDE, SIDE), np.float32),
+        ("facing", (n, SIDE, SIDE), np.uint8),
     ):
         array = arrays[name]
         if array.shape != shape or array.dtype != kind or not np.isfinite(array).all():
@@ -132,4 +134,4 @@ def fill(network: Network, arrays: dict[str, NDArray[Any]]) -> None:
         slot = int(cells.free[cells.counts[FREE_COUNT]])
         cells.directory[row, column] = slot
         cells.x[slot], cells.y[slot] = arrays["x"][k], arrays["y"][k]
-        cells.age[slot] = arrays["age"][k]
+        cells.age[slot], cells.facing[slot] = arrays["age"][k], arrays["facing"][k]

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.frames import Float
 from slam.shunting.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells
 from slam.shunting.config import ShuntingConfig
@@ -26,7 +26,7 @@ HIT, MISS, MOST = 0.85, -0.4, 3.5
 STRUCK = 0.6  # impression of a cell that holds the end of a beam; fainter is only beside it
 
 
-@njit
+@inner
 def _in_reach(
     cells: Cells, view: View, ox: float, oy: float, size: float
 ) -> tuple[int, int, int, int]:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.shunting.cells import MASK, SHIFT, Cells
 from slam.shunting.surfaces import opposite, turned_face
 
@@ -46,7 +46,7 @@ class Seen(NamedTuple):
     facings: NDArray[np.uint8]
 
 
-@njit
+@inner
 def _overlap(
     cells: Cells,
     reward: Reward,
@@ -202,7 +202,7 @@ def evaluate(
     return score, matched
 
 
-@njit
+@inner
 def _prior(
     pose: NDArray[np.float64],
     prediction: NDArray[np.float64],
@@ -218,7 +218,7 @@ def _prior(
     return float(0.5 * (slope[0] * ex + slope[1] * ey + slope[2] * et))
 
 
-@njit
+@inner
 def _solve(
     H: NDArray[np.float64], g: NDArray[np.float64], damping: float, step: NDArray[np.float64]
 ) -> None:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.frames import Float
 from slam.shunting.cells import MASK, SHIFT, SIDE, Cells
 from slam.shunting.network import Network
@@ -16,7 +16,7 @@ from slam.shunting.network import Network
 MOST = 1 << 14  # peaks returned at most
 
 
-@njit
+@inner
 def _value(cells: Cells, short: float, i: int, j: int) -> float:
     """v = y + (1 - y) short x of neuron (i, j), what the matcher sees; 0 where no block lives."""
     row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
@@ -30,7 +30,7 @@ def _value(cells: Cells, short: float, i: int, j: int) -> float:
     return float(y + (1.0 - y) * short * cells.x[slot, j & MASK, i & MASK])
 
 
-@njit
+@inner
 def _between(before: float, here: float, after: float) -> float:
     """Offset of the top of the Gaussian through three neighbours, in neurons, |offset| <= 0.5."""
     low = math.log(max(before, 1e-9))

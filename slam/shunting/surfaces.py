@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 LONGEST_JOIN_M = 1.0
 LINE_HITS = 4  # evidence for a surface between hits farther apart than ``NEAR_JOIN_CELLS``
@@ -22,7 +22,7 @@ FACES, FACES_SEEN = (
 MIXED_M = 1.5  # the receiver tells two surfaces farther apart than this from each other
 
 
-@njit
+@inner
 def _one_line(
     points: NDArray[np.float64], beams: NDArray[np.int64], first: int, x: float, y: float
 ) -> bool:
@@ -122,7 +122,7 @@ def face(
         out[k] = FACES_SEEN | (math.floor(math.atan2(ny, nx) / math.tau * FACES + 0.5) % FACES)
 
 
-@njit
+@inner
 def turned_face(facing: int, theta: float) -> int:
     """A facing in axes turned by -theta."""
     if facing == 0:
@@ -130,7 +130,7 @@ def turned_face(facing: int, theta: float) -> int:
     return FACES_SEEN | ((int(facing) + math.floor(theta / math.tau * FACES + 0.5)) % FACES)
 
 
-@njit
+@inner
 def opposite(one: int, other: int) -> bool:
     """Whether two surfaces face away from each other, by more than 135 degrees; unknown: no.
 
@@ -142,7 +142,7 @@ def opposite(one: int, other: int) -> bool:
     return 3 * FACES < 8 * apart < 5 * FACES
 
 
-@njit
+@inner
 def _apart(points: NDArray[np.float64], j: int, k: int) -> float:
     dx, dy = points[j, 0] - points[k, 0], points[j, 1] - points[k, 1]
     return math.sqrt(dx * dx + dy * dy)
@@ -175,7 +175,7 @@ def unveiled(
     return count
 
 
-@njit
+@inner
 def _range(points: NDArray[np.float64], k: int, origin: NDArray[np.float64]) -> float:
     dx, dy = points[k, 0] - origin[0], points[k, 1] - origin[1]
     return math.sqrt(dx * dx + dy * dy)

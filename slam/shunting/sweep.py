@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.shunting.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells
 from slam.shunting.surfaces import opposite
 from slam.shunting.visibility import View, block_is_hidden, seen_empty
@@ -52,29 +52,19 @@ def lateral_mu(total: float, reach: float) -> float:
     return total / inverse_distances if inverse_distances else 0.0
 
 
-@njit
-def _activity(cells: Cells, i: int, j: int) -> float:
-    """x of neuron (i, j); 0 where no block lives."""
-    row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
-    rows, columns = cells.directory.shape
-    if row < 0 or column < 0 or row >= rows or column >= columns:
-        return 0.0
-    slot = cells.directory[row, column]
-    if slot < 0:
-        return 0.0
-    return float(cells.x[slot, j & MASK, i & MASK])
-
-
-@njit
+@inner
 def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
     """Sum of w_ij d(x_j) over the neighbours of neuron (i, j), d(x) = max(x - sigma, 0)."""
     edge = math.ceil(law.reach)
+    rows, columns = cells.directory.shape
     total = 0.0
-    for dj in range(-edge, edge + 1):
-        for di in range(-edge, edge + 1):
-            d = math.sqrt(di * di + dj * dj)
-            if 0.0 < d < law.reach:
-                above = _activity(cells, i + di, j + dj) - law.threshold
+    for b in range(j - edge, j + edge + 1):
+        for a in range(i - edge, i + edge + 1):
+            d = math.sqrt((a - i) * (a - i) + (b - j) * (b - j))
+            row, column = (b >> SHIFT) - cells.corner[1], (a >> SHIFT) - cells.corner[0]
+            if 0.0 < d < law.reach and 0 <= row < rows and 0 <= column < columns:
+                slot = cells.directory[row, column]
+                above = cells.x[slot, b & MASK, a & MASK] - law.threshold if slot >= 0 else 0.0
                 if above > 0.0:
                     total += law.mu / d * above
     return total

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 MARGIN_CELLS = 1.5
 GATE_CELLS = 0.6
@@ -103,7 +103,7 @@ def view_of_features(points: NDArray[np.float64], cell: float) -> View:
     return view._replace(gate=math.inf)
 
 
-@njit
+@inner
 def seen_empty(view: View, dx: float, dy: float) -> bool:
     """True where a beam passed by (dx, dy) (m, from the laser, laser axes) without stopping."""
     r = math.sqrt(dx * dx + dy * dy)
@@ -125,7 +125,7 @@ def seen_empty(view: View, dx: float, dy: float) -> bool:
     return bool(nearest * view.step * r <= view.gate)
 
 
-@njit
+@inner
 def block_is_hidden(view: View, dx: float, dy: float, half: float) -> bool:
     """True when no neuron within ``half`` m of (dx, dy) can be in view."""
     r = math.sqrt(dx * dx + dy * dy)
