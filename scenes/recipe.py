@@ -133,7 +133,8 @@ def scatter(
 ) -> None:
     """``n`` people (or others) on free floor anywhere."""
     for index in range(n):
-        pose = _anywhere(floor, kind, f"n_{kind}", n, rng)
+        field = "n_people" if kind == "person" else f"n_{kind}s"
+        pose = _anywhere(floor, kind, field, n, rng)
         paint = look.dress(draws.colours) if kind == "person" else None
         builder.add(kind, f"{kind}{index}", pose, paint=paint)
         floor.block(pose[0], pose[1], hull_radius(kind))

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.checks import numbers
 from sim.flow import box_clearance
 from slam._jit import njit
 from slam.errors import InvalidValueError
@@ -136,7 +137,7 @@ class Bodies:
 
     def place_robot(self, data: mujoco.MjData, pose: Sequence[float]) -> None:
         """Put the robot at (x, y, heading); ``InvalidValueError`` where it does not fit."""
-        x, y, yaw = (float(v) for v in pose)
+        x, y, yaw = numbers("start", pose, 3, "(x m, y m, heading rad)")
         here = self.poses(data)
         if self.robot is None or not math.isfinite(x + y + yaw):
             raise InvalidValueError(f"start must be a finite pose of a robot, got {pose!r}")

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.checks import check_types
 from sim.navgrid import NavGrid
 from slam._jit import njit
 from slam.errors import InvalidValueError
@@ -41,6 +42,7 @@ class TourConfig:
     patience_s: float = 6.0
 
     def __post_init__(self) -> None:
+        check_types(self)
         for name in self.__dataclass_fields__:
             if not getattr(self, name) > 0.0:
                 raise InvalidValueError(f"TourConfig.{name} must be > 0, got {getattr(self, name)}")

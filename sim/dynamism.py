@@ -25,6 +25,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from sim.checks import check_types
 from slam.errors import InvalidValueError
 
 
@@ -57,6 +58,7 @@ class Dynamism:
     push_spin_max: float = math.pi
 
     def __post_init__(self) -> None:
+        check_types(self)
         rates = ("chair_push_rate", "bin_kick_rate", "load_push_rate", "door_rate", "push_spin_max")
         for name in rates:
             value = getattr(self, name)

@@ -191,7 +191,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def act(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool]:
         """``step`` without the info."""
-        v, omega = (min(max(float(part), -1.0), 1.0) for part in action)
+        try:
+            v, omega = (min(max(float(part), -1.0), 1.0) for part in action)
+        except (TypeError, ValueError):
+            raise InvalidValueError(f"an action is two numbers, got {action!r}") from None
         simulation = self.simulation
         simulation.world.set_command(v * V_MAX_MPS, omega * OMEGA_MAX_RADPS)
         scan = simulation.sense()

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from sim.checks import numbers
 from sim.dynamism import Dynamism
 from sim.lidar import Lms221Config
 from slam.errors import InvalidValueError
@@ -37,7 +38,7 @@ def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> E
     for name in sorted(given):
         if name not in OPTIONS:
             near = difflib.get_close_matches(name, OPTIONS, n=1)
-            hint = f", did you mean {near[0]!r}?" if near else ""
+            hint = f", did you mean {near[0]!r}?" if near else "."
             raise InvalidValueError(
                 f"unknown reset option {name!r}{hint} Known: {', '.join(sorted(OPTIONS))}"
             )
@@ -48,8 +49,8 @@ def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> E
     merged["dynamism"] = _rates(merged["dynamism"], given)
     merged["laser"] = _laser(merged["laser"], given)
     if "start" in given:
-        merged["start"] = numbers("start", given["start"], 3, "(x m, y m, heading rad)")
-    goal = numbers("goal", given["goal"], 2, "(x, y) in m") if "goal" in given else None
+        merged["start"] = _finite("start", given["start"], 3, "(x m, y m, heading rad)")
+    goal = _finite("goal", given["goal"], 2, "(x, y) in m") if "goal" in given else None
     return Episode(
         settings=merged,
         seeds=mapping("seeds", given.get("seeds")),
@@ -76,14 +77,8 @@ def _scene_options(given: Mapping[str, Any], settings: Mapping[str, Any]) -> dic
     return options
 
 
-def numbers(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
-    """``n`` finite numbers."""
-    try:
-        out = tuple(float(v) for v in value)
-    except (TypeError, ValueError):
-        out = ()
-    if len(out) != n:
-        raise InvalidValueError(f"option {name} must be {meaning}, got {value!r}")
+def _finite(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
+    out = numbers(f"option {name}", value, n, meaning)
     if not all(math.isfinite(v) for v in out):
         raise InvalidValueError(f"option {name} must be finite, got {value!r}")
     return out

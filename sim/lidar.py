@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.caster import FanPlan, Raycaster
+from sim.checks import instance
 from sim.lidar_config import (
     DEGREES_PER_STEP,
     STEPS_PER_SWEEP,
@@ -68,6 +69,7 @@ class Lms221:
         robot: str = "robot/base",
     ) -> None:
         self.config = Lms221Config() if config is None else config
+        instance("laser", self.config, Lms221Config)
         _check_timestep(model)
         number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, site)
         if number < 0:

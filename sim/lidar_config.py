@@ -14,6 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.checks import check_types, instance
 from sim.lidar_effects import RangeEffects
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, LaserSpec
@@ -71,6 +72,8 @@ class Lms221Config:
     effects: RangeEffects = field(default_factory=RangeEffects)
 
     def __post_init__(self) -> None:
+        check_types(self)
+        instance("Lms221Config.effects", self.effects, RangeEffects)
         if self.resolution_deg not in SCAN_MODES:
             raise InvalidValueError(
                 f"Lms221Config.resolution_deg must be 1, 0.5 or 0.25, got {self.resolution_deg}"

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.caster import Spot
+from sim.checks import check_types
 from sim.lidar_signal import ERROR_STEP, NEEDED_STEP
 from slam._jit import njit
 from slam.errors import InvalidValueError
@@ -73,6 +74,7 @@ class RangeEffects:
     dropout_rate: float = 0.0
 
     def __post_init__(self) -> None:
+        check_types(self)
         if not 0.0 <= self.dropout_rate <= 1.0:
             raise InvalidValueError(
                 f"RangeEffects.dropout_rate must be within 0..1, got {self.dropout_rate}"

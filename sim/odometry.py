@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import state
+from sim.checks import instance
 from sim.odometry_config import PRESETS, OdometryConfig, preset
 from sim.odometry_motion import COUNTED, NOW, over_scan, update
 from slam import se2
@@ -58,6 +59,7 @@ class WheelOdometry:
         errors: tuple[float, float, float] | None = None,
     ) -> None:
         self.config = preset(config) if isinstance(config, str) else config
+        instance("odometry", self.config, OdometryConfig)
         if not 0.0 < track < math.inf:
             raise InvalidValueError(f"WheelOdometry.track must be > 0 m, got {track}")
         self._rng = np.random.default_rng(0) if rng is None else rng

@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 
+from sim.checks import check_types
 from slam.errors import InvalidValueError, UnknownNameError
 
 
@@ -37,6 +38,7 @@ class OdometryConfig:
     ticks_per_m: float = 0.0
 
     def __post_init__(self) -> None:
+        check_types(self)
         for item in fields(self):
             value = getattr(self, item.name)
             if not (math.isfinite(value) and value >= 0.0):

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.checks import check_types
 from slam._jit import njit
 from slam.errors import InvalidValueError
 
@@ -36,6 +37,7 @@ class DriveConfig:
     track: float = 0.33
 
     def __post_init__(self) -> None:
+        check_types(self)
         for name in ("v_max", "omega_max", "accel", "alpha", "track"):
             value = getattr(self, name)
             if not 0.0 < value < math.inf:

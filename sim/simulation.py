@@ -266,8 +266,8 @@ def tour(
 
 def n_frames(seconds: float, period_s: float) -> int:
     """Whole scans in ``seconds``."""
-    if not (math.isfinite(seconds) and seconds > 0.0):
-        raise InvalidValueError(f"seconds must be > 0 and finite, got {seconds}")
+    if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds > 0.0):
+        raise InvalidValueError(f"seconds must be > 0 and finite, got {seconds!r}")
     return max(1, round(seconds / period_s))
 
 

@@ -26,7 +26,7 @@ def pack(arrays: Mapping[str, NDArray[Any]], words: Mapping[str, Any]) -> bytes:
 def unpack(block: bytes) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Inverse of ``pack``; ``InvalidValueError`` for anything else than its output."""
     start = len(_MAGIC) + 8
-    if block[: len(_MAGIC)] != _MAGIC or len(block) < start:
+    if not isinstance(block, bytes) or block[: len(_MAGIC)] != _MAGIC or len(block) < start:
         raise InvalidValueError("this is no saved world: it does not start with its mark")
     at = start + int.from_bytes(block[len(_MAGIC) : start], "little")
     try:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import state
+from sim.checks import check_types
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float
@@ -53,6 +54,7 @@ class TagCameraConfig:
     tag_side_m: float = 0.24
 
     def __post_init__(self) -> None:
+        check_types(self)
         for item in fields(self):
             value = getattr(self, item.name)
             if not (math.isfinite(value) and value >= 0.0):

@@ -20,6 +20,7 @@ from sim import state, substeps
 from sim.bodies import Bodies
 from sim.castors import checked_level, stand_on_castors
 from sim.chairs import pushers, tables
+from sim.checks import instance
 from sim.contacts import Contact, RobotContacts
 from sim.doors import Doors
 from sim.dynamism import Dynamism
@@ -74,7 +75,8 @@ class World:
         self._clock = np.zeros(1, dtype=np.int64)
         self.bodies = Bodies(self.model, self.scene)
         self._contacts = RobotContacts(self.model, self.bodies)
-        self.drive_config = drive or DriveConfig()
+        self.drive_config = DriveConfig() if drive is None else drive
+        instance("drive", self.drive_config, DriveConfig)
         self._drive = Drive(self.model, self.drive_config, SUBSTEPS_PER_TICK / SUBSTEPS_PER_S)
         self._shoves = pushers(self.model, self.scene.movers, self.rates, self.seeds)
         self._doors = Doors(
@@ -108,6 +110,7 @@ class World:
             return build(scene, seed=self.seeds.integer("layout"), **options)
         if options:
             raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")
+        instance("scene", scene, Scene)
         return scene
 
     def _named(self, kind: str) -> list[str]:
