@@ -37,7 +37,11 @@ class Estimate:
     T_map_robot  (3,) m, m, rad; the map frame is the robot's frame at the first update
     covariance   (3, 3) of (x, y, theta) in the map frame
     converged    False when the system does not trust this estimate; never a plausible stand-in
-    diagnostics  JSON-serialisable numbers and words, e.g. {"state": "tracking", "matched": 0.97}
+    diagnostics  JSON-serialisable numbers and words, e.g. {"state": "tracking", "matched": 0.97}.
+                 "unobservable": number of directions of position (0, 1 or 2) about which the sensor
+                 says nothing now, as along a bare corridor; "unobservable_rad": the one direction,
+                 in the map frame. ``converged`` stays True then: nothing is wrong, the estimate is
+                 odometry's there, and the covariance grows along it
     """
 
     stamp_ns: int

@@ -1,5 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How sure the shunting SLAM is of its pose, in the map of the known start."""
+"""How sure the shunting SLAM is of its pose, in the map of the known start.
+
+Three errors, kept apart because they grow differently:
+
+- the map in view is off as a whole, by what it was off when its parts were first written. Grows
+  with the share of the map that is new (trace gain), and turns with the robot about it;
+- the scan lies off the map by what surfaces share: the scanner's errors by range and slant, and the
+  lattice's. Does not grow; its size is read off the residuals (``residuals``);
+- odometry, where the scan says nothing: the map's share of the pose ends, and this one grows.
+
+Every constant is in units of what is observed, so one set serves any scanner and rate.
+"""
 
 from __future__ import annotations
 
@@ -7,44 +18,99 @@ import math
 
 import numpy as np
 
-from slam import se2
 from slam.frames import Float
+from slam.shunting.covariances import advance, observable
 from slam.shunting.matching import Match
-from slam.shunting.motion import WIDEN, Prediction, inverted
+from slam.shunting.motion import Prediction
+from slam.shunting.residuals import Evidence
 
-INFORMATION_SHARE = 0.3  # of the data's curvature that is independent from frame to frame
-DRIFT_SHARE = 1.0  # of the pose's error that goes into newly mapped structure
-LOCK_CELLS, LOCK_RAD = 0.05, 3e-4  # what the lattice itself leaves, 1 sigma
+LATTICE_CELLS = 0.065  # what surfaces are off by without any shared residual, 1 sigma
+SHARED_TIMES = 2.3  # the pose's error in units of the residual that surfaces share
+NEW_TIMES = 0.25  # ... of which so much stays, when a map is all written anew
+SHARED_S, VIEW_S = 20.0, 0.5  # over which shared residuals and directions of surfaces are averaged
+AT_FIRST = 200.0  # pairs of points that the scanner's usual residual counts as
+USUAL_M = 0.002  # that residual
+CORRELATED_S = 1.0  # for so long the shared error of a scan stays the same
 
 
 class Belief:
-    """Fuses odometry and match into the covariance of the pose.
+    """The covariance of the pose.
 
     covariance    (3, 3) of (x, y, theta) in the map frame; zero at the known start
-    newest_drift  (3, 3) the share of it that the latest frame wrote into the map
+    newest_drift  (3, 3) what the latest frame added to the error of the map
+    unobservable  directions of position (0, 1 or 2) about which the latest scans say no more than
+                  the noise of their beams would
+    along_rad     direction in the map of the one that is not observable, None unless it is one
     """
 
     def __init__(self, cell_m: float) -> None:
         self.covariance: Float = np.zeros((3, 3))
         self.newest_drift: Float = np.zeros((3, 3))
-        self._relative: Float = np.zeros((3, 3))
+        self.unobservable = 0
+        self.along_rad: float | None = None
+        self._lattice = (LATTICE_CELLS * cell_m) ** 2
+        self._products, self._pairs = AT_FIRST * USUAL_M**2, AT_FIRST
+        self._geometry: Float = np.zeros((3, 3))
+        self._feigned, self._weighed = 0.0, 0.0
         self._drift: Float = np.zeros((3, 3))
-        lock = LOCK_CELLS * cell_m
-        self._floor: Float = np.diag([lock * lock, lock * lock, LOCK_RAD**2])
+        self._blind: Float = np.zeros((3, 3))
+        self._shared: Float = np.zeros((3, 3))
+
+    @property
+    def shared_m2(self) -> float:
+        """Variance, m^2, of the residual that neighbouring points of a surface share."""
+        return max(self._products, 0.0) / self._pairs
 
     def relocated(self, covariance: Float) -> None:
         """Found again somewhere in the map, to within ``covariance`` (3, 3)."""
-        self._relative = covariance.copy()
+        self._blind = covariance.copy()
 
-    def update(self, T_map_before: Float, prediction: Prediction, match: Match) -> None:
-        """Take the motion from ``T_map_before`` and the match at its end in."""
-        before = se2.propagate(self._relative, T_map_before, prediction.increment, np.zeros((3, 3)))
-        spread = before + prediction.covariance / WIDEN**2
-        share = INFORMATION_SHARE * match.tau
-        self._relative = inverted(inverted(spread) + share * match.information)
-        # What is new is mapped with the pose's present error, which then stays in the map.
-        share = DRIFT_SHARE * (1.0 - match.matched)
-        share *= math.sqrt(min(5.0 * max(prediction.elapsed, 0.0), 1.0))
-        self.newest_drift = share * self._relative
-        self._drift = self._drift + self.newest_drift
-        self.covariance = self._relative + self._drift + self._floor
+    def resumed(self, covariance: Float) -> None:
+        """Going on in a map of before, which is off by ``covariance`` (3, 3) as a whole."""
+        self._drift = covariance.copy()
+        self.covariance = covariance.copy()
+
+    def update(
+        self, T_map_before: Float, prediction: Prediction, match: Match, evidence: Evidence | None
+    ) -> None:
+        """Take the motion from ``T_map_before`` and the match at its end in.
+
+        Without ``evidence`` the match was not believed: odometry alone moved the robot.
+        """
+        data = np.zeros((3, 3))
+        strength, new = 0.0, 0.0
+        if evidence is not None:
+            self._learn(evidence, prediction.elapsed)
+            strength = match.tau * float(match.information[0, 0] + match.information[1, 1])
+            new = evidence.new / max(evidence.weighed, 1e-9)
+        if strength > 0.0 and self._weighed > 0.0:
+            feigned = self._feigned / self._weighed
+            geometry = self._geometry * (1.0 / self._weighed)
+            self.unobservable, along = observable(geometry, feigned, data)
+            self.along_rad = along if self.unobservable == 1 else None
+            data *= strength
+        else:
+            self.unobservable, self.along_rad = 2, None
+            self._blind = self._blind + self._shared
+        variance = self._lattice + SHARED_TIMES**2 * self.shared_m2
+        frames = max(1.0, CORRELATED_S / max(prediction.elapsed, 1e-3))
+        advance(
+            self._drift,
+            self._blind,
+            self._shared,
+            self.newest_drift,
+            prediction.T_map_robot - T_map_before,
+            prediction.covariance,
+            data,
+            (variance * strength, NEW_TIMES**2 * new * variance * strength, frames),
+        )
+        self.covariance = self._drift + self._blind + self._shared
+
+    def _learn(self, evidence: Evidence, elapsed: float) -> None:
+        keep = math.exp(-elapsed / SHARED_S)
+        self._products = keep * self._products + evidence.shared
+        self._pairs = keep * self._pairs + evidence.paired
+        keep = math.exp(-elapsed / VIEW_S)
+        self._geometry = keep * self._geometry + evidence.geometry
+        self._feigned = keep * self._feigned + evidence.feigned
+        self._weighed = keep * self._weighed + evidence.weighed

@@ -4,15 +4,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from slam import se2
 from slam.frames import Float, Odometry
 
-WIDEN = 2.5  # times the odometry's own standard deviation: a too tight prior lets the map slip
-FLOOR_M, FLOOR_RAD = 0.004, 0.003  # standard deviation per sqrt(0.2 s): skew, quantisation, slip
+FLOOR_M, FLOOR_RAD = 0.002, 0.0015  # standard deviation per sqrt(0.2 s): skew, a match's own
+LEAST_VARIANCE = 1e-12  # of an increment, m^2 and rad^2
 # Without a covariance: a worn robot on a log, see ``assumed_covariance``.
 ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
 
@@ -44,9 +44,11 @@ class Prediction:
 
     T_map_robot  (3,) predicted pose
     increment    (3,) T_before_now by odometry
-    covariance   (3, 3) of the increment, in the map frame, widened and floored
+    covariance   (3, 3) of the increment, in the map frame, scaled and floored
     twist        (3,) body velocity for de-skewing
     elapsed      s since the previous frame
+    unscaled     (3, 3) as stated or assumed, in the previous robot frame; zero: nothing to learn
+    floor        m^2 and rad^2 that were added
     """
 
     T_map_robot: Float
@@ -54,6 +56,8 @@ class Prediction:
     covariance: Float
     twist: Float
     elapsed: float
+    unscaled: Float = field(default_factory=lambda: np.zeros((3, 3)))
+    floor: tuple[float, float] = (0.0, 0.0)
 
 
 def assumed_covariance(increment: Float) -> Float:
@@ -65,17 +69,22 @@ def assumed_covariance(increment: Float) -> Float:
     return np.diag([sd_xy**2, sd_xy**2, sd_theta**2])
 
 
-def predict(T_map_before: Float, before: Odometry, now: Odometry) -> Prediction:
-    """Chain the odometry increment on the last pose; covariance from the frame's own."""
+def predict(
+    T_map_before: Float, before: Odometry, now: Odometry, scales: tuple[float, float] = (1.0, 1.0)
+) -> Prediction:
+    """Chain the odometry increment on the last pose; covariance from the frame's own.
+
+    ``scales`` multiply its variance of translation and of rotation.
+    """
     increment = se2.between(before.T_odom_robot, now.T_odom_robot)
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
     given = now.increment_covariance
-    if given is None:
-        in_robot = assumed_covariance(increment)
-    else:
-        in_robot = WIDEN**2 * np.asarray(given)
+    unscaled = assumed_covariance(increment) if given is None else np.asarray(given)
+    unscaled = unscaled + LEAST_VARIANCE * np.eye(3)
     share = min(max(elapsed, 1e-3), 1.0) / 0.2
-    in_robot = in_robot + share * np.diag([FLOOR_M**2, FLOOR_M**2, FLOOR_RAD**2])
+    floor = share * FLOOR_M**2, share * FLOOR_RAD**2
+    widths = np.array([math.sqrt(scales[0]), math.sqrt(scales[0]), math.sqrt(scales[1])])
+    in_robot = unscaled * widths[:, None] * widths + np.diag([floor[0], floor[0], floor[1]])
     if now.twist is not None:
         twist = np.asarray(now.twist)
     elif 0.0 < elapsed < 0.5:
@@ -86,6 +95,8 @@ def predict(T_map_before: Float, before: Odometry, now: Odometry) -> Prediction:
         T_map_robot=se2.compose(T_map_before, increment),
         increment=increment,
         covariance=turned(in_robot, float(T_map_before[2])),
+        unscaled=unscaled,
+        floor=floor,
         twist=twist,
         elapsed=elapsed,
     )

@@ -24,11 +24,13 @@ from slam.shunting.impressions import (
     joined,
     stamp,
 )
+from slam.shunting.increments import Increments
 from slam.shunting.loops import Loops
 from slam.shunting.matching import Match, Matcher
-from slam.shunting.motion import Prediction, inverted, predict, turned
+from slam.shunting.motion import Prediction, inverted, turned
 from slam.shunting.network import Network
 from slam.shunting.recovery import COARSE, Recovery
+from slam.shunting.residuals import Evidence, look
 from slam.shunting.search import SearchWindow
 from slam.shunting.warmup import warm_up
 from slam.system import Estimate, Raster, register
@@ -75,6 +77,7 @@ class ShuntingSlam:
         self._resumed: Float | None = None
         self._T_map_robot: Float = np.zeros(3)
         self._belief = Belief(self.config.cell_m)
+        self._increments = Increments(self.config.cell_m)
         self._usual: deque[float] = deque(maxlen=50)
         self._supports: deque[float] = deque(maxlen=50)
         self._doubts = 0
@@ -97,12 +100,18 @@ class ShuntingSlam:
             )
         prediction = self._predict(frame.odometry)
         observations = self._observe(frame, prediction.twist)
+        evidence = None
         if self._recovery is None:
             match = self._match(observations, prediction)
+            evidence = self._look(observations, match, prediction.elapsed)
             state = self._integrate(observations, match, prediction.elapsed)
         else:
             match, state = self._recover(self._recovery, observations, prediction)
-        self._belief.update(self._T_map_robot, prediction, match)
+        self._belief.update(self._T_map_robot, prediction, match, evidence)
+        if state == "tracking":
+            self._increments.learn(prediction, match)
+        else:
+            self._increments.skip()
         self._keep(observations, match, prediction, state)
         return self._report(frame, match, state)
 
@@ -121,7 +130,7 @@ class ShuntingSlam:
     def _predict(self, odometry: Odometry) -> Prediction:
         """By odometry; on the first frame with a loaded map, where the robot was before."""
         if self._before is not None:
-            return predict(self._T_map_robot, self._before, odometry)
+            return self._increments.predict(self._T_map_robot, self._before, odometry)
         assert self._resumed is not None
         return Prediction(
             T_map_robot=self._T_map_robot,
@@ -162,6 +171,11 @@ class ShuntingSlam:
             if found.score > match.score:
                 match = found
         return match
+
+    def _look(self, observations: Observations, match: Match, elapsed: float) -> Evidence:
+        short_term = self._matcher.reward.short_term
+        step, turn = min(elapsed, LONGEST_LOOK_S), len(self._poses)
+        return look(self.network, short_term, observations, match.T_map_robot, step, turn)
 
     def _usual_match(self) -> float:
         return float(np.median(self._usual)) if self._usual else 1.0
@@ -258,6 +272,9 @@ class ShuntingSlam:
                 "matched": match.matched,
                 "searched": match.searched,
                 "evaluations": match.evaluations,
+                "unobservable": self._belief.unobservable,
+                "unobservable_rad": self._belief.along_rad,
+                "nis": self._increments.nis,
             },
         )
 
@@ -307,7 +324,7 @@ class ShuntingSlam:
         memory.fill(slam.network, arrays)
         slam._T_map_robot = state.T_map_robot
         slam._resumed = state.covariance + COARSE
-        slam._belief.relocated(state.covariance)
+        slam._belief.resumed(state.covariance)
         slam._usual.extend(state.usual)
         slam._supports.extend(state.supports)
         slam._tracked_s, slam._tracked = state.tracked_s, state.tracked

@@ -16,10 +16,12 @@ from numba.core import event
 
 from slam.frames import LaserSpec, Scan
 from slam.shunting.config import ShuntingConfig
+from slam.shunting.covariances import advance, innovation, observable
 from slam.shunting.everywhere import places
 from slam.shunting.impressions import from_scan, stamp
 from slam.shunting.matching import Matcher
 from slam.shunting.network import Network
+from slam.shunting.residuals import look
 from slam.shunting.search import SearchWindow
 
 _log = logging.getLogger(__name__)
@@ -59,6 +61,11 @@ def _run_all() -> None:
     network, matcher = Network(config), Matcher(config)
     origin, covariance = np.zeros(3), np.diag([0.1, 0.1, 0.1])
     seen = from_scan(Scan(stamp_ns=0, ranges=ranges, spec=spec), np.zeros(3), config)
+    look(network, 0.3, seen, origin, 1.0, 0)
+    whole = [np.eye(3) for _ in range(4)]
+    advance(whole[0], whole[1], whole[2], whole[3], origin, covariance, covariance, (1.0, 1.0, 1.0))
+    observable(covariance, 0.0, np.eye(3))
+    innovation(covariance, covariance, origin, 1.0)
     for write in (False, True):
         stamp(network, seen, origin)
         network.integrate(seen.view, origin, 1.0, write=write)

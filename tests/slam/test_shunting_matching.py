@@ -14,7 +14,7 @@ from slam.frames import Features, Odometry, Scan
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.impressions import Observations, from_features, from_scan, stamp
 from slam.shunting.matching import Matcher, seen_by
-from slam.shunting.motion import WIDEN, inverted, predict, turned
+from slam.shunting.motion import inverted, predict, turned
 from slam.shunting.network import Network
 from slam.shunting.overlap import evaluate
 from slam.shunting.search import SearchWindow
@@ -186,10 +186,11 @@ def test_prior_comes_from_the_frames_own_covariance() -> None:
         increment_covariance=covariance,
     )
     T_map = np.array([5.0, 5.0, math.pi / 2.0])
-    prediction = predict(T_map, before, now)
+    prediction = predict(T_map, before, now, (2.25, 4.0))
     np.testing.assert_allclose(prediction.T_map_robot, se2.compose(T_map, [0.2, 0.0, 0.1]))
-    assert prediction.covariance[1, 1] == pytest.approx(WIDEN**2 * 0.04, rel=0.01)  # x is map's y
-    assert prediction.covariance[0, 0] == pytest.approx(WIDEN**2 * 0.01, rel=0.01)
+    assert prediction.covariance[1, 1] == pytest.approx(2.25 * 0.04, rel=0.01)  # x is map's y
+    assert prediction.covariance[0, 0] == pytest.approx(2.25 * 0.01, rel=0.01)
+    assert prediction.covariance[2, 2] == pytest.approx(4.0 * 0.0025, rel=0.01)
     silent = Odometry(stamp_ns=200_000_000, T_odom_robot=now.T_odom_robot)
     assumed = predict(T_map, before, silent).covariance
     assert 0.01 < math.sqrt(assumed[0, 0]) < 0.1

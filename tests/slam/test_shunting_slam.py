@@ -302,7 +302,8 @@ def test_no_frame_waits_for_the_compiler() -> None:
             system.update(frame)
         here, elsewhere = stream[3], stream[60].scan
         assert elsewhere is not None
-        scan = Scan(stamp_ns=here.stamp_ns, ranges=elsewhere.ranges, spec=elsewhere.spec)
+        another_room = elsewhere.ranges * np.float32(0.6)
+        scan = Scan(stamp_ns=here.stamp_ns, ranges=another_room, spec=elsewhere.spec)
         jump = Frame(stamp_ns=here.stamp_ns, odometry=here.odometry, scan=scan)
         searched = system.update(jump).diagnostics["searched"]
         system.map()

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arithmetic on (3, 3) covariances of (x, y, theta), in a fixed order of operations."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import njit
+
+NOISY = 2.0  # times what the noise of beams alone feigns: less information along an axis is none
+
+
+@njit
+def _inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Inverse of a symmetric positive definite (3, 3)."""
+    a, b, c, d, e, f = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
+    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
+    bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
+    det = a * aa + b * ab + c * ac
+    out[0, 0], out[0, 1], out[0, 2] = aa / det, ab / det, ac / det
+    out[1, 0], out[1, 1], out[1, 2] = ab / det, bb / det, bc / det
+    out[2, 0], out[2, 1], out[2, 2] = ac / det, bc / det, cc / det
+
+
+@njit
+def _sandwich(f: NDArray[np.float64], p: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """out = f p f' for a symmetric (3, 3) p, exactly symmetric."""
+    half = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                half[i, j] += f[i, k] * p[k, j]
+    for i in range(3):
+        for j in range(i, 3):
+            total = 0.0
+            for k in range(3):
+                total += half[i, k] * f[j, k]
+            out[i, j] = out[j, i] = total
+
+
+@njit
+def observable(
+    geometry: NDArray[np.float64], feigned: float, out: NDArray[np.float64]
+) -> tuple[int, float]:
+    """``geometry`` without what noise feigns of it (``out``).
+
+    Returns the number of directions of position in which nothing is left, and the angle (rad) of
+    the first one. The rest is scaled so that the matrix stays positive semidefinite.
+    """
+    a, b, d = geometry[0, 0], geometry[0, 1], geometry[1, 1]
+    angle = 0.5 * math.atan2(2.0 * b, a - d)  # of the larger eigenvalue
+    c, s = math.cos(angle), math.sin(angle)
+    mean, radius = 0.5 * (a + d), math.sqrt(0.25 * (a - d) * (a - d) + b * b)
+    keep = np.zeros(2)
+    lost = 0
+    for k in range(2):
+        value = mean + radius if k == 0 else mean - radius
+        if value > NOISY * feigned and value > 0.0:
+            keep[k] = math.sqrt(1.0 - NOISY * feigned / value)
+        else:
+            lost += 1
+    T = np.zeros((3, 3))
+    T[0, 0] = c * c * keep[0] + s * s * keep[1]
+    T[0, 1] = T[1, 0] = c * s * (keep[0] - keep[1])
+    T[1, 1] = s * s * keep[0] + c * c * keep[1]
+    T[2, 2] = 1.0
+    _sandwich(T, geometry, out)
+    return lost, math.atan2(c, -s)
+
+
+@njit
+def advance(
+    drift: NDArray[np.float64],
+    blind: NDArray[np.float64],
+    shared: NDArray[np.float64],
+    newest: NDArray[np.float64],
+    motion: NDArray[np.float64],
+    prior: NDArray[np.float64],
+    data: NDArray[np.float64],
+    variances: tuple[float, float, float],
+) -> None:
+    """One frame; all arrays (3, 3) in the map frame, changed in place but the last three.
+
+    ``data``: information of the match, with the weight it was given. ``variances``: per unit of
+    information, of the shared error and of what is newly written; frames in which the first stays.
+    """
+    F, N = np.eye(3), np.empty((3, 3))
+    F[0, 2], F[1, 2] = -motion[1], motion[0]
+    precision, M, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    _inverse(prior, precision)
+    _sandwich(F, drift, moved)
+    drift[:] = moved
+    # odometry's: what the data leave of it
+    _sandwich(F, blind, moved)
+    _inverse(data + precision, M)
+    for i in range(3):
+        for j in range(3):
+            N[i, j] = M[i, 0] * precision[0, j] + M[i, 1] * precision[1, j]
+            N[i, j] += M[i, 2] * precision[2, j]
+    _sandwich(N, moved + prior, blind)
+    # the shared error, as far as the data decide over the time that it stays the same
+    _inverse(data + precision / variances[2], M)
+    _sandwich(M, data, moved)
+    for i in range(3):
+        for j in range(3):
+            shared[i, j] = variances[0] * moved[i, j]
+            newest[i, j] = variances[1] * moved[i, j]
+            drift[i, j] += newest[i, j]
+
+
+@njit
+def innovation(
+    prior: NDArray[np.float64],
+    data: NDArray[np.float64],
+    off: NDArray[np.float64],
+    share: float,
+) -> tuple[float, float, float, float, float]:
+    """What the correction ``off`` of a pose with that ``prior`` says about the prior.
+
+    ``data`` is the information with which the match corrected, ``share`` how much of the variance
+    that claims it really has. The innovation e is what a match alone would have said: off = K e, so
+    e = off + R inv(P) off. Returns its NIS, its squares in position and heading, and the match's
+    variances there.
+    """
+    precision, R, S = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    _inverse(prior, precision)
+    _inverse(data + 1e-3 * precision, R)
+    pulled, e = np.zeros(3), np.zeros(3)
+    for i in range(3):
+        for k in range(3):
+            pulled[i] += precision[i, k] * off[k]
+    for i in range(3):
+        e[i] = off[i]
+        for k in range(3):
+            e[i] += R[i, k] * pulled[k]
+    _inverse(prior + share * R, S)
+    nis = 0.0
+    for i in range(3):
+        for k in range(3):
+            nis += e[i] * S[i, k] * e[k]
+    place = e[0] * e[0] + e[1] * e[1]
+    return nis, place, e[2] * e[2], share * (R[0, 0] + R[1, 1]), share * R[2, 2]

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far to trust odometry: its covariance, scaled until it explains what matching corrects.
+
+An innovation is where a match alone puts the robot, against where odometry does. Its covariance is
+that of the increment plus that of a match. What was driven lately says by how much to multiply the
+first, apart for translation and for rotation, whether a log states it or it had to be assumed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float, Odometry
+from slam.shunting.covariances import innovation
+from slam.shunting.impressions import SENSOR_SIGMA_M, SIGMA_CELLS
+from slam.shunting.matching import Match
+from slam.shunting.motion import Prediction, predict
+
+STATED, ASSUMED = 2.0, 1.0  # times the variance at first: statements tend to be optimistic
+LEAST_STATED, LEAST_ASSUMED, MOST = 0.25, 0.01, 100.0
+AT_FIRST = 20.0  # frames that these count as
+MEMORY, MEMORY_S = 100.0, 20.0  # frames, or s if that is longer, that are averaged
+WILD = 16.0  # a squared innovation counts up to so many times its expectation
+
+
+class Increments:
+    """Predicts, and learns from what became of it.
+
+    scales  (2,) of the variances of translation and rotation
+    nis     of the latest frame; None where its match is not believed
+    """
+
+    def __init__(self, cell_m: float) -> None:
+        # Variance of a match by the noise of its beams over what the reward's curvature claims.
+        self._noise_share = (SENSOR_SIGMA_M / (SIGMA_CELLS * cell_m)) ** 2 / 2.0
+        self.scales: Float = np.ones(2)
+        self.nis: float | None = None
+        self._least = LEAST_STATED
+        self._squares: Float = np.zeros(2)
+        self._expected: Float = np.zeros(2)
+
+    def predict(self, T_map_before: Float, before: Odometry, now: Odometry) -> Prediction:
+        """The prior of a frame."""
+        stated = now.increment_covariance is not None
+        self._least = LEAST_STATED if stated else LEAST_ASSUMED
+        if self._expected[0] == 0.0:
+            self._expected[:] = AT_FIRST
+            self._squares[:] = AT_FIRST * (STATED if stated else ASSUMED)
+            self.scales = self._squares / self._expected
+        return predict(T_map_before, before, now, (float(self.scales[0]), float(self.scales[1])))
+
+    def learn(self, prediction: Prediction, match: Match) -> None:
+        """Compare the increment with a match that is believed."""
+        off = match.T_map_robot - prediction.T_map_robot
+        off[2] = se2.wrap(float(off[2]))
+        data = match.tau * match.information
+        share = min(match.tau * self._noise_share, 1.0)
+        self.nis, *found = innovation(prediction.covariance, data, off, share)
+        (a, _, _), (_, b, _), (_, _, c) = prediction.unscaled.tolist()
+        floor_m2, floor_rad2 = prediction.floor
+        keep = math.exp(-1.0 / max(MEMORY, MEMORY_S / max(prediction.elapsed, 1e-3)))
+        for k, unit, rest in (
+            (0, a + b, 2.0 * floor_m2 + found[2]),
+            (1, c, floor_rad2 + found[3]),
+        ):
+            expected = float(self.scales[k]) * unit + rest
+            square = min(found[k], WILD * expected)
+            # Least squares of square = scale * unit + rest, weighed by what scatter to expect.
+            weight = unit / expected**2
+            self._squares[k] = keep * self._squares[k] + weight * (square - rest)
+            self._expected[k] = keep * self._expected[k] + weight * unit
+            scale = float(self._squares[k]) / max(float(self._expected[k]), 1e-9)
+            self.scales[k] = min(max(scale, self._least), MOST)
+
+    def skip(self) -> None:
+        """The match of this frame is not believed."""
+        self.nis = None
