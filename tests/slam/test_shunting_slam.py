@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Any
 
@@ -302,9 +303,9 @@ def test_no_frame_waits_for_the_compiler() -> None:
             system.update(frame)
         here, elsewhere = stream[3], stream[60].scan
         assert elsewhere is not None
-        another_room = elsewhere.ranges * np.float32(0.6)
-        scan = Scan(stamp_ns=here.stamp_ns, ranges=another_room, spec=elsewhere.spec)
-        jump = Frame(stamp_ns=here.stamp_ns, odometry=here.odometry, scan=scan)
+        scan = Scan(stamp_ns=here.stamp_ns, ranges=elsewhere.ranges, spec=elsewhere.spec)
+        unsure = dataclasses.replace(here.odometry, increment_covariance=np.diag([0.04, 0.04, 0.1]))
+        jump = Frame(stamp_ns=here.stamp_ns, odometry=unsure, scan=scan)
         searched = system.update(jump).diagnostics["searched"]
         system.map()
     finally:
