@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 
 from sim.lidar import ScanResult
 from sim.world import World
+from slam._jit import njit
 from slam.frames import BeamClass, BeamLabels, Float
+
+NONE, STATIC = int(BeamClass.NONE), int(BeamClass.STATIC)
+SEMI_STATIC, MOVING = int(BeamClass.SEMI_STATIC), int(BeamClass.MOVING)
 
 
 class BeamLabeller:
@@ -29,27 +33,39 @@ class BeamLabeller:
         ``displacement`` is how far the hit body's origin moved since the scan before that saw it,
         0 the first time and for what cannot move.
         """
-        world = self._world
-        moving = np.append(world.movers_moving(), False)
-        mover = np.append(world.bodies.mover_of_body, -1)[result.bodies]
-        kind = np.full(len(mover), BeamClass.STATIC, dtype=np.uint8)
-        kind[mover >= 0] = BeamClass.SEMI_STATIC
-        kind[(mover >= 0) & moving[mover]] = BeamClass.MOVING
-        kind[result.bodies < 0] = BeamClass.NONE
-        displacement = np.append(self._displacements(np.unique(mover[mover >= 0])), 0.0)[mover]
+        world, n = self._world, len(result.bodies)
+        kind, displacement = np.empty(n, dtype=np.uint8), np.empty(n, dtype=np.float32)
+        movers = (world.bodies.mover_of_body, world.movers_moving(), world.mover_poses())
+        _label(result.bodies, movers, self.last_seen, kind, displacement)
         return BeamLabels(
             body=result.bodies,
             kind=kind,
-            displacement=displacement.astype(np.float32),
+            displacement=displacement,
             incidence=result.incidence,
             mixed=result.mixed,
         )
 
-    def _displacements(self, seen: NDArray[np.int64]) -> Float:
-        poses = self._world.mover_poses()
-        moved = np.zeros(len(poses))
-        for k in seen.tolist():
-            dx, dy = (poses[k, :2] - self.last_seen[k, :2]).tolist()
-            moved[k] = 0.0 if math.isnan(dx) else math.sqrt(dx * dx + dy * dy)
-            self.last_seen[k] = poses[k]
-        return moved
+
+@njit
+def _label(
+    bodies: NDArray[np.int32],
+    movers: tuple[NDArray[np.int64], NDArray[np.bool_], Float],
+    last_seen: Float,
+    kind: NDArray[np.uint8],
+    displacement: NDArray[np.float32],
+) -> None:
+    """Fill the last two; ``movers``: by body its mover, by mover whether it moves and its pose."""
+    mover_of_body, moving, poses = movers
+    moved = np.full(len(poses), -1.0)  # m since last seen, < 0: not seen in this scan
+    for k in range(len(bodies)):
+        mover = mover_of_body[bodies[k]] if bodies[k] >= 0 else -1
+        displacement[k] = 0.0
+        if mover < 0:
+            kind[k] = STATIC if bodies[k] >= 0 else NONE
+            continue
+        if moved[mover] < 0.0:
+            dx, dy = poses[mover, 0] - last_seen[mover, 0], poses[mover, 1] - last_seen[mover, 1]
+            moved[mover] = 0.0 if math.isnan(dx) else math.sqrt(dx * dx + dy * dy)
+            last_seen[mover] = poses[mover]
+        kind[k] = MOVING if moving[mover] else SEMI_STATIC
+        displacement[k] = moved[mover]

@@ -14,11 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.recording.template import Marks, Template, header, message
+from slam._jit import njit
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, BeamLabels, Float, LaserSpec, Odometry, Scan
 from slam.logs.ros_numbers import quaternion_of
@@ -32,7 +34,6 @@ POINT = np.dtype(
     ]
 )  # fmt: skip
 UNKNOWN = -1.0  # first entry of a covariance: there is no such measurement (sensor_msgs/Imu)
-_PER_M = np.float32(1024.0)  # points are rounded to 1 / 1024 m: more digits are noise to store
 _ROS_TYPES = {"<f4": 7, "<i4": 5, "|u1": 2}  # sensor_msgs/PointField
 
 
@@ -243,6 +244,19 @@ class TruthMessage:
         return self._template.stamp(stamp_ns)
 
 
+@njit
+def _project(
+    ranges: NDArray[np.float32], cos: Float, sin: Float, x: NDArray[Any], y: NDArray[Any]
+) -> None:
+    """Points (m) of ranges, to the nearest 1 / 1024 m: more digits are noise to store."""
+    for k in range(len(ranges)):
+        if math.isfinite(ranges[k]):
+            x[k] = math.floor(ranges[k] * cos[k] * 1024.0 + 0.5) / 1024.0
+            y[k] = math.floor(ranges[k] * sin[k] * 1024.0 + 0.5) / 1024.0
+        else:
+            x[k] = y[k] = math.nan
+
+
 class LabelsMessage:
     """sensor_msgs/PointCloud2 in the laser frame, one point a beam; NaN where nothing came back."""
 
@@ -278,14 +292,13 @@ class LabelsMessage:
         self._points: NDArray[np.void] = self._template.view(data).view(POINT)
         self._points["z"] = 0.0
         # libm's cosines: NumPy's own change their last bit with the CPU.
-        self._cos = np.array([math.cos(a) for a in spec.angles.tolist()], dtype=np.float32)
-        self._sin = np.array([math.sin(a) for a in spec.angles.tolist()], dtype=np.float32)
+        self._cos = np.array([math.cos(a) for a in spec.angles.tolist()])
+        self._sin = np.array([math.sin(a) for a in spec.angles.tolist()])
 
     def __call__(self, scan: Scan, labels: BeamLabels) -> bytearray:
         """Labels of that scan."""
-        points, ranges = self._points, np.where(np.isfinite(scan.ranges), scan.ranges, np.nan)
-        points["x"] = np.round(ranges * self._cos * _PER_M) / _PER_M
-        points["y"] = np.round(ranges * self._sin * _PER_M) / _PER_M
+        points = self._points
+        _project(scan.ranges, self._cos, self._sin, points["x"], points["y"])
         points["body"], points["kind"] = labels.body, labels.kind
         points["displacement"], points["incidence"] = labels.displacement, labels.incidence
         points["mixed"] = labels.mixed
