@@ -41,7 +41,7 @@ def bench(
     table = Table(title="Speed", title_justify="left", caption=str(machine()["processor"]))
     for heading in ("what", "figure", "unit", "target", "how"):
         table.add_column(heading, justify="right" if heading == "figure" else "left")
-    for measure in (_simulation, _scanner, _physics, _environment, _pictures, _slam):
+    for measure in (_simulation, _scanner, _physics, _environment, _pictures, _slam, _datasets):
         with console.status(f"measuring: {measure.__name__.strip('_')}"):
             found = list(measure(seconds))
         for row in found:
@@ -152,6 +152,12 @@ def _pictures(seconds: float) -> Iterator[Row]:
             spent = [_timed(lambda picture=picture: picture(simulation)) for _ in range(10)]  # type: ignore[misc]
         what = "picture 1280 × 720, office, " + ("with shadows" if shadows else "no shadows")
         yield _row(what, float(np.median(spent)) * 1e3, "ms", target, "all threads; software GL")
+
+
+def _datasets(seconds: float) -> Iterator[Row]:
+    from scripts.bench_dataset import rows
+
+    yield from rows(seconds, seed=SEED, dynamism=DYNAMISM)
 
 
 def _slam(seconds: float) -> Iterator[Row]:

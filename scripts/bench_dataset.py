@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rows of ``mobilia bench`` about datasets: making, reading, sizes, two processes."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterator
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from scripts import workers
+from sim.moments import toured
+from sim.recording.bag import BagWriter
+from sim.recording.episode import record
+from sim.recording.recipe import Recipe
+from sim.simulation import Simulation, n_frames
+from slam.logs import read_bag
+
+WARM_S = 2.0
+Row = dict[str, Any]
+
+
+def rows(seconds: float, *, seed: int, dynamism: float) -> Iterator[Row]:
+    """Office, half-degree scans at 37.5 Hz, every effect, labels."""
+    recipe = Recipe(scene="office", seed=seed, dynamism=dynamism, seconds=seconds)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        bare, labelled, written, bag = _making(recipe, folder)
+        frames = n_frames(seconds, 1.0 / 37.5)
+        yield _row("episode, made", seconds / written, "× real time", "≥ 15", "simulate and write")
+        for what, spent in (
+            ("simulation", bare), ("labels", labelled - bare), ("writing", written - labelled),
+        ):  # fmt: skip
+            share = 100.0 * spent / written
+            yield _row(f"episode, share of {what}", share, "%", "", "of processor time")
+        size = sum(file.stat().st_size for file in bag.iterdir())
+        raw = 4 * recipe.laser().beams[0].size
+        per_frame = size / (frames + n_frames(WARM_S, 1.0 / 37.5))
+        yield _row("episode, bytes a frame", per_frame, "B", "", f"ranges as float32: {raw} B")
+        for what, labels, target in (("", False, "≥ 8000"), (", with labels", True, "")):
+            rate = _reading(bag, labels)
+            yield _row(f"bag, read{what}", rate, "frames/s", target, "into Frames")
+        yield _row("two processes", _speed_up(recipe, folder), "×", "≥ 1.8", "against one, wall")
+
+
+def _row(what: str, figure: float, unit: str, target: str, how: str) -> Row:
+    return {"what": what, "figure": float(figure), "unit": unit, "target": target, "how": how}
+
+
+def _making(recipe: Recipe, folder: Path) -> tuple[float, float, float, Path]:
+    """Processor seconds without labels, with them, and written, too; the bag."""
+    spent = []
+    for labels in (False, True):
+        simulation = Simulation(**{**recipe.simulation(), "labels": labels})
+        moments = toured(simulation, recipe.seconds + WARM_S)
+        _skip(moments)
+        started = time.process_time()
+        for _ in moments:
+            pass
+        spent.append(time.process_time() - started)
+    simulation = Simulation(**recipe.simulation())
+    moments = toured(simulation, recipe.seconds + WARM_S)
+    with BagWriter(folder / "bag", simulation.spec, movers=simulation.world.scene.movers) as bag:
+        for moment in islice(moments, n_frames(WARM_S, simulation.scan_period_s)):
+            bag.write(moment)
+        started = time.process_time()
+        for moment in moments:
+            bag.write(moment)
+        spent.append(time.process_time() - started)
+    return spent[0], spent[1], spent[2], folder / "bag"
+
+
+def _skip(moments: Iterator[object]) -> None:
+    for _ in islice(moments, n_frames(WARM_S, 1.0 / 37.5)):
+        pass
+
+
+def _reading(bag: Path, labels: bool) -> float:
+    stream = read_bag(bag, labels=labels)
+    next(iter(stream))
+    started = time.process_time()
+    count = sum(1 for _ in stream)
+    return count / (time.process_time() - started)
+
+
+def _speed_up(recipe: Recipe, folder: Path) -> float:
+    """Wall time of four episodes on one process over that on two, both warm."""
+    spent = {}
+    for jobs in (1, 2):
+        for attempt in ("warm", "timed"):
+            out = folder / f"{jobs}-{attempt}"
+            out.mkdir()
+            seeds = range(recipe.seed, recipe.seed + 4)
+            recipes = [Recipe(scene="office", seed=s, dynamism=recipe.dynamism,
+                              seconds=1.0 if attempt == "warm" else recipe.seconds)
+                       for s in seeds]  # fmt: skip
+            started = time.perf_counter()
+            for _ in workers.each(partial(_one, out), recipes, jobs=jobs):
+                pass
+            spent[jobs] = time.perf_counter() - started
+    return spent[1] / spent[2]
+
+
+def _one(folder: Path, recipe: Recipe) -> None:
+    record(recipe, folder)
