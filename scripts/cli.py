@@ -77,3 +77,7 @@ def main() -> None:
         sys.exit(130)
     except BrokenPipeError:
         sys.exit(1)
+    except OSError as error:  # a folder that cannot be written, a full disk
+        fail(f"{error.strerror or error}: {error.filename}" if error.filename else str(error))
+        _log.info("where it came from:", exc_info=error)
+        sys.exit(1)

@@ -15,14 +15,15 @@ whole scans; 19.2 kBd is inferred from the same rule. At 500 kBd (RS 422) nothin
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from sim.lidar_config import TURNS_PER_S, Lms221Config
 from slam.errors import InvalidValueError
-from slam.frames import NS_PER_S, LaserSpec, Scan
+from slam.frames import NS_PER_S, Float, Frame, LaserSpec, Scan
 
 BITS_PER_BYTE = 10  # TL 4.1
 BYTES_PER_TURN = 508  # TL p22, at 500 kBd
@@ -92,6 +93,22 @@ class SerialLink:
     def sends(self, index: int) -> bool:
         """Whether scan number ``index`` of a run is sent; the first one, 0, is."""
         return index % (self.lost_scans + 1) == 0
+
+
+def over_link(frames: Iterable[Frame], link: SerialLink) -> Iterator[Frame]:
+    """The frames whose scan is sent; each arrives ``link.latency_ns`` after its stamp.
+
+    Odometry comes by a line of its own, so that none of it is lost: the covariance of an increment
+    is that of all the motion since the last scan that was sent.
+    """
+    since: list[Float] = []
+    for index, frame in enumerate(frames):
+        part = frame.odometry.increment_covariance
+        since += [] if part is None else [part]
+        if link.sends(index):
+            whole = None if part is None else np.sum(since, axis=0)
+            yield replace(frame, odometry=replace(frame.odometry, increment_covariance=whole))
+            since = []
 
 
 def partial_spec(spec: LaserSpec, config: Lms221Config, turn: int) -> LaserSpec:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from sim.drive import TourConfig
 from sim.dynamism import Dynamism
 from sim.labels import BeamLabeller
 from sim.lidar import Lms221, Lms221Config, ScanResult
+from sim.lidar_link import SerialLink, over_link
 from sim.odometry import WheelOdometry
 from sim.pilot import Pilot
 from sim.robot import DriveConfig
@@ -271,14 +272,25 @@ def n_frames(seconds: float, period_s: float) -> int:
     return max(1, round(seconds / period_s))
 
 
-def stream(scene: str = "office", *, seconds: float = 60.0, **settings: Any) -> Stream:
+def stream(
+    scene: str = "office", *, seconds: float = 60.0, baud: int | None = None, **settings: Any
+) -> Stream:
     """A stream that simulates a tour anew each time it is iterated, byte for byte the same.
 
+    baud      of the scanner's serial line: most scans are lost at 38400 (``sim.lidar_link``); None:
+              all arrive
     settings  as for ``Simulation``
     """
     probe = Simulation(scene, **settings)
-    return Stream(
-        metadata=probe.metadata(),
-        frames=lambda: tour(Simulation(scene, **settings), seconds),
-        length=n_frames(seconds, probe.scan_period_s),
-    )
+    metadata, n = probe.metadata(), n_frames(seconds, probe.scan_period_s)
+    link = None if baud is None else SerialLink(baud=baud, config=probe.laser.config)
+    if link is not None:
+        line = {"baud": link.baud, "latency_ns": link.latency_ns}
+        metadata = replace(metadata, extra={**metadata.extra, "link": line})
+
+    def frames() -> Iterator[Frame]:
+        driven = tour(Simulation(scene, **settings), seconds)
+        return driven if link is None else over_link(driven, link)
+
+    length = n if link is None else sum(map(link.sends, range(n)))
+    return Stream(metadata=metadata, frames=frames, length=length)

@@ -11,6 +11,7 @@ import pytest
 
 from sim.lidar_config import Lms221Config
 from sim.lidar_link import SerialLink, partial_scans
+from sim.simulation import stream
 from slam.errors import InvalidValueError
 from slam.frames import Scan
 
@@ -51,6 +52,24 @@ def test_every_ninth_scan_is_sent_at_38400_baud() -> None:
     slow, fast = link(38_400, 0.5), link(500_000, 0.5)
     assert [k for k in range(30) if slow.sends(k)] == [0, 9, 18, 27]
     assert all(fast.sends(k) for k in range(30))
+
+
+def test_a_slow_line_loses_scans_but_no_odometry() -> None:
+    settings = {"seed": 3, "seconds": 1.0, "n_chairs": 2, "dynamism": 0.0}
+    whole, slow = stream("arena", **settings), stream("arena", baud=38_400, **settings)
+    every, sent = list(whole), list(slow)
+    assert len(sent) == slow.length == 5
+    assert slow.metadata.extra["link"]["baud"] == 38_400
+    assert slow.metadata.extra["link"]["latency_ns"] == link(38_400, 0.5).latency_ns
+    for k, frame in enumerate(sent):
+        same = every[9 * k]
+        assert frame.stamp_ns == same.stamp_ns
+        np.testing.assert_array_equal(frame.scan.ranges, same.scan.ranges)
+        np.testing.assert_array_equal(frame.odometry.T_odom_robot, same.odometry.T_odom_robot)
+        parts = [f.odometry.increment_covariance for f in every[max(9 * k - 8, 0) : 9 * k + 1]]
+        np.testing.assert_array_equal(frame.odometry.increment_covariance, np.sum(parts, axis=0))
+    with pytest.raises(InvalidValueError, match=r"SerialLink\.baud"):
+        stream("arena", baud=300, **settings)
 
 
 def test_what_the_device_cannot_send_is_refused() -> None:
