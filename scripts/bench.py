@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import math
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -162,21 +165,79 @@ def _datasets(seconds: float) -> Iterator[Row]:
 
 def _slam(seconds: float) -> Iterator[Row]:
     from sim.simulation import stream
-    from slam import create
+    from slam.shunting import ShuntingConfig, ShuntingSlam
 
     frames = list(stream("office", seed=SEED, dynamism=DYNAMISM, seconds=seconds + 2.0))
-    for rate, stride, target in ((37.5, 1, "≥ 5"), (37.5 / 8, 8, "")):
-        slam = create("shunting")
-        spent = []
-        for frame in frames[::stride]:
-            blind = frame.without_truth()
-            start = time.process_time()
-            slam.update(blind)
-            spent.append(time.process_time() - start)
+    blind = [frame.without_truth() for frame in frames]
+    coarse = ShuntingConfig(cell_m=0.05)
+    for what, stride, config, stream_, targets in (
+        ("shunting, 37.5 Hz", 1, ShuntingConfig(), blind, ("≤ 3, aim 1", "")),
+        ("shunting, 4.7 Hz", 8, ShuntingConfig(), blind, ("≤ 3, aim 1", "≥ 100")),
+        ("shunting, 5 cm cells, 181 beams", 1, coarse, _halved(blind), ("aim 0.5", "")),
+    ):
+        slam = ShuntingSlam(config)
+        spent = [_timed(lambda f=f, s=slam: s.update(f)) for f in stream_[::stride]]  # type: ignore[misc]
         steady = np.array(spent[5:]) * 1e3
-        how = "361 beams, every effect, default cells"
-        what = f"shunting, {rate:.1f} Hz"
-        yield _row(f"{what}, p50", float(np.percentile(steady, 50)), "ms", "", how)
+        how = "office, every effect; 361 beams and 3 cm cells unless said otherwise"
+        yield _row(f"{what}, p50", float(np.percentile(steady, 50)), "ms", targets[0], how)
         yield _row(f"{what}, p99", float(np.percentile(steady, 99)), "ms", "", how)
         period_ms = 1e3 * stride / 37.5
-        yield _row(what, period_ms / float(steady.mean()), "× real time", target, how)
+        yield _row(what, period_ms / float(steady.mean()), "× real time", targets[1], how)
+        if stride == 1 and config != coarse:
+            memory = slam.network.bytes_per_neuron()
+            yield _row(
+                "network", memory, "B a live neuron", "≤ 40", "office, every array, at the end"
+            )
+
+
+def _halved(frames: list[Any]) -> list[Any]:
+    """Every second beam of each scan."""
+    spec = frames[0].scan.spec
+    half = dataclasses.replace(
+        spec,
+        n_beams=(spec.n_beams + 1) // 2,
+        angle_increment=2.0 * spec.angle_increment,
+        beam_time_offsets=spec.beam_time_offsets[::2],
+    )
+    scans = [dataclasses.replace(f.scan, ranges=f.scan.ranges[::2], spec=half) for f in frames]
+    return [dataclasses.replace(f, scan=s) for f, s in zip(frames, scans, strict=True)]
+
+
+def _area(seconds: float) -> Iterator[Row]:
+    """One scan in a map of ever more rooms like the one the robot is in."""
+    from sim.simulation import stream
+    from slam.shunting import ShuntingConfig, ShuntingSlam
+
+    slam = ShuntingSlam(ShuntingConfig(cell_m=0.05))
+    frames = list(stream("arena", seed=SEED, dynamism=DYNAMISM, seconds=seconds / 2.0 + 8.0))
+    for frame in frames[:-150]:
+        slam.update(frame.without_truth())
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "arena.npz"
+        slam.save(path)
+        for times in (1, 10, 100, 1000):
+            slam = ShuntingSlam.load(path)
+            enlarge(slam.network, times)
+            yield _in_area(slam, frames[-150:], times)
+
+
+def _in_area(slam: Any, frames: list[Any], times: int) -> Row:
+    spent = [_timed(lambda f=f: slam.update(f.without_truth())) for f in frames]  # type: ignore[misc]
+    extent = slam.network.extent()
+    square_m = (extent[2] - extent[0]) * (extent[3] - extent[1]) * 0.05**2
+    how = f"median of 150 scans, arena, 5 cm cells, {times} × the rooms"
+    what = f"shunting in a map of {square_m:.3g} m²"
+    return _row(what, float(np.median(spent)) * 1e3, "ms", "flat within 20 %", how)
+
+
+def enlarge(network: Any, times: int) -> None:
+    """Let copies of all that lives be there ``times`` times, in a square beside itself."""
+    from slam.shunting.cells import living
+    from slam.shunting.memory import fill
+
+    slots, places = living(network.cells)
+    side = places.max(axis=0) - places.min(axis=0) + 9
+    across = math.ceil(math.sqrt(times))
+    for k in range(1, times):
+        arrays = {n: getattr(network.cells, n)[slots] for n in ("x", "y", "age", "facing")}
+        fill(network, arrays | {"places": places + side * (k % across, k // across)})
