@@ -204,6 +204,9 @@ def _touch(cells: Cells, column: int, row: int) -> int:
 
     The column and row are those of the directory.
     """
+    scratch = cells.counts[TOUCHED_COUNT]
+    if scratch == len(cells.touched):
+        return -1
     slot, born = cells.directory[row, column], 0
     if slot < 0:
         if cells.counts[FREE_COUNT] == 0:
@@ -216,9 +219,6 @@ def _touch(cells: Cells, column: int, row: int) -> int:
             for i in range(SIDE):
                 cells.x[slot, j, i] = cells.y[slot, j, i] = cells.age[slot, j, i] = 0.0
                 cells.facing[slot, j, i] = 0
-    scratch = cells.counts[TOUCHED_COUNT]
-    if scratch == len(cells.touched):
-        return -1
     cells.counts[TOUCHED_COUNT] += 1
     cells.touched[scratch, 0] = slot
     cells.touched[scratch, 1] = column + cells.corner[0]
