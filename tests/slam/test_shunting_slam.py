@@ -96,7 +96,8 @@ def test_scans_metres_apart_without_a_covariance() -> None:
     assert rms(error[:, :2]) < 0.03
 
 
-def test_point_features_alone_are_enough() -> None:
+@pytest.mark.parametrize(("preset", "limit"), [("robust", 0.03), ("paper", 0.05)])
+def test_point_features_alone_are_enough(preset: str, limit: float) -> None:
     rng = np.random.default_rng(6)
     landmarks = rng.uniform(-10.0, 10.0, (60, 2))
     drive = wander(20.0)
@@ -120,8 +121,9 @@ def test_point_features_alone_are_enough() -> None:
                 truth=frame.truth,
             )
         )
-    error = errors(slam.create("shunting", config=ShuntingConfig(cell_m=0.1)), stream)
-    assert rms(error[:, :2]) < 0.03
+    config = getattr(ShuntingConfig, preset)(cell_m=0.1)
+    error = errors(slam.create("shunting", config=config), stream)
+    assert rms(error[:, :2]) < limit
 
 
 def test_two_runs_give_the_same_bytes() -> None:
