@@ -27,7 +27,7 @@ from slam.shunting.residuals import Evidence
 LATTICE_CELLS = 0.065  # what surfaces are off by without any shared residual, 1 sigma
 SHARED_TIMES = 2.3  # the pose's error in units of the residual that surfaces share
 NEW_TIMES = 0.25  # ... of which so much stays, when a map is all written anew
-SHARED_S, VIEW_S = 20.0, 0.5  # over which shared residuals and directions of surfaces are averaged
+SHARED_S, VIEW_S = 20.0, 1.0  # over which shared residuals and directions of surfaces are averaged
 AT_FIRST = 200.0  # pairs of points that the scanner's usual residual counts as
 USUAL_M = 0.002  # that residual
 CORRELATED_S = 1.0  # for so long the shared error of a scan stays the same

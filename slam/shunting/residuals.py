@@ -25,7 +25,7 @@ from slam.shunting.impressions import SENSOR_SIGMA_M, Observations
 from slam.shunting.network import Network
 
 APART_CELLS, LONGEST_CELLS = 3.5, 35.0  # the two points of a pair: across the beams, and at most
-SAMPLES = 24  # points looked at in one frame, each with a partner
+SAMPLES = 16  # points looked at in one frame, each with a partner
 FAINT_OVERLAP = 0.15  # a point that overlaps the map less is off it
 BENT = 0.2  # of a chord's length: a surface that leaves it by more is not straight
 SHARED, PAIRED, FEIGNED, NEW, WEIGHED = range(5)  # places in the sums of ``_look``
