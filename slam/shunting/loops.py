@@ -2,7 +2,9 @@
 """Loops of long runs: key frames, little networks round them, and a pose graph over all.
 
 The online map is left as it is. What comes out is the corrected trajectory, made when it is asked
-for: each key frame is matched to the little network of the nearest earlier stretch of the way.
+for. Each key frame is matched to the few before it: matched to the whole map, as it was online, a
+step would hide the drift that a loop is to tell. Then it is matched to the little network of the
+nearest earlier stretch of the way; and when all are in place, to those of every other passage.
 """
 
 from __future__ import annotations
@@ -31,10 +33,13 @@ AFTER_M = 15.0  # way between the ends of a loop
 GATE_M, GATE_SHARE, WIDEST_M = 1.5, 0.02, 6.0  # how far off a loop may be, + share of the way,
 GATE_RAD = 0.5  # and how far turned
 MOST = 4  # places looked at for one loop
+AGAIN_M, PASSAGES = 3.0, 3  # the second look: how far off, and to how many passages at most
+RECENT = 6  # key frames that a step is measured against,
+SLACK = np.diag([0.05**2, 0.05**2, 0.01**2])  # and how much better than online it may know
 SUBMAP, EVERY = 4, 4  # key frames on either side of a little network's middle; between two middles
 LOOK_S = 1.0
-GOOD_MATCH, GOOD_SUPPORT, ALIAS = 0.6, 0.5, 0.9
-CHAIN_M, CHAIN_RAD = 0.01, 0.0015  # standard deviation of a step from key frame to key frame, and
+GOOD_STEP, GOOD_MATCH, GOOD_SUPPORT, ALIAS = 0.5, 0.6, 0.5, 0.9
+CHAIN_M, CHAIN_RAD = 0.02, 0.0015  # standard deviation of a step from key frame to key frame, and
 LOOP_M, LOOP_RAD = 0.03, 0.003  # of a loop, beside what their matches say
 INFORMATION_SHARE = 0.3
 
@@ -45,7 +50,7 @@ class KeyFrame:
 
     frame         its index among all frames
     T_map_robot   (3,) online
-    step          (3,) motion since the previous key frame, and its (3, 3) covariance in that frame
+    step          (3,) motion since the previous key frame online, (3, 3) covariance in that frame
     way_m         driven up to here
     """
 
@@ -67,6 +72,8 @@ class Loops:
         self.edges: list[Edge] = []  # loops found so far
         self._tried = 0  # key frames that were looked at
         self._poses: list[Float] = []  # corrected, of the key frames tried
+        self._chain: list[Edge] = []  # step by step, without loops; and where it leads
+        self._chained: list[Float] = []
         self._submaps: dict[int, Network] = {}
         self._step: Float = np.zeros(3)
         self._covariance: Float = np.zeros((3, 3))
@@ -82,14 +89,13 @@ class Loops:
         moved = math.hypot(float(self._step[0]), float(self._step[1]))
         if self.keys and moved < KEY_M and abs(float(self._step[2])) < KEY_RAD:
             return
-        floor = np.diag([CHAIN_M**2, CHAIN_M**2, CHAIN_RAD**2])
         self.keys.append(
             KeyFrame(
                 frame=frame,
                 T_map_robot=T_map_robot,
                 observations=seen,
                 step=self._step,
-                covariance=self._covariance + floor,
+                covariance=self._covariance + SLACK,
                 way_m=self._way_m,
             )
         )
@@ -101,44 +107,94 @@ class Loops:
             return poses
         if self._tried < len(self.keys):
             _log.info("closing loops over %d key frames", len(self.keys))
-        while self._tried < len(self.keys):
-            self._look(self._tried)
-            self._tried += 1
+            while self._tried < len(self.keys):
+                self._look(self._tried)
+                self._tried += 1
+            self._look_again()
         if not self.edges:
             return poses
         keys = np.array([key.T_map_robot for key in self.keys])
         frames = np.array([key.frame for key in self.keys])
         at = np.interp(np.arange(len(poses)), frames, np.arange(len(frames)))
-        return carried(keys, self._optimised(), at, poses)
+        return carried(keys, np.array(self._poses), at, poses)
 
-    def _optimised(self) -> Float:
-        start = np.array(self._poses)
-        chain = [
-            Edge(a=k - 1, b=k, T_a_b=key.step, information=inverted(key.covariance))
-            for k, key in enumerate(self.keys[: len(start)])
-            if k > 0
-        ]
-        return optimise(start, chain + self.edges)[0]
+    def _optimise(self) -> None:
+        self._poses = list(optimise(np.array(self._poses), self._chain + self.edges)[0])
 
     def _look(self, j: int) -> None:
         """Chain key frame ``j`` to those before, and close a loop if it is on one."""
-        key = self.keys[j]
         if j == 0:
-            self._poses.append(key.T_map_robot)
+            self._poses.append(self.keys[0].T_map_robot)
+            self._chained.append(self.keys[0].T_map_robot)
             return
-        self._poses.append(se2.compose(self._poses[-1], key.step))
+        step = self._stepped(j)
+        self._chain.append(step)
+        self._chained.append(se2.compose(self._chained[-1], step.T_a_b))
+        self._poses.append(se2.compose(self._poses[-1], step.T_a_b))
         middle = self._nearest(j)
         if middle is None:
             return
         predicted = se2.between(self._poses[middle], self._poses[j])
-        gate = self._gate(j, middle)
-        edge = self._loop(middle, j, predicted, gate)
+        edge = self._loop(middle, j, predicted, self._gate(j, middle))
         if edge is None:
             return
         self.edges.append(edge)
         off = edge.T_a_b - predicted
         if math.hypot(off[0], off[1]) > LOOP_M or abs(se2.wrap(float(off[2]))) > LOOP_RAD:
-            self._poses = list(self._optimised())
+            self._optimise()
+
+    def _stepped(self, j: int) -> Edge:
+        """The step to key frame ``j``, matched to the few before it; as online where in doubt."""
+        key = self.keys[j]
+        step, covariance = key.step, key.covariance
+        network = self._network(range(max(0, j - RECENT), j), j - 1)
+        start = self._matcher.approach(network, key.observations, step, covariance)
+        precision = inverted(covariance)
+        match = self._matcher.climb(network, key.observations, start, step, precision)
+        if match.matched >= GOOD_STEP:
+            step = match.T_map_robot
+            information = INFORMATION_SHARE * match.tau * match.information
+            covariance = inverted(information + precision)
+        covariance = covariance + np.diag([CHAIN_M**2, CHAIN_M**2, CHAIN_RAD**2])
+        return Edge(a=j - 1, b=j, T_a_b=step, information=inverted(covariance))
+
+    def _look_again(self) -> None:
+        """With every pose near its place, tie each key frame to all passages along there."""
+        if not self.edges:
+            return
+        self._optimise()
+        poses = np.array(self._poses)
+        ways = np.array([key.way_m for key in self.keys])
+        edges = []
+        for j in range(len(self.keys)):
+            for middle in self._passages(j, poses, ways):
+                edge = self._tie(middle, j, se2.between(poses[middle], poses[j]))
+                if edge is not None:
+                    edges.append(edge)
+        self.edges = edges or self.edges
+        self._optimise()
+
+    def _passages(self, j: int, poses: Float, ways: Float) -> list[int]:
+        """Middles near key frame ``j``, one of each time the robot came along there."""
+        middles = np.arange(SUBMAP, len(poses) - SUBMAP, EVERY)
+        middles = middles[np.abs(ways[middles] - ways[j]) > AFTER_M]
+        apart = poses[middles, :2] - poses[j, :2]
+        squares = (apart * apart).sum(axis=1)
+        found: list[int] = []
+        for k in np.argsort(squares, kind="stable"):
+            if squares[k] > AGAIN_M**2 or len(found) == PASSAGES:
+                break
+            middle = int(middles[k])
+            if all(abs(ways[middle] - ways[other]) > AFTER_M for other in found):
+                found.append(middle)
+        return found
+
+    def _tie(self, middle: int, j: int, predicted: Float) -> Edge | None:
+        """Key frame ``j`` matched to the network about ``middle``, near where it is predicted."""
+        network, seen = self._submap(middle), self.keys[j].observations
+        start = self._matcher.approach(network, seen, predicted, COARSE)
+        match = self._matcher.climb(network, seen, start, predicted, inverted(COARSE))
+        return self._edge(middle, j, match, support(network, seen, match))
 
     def _gate(self, j: int, middle: int) -> float:
         way = self.keys[j].way_m - self.keys[middle].way_m
@@ -171,7 +227,10 @@ class Loops:
         found.sort(key=lambda one: -one[0])
         (best, match), others = found[0], found[1:]
         alike = any(other > ALIAS * best for other, _ in others)
-        if alike or best < GOOD_SUPPORT or match.matched < GOOD_MATCH:
+        return None if alike else self._edge(middle, j, match, best)
+
+    def _edge(self, middle: int, j: int, match: Match, backing: float) -> Edge | None:
+        if backing < GOOD_SUPPORT or match.matched < GOOD_MATCH:
             return None
         information = INFORMATION_SHARE * match.tau * match.information
         covariance = inverted(information + np.diag([1.0, 1.0, 1.0]))
@@ -182,11 +241,16 @@ class Loops:
     def _submap(self, middle: int) -> Network:
         """What the key frames about ``middle`` saw, in the frame of that one."""
         if middle not in self._submaps:
-            network = Network(self._config)
-            for key in self.keys[middle - SUBMAP : middle + SUBMAP + 1]:
-                pose = se2.between(self.keys[middle].T_map_robot, key.T_map_robot)
-                stamp(network, key.observations, pose)
-                T_map_laser = se2.compose(pose, key.observations.T_robot_laser)
-                network.integrate(key.observations.view, T_map_laser, LOOK_S, write=True)
-            self._submaps[middle] = network
+            about = range(middle - SUBMAP, middle + SUBMAP + 1)
+            self._submaps[middle] = self._network(about, middle)
         return self._submaps[middle]
+
+    def _network(self, members: range, origin: int) -> Network:
+        """What some key frames saw, in the frame of one, as the chain puts them."""
+        network = Network(self._config)
+        for k in members:
+            key, pose = self.keys[k], se2.between(self._chained[origin], self._chained[k])
+            stamp(network, key.observations, pose)
+            T_map_laser = se2.compose(pose, key.observations.T_robot_laser)
+            network.integrate(key.observations.view, T_map_laser, LOOK_S, write=True)
+        return network

@@ -84,6 +84,7 @@ class ShuntingSlam:
         self._recovery: Recovery | None = None
         self._tracked_s, self._tracked = 0.0, 0
         self._loops = Loops(self.config, self._matcher)
+        self._trusted = True  # the pose of the frame before
         self._stamps: list[int] = []
         self._poses: list[Float] = []
 
@@ -249,11 +250,12 @@ class ShuntingSlam:
     def _keep(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
     ) -> None:
-        """For closing loops: the motion as matched, or by odometry where the match is in doubt."""
+        """For closing loops: motion as matched, or by odometry where an end of it is in doubt."""
         motion = se2.between(self._T_map_robot, match.T_map_robot)
         covariance = self._belief.newest_drift
-        if state != "tracking":
+        if state != "tracking" or not self._trusted:
             motion, covariance = prediction.increment, prediction.covariance
+        self._trusted = state in ("tracking", "relocated")
         covariance = turned(covariance, -float(self._T_map_robot[2]))
         self._loops.add(len(self._poses), match.T_map_robot, motion, covariance, observations)
 
