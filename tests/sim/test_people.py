@@ -166,6 +166,22 @@ def test_closed_doors_open_for_a_person_from_both_sides_and_close_behind():
     assert np.sum(angles < 0.02) >= len(doors) - 1
 
 
+def test_people_push_chairs_out_of_the_doorways_they_want_through():
+    """A chair in every doorway, no shoves: who wants through pushes it aside and passes."""
+    world = World("office", seed=1, dynamism=Dynamism(stay_mean=2.0), n_people=4, n_chairs=7)
+    chairs = [row for kind in ("chair_swivel", "chair_visitor") for row in _rows(world, kind)]
+    for row, place in zip(chairs, world._doors.middles, strict=True):
+        at = int(world.model.joint(f"{world.scene.movers[row].name}/x").qposadr[0])
+        world.data.qpos[at : at + 2] = place
+    before = world.mover_poses()[chairs, :2]
+    for _ in range(25 * SUBSTEPS_PER_S):
+        world.substep()
+    moved = np.linalg.norm(world.mover_poses()[chairs, :2] - before, axis=1)
+    assert np.sum(moved > 0.5) >= 3
+    walked, blocked = world.people.walked_s()
+    assert blocked.sum() < 0.3 * walked.sum()
+
+
 def test_a_door_lets_the_robot_through():
     world = World("office", seed=3, dynamism=0, n_people=0, n_chairs=0)
     row = _rows(world, "door")[0]
