@@ -130,9 +130,9 @@ def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float
     x, y, _ = raster.T_map_origin
     extent = (x, x + width * raster.resolution_m, y, y + height * raster.resolution_m)
     faint = np.where(raster.values > 0.02, raster.values, np.nan)
-    image = ax.imshow(faint, origin="lower", extent=extent, cmap="YlOrRd", vmin=0.0, vmax=1.0,
+    colors = mpl.colormaps["YlOrRd"].with_extremes(bad="#fafaf8")
+    image = ax.imshow(faint, origin="lower", extent=extent, cmap=colors, vmin=0.0, vmax=1.0,
                       interpolation="nearest")  # fmt: skip
-    image.cmap.set_bad("#fafaf8")
     ax.plot(points_map[:, 0], points_map[:, 1], ".", color="#1f61be", ms=1.5, label="last scan")
     ax.plot(track.poses[:, 0], track.poses[:, 1], "k-", lw=0.9, label="trajectory")
     ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title="Activities of the map")

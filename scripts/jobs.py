@@ -11,11 +11,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -23,7 +20,7 @@ from typing import Any
 
 from rich.markup import escape
 
-from scripts import interrupt
+from scripts import interrupt, workers
 from scripts.console import progress
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 
@@ -113,24 +110,14 @@ def run_jobs(
 def _in_parallel(
     jobs: list[Job], files: Mapping[str, Path], processes: int, advance: Callable[[], None]
 ) -> None:
-    """Spawned, not forked: compiled kernels and OpenGL do not survive a fork."""
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context) as pool:
-        running: set[Future[None]] = {pool.submit(make, job, files[job.name]) for job in jobs}
-        try:
-            while running:
-                done, running = wait(running, timeout=1.0, return_when=FIRST_COMPLETED)
-                interrupt.check()
-                for future in done:
-                    future.result()
-                    advance()
-        except BrokenProcessPool as error:
-            raise SlamFailedError(
-                "a worker was killed, perhaps for want of memory: what is whole was kept, run it "
-                "again with fewer --jobs"
-            ) from error
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+    pairs = [(job, files[job.name]) for job in jobs]
+    for _ in workers.each(_make_pair, pairs, jobs=processes):
+        interrupt.check()
+        advance()
+
+
+def _make_pair(pair: tuple[Job, Path]) -> None:
+    make(*pair)
 
 
 def make(job: Job, file: Path) -> None:

@@ -73,11 +73,11 @@ def check_jobs(jobs: int) -> None:
 
 
 def _guarded(call: Callable[[T], R], item: T) -> tuple[R | None, MobiliaError | None]:
-    """Errors as values: not all of ours survive the way back as exceptions."""
+    """Errors as values: as exceptions they would come back wrapped in a worker's traceback."""
     try:
         return call(item), None
     except MobiliaError as error:
-        return None, MobiliaError(str(error))
+        return None, error
 
 
 def _client(address: str) -> Any:

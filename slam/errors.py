@@ -29,9 +29,14 @@ class LogFormatError(MobiliaError):
 
     def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
         self.path = Path(path)
+        self.message = message
         self.line = line
         where = f"{path}:{line}" if line is not None else f"{path}"
         super().__init__(f"{where}: {message}")
+
+    def __reduce__(self) -> tuple[type, tuple[str, str, int | None]]:
+        """So that it comes back whole from another process."""
+        return type(self), (str(self.path), self.message, self.line)
 
 
 class SlamFailedError(MobiliaError):

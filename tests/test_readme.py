@@ -78,3 +78,23 @@ def test_every_link_leads_somewhere(page: Path):
     for target in re.findall(r"\]\(([^)#]+)", page.read_text()):
         if "://" not in target:
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+def test_the_dataset_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """As printed, but shorter episodes and no film."""
+    from typer.testing import CliRunner
+
+    from scripts.cli import app
+
+    section = README.split("## Make a dataset")[1].split("\n## ")[0]
+    assert len(section.strip().splitlines()) <= 10
+    commands = re.findall(r"\.venv/bin/mobilia ([^#\n]+)", section)
+    assert [command.split()[0] for command in commands] == ["generate", "verify", "export", "run"]
+    monkeypatch.chdir(tmp_path)
+    for command in commands:
+        words = command.replace("--seconds 20", "--seconds 1").split()
+        words += ["--no-film"] if words[0] == "run" else []
+        done = CliRunner().invoke(app, words, catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+    assert (tmp_path / "out" / "office" / "SHA256SUMS").exists()
+    assert (tmp_path / "out" / "office" / "office-d0.5-s0001.log.gz").exists()
