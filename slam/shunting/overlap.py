@@ -19,7 +19,7 @@ from slam.shunting.cells import MASK, SHIFT, Cells
 from slam.shunting.surfaces import opposite, turned_face
 
 MATCHED_OVERLAP = 0.15  # an observation that overlaps the map less is not matched
-ENOUGH = 1e-4  # expected rise of the score below which climbing ends
+ENOUGH = 3e-3  # expected rise of the score below which a step is the last
 LOG_FLOOR = 0.1  # added to an overlap before its logarithm is taken
 
 
@@ -250,10 +250,11 @@ def refine(
 ) -> tuple[float, float, float]:
     """Climb to the maximum of tau * reward - 1/2 Mahalanobis^2 from ``pose`` (changed in place).
 
-    Newton's method with Levenberg damping; a step is taken only if it rises. The slope of the
-    reward along observed surfaces is left out of it: there it only says where the map is older,
-    which would hold a robot back in a corridor. Returns reward, prior and the weight of matched
-    observations; leaves the data's information (without tau and prior) in ``information``.
+    Newton's method with Levenberg damping; a step is taken only if it rises, but for the last, tiny
+    one. The slope of the reward along observed surfaces is left out of it: there it only says where
+    the map is older, which would hold a robot back in a corridor. Returns reward, prior and the
+    weight of matched observations, and leaves the data's information (without tau and prior) in
+    ``information``, all as before the last step.
     """
     gradient, along, slope, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     trial, trial_gradient, trial_along = np.empty(3), np.empty(3), np.empty(3)
@@ -268,6 +269,8 @@ def refine(
             slope[a] += tau * (gradient[a] - along[a])
         _solve(H, slope, damping, step)
         if step[0] * slope[0] + step[1] * slope[1] + step[2] * slope[2] < ENOUGH:
+            for a in range(3):
+                pose[a] += step[a]  # so little that it needs no look at the score
             break
         for a in range(3):
             trial[a] = pose[a] + step[a]
