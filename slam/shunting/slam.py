@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from pathlib import Path
+from statistics import median
 from typing import Self
 
 import numpy as np
@@ -179,10 +180,10 @@ class ShuntingSlam:
         return look(self.network, short_term, observations, match.T_map_robot, step, turn)
 
     def _usual_match(self) -> float:
-        return float(np.median(self._usual)) if self._usual else 1.0
+        return median(self._usual) if self._usual else 1.0
 
     def _usual_support(self) -> float:
-        return float(np.median(self._supports)) if self._supports else 1.0
+        return median(self._supports) if self._supports else 1.0
 
     def _is_worth_searching(self) -> bool:
         grown = self._tracked_s >= GROWN_S and self._tracked >= GROWN_SCANS

@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 CALLEE = """
-from slam._jit import njit
-@njit
+from slam._jit import {} as jit
+@jit
 def inner(x):
     return x + {}
 """
@@ -24,8 +27,8 @@ print(outer(1.0))
 """
 
 
-def run(folder: Path, step: float) -> float:
-    (folder / "callee.py").write_text(CALLEE.format(step))
+def run(folder: Path, decorator: str, step: float) -> float:
+    (folder / "callee.py").write_text(CALLEE.format(decorator, step))
     here = Path(__file__).parents[2]
     env = {**os.environ, "PYTHONPATH": f"{here}{os.pathsep}{folder}"}
     env["NUMBA_CACHE_DIR"] = str(folder / "cache")
@@ -40,7 +43,20 @@ def run(folder: Path, step: float) -> float:
     return float(done.stdout)
 
 
-def test_a_changed_callee_of_another_module_is_compiled_anew(tmp_path):
+@pytest.mark.parametrize("decorator", ["njit", "inner"])
+def test_a_changed_callee_of_another_module_is_compiled_anew(tmp_path, decorator):
     (tmp_path / "caller.py").write_text(CALLER)
-    assert run(tmp_path, 1.0) == 2.0
-    assert run(tmp_path, 2.0) == 3.0
+    assert run(tmp_path, decorator, 1.0) == 2.0
+    assert run(tmp_path, decorator, 2.0) == 3.0
+
+
+def test_a_cache_that_names_types_which_are_gone_is_an_empty_cache(tmp_path):
+    """As after an update that moved a class to another module."""
+    (tmp_path / "caller.py").write_text(CALLER)
+    run(tmp_path, "njit", 1.0)
+    indices = list((tmp_path / "cache").rglob("caller.outer*.nbi"))
+    assert len(indices) == 1
+    with indices[0].open("rb") as file:
+        version = pickle.load(file)
+    indices[0].write_bytes(pickle.dumps(version) + b"cslam.errors\nGone\n.")
+    assert run(tmp_path, "njit", 1.0) == 2.0
