@@ -15,7 +15,7 @@ from sim.pilot import Pilot
 from sim.seeds import Seeds
 from sim.simulation import Simulation
 
-PARTS = ("layout", "chairs", "bins", "doors", "people", "lidar", "odometry", "driving")
+PARTS = ("layout", "chairs", "bins", "doors", "people", "lidar", "odometry", "driving", "tags")
 SECONDS = 8.0
 
 
@@ -26,7 +26,7 @@ def _state(*rngs: np.random.Generator) -> str:
 def draws(seeds: Seeds) -> dict[str, Any]:
     """What each part has drawn after some seconds; for schedules, event by event."""
     simulation = Simulation(
-        "office", seed=seeds, dynamism=1.0, laser=Lms221Config(resolution_deg=1.0)
+        "office", seed=seeds, dynamism=1.0, laser=Lms221Config(resolution_deg=1.0), tags="camera"
     )
     world = simulation.world
     tour = Pilot(world).driver.goals
@@ -54,6 +54,7 @@ def draws(seeds: Seeds) -> dict[str, Any]:
         "lidar": noise.hexdigest(),
         "odometry": (_state(simulation.encoders._rng), simulation.encoders.errors),
         "driving": tour.tolist(),
+        "tags": _state(simulation._tags._rng),
     }
 
 
