@@ -93,7 +93,10 @@ class ShuntingSlam:
         return Network(self.config)
 
     def update(self, frame: Frame) -> Estimate:
-        """Predict, look, match, integrate."""
+        """Predict, look, match, integrate.
+
+        Not converged while frozen, lost, or blind: a scan without a single return.
+        """
         if self._before is None and self._resumed is None:
             return self._first(frame)
         if self._stamps and frame.stamp_ns <= self._stamps[-1]:
@@ -109,6 +112,8 @@ class ShuntingSlam:
             state = self._integrate(observations, match, prediction.elapsed)
         else:
             match, state = self._recover(self._recovery, observations, prediction)
+        if state == "tracking" and len(observations.points_robot) == 0:
+            state = "blind"  # odometry alone
         self._belief.update(self._T_map_robot, prediction, match, evidence)
         if state == "tracking":
             self._increments.learn(prediction, match)
@@ -127,7 +132,7 @@ class ShuntingSlam:
             T_map_robot=np.zeros(3), information=np.zeros((3, 3)), matched=1.0, score=0.0, tau=0.0
         )
         self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
-        return self._report(frame, match, "tracking")
+        return self._report(frame, match, "tracking" if len(observations.points_robot) else "blind")
 
     def _predict(self, odometry: Odometry) -> Prediction:
         """By odometry; on the first frame with a loaded map, where the robot was before."""
@@ -215,7 +220,7 @@ class ShuntingSlam:
         confirmed, contradicted, _ = self.network.integrate(
             observations.view, T_map_laser, step, write=True
         )
-        if not doubtful:
+        if not doubtful and len(observations.points_robot) > 0:
             self._usual.append(match.matched)
             self._tracked_s, self._tracked = self._tracked_s + elapsed, self._tracked + 1
             if confirmed + contradicted > 0.0:
