@@ -4,17 +4,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
-from sim.bodies import STATIC, Bodies
+from sim.bodies import Bodies
+from sim.engine import Engine, call_force
 from slam._jit import njit
 
-Int = NDArray[np.int64]
+Float = NDArray[np.float64]
 
-_MOST = 64  # contacts of the robot that are looked at
+_MOST = 1024  # contacts that are looked at; chairs on castors have five each
 HARD_FORCE = 60.0  # N; a robot of 22 kg that brakes on something at more than a third of g
 
 
@@ -36,54 +39,67 @@ class Contact:
         return self.kind in ("static", "person") or self.force > HARD_FORCE
 
 
-@njit
-def touched(geoms: NDArray[np.int32], owners: NDArray[np.int64], robot: int, out: Int) -> int:
-    """Which contacts, by their geoms (n, 2), are the robot's: rows and what is touched to ``out``.
+class Touches(NamedTuple):
+    """Where the forces on the robot are collected.
 
-    owners  (ngeom,) mover of each geom; ``out`` (k, 2). Returns how many.
+    robot   index of its mover; ``owners`` (ngeom,) mover of each geom
+    geoms   (k, 2) of the first k contacts, MuJoCo's own memory; k = 0: not known yet
+    forces  (movers + 1,) N, greatest normal force so far; the last row is ``STATIC``
+    wrench  (6,) room for one contact
     """
-    found = 0
-    for i in range(geoms.shape[0]):
-        a, b = owners[geoms[i, 0]], owners[geoms[i, 1]]
-        if robot in (a, b) and found < len(out):
-            out[found, 0], out[found, 1] = i, a + b - robot
-            found += 1
-    return found
+
+    robot: int
+    owners: NDArray[np.int64]
+    geoms: NDArray[np.int32]
+    forces: Float
+    wrench: Float
+
+
+@njit
+def collect(engine: Engine, touches: Touches) -> None:
+    """Take over the robot's contacts of the substep just made, before the next ones are found."""
+    for i in range(len(touches.geoms)):
+        call_force(engine.force, engine.model, engine.data, i, touches.wrench)
+        force = touches.wrench[0]
+        if force == 0.0:  # also what there is none of
+            continue
+        a, b = touches.owners[touches.geoms[i, 0]], touches.owners[touches.geoms[i, 1]]
+        if touches.robot in (a, b):
+            other = a + b - touches.robot
+            touches.forces[other] = max(touches.forces[other], force)
 
 
 class RobotContacts:
-    """Collects the robot's contacts over substeps until they are taken."""
+    """Collects the robot's contacts over substeps, in ``table``, until they are taken."""
 
     def __init__(self, model: mujoco.MjModel, bodies: Bodies) -> None:
-        self._model = model
-        self._bodies = bodies
-        self._mover_of_geom = bodies.mover_of_body[model.geom_bodyid]
-        self._forces: dict[int, float] = {}
-        self._wrench = np.zeros(6)
-        self._found = np.zeros((_MOST, 2), dtype=np.int64)
+        self._movers = bodies.scene.movers
+        robot = -2 if bodies.robot is None else bodies.robot
+        owners = bodies.mover_of_body[model.geom_bodyid]
+        unknown = np.zeros((0, 4), dtype=np.int32)[:, ::2]  # strided, as what comes in its place
+        self._forces = np.zeros(len(self._movers) + 1)
+        self.table = Touches(robot, owners, unknown, self._forces, np.zeros(6))
 
-    def watch(self, data: mujoco.MjData) -> None:
-        """Look at the contacts of the substep just made, before the next ones are found."""
-        robot = self._bodies.robot
-        if data.ncon == 0 or robot is None:
-            return
-        found = touched(data.contact.geom, self._mover_of_geom, robot, self._found)
-        for i, other in self._found[:found].tolist():
-            mujoco.mj_contactForce(self._model, data, i, self._wrench)
-            force = float(self._wrench[0])
-            if force > self._forces.get(other, 0.0):
-                self._forces[other] = force
+    def locate(self, data: mujoco.MjData) -> bool:
+        """Find out where MuJoCo keeps its contacts, which it tells when it has one.
+
+        The memory is the start of its arena, the same for the whole life of ``data``.
+        """
+        first = data.contact.geom
+        if not len(first):
+            return False
+        geoms = as_strided(first, (_MOST, 2), first.strides)
+        self.table = self.table._replace(geoms=geoms)
+        return True
 
     def take(self) -> list[Contact]:
         """The contacts since the last call, by force; forgets them."""
-        movers = self._bodies.scene.movers
-        found = [
-            Contact(
-                name="static" if i == STATIC else movers[i].name,
-                kind="static" if i == STATIC else movers[i].kind,
-                force=force,
-            )
-            for i, force in self._forces.items()
-        ]
-        self._forces.clear()
+        if not self._forces.any():
+            return []
+        found = []
+        for i in np.flatnonzero(self._forces).tolist():
+            static = i == len(self._movers)
+            name, kind = ("static",) * 2 if static else (self._movers[i].name, self._movers[i].kind)
+            found.append(Contact(name=name, kind=kind, force=float(self._forces[i])))
+        self._forces[:] = 0.0
         return sorted(found, key=lambda c: (-c.force, c.name))

@@ -15,16 +15,21 @@ import ctypes
 from typing import Any, NamedTuple
 
 import mujoco
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from slam._jit import njit
 
 
 class Engine(NamedTuple):
-    """Addresses of ``mj_step1``, ``mj_step2``, and of one model and its data."""
+    """Addresses of ``mj_step1``, ``mj_step2``, ``mj_contactForce``, one model and its data."""
 
     step1: int
     step2: int
+    force: int
     model: int
     data: int
 
@@ -33,8 +38,9 @@ def engine(model: mujoco.MjModel, data: mujoco.MjData) -> Engine:
     """The engine of one room; it must not outlive ``model`` and ``data``."""
     # The bindings are linked to MuJoCo, so its functions are found through them.
     library = ctypes.CDLL(mujoco._functions.__file__)
-    steps = [_address(getattr(library, name)) for name in ("mj_step1", "mj_step2")]
-    return Engine(steps[0], steps[1], model._address, data._address)
+    names = ("mj_step1", "mj_step2", "mj_contactForce")
+    step1, step2, force = (_address(getattr(library, name)) for name in names)
+    return Engine(step1, step2, force, model._address, data._address)
 
 
 def _address(function: Any) -> int:
@@ -55,3 +61,28 @@ def call(typing_context: Any, function: Any, model: Any, data: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(types.int64, types.int64, types.int64), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _call_force(
+    typing_context: Any, function: Any, model: Any, data: Any, contact: Any, out: Any
+) -> Any:
+    """``mj_contactForce(model, data, contact, out)``; all but the number are addresses."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        pointer, number = ir.IntType(8).as_pointer(), ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer, number, pointer]).as_pointer()
+        room = [builder.inttoptr(argument, pointer) for argument in (args[1], args[2], args[4])]
+        room.insert(2, builder.trunc(args[3], number))
+        builder.call(builder.inttoptr(args[0], kind), room)
+        return context.get_dummy_value()
+
+    return types.void(*(types.int64,) * 5), generate
+
+
+@njit
+def call_force(
+    function: int, model: int, data: int, contact: int, wrench: NDArray[np.float64]
+) -> None:
+    """Force and torque (6,) N, N m of a contact in its own frame; zeros where there is none."""
+    _call_force(function, model, data, contact, wrench.ctypes.data)

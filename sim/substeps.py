@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.chairs import Shoved, shove
+from sim.contacts import Touches, collect
 from sim.crowd import People, decide
 from sim.doors import Leaves, swing
 from sim.engine import Engine, call
@@ -46,12 +47,14 @@ class Physics(NamedTuple):
 class Robot(NamedTuple):
     """at      first qpos and first dof
     push       ``qfrc_constraint``: anything but 0 at the robot's dofs is a touch
+    touches    where these are collected
     drive      (8,) state, see ``sim.robot.Drive``; tyres  (2,) actuators left, right
     limits     (3,) largest change of speed m/s and turn rate rad/s in a tick, half the track m
     """
 
     at: tuple[int, int]
     push: Float
+    touches: Touches
     drive: Float
     tyres: NDArray[np.int64]
     limits: Float
@@ -120,10 +123,16 @@ def _actors(parts: Any) -> Actors:
 
 
 @njit
+def _robot(parts: Any) -> Robot:
+    at, push, touches, drive, tyres, limits = parts
+    return Robot(at, push, Touches(*touches), drive, tyres, limits)
+
+
+@njit
 def decide_first(room: Any) -> None:
     """Let everybody decide for the tick that begins the run; ``room`` as for ``advance``."""
     _, _, robot, physics, actors = room
-    control(0.0, Robot(*robot), Physics(*physics), _actors(actors))
+    control(0.0, _robot(robot), Physics(*physics), _actors(actors))
 
 
 @njit
@@ -132,7 +141,7 @@ def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:
     clock, engine, robot, physics, actors = room
     marks, scanner, path, travel = watch
     return _advance(
-        first, last, resumed, clock, Engine(*engine), Robot(*robot), Physics(*physics),
+        first, last, resumed, clock, Engine(*engine), _robot(robot), Physics(*physics),
         _actors(actors), Watch(marks, Noted(*scanner), path, travel),
     )  # fmt: skip
 
@@ -151,9 +160,8 @@ def _advance(
 ) -> int:
     """Make the substeps that end at rows ``first + 1`` to ``last`` of ``watch``.
 
-    Returns the last row. Where the robot touches something it returns early, once the forces of
-    that substep are known and before they are lost: with the row before. Look at the contacts, then
-    call it again from that row, ``resumed``.
+    Returns the last row. At the robot's first touch it returns early, with the row before, as it
+    does not know yet where contacts are: find out, then call it again from that row, ``resumed``.
 
     clock  (1,) substeps made since the start
     """
@@ -174,9 +182,11 @@ def _advance(
                 )  # fmt: skip
             if clock[0] % SUBSTEPS_PER_TICK == 0:
                 control(clock[0] / SUBSTEPS_PER_S, robot, physics, actors)
-            dof = robot.at[1]
-            if robot.push[dof] != 0.0 or robot.push[dof + 1] != 0.0 or robot.push[dof + 2] != 0.0:
+        dof = robot.at[1]
+        if robot.push[dof] != 0.0 or robot.push[dof + 1] != 0.0 or robot.push[dof + 2] != 0.0:
+            if len(robot.touches.geoms) == 0 and not resumed:
                 return row
+            collect(engine, robot.touches)
         call(engine.step1, engine.model, engine.data)
         for k in range(3):
             watch.path[row + 1, k] = physics.qpos[robot.at[0] + k]

@@ -125,8 +125,9 @@ class World:
         data, drive = self.data, self._drive
         at, dof = (int(a[0]) for a in self.bodies.addresses(["robot"]))
         robot = substeps.Robot(
-            (at, dof), data.qfrc_constraint, drive.state, drive.tyres, drive.limits
-        )
+            (at, dof), data.qfrc_constraint, self._contacts.table,
+            drive.state, drive.tyres, drive.limits,
+        )  # fmt: skip
         mocap = (data.mocap_pos, data.mocap_quat)
         physics = substeps.Physics(data.qpos, data.qvel, data.ctrl, data.qfrc_applied, mocap)
         shoved, rolled = tables(self.model, self._shoves)
@@ -155,9 +156,10 @@ class World:
     def advance(self, first: int, last: int, watch: Any) -> None:
         """Make the substeps that end at rows ``first + 1`` to ``last`` of a ``plain`` ``Watch``."""
         row = substeps.advance(first, last, False, self._room, watch)
-        while row < last:
-            self._contacts.watch(self.data)
-            row = substeps.advance(row, last, True, self._room, watch)
+        if row < last:  # the first touch
+            self._contacts.locate(self.data)
+            self._room = self._tables()
+            substeps.advance(row, last, True, self._room, watch)
 
     # -- the robot --------------------------------------------------------------------------
 

@@ -45,7 +45,7 @@ def test_both_halves_in_turn_are_a_step_with_fresh_poses():
 
 
 def test_many_substeps_at_once_are_single_ones():
-    """Also where the robot runs into something, at which the compiled code stops to be asked."""
+    """Also where the robot runs into something."""
     worlds = [World("arena", seed=100, dynamism=0.9) for _ in range(2)]
     watch = substeps.unseen(9)
     _, _, path, travel = watch
