@@ -90,7 +90,7 @@ def scanner(seconds: float) -> Iterator[Row]:
 
 def physics(seconds: float) -> Iterator[Row]:
     """Substeps without a scanner."""
-    cases: tuple[tuple[str, dict[str, int], str], ...] = (
+    cases: tuple[tuple[str, dict[str, Any], str], ...] = (
         ("office", {}, ""),
         ("50 chairs, 10 people", {"n_chairs": 50, "n_people": 10}, "≥ 9000"),
     )

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many rooms in one process: ``gymnasium.make_vec(id, num_envs=8)``, bit for bit the single ones.
 
-One physics model per room steps by plain ``mj_step``. MuJoCo's ``Batch`` steps no faster on one
-core (46 us a step of the office either way), and it wants models of one size, which two seeds need
-not have. What is saved here is what a single environment builds at each step and a policy for many
-does not read. With ``n_threads`` the rooms step side by side; physics, crowd and scanner let go of
-the interpreter lock, and the results do not depend on it.
+One physics model per room, each stepped in one compiled call a scan. MuJoCo's ``Batch`` steps no
+faster on one core (46 us a step of the office either way), and it wants models of one size, which
+two seeds need not have. What is saved here is what a single environment builds at each step and a
+policy for many does not read: frames and the info of each room. With ``n_threads`` the rooms step
+side by side; physics, crowd and scanner let go of the interpreter lock, and the results do not
+depend on it.
 """
 
 from __future__ import annotations
