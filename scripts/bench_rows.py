@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 import sim  # noqa: F401  (registers the environments)
+from scripts import bench_dataset
 from sim import gl
 from sim.lidar import Lms221, Lms221Config
 from sim.pictures import CameraPicture
@@ -195,4 +196,9 @@ def slam(seconds: float) -> Iterator[Row]:
         yield row(what, period_ms / float(steady.mean()), "× real time", target, how)
 
 
-MEASURES = (simulation, scanner, physics, environments, pictures, slam)
+def datasets(seconds: float) -> Iterator[Row]:
+    """Episodes: making, reading, sizes."""
+    yield from bench_dataset.rows(seconds, seed=SEED, dynamism=DYNAMISM)
+
+
+MEASURES = (simulation, scanner, physics, environments, pictures, slam, datasets)
