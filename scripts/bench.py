@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,14 +33,25 @@ def bench(
     """
     if not 1.0 <= seconds <= 3600.0:
         raise InvalidValueError(f"--seconds must lie in [1, 3600] s, got {seconds}")
-    from scripts.bench_rows import MEASURES
+    from scripts import bench_dataset, bench_rows, bench_slam
+
+    measures: tuple[Callable[[float], Iterable[dict[str, Any]]], ...] = (
+        bench_rows.simulation,
+        bench_rows.scanner,
+        bench_rows.physics,
+        bench_rows.environments,
+        bench_rows.pictures,
+        bench_slam.updates,
+        bench_slam.area,
+        partial(bench_dataset.rows, seed=bench_rows.SEED, dynamism=bench_rows.DYNAMISM),
+    )
 
     rows: list[dict[str, Any]] = []
     table = Table(title="Speed", title_justify="left", caption=str(machine()["processor"]))
     for heading in ("what", "figure", "unit", "target", "how"):
         table.add_column(heading, justify="right" if heading == "figure" else "left")
-    for measure in MEASURES:
-        with console.status(f"measuring: {measure.__name__}"):
+    for measure in measures:
+        with console.status(f"measuring ({len(rows)} rows so far)"):
             found = list(measure(seconds))
         for row in found:
             rows.append(row)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows of ``mobilia bench``: what is measured, and how.
+"""The rows of ``mobilia bench`` about the world, and what all rows need.
 
-Figures of the world are medians of ``REPEATS`` repeats of processor time.
+Figures are medians of ``REPEATS`` repeats of processor time.
 """
 
 from __future__ import annotations
@@ -15,14 +15,12 @@ import mujoco
 import numpy as np
 
 import sim  # noqa: F401  (registers the environments)
-from scripts import bench_dataset
 from sim import gl
 from sim.lidar import Lms221, Lms221Config
 from sim.pictures import CameraPicture
-from sim.simulation import Simulation, n_frames, stream, tour
+from sim.simulation import Simulation, n_frames, tour
 from sim.substeps import SUBSTEPS_PER_S, unseen
 from sim.world import World
-from slam import create
 from slam.frames import Frame
 
 SEED = 100
@@ -174,31 +172,3 @@ def pictures(seconds: float) -> Iterator[Row]:
             spent = [timed(lambda picture=picture: picture(room)) for _ in range(10)]  # type: ignore[misc]
         what = "picture 1280 × 720, office, " + ("with shadows" if shadows else "no shadows")
         yield row(what, float(np.median(spent)) * 1e3, "ms", target, "all threads; software GL")
-
-
-def slam(seconds: float) -> Iterator[Row]:
-    """Updates of the SLAM."""
-    frames = list(stream("office", seed=SEED, dynamism=DYNAMISM, seconds=seconds + 2.0))
-    for rate, stride, target in ((37.5, 1, "≥ 5"), (37.5 / 8, 8, "")):
-        mapper = create("shunting")
-        spent = []
-        for frame in frames[::stride]:
-            blind = frame.without_truth()
-            start = time.process_time()
-            mapper.update(blind)
-            spent.append(time.process_time() - start)
-        steady = np.array(spent[5:]) * 1e3
-        how = "361 beams, every effect, default cells"
-        what = f"shunting, {rate:.1f} Hz"
-        yield row(f"{what}, p50", float(np.percentile(steady, 50)), "ms", "", how)
-        yield row(f"{what}, p99", float(np.percentile(steady, 99)), "ms", "", how)
-        period_ms = 1e3 * stride / 37.5
-        yield row(what, period_ms / float(steady.mean()), "× real time", target, how)
-
-
-def datasets(seconds: float) -> Iterator[Row]:
-    """Episodes: making, reading, sizes."""
-    yield from bench_dataset.rows(seconds, seed=SEED, dynamism=DYNAMISM)
-
-
-MEASURES = (simulation, scanner, physics, environments, pictures, slam, datasets)

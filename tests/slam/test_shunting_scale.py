@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.bench import enlarge
+from scripts.bench_slam import enlarge
 from slam import se2
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.bounds import Search
