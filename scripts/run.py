@@ -27,7 +27,7 @@ def run(
     ],
     log: Annotated[
         Path | None,
-        typer.Option(help="A log: CARMEN (plain, .gz or .xz) or the folder of Victoria Park."),
+        typer.Option(help="A log: a bag of ROS 1 or 2, CARMEN or the folder of Victoria Park."),
     ] = None,
     scene: Annotated[
         str | None, typer.Option(help="Or a simulated scene, driven on a tour of its rooms.")

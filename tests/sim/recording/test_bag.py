@@ -278,7 +278,7 @@ def test_memory_stays_flat_however_long_the_episode(tmp_path):
         tracemalloc.stop()
         return writing, reading
 
-    short, long = peak(400), peak(1600)
+    short, long = peak(200), peak(1000)
     assert long[0] < short[0] + 3_000_000
     assert long[1] < short[1] + 3_000_000
 
