@@ -15,14 +15,14 @@ from scripts.reproduce.report import (
     error_axes,
     new_figure,
 )
-from scripts.reproduce.rooms import (
+from scripts.reproduce.room_pages import (
     RULE,
     fig_rmse,
-    run_all,
     score_table,
     seconds_of,
     verdict,
 )
+from scripts.reproduce.rooms import run_all
 from scripts.reproduce.runs import Plan, Run
 
 VARIANTS: dict[str, dict[str, Any]] = {

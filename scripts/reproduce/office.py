@@ -6,15 +6,15 @@ from __future__ import annotations
 from typing import Any
 
 from scripts.reproduce.report import Report, draw_activities, new_figure
-from scripts.reproduce.rooms import (
+from scripts.reproduce.room_pages import (
     RULE,
     fig_rmse,
     path_length,
-    run_all,
     score_table,
     seconds_of,
     verdict,
 )
+from scripts.reproduce.rooms import run_all
 from scripts.reproduce.runs import Plan, Run
 
 DYNAMISM = 0.5

@@ -3,25 +3,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scripts.accuracy import thinned
-from scripts.reproduce.report import COLORS, Report, new_figure
+from scripts.reproduce.report import Report
 from scripts.reproduce.runs import (
     Plan,
     Run,
-    SignTest,
     job,
     pose_numbers,
     save_run,
-    sign_test,
-    spread,
     truth_of,
 )
 from sim.simulation import stream
@@ -33,10 +28,6 @@ from slam.replay import Track
 STRIDE = 5  # 37.5 Hz thinned to 7.5 Hz
 SECONDS = 60.0
 FAILED_M, FAILED_RAD = 0.5, 0.2
-RULE = (
-    f"Failed: RMSE above {FAILED_M} m or {FAILED_RAD} rad, or the SLAM itself says at the end that "
-    "it is lost."
-)
 SYSTEMS: dict[str, tuple[str, dict[str, Any]]] = {
     "odometry": ("odometry", {}),
     "occupancy": ("occupancy", {}),
@@ -44,7 +35,6 @@ SYSTEMS: dict[str, tuple[str, dict[str, Any]]] = {
     "shunting": ("shunting", {}),
     "shunting, paper preset": ("shunting-features", {"config": "paper"}),
 }
-NAMES = tuple(SYSTEMS)
 EVERY_SCAN, EVERY_BEAM = 8, 4  # of the raw points kept for the figure
 
 
@@ -135,61 +125,3 @@ def run_all(
     )
     report.recipe["systems"] = {name: list(system) for name, system in SYSTEMS.items()}
     return {v: [runs[f"{v}-seed-{seed}"] for seed in seeds] for v in variants}
-
-
-def score_table(report: Report, runs: Sequence[Run]) -> None:
-    """RMSE, heading and failures of every SLAM, and who wins against the EKF."""
-    rows = []
-    theirs = [run.numbers["EKF"]["rmse_m"] for run in runs]
-    for name in NAMES:
-        numbers = [run.numbers[name] for run in runs]
-        mine = [n["rmse_m"] for n in numbers]
-        test = "" if name == "EKF" else sign_test(mine, theirs).text()
-        rows.append(
-            [
-                name,
-                spread(mine).text("{:.4f}"),
-                f"{max(mine):.4f}",
-                spread(n["heading_rmse_rad"] for n in numbers).text("{:.4f}"),
-                f"{sum(n['failed'] for n in numbers)} of {len(numbers)}",
-                spread(n["ms"] for n in numbers).text("{:.1f}"),
-                test,
-            ]
-        )
-    head = ["", "RMSE, m", "worst, m", "heading RMSE, rad", "failed", "CPU per scan, ms"]
-    report.table([*head, "seeds won : lost against the EKF"], rows)
-
-
-def verdict(runs: Sequence[Run]) -> str:
-    """Whether the shunting SLAM beats our EKF as the project wants it to: 17 of 20 seeds."""
-    mine = [run.numbers["shunting"]["rmse_m"] for run in runs]
-    test: SignTest = sign_test(mine, [run.numbers["EKF"]["rmse_m"] for run in runs])
-    enough = test.wins >= math.ceil(0.85 * len(runs))
-    told = f"Shunting on beams against our EKF: {test.text()}"
-    return f"{told}; the target (17 of 20) is met." if enough else f"**{told}: target missed.**"
-
-
-def fig_rmse(groups: Mapping[str, Sequence[Run]]) -> Any:
-    """RMSE of each seed, one column of dots for each SLAM."""
-    figure, axes = new_figure(4.5 * len(groups), 4.2, columns=len(groups), sharey=True)
-    for ax, (title, runs) in zip(axes, groups.items(), strict=True):
-        for k, name in enumerate(NAMES):
-            values = np.array([run.numbers[name]["rmse_m"] for run in runs])
-            x = k + 0.25 * np.linspace(-1.0, 1.0, len(values)) if len(values) > 1 else np.array([k])
-            ax.plot(x, values, "o", color=COLORS[name], ms=3.5, alpha=0.7)
-            ax.plot([k - 0.35, k + 0.35], [np.median(values)] * 2, color=COLORS[name], lw=2.0)
-        ax.set(yscale="log", title=title)
-        ax.set_xticks(range(len(NAMES)), [n.replace(", ", ",\n") for n in NAMES], fontsize=7)
-        ax.axhline(FAILED_M, color="black", lw=0.7, ls=":")
-    axes[0].set(ylabel="RMSE of the position in m (dotted: failed)")
-    return figure
-
-
-def path_length(poses: Float) -> float:
-    """Metres along (n, 3) poses."""
-    return sum(float(np.hypot(*(b - a)[:2])) for a, b in pairwise(poses))
-
-
-def seconds_of(run: Run) -> float:
-    """How long a tour was."""
-    return float(run.arrays["seconds"][-1])
