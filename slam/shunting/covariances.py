@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arithmetic on (3, 3) covariances of (x, y, theta), in a fixed order of operations."""
+"""Arithmetic on (3, 3) covariances of (x, y, theta), in a fixed order of operations.
+
+Element by element: whole-array expressions take seconds to compile.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 NOISY = 2.0  # times what the noise of beams alone feigns: less information along an axis is none
 
 
-@njit
+@inner
 def _inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     """Inverse of a symmetric positive definite (3, 3)."""
     a, b, c, d, e, f = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
@@ -25,7 +28,7 @@ def _inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     out[2, 0], out[2, 1], out[2, 2] = ac / det, bc / det, cc / det
 
 
-@njit
+@inner
 def _sandwich(f: NDArray[np.float64], p: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     """out = f p f' for a symmetric (3, 3) p, exactly symmetric."""
     half = np.zeros((3, 3))
@@ -39,6 +42,16 @@ def _sandwich(f: NDArray[np.float64], p: NDArray[np.float64], out: NDArray[np.fl
             for k in range(3):
                 total += half[i, k] * f[j, k]
             out[i, j] = out[j, i] = total
+
+
+@inner
+def _sum(a: NDArray[np.float64], share: float, b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """a + share b."""
+    out = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = a[i, j] + share * b[i, j]
+    return out
 
 
 @njit
@@ -87,22 +100,25 @@ def advance(
     ``data``: information of the match, with the weight it was given. ``variances``: per unit of
     information, of the shared error and of what is newly written; frames in which the first stays.
     """
-    F, N = np.eye(3), np.empty((3, 3))
+    F, N = np.zeros((3, 3)), np.empty((3, 3))
+    F[0, 0] = F[1, 1] = F[2, 2] = 1.0
     F[0, 2], F[1, 2] = -motion[1], motion[0]
     precision, M, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     _inverse(prior, precision)
     _sandwich(F, drift, moved)
-    drift[:] = moved
+    for i in range(3):
+        for j in range(3):
+            drift[i, j] = moved[i, j]
     # odometry's: what the data leave of it
     _sandwich(F, blind, moved)
-    _inverse(data + precision, M)
+    _inverse(_sum(data, 1.0, precision), M)
     for i in range(3):
         for j in range(3):
             N[i, j] = M[i, 0] * precision[0, j] + M[i, 1] * precision[1, j]
             N[i, j] += M[i, 2] * precision[2, j]
-    _sandwich(N, moved + prior, blind)
+    _sandwich(N, _sum(moved, 1.0, prior), blind)
     # the shared error, as far as the data decide over the time that it stays the same
-    _inverse(data + precision / variances[2], M)
+    _inverse(_sum(data, 1.0 / variances[2], precision), M)
     _sandwich(M, data, moved)
     for i in range(3):
         for j in range(3):
@@ -127,7 +143,7 @@ def innovation(
     """
     precision, R, S = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     _inverse(prior, precision)
-    _inverse(data + 1e-3 * precision, R)
+    _inverse(_sum(data, 1e-3, precision), R)
     pulled, e = np.zeros(3), np.zeros(3)
     for i in range(3):
         for k in range(3):
@@ -136,7 +152,7 @@ def innovation(
         e[i] = off[i]
         for k in range(3):
             e[i] += R[i, k] * pulled[k]
-    _inverse(prior + share * R, S)
+    _inverse(_sum(prior, share, R), S)
     nis = 0.0
     for i in range(3):
         for k in range(3):

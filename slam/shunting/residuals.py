@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.frames import Float
 from slam.shunting.cells import MASK, SHIFT, Cells
 from slam.shunting.impressions import SENSOR_SIGMA_M, Observations
@@ -31,7 +31,7 @@ BENT = 0.2  # of a chord's length: a surface that leaves it by more is not strai
 SHARED, PAIRED, FEIGNED, NEW, WEIGHED = range(5)  # places in the sums of ``_look``
 
 
-@njit
+@inner
 def _offset(
     cells: Cells, short_term: float, u: float, v: float, variance: float, out: NDArray[np.float64]
 ) -> bool:
@@ -73,7 +73,7 @@ def _offset(
     return True
 
 
-@njit
+@inner
 def _age(cells: Cells, u: float, v: float) -> float:
     """For how long, s, the neuron nearest to (u, v) was looked at; 0 where none lives."""
     i, j = math.floor(u + 0.5), math.floor(v + 0.5)
@@ -85,7 +85,7 @@ def _age(cells: Cells, u: float, v: float) -> float:
     return float(cells.age[slot, j & MASK, i & MASK]) if slot >= 0 else 0.0
 
 
-@njit
+@inner
 def _partner(
     points: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64],
     first: int, cell: float,
@@ -110,7 +110,7 @@ def _partner(
     return k
 
 
-@njit
+@inner
 def _free_standing(
     points: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64], k: int
 ) -> bool:
@@ -141,7 +141,9 @@ def _look(
     """Add up what ``Evidence`` holds; ``times``: s of one look, and of a trace's prior age."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     off = np.empty(2)
-    surfaces = joined.any()
+    surfaces = False
+    for k in range(len(joined)):
+        surfaces = surfaces or joined[k]
     for first in range(start, len(points), step):
         u = (c * points[first, 0] - s * points[first, 1] + pose[0]) / cell - 0.5
         v = (s * points[first, 0] + c * points[first, 1] + pose[1]) / cell - 0.5

@@ -50,8 +50,9 @@ def _fill(
     offset: NDArray[np.float64],
 ) -> float:
     bins = len(limit)
-    least = np.full(bins, np.inf)
-    offset[:] = np.inf
+    least = np.empty(bins)
+    for k in range(bins):
+        least[k] = offset[k] = math.inf
     farthest = 0.0
     for beam in range(len(bearings)):
         if ranges[beam] <= 0.0:
