@@ -131,7 +131,7 @@ def _frames(path: Path, topics: Topics, laser: Laser) -> Iterator[Frame]:
         for topic, log_ns, message in bag.messages({name for name in names if name}):
             try:
                 assembly.take(topic, log_ns, message)
-                ready = assembly.ready(log_ns)
+                ready = assembly.ready(log_ns) if assembly.waiting else ()
             except _IMPOSSIBLE as error:
                 raise LogFormatError(path, f"topic {topic}: {error}") from error
             yield from ready
@@ -146,7 +146,7 @@ class _Assembly:
 
     def __init__(self, topics: Topics, laser: Laser) -> None:
         self._topics, self._laser = topics, laser
-        self._scans: deque[tuple[Scan, int]] = deque()
+        self.waiting: deque[tuple[Scan, int]] = deque()  # scans and when they were logged
         self._odometry, self._truth = PoseTrack(), PoseTrack()
         self._increments: dict[int, Float] = {}
         self._labels: dict[int, BeamLabels] = {}
@@ -163,7 +163,7 @@ class _Assembly:
                 self._disordered += 1
                 return
             self._last_ns = scan.stamp_ns
-            self._scans.append((scan, log_ns))
+            self.waiting.append((scan, log_ns))
         elif topic == topics.odometry:
             self._odometry.add(_odometry(message, stamp_ns, topics.increment is None))
         elif topic == topics.truth:
@@ -176,13 +176,13 @@ class _Assembly:
     def ready(self, now_ns: int | None) -> list[Frame]:
         """Frames that are complete, or have waited long enough; None: nothing more comes."""
         out = []
-        while self._scans:
-            scan, log_ns = self._scans[0]
+        while self.waiting:
+            scan, log_ns = self.waiting[0]
             late = now_ns is None or now_ns - log_ns > PATIENCE_NS
             stamp_ns = scan.stamp_ns
             if not (late or self._complete(stamp_ns)):
                 break
-            self._scans.popleft()
+            self.waiting.popleft()
             frame = self._frame(scan)
             if frame is not None:
                 out.append(frame)
