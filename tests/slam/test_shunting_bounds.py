@@ -33,18 +33,22 @@ def random_lattice(rng: np.random.Generator, depth: int, *, flat: bool = False) 
 
 def exhaustive(lattice: Lattice) -> Found:
     """Every candidate, the first of the best by heading, row and column."""
-    best = Found(score=-math.inf)
-    reach, bases = lattice.reach, lattice.bases
+    offsets = np.arange(-lattice.reach, lattice.reach + 1)
+    rows, columns = offsets[:, None], offsets[None, :]
+    scores = np.empty((len(lattice.turns), len(offsets), len(offsets)))
+    P = lattice.precision
     for h, turn in enumerate(lattice.turns.tolist()):
-        for row in range(-reach, reach + 1):
-            for column in range(-reach, reach + 1):
-                values = lattice.levels[0, bases[h, :, 1] + row, bases[h, :, 0] + column]
-                e = np.array([column * lattice.pitch, row * lattice.pitch, turn])
-                score = lattice.gain * int(values.sum(dtype=int))
-                score -= 0.5 * float(e @ lattice.precision @ e)
-                if score > best.score + 1e-12:
-                    best = Found(score=score, heading=h, row=row, column=column)
-    return best
+        sums = np.zeros(scores.shape[1:], np.int64)
+        for column, row in lattice.bases[h].tolist():
+            sums += lattice.levels[0, row + rows, column + columns]
+        ex, ey = columns * lattice.pitch, rows * lattice.pitch
+        square = P[0, 0] * ex * ex + P[1, 1] * ey * ey + P[2, 2] * turn * turn
+        square = square + 2.0 * (P[0, 1] * ex * ey + P[0, 2] * ex * turn + P[1, 2] * ey * turn)
+        scores[h] = lattice.gain * sums - 0.5 * square
+    first = np.argwhere(scores >= scores.max() - 1e-12)[0]
+    heading, row, column = first.tolist()
+    reach = lattice.reach
+    return Found(score=float(scores.max()), heading=heading, row=row - reach, column=column - reach)
 
 
 def test_branch_and_bound_equals_exhaustive_search_in_200_of_200_cases() -> None:
