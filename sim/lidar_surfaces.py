@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
@@ -33,6 +34,7 @@ PANES = ("glass",)
 POLISHED = ("mirror", "metal_polished", "chrome")
 
 
+@cache
 def reflectivity_of(material: str) -> float:
     """Of a material by its name without prefix: the longest entry of the table it begins with."""
     name = material.rsplit("/", 1)[-1]
