@@ -129,12 +129,13 @@ def advance(
 
 @njit
 def innovation(
+    stated: NDArray[np.float64],
     prior: NDArray[np.float64],
     data: NDArray[np.float64],
     off: NDArray[np.float64],
     share: float,
 ) -> tuple[float, float, float, float, float]:
-    """What the correction ``off`` of a pose with that ``prior`` says about the prior.
+    """What the correction ``off`` of a pose matched with ``prior`` says about what is ``stated``.
 
     ``data`` is the information with which the match corrected, ``share`` how much of the variance
     that claims it really has. The innovation e is what a match alone would have said: off = K e, so
@@ -152,7 +153,7 @@ def innovation(
         e[i] = off[i]
         for k in range(3):
             e[i] += R[i, k] * pulled[k]
-    _inverse(_sum(prior, share, R), S)
+    _inverse(_sum(stated, share, R), S)
     nis = 0.0
     for i in range(3):
         for k in range(3):

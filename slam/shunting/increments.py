@@ -18,6 +18,7 @@ from slam.shunting.covariances import innovation
 from slam.shunting.impressions import SENSOR_SIGMA_M, SIGMA_CELLS
 from slam.shunting.matching import Match
 from slam.shunting.motion import Prediction, predict
+from slam.shunting.turning import TurnBias
 
 STATED, ASSUMED = 2.0, 1.0  # times the variance at first: statements tend to be optimistic
 LEAST_STATED, LEAST_ASSUMED, MOST = 0.25, 0.01, 100.0
@@ -31,6 +32,7 @@ class Increments:
 
     scales  (2,) of the variances of translation and rotation
     nis     of the latest frame; None where its match is not believed
+    bias    what odometry adds to the heading by itself; taken out of it
     """
 
     def __init__(self, cell_m: float) -> None:
@@ -38,6 +40,8 @@ class Increments:
         self._noise_share = (SENSOR_SIGMA_M / (SIGMA_CELLS * cell_m)) ** 2 / 2.0
         self.scales: Float = np.ones(2)
         self.nis: float | None = None
+        self.bias = TurnBias()
+        self._stated = False
         self._least = LEAST_STATED
         self._squares: Float = np.zeros(2)
         self._expected: Float = np.zeros(2)
@@ -50,15 +54,21 @@ class Increments:
             self._expected[:] = AT_FIRST
             self._squares[:] = AT_FIRST * (STATED if stated else ASSUMED)
             self.scales = self._squares / self._expected
-        return predict(T_map_before, before, now, (float(self.scales[0]), float(self.scales[1])))
+        scales = float(self.scales[0]), float(self.scales[1])
+        self._stated = stated
+        return predict(T_map_before, before, now, scales, self.bias)
 
     def learn(self, prediction: Prediction, match: Match) -> None:
         """Compare the increment with a match that is believed."""
         off = match.T_map_robot - prediction.T_map_robot
         off[2] = se2.wrap(float(off[2]))
         data = match.tau * match.information
+        if self._stated:  # an assumed variance says nothing of what is bias and what is chance
+            variances = float(prediction.covariance[2, 2]), float(prediction.prior[2, 2])
+            found_out = match.matched, float(off[2]), data
+            self.bias.learn(prediction.increment, prediction.elapsed, variances, found_out)
         share = min(match.tau * self._noise_share, 1.0)
-        self.nis, *found = innovation(prediction.covariance, data, off, share)
+        self.nis, *found = innovation(prediction.covariance, prediction.prior, data, off, share)
         (a, _, _), (_, b, _), (_, _, c) = prediction.unscaled.tolist()
         floor_m2, floor_rad2 = prediction.floor
         keep = math.exp(-1.0 / max(MEMORY, MEMORY_S / max(prediction.elapsed, 1e-3)))

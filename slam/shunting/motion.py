@@ -10,8 +10,11 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float, Odometry
+from slam.shunting.turning import TurnBias
 
 FLOOR_M, FLOOR_RAD = 0.002, 0.0015  # standard deviation per sqrt(0.2 s): skew, a match's own
+# The matcher is given a stated covariance no tighter than this: else the map slips unnoticed.
+LEAST_SCALE, LEAST_M, LEAST_RAD = 2.25, 0.004, 0.003
 LEAST_VARIANCE = 1e-12  # of an increment, m^2 and rad^2
 # Without a covariance: a worn robot on a log, see ``assumed_covariance``.
 ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
@@ -49,6 +52,7 @@ class Prediction:
     elapsed      s since the previous frame
     unscaled     (3, 3) as stated or assumed, in the previous robot frame; zero: nothing to learn
     floor        m^2 and rad^2 that were added
+    loosened     (3, 3) that the matcher's prior has more than the covariance
     """
 
     T_map_robot: Float
@@ -58,6 +62,12 @@ class Prediction:
     elapsed: float
     unscaled: Float = field(default_factory=lambda: np.zeros((3, 3)))
     floor: tuple[float, float] = (0.0, 0.0)
+    loosened: Float = field(default_factory=lambda: np.zeros((3, 3)))
+
+    @property
+    def prior(self) -> Float:
+        """(3, 3) as the matcher takes it."""
+        return self.covariance + self.loosened
 
 
 def assumed_covariance(increment: Float) -> Float:
@@ -70,13 +80,20 @@ def assumed_covariance(increment: Float) -> Float:
 
 
 def predict(
-    T_map_before: Float, before: Odometry, now: Odometry, scales: tuple[float, float] = (1.0, 1.0)
+    T_map_before: Float,
+    before: Odometry,
+    now: Odometry,
+    scales: tuple[float, float] = (1.0, 1.0),
+    bias: TurnBias | None = None,
 ) -> Prediction:
     """Chain the odometry increment on the last pose; covariance from the frame's own.
 
-    ``scales`` multiply its variance of translation and of rotation.
+    ``scales`` multiply its variance of translation and of rotation; ``bias`` is taken out of the
+    increment.
     """
     increment = se2.between(before.T_odom_robot, now.T_odom_robot)
+    if bias is not None:
+        increment = bias.corrected(increment)
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
     given = now.increment_covariance
     unscaled = assumed_covariance(increment) if given is None else np.asarray(given)
@@ -85,6 +102,11 @@ def predict(
     floor = share * FLOOR_M**2, share * FLOOR_RAD**2
     widths = np.array([math.sqrt(scales[0]), math.sqrt(scales[0]), math.sqrt(scales[1])])
     in_robot = unscaled * widths[:, None] * widths + np.diag([floor[0], floor[0], floor[1]])
+    loosened = np.zeros((3, 3))
+    if given is not None:
+        more = np.sqrt([max(LEAST_SCALE - scale, 0.0) for scale in (scales[0], *scales)])
+        rest = share * LEAST_M**2 - floor[0], share * LEAST_RAD**2 - floor[1]
+        loosened = unscaled * more[:, None] * more + np.diag([rest[0], rest[0], rest[1]])
     if now.twist is not None:
         twist = np.asarray(now.twist)
     elif 0.0 < elapsed < 0.5:
@@ -96,6 +118,7 @@ def predict(
         increment=increment,
         covariance=turned(in_robot, float(T_map_before[2])),
         unscaled=unscaled,
+        loosened=turned(loosened, float(T_map_before[2])),
         floor=floor,
         twist=twist,
         elapsed=elapsed,

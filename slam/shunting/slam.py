@@ -46,6 +46,7 @@ VAGUE_CELLS = 1.0  # a prior wider than this may leave the basin of the right op
 LOST_AFTER, PATIENCE = 3, 30  # doubtful frames in a row: then lost; then the map is written anew
 WORTH_SEARCHING = 0.6  # usual support by the map from which on a lost robot searches it,
 GROWN_S, GROWN_SCANS = 10.0, 10  # once the map has been tracked on this long
+KNOWN = 0.5  # of that time: from then on the map may be frozen
 SUSPICIOUS, DENIED, STILL = 0.70, 0.30, 0.20  # of the usual match; share of the map in view
 # contradicted that raises doubt, and that keeps it up
 GIVE_UP_S = 60.0  # of searching: then the map is written on from where odometry says
@@ -160,10 +161,11 @@ class ShuntingSlam:
     def _match(self, observations: Observations, prediction: Prediction) -> Match:
         """Climb from the prediction; search around it when that is vague or finds too little."""
         predicted = prediction.T_map_robot
-        precision = inverted(prediction.covariance)
-        start = self._matcher.approach(self.network, observations, predicted, prediction.covariance)
+        prior = prediction.prior
+        precision = inverted(prior)
+        start = self._matcher.approach(self.network, observations, predicted, prior)
         match = self._matcher.climb(self.network, observations, start, predicted, precision)
-        sd = [math.sqrt(prediction.covariance[k, k]) for k in range(3)]
+        sd = [math.sqrt(prior[k, k]) for k in range(3)]
         spread = max(sd[0], sd[1])
         near = SearchWindow(
             reach_m=min(max(3.0 * spread, 0.1), WIDEST.reach_m),
@@ -190,8 +192,9 @@ class ShuntingSlam:
     def _usual_support(self) -> float:
         return median(self._supports) if self._supports else 1.0
 
-    def _is_worth_searching(self) -> bool:
-        grown = self._tracked_s >= GROWN_S and self._tracked >= GROWN_SCANS
+    def _is_worth_searching(self, share: float = 1.0) -> bool:
+        """Grown (or to that share), and explains what is seen: else it cannot deny it either."""
+        grown = self._tracked_s >= share * GROWN_S and self._tracked >= GROWN_SCANS
         return grown and self._usual_support() >= WORTH_SEARCHING
 
     def _integrate(self, observations: Observations, match: Match, elapsed: float) -> str:
@@ -206,7 +209,8 @@ class ShuntingSlam:
             confirmed, contradicted, _ = self.network.integrate(
                 observations.view, T_map_laser, step, write=False
             )
-            doubtful = share < self.config.freeze_below and contradicted > confirmed
+            doubtful = self._is_worth_searching(KNOWN) and contradicted > confirmed
+            doubtful &= share < self.config.freeze_below
             denied = STILL if self._doubts else DENIED
             # A corridor looked at the other way round still fits by two thirds.
             doubtful |= suspicious and contradicted > denied * (confirmed + contradicted)
@@ -233,7 +237,7 @@ class ShuntingSlam:
     ) -> tuple[Match, str]:
         """Dead reckoning, until one hypothesis alone explains what is seen."""
         predicted = prediction.T_map_robot
-        precision = inverted(prediction.covariance)
+        precision = inverted(prediction.prior)
         here = self._matcher.climb(self.network, observations, predicted, predicted, precision)
         match = recovery.step(observations, prediction, here, self._usual_support())
         if match is not None:

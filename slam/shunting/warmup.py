@@ -65,7 +65,7 @@ def _run_all() -> None:
     whole = [np.eye(3) for _ in range(4)]
     advance(whole[0], whole[1], whole[2], whole[3], origin, covariance, covariance, (1.0, 1.0, 1.0))
     observable(covariance, 0.0, np.eye(3))
-    innovation(covariance, covariance, origin, 1.0)
+    innovation(covariance, covariance, covariance, origin, 1.0)
     for write in (False, True):
         stamp(network, seen, origin)
         network.integrate(seen.view, origin, 1.0, write=write)

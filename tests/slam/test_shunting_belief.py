@@ -154,7 +154,8 @@ def test_innovations_have_the_nis_of_prior_and_match_together() -> None:
         gain = np.linalg.solve(data + np.linalg.inv(prior), data)
         root = np.linalg.cholesky(prior + R)
         values = [
-            innovation(prior, data, gain @ root @ rng.normal(size=3), share)[0] for _ in range(3000)
+            innovation(prior, prior, data, gain @ root @ rng.normal(size=3), share)[0]
+            for _ in range(3000)
         ]
         assert np.mean(values) == pytest.approx(3.0, abs=0.2)
 
@@ -173,7 +174,7 @@ def corrected(
     match = np.diag([1e-3, 1e-3, 5e-4]) ** 2
     information = np.linalg.inv(match) * increments._noise_share  # what the reward's curvature says
     e = true * rng.normal(size=3) + np.sqrt(np.diag(match)) * rng.normal(size=3)
-    gain = np.linalg.solve(information + np.linalg.inv(prediction.covariance), information)
+    gain = np.linalg.solve(information + np.linalg.inv(prediction.prior), information)
     increments.learn(
         prediction,
         Match(
