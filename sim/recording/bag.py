@@ -28,6 +28,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from scenes.scene import SCAN_HEIGHT, Mover
 from sim.moments import Moment
 from sim.recording import messages as ros
+from sim.recording.label_cloud import LabelsMessage
 from sim.recording.objects import ObjectsMessage
 from sim.recording.template import STORE
 from slam import se2
@@ -188,7 +189,7 @@ class BagWriter:
         ]  # fmt: skip
         self._mount = ros.TransformMessage(ros.ROBOT, ros.LASER, height_m)
         self._wheels, self._truth = _Wheels(), ros.TruthMessage()
-        self._labels = ros.LabelsMessage(spec) if labels else None
+        self._labels = LabelsMessage(spec) if labels else None
         self._objects = ObjectsMessage(movers) if movers else None
         self._writer = Writer(path, version=VERSION, storage_plugin=StoragePlugin.MCAP)
         self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
@@ -206,7 +207,7 @@ class BagWriter:
             "/odom_increment": wheels.increment.KIND,
             "/ground_truth/pose": ros.TruthMessage.KIND,
             "/ground_truth/objects": ObjectsMessage.KIND if self._objects else "",
-            "/ground_truth/labels": ros.LabelsMessage.KIND if self._labels else "",
+            "/ground_truth/labels": LabelsMessage.KIND if self._labels else "",
             "/scan": scan,
             "/scan_turn": scan,
         }
