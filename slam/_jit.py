@@ -14,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import logging
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -70,9 +71,23 @@ def _watch_callees(dispatcher: Any, function: Any) -> None:
     if index is None:
         return
     index._load_index = _or_nothing(index._load_index)
+    index.save = partial(_save, index)
     if files:
         digest = hashlib.sha256(b"".join(Path(f).read_bytes() for f in sorted(files)))
         index._source_stamp = (index._source_stamp, digest.hexdigest())
+
+
+def _save(index: Any, key: Any, data: Any) -> None:
+    """As ``IndexDataCacheFile.save``, but a file of code is never that of another key or source.
+
+    Numba numbers the files: of two processes that compile at once, one may then load what the
+    other compiled for other types. Named after what they hold, and written before the index names
+    them, they are always right; an entry lost to the other process is compiled once more.
+    """
+    held = hashlib.sha256(index._dump((index._source_stamp, key))).hexdigest()[:16]
+    name = index._data_name_pattern.replace("{number:d}", held)
+    index._save_data(name, data)
+    index._save_index({**index._load_index(), key: name})
 
 
 def _or_nothing(load: Callable[[], dict[Any, Any]]) -> Callable[[], dict[Any, Any]]:
