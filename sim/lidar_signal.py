@@ -182,8 +182,9 @@ def receive(
             if total > 0.0 and total >= needed[min(int(middle / NEEDED_STEP), needed.size - 1)]:
                 place, ray = middle, strongest
         elif rays > 1 or distances[0] < math.inf:
+            chance = chances[i] if mixes else 0.0  # none are drawn where nothing mixes
             place, ray, mixed = detect(
-                distances[:rays], energies, surfaces, order[:rays], needed, chances[i], mixes
+                distances[:rays], energies, surfaces, order[:rays], needed, chance, mixes
             )
         places[0, i], places[1, i], marks[0, i] = place, distances[0], mixed
         places[2, i] = cosines[ray] if ray >= 0 else math.nan
