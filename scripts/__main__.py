@@ -12,11 +12,14 @@ def main() -> None:
     """Install the signal handlers, then load and run the command line."""
     interrupt.install()
     try:
+        from sim import gl
+
+        warning = gl.sanitise_environment()  # before anything imports mujoco, as verbs do
         from scripts.cli import main as command_line
     except interrupt.InterruptedBySignal:
         print("mobilia: interrupted", file=sys.stderr)
         sys.exit(130)
-    command_line()
+    command_line(warning)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,6 @@ from scripts.reproduce.verb import reproduce
 from scripts.run import run
 from scripts.sensor_card import sensor_card
 from scripts.verify import verify
-from sim import gl
 from slam.errors import MobiliaError
 
 _log = logging.getLogger(__name__)
@@ -60,10 +59,12 @@ def options(
     )
 
 
-def main() -> None:
-    """Entry point: every failure we foresee is one clear line and a non-zero exit status."""
+def main(warning: str | None = None) -> None:
+    """Every failure we foresee is one clear line and a non-zero exit status.
+
+    warning  of the environment, to be said first
+    """
     sys.path.append(os.getcwd())  # so that module:Class finds what lies in the user's folder
-    warning = gl.sanitise_environment()  # before anything imports mujoco
     if warning:
         note(warning)
     try:

@@ -18,6 +18,7 @@ from slam.errors import InvalidValueError, MissingDependencyError, MobiliaError,
 from slam.files import write_text
 
 MAX_JOBS = 1024
+WORKERS_TIMEOUT_S = 30
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -48,7 +49,7 @@ def each(
             client = stack.enter_context(_client(cluster))
             if shared is not None:
                 _check_shared(client, shared)
-            backend = {"backend": "dask", "wait_for_workers_timeout": 30}
+            backend = {"backend": "dask", "wait_for_workers_timeout": WORKERS_TIMEOUT_S}
         stack.enter_context(joblib.parallel_config(**backend))
         parallel = joblib.Parallel(return_as="generator_unordered", batch_size=1)
         results = parallel(joblib.delayed(_guarded)(call, item) for item in items)
@@ -95,14 +96,18 @@ def _client(address: str) -> Any:
 
 def _check_shared(client: Any, folder: Path) -> None:
     """Every worker must find in ``folder`` what is written there now."""
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_TIMEOUT_S)
+    except TimeoutError:
+        raise OutputError(
+            f"the Dask cluster has no worker after {WORKERS_TIMEOUT_S} s of waiting"
+        ) from None
     token = folder / f".{uuid.uuid4().hex}.token"
     write_text(token, token.name)
     try:
         seen = client.run(_sees, str(token))
     finally:
         token.unlink(missing_ok=True)
-    if not seen:
-        raise OutputError("the Dask cluster has no worker")
     blind = sorted(worker for worker, sees in seen.items() if not sees)
     if blind:
         raise OutputError(f"{folder} is not shared by the workers {', '.join(blind)}")

@@ -332,7 +332,7 @@ def kill_in_mid_episode(worker: subprocess.Popen[bytes], out: Path) -> None:
 
 
 def test_a_dask_cluster_that_loses_a_worker_makes_the_same_bytes(serial, tmp_path):
-    pytest.importorskip("distributed")
+    distributed = pytest.importorskip("distributed")
     told = tmp_path / "scheduler.json"
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 
@@ -347,6 +347,8 @@ def test_a_dask_cluster_that_loses_a_worker_makes_the_same_bytes(serial, tmp_pat
     try:
         wait_for(lambda: told.exists() and told.read_text().endswith("}"))
         address = json.loads(told.read_text())["address"]
+        with distributed.Client(address) as client:
+            client.wait_for_workers(2, timeout=60)
         killer = threading.Thread(target=kill_in_mid_episode, args=(parts[1], out))
         killer.start()
         generate("arena", out, **SETTINGS, cluster=address)
