@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
 from types import MappingProxyType
 from typing import Any
@@ -50,3 +51,13 @@ def numbers(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
     if len(out) != n:
         raise InvalidValueError(f"{name} must be {meaning}, got {value!r}")
     return out
+
+
+def check_not_negative(config: Any) -> None:
+    """``InvalidValueError`` for a field of that dataclass that is negative or not finite."""
+    for item in fields(config):
+        value = getattr(config, item.name)
+        if not (math.isfinite(value) and value >= 0.0):
+            raise InvalidValueError(
+                f"{type(config).__name__}.{item.name} must be finite and >= 0, got {value}"
+            )

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import difflib
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from types import MappingProxyType
 
-from sim.checks import check_types
-from slam.errors import InvalidValueError, UnknownNameError
+from sim.checks import check_not_negative, check_types
+from slam.errors import UnknownNameError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,12 +39,7 @@ class OdometryConfig:
 
     def __post_init__(self) -> None:
         check_types(self)
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InvalidValueError(
-                    f"OdometryConfig.{item.name} must be finite and >= 0, got {value}"
-                )
+        check_not_negative(self)
 
 
 PRESETS = MappingProxyType(

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import state
-from sim.checks import check_types
+from sim.checks import check_not_negative, check_types
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float
@@ -55,12 +55,7 @@ class TagCameraConfig:
 
     def __post_init__(self) -> None:
         check_types(self)
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InvalidValueError(
-                    f"TagCameraConfig.{item.name} must be finite and >= 0, got {value}"
-                )
+        check_not_negative(self)
         for name in ("rate_hz", "spacing_m"):
             if getattr(self, name) == 0.0:
                 raise InvalidValueError(f"TagCameraConfig.{name} must be > 0, got 0.0")
