@@ -17,6 +17,10 @@ class InvalidValueError(MobiliaError, ValueError):
     """A field, argument or option has a value it cannot have."""
 
 
+class NotFiniteError(InvalidValueError):
+    """A number that must be finite is NaN or infinite."""
+
+
 class UnknownNameError(MobiliaError, LookupError):
     """A scene, SLAM or preset of that name is not registered."""
 
@@ -39,8 +43,33 @@ class LogFormatError(MobiliaError):
         return type(self), (str(self.path), self.message, self.line)
 
 
+FAILURES = ("raised", "hung", "nan", "bad")
+
+
 class SlamFailedError(MobiliaError):
-    """A SLAM raised, or returned what it must not; says which one and at which scan."""
+    """A SLAM failed; says which one and at which scan.
+
+    outcome  "raised": it raised, or its process ended; "hung": no answer within its time limit;
+             "nan": a pose or covariance that is not finite; "bad": anything else that is no
+             answer: another type, length or stamp, or words outside the protocol
+    """
+
+    def __init__(self, message: str, outcome: str = "raised") -> None:
+        if outcome not in FAILURES:
+            raise InvalidValueError(
+                f"outcome must be one of {', '.join(FAILURES)}, got {outcome!r}"
+            )
+        self.message = message
+        self.outcome = outcome
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[type, tuple[str, str]]:
+        """So that it comes back whole from another process."""
+        return type(self), (self.message, self.outcome)
+
+    def at(self, where: str) -> SlamFailedError:
+        """The same failure, with the place before its words."""
+        return type(self)(f"{where} {self.message}", self.outcome)
 
 
 class OutputError(MobiliaError, OSError):

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, NotFiniteError
 
 Float = NDArray[np.float64]
 NS_PER_S = 1_000_000_000
@@ -72,12 +72,12 @@ def _cast(value: ArrayLike, dtype: Any) -> NDArray[Any]:
 
 
 def finite(owner: str, name: str, array: NDArray[Any]) -> None:
-    """Raise ``InvalidValueError`` when any entry is NaN or infinite."""
+    """Raise ``NotFiniteError`` when any entry is NaN or infinite."""
     # For the few numbers of a pose NumPy costs more than scalars.
     few = array.size <= 9
     fine = all(map(math.isfinite, array.ravel().tolist())) if few else np.isfinite(array).all()
     if not fine:
-        raise InvalidValueError(f"{owner}.{name} must be finite, got {array.tolist()!r:.200}")
+        raise NotFiniteError(f"{owner}.{name} must be finite, got {array.tolist()!r:.200}")
 
 
 def pose(owner: str, name: str, value: ArrayLike) -> Float:

@@ -5,14 +5,77 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
-from slam.errors import SlamFailedError
+from slam.errors import InvalidValueError, NotFiniteError, SlamFailedError
 from slam.frames import Float, Frame
 from slam.system import Estimate, Raster, SlamSystem, told
 from slam.trajectory import Trajectory
+
+
+def asked(system: SlamSystem, frame: Frame) -> Estimate:
+    """One update, judged: raises ``SlamFailedError`` for whatever is no estimate of this frame."""
+    with judged():
+        estimate: object = system.update(frame)
+    if not isinstance(estimate, Estimate):
+        raise SlamFailedError(f"returned no Estimate but {estimate!r:.80}", "bad")
+    if estimate.stamp_ns != frame.stamp_ns:
+        raise SlamFailedError(
+            f"returned an estimate for {estimate.stamp_ns} ns instead of {frame.stamp_ns} ns", "bad"
+        )
+    return estimate
+
+
+def asked_map(system: SlamSystem) -> Raster | None:
+    """The map now, None for none or an empty one; ``SlamFailedError`` for what no map can be."""
+    with judged():
+        raster: object = system.map()
+    if raster is None:
+        return None
+    if not isinstance(raster, Raster):
+        raise SlamFailedError(f"returned no Raster or None but {raster!r:.80}", "bad")
+    if raster.T_map_origin[2] != 0.0:
+        raise SlamFailedError(
+            "returned a map that does not lie along the map's axes, its origin is turned by "
+            f"{raster.T_map_origin[2]} rad",
+            "bad",
+        )
+    return raster if raster.values.size else None
+
+
+def asked_trajectory(system: SlamSystem, stamps_ns: NDArray[np.int64]) -> Trajectory:
+    """Its final poses, one at least for each of ``stamps_ns``; ``SlamFailedError`` otherwise."""
+    with judged():
+        final: object = system.trajectory()
+    if not isinstance(final, Trajectory):
+        raise SlamFailedError(f"returned no Trajectory but {final!r:.80}", "bad")
+    if not np.isin(stamps_ns, final.stamps_ns).all():
+        raise SlamFailedError(
+            f"returned {len(final)} poses and leaves out frames; it must have one for each of the "
+            f"{len(stamps_ns)} updates",
+            "bad",
+        )
+    return final
+
+
+@contextmanager
+def judged() -> Iterator[None]:
+    """Whatever somebody's SLAM raises becomes a ``SlamFailedError`` with its outcome."""
+    try:
+        yield
+    except SlamFailedError:
+        raise
+    except NotFiniteError as error:
+        raise SlamFailedError(f"raised {told(error)}", "nan") from error
+    except InvalidValueError as error:  # ours begin with the type whose field is wrong
+        theirs = not str(error).startswith(("Estimate.", "Raster.", "Trajectory."))
+        raise SlamFailedError(f"raised {told(error)}", "raised" if theirs else "bad") from error
+    except Exception as error:
+        raise SlamFailedError(f"raised {told(error)}") from error
 
 
 @dataclass(eq=False)
@@ -20,7 +83,8 @@ class Track:
     """One SLAM's run: every online estimate and what it cost.
 
     durations_s  processor time of each ``update`` (all threads), s; a figure about the machine,
-                 never part of a result that must repeat
+                 never part of a result that must repeat. A system in a process of its own says its
+                 processor time by a method ``processor_s()``
     """
 
     name: str
@@ -38,21 +102,8 @@ class Track:
     def final(self) -> Trajectory | None:
         """The poses as the system sees them now, None where they are the online ones."""
         online = self.online()
-        try:
-            final: object = self.system.trajectory()
-        except Exception as error:
-            raise SlamFailedError(
-                f"SLAM '{self.name}': trajectory() raised {told(error)}"
-            ) from error
-        if not isinstance(final, Trajectory):
-            raise SlamFailedError(
-                f"SLAM '{self.name}': trajectory() returned no Trajectory but {final!r:.80}"
-            )
-        if not np.isin(online.stamps_ns, final.stamps_ns).all():
-            raise SlamFailedError(
-                f"SLAM '{self.name}': trajectory() has {len(final)} poses and leaves out frames; "
-                f"it must have one for each of the {len(online)} updates"
-            )
+        with self._named("trajectory()"):
+            final = asked_trajectory(self.system, online.stamps_ns)
         same = np.array_equal(final.stamps_ns, online.stamps_ns) and np.array_equal(
             final.poses, online.poses
         )
@@ -60,47 +111,27 @@ class Track:
 
     def map(self) -> Raster | None:
         """The map now; raises ``SlamFailedError`` for what no map can be."""
-        try:
-            raster: object = self.system.map()
-        except Exception as error:
-            raise SlamFailedError(f"SLAM '{self.name}': map() raised {told(error)}") from error
-        if raster is None:
-            return None
-        if not isinstance(raster, Raster):
-            raise SlamFailedError(
-                f"SLAM '{self.name}': map() returned no Raster or None but {raster!r:.80}"
-            )
-        if raster.values.size == 0:
-            return None
-        if raster.T_map_origin[2] != 0.0:
-            raise SlamFailedError(
-                f"SLAM '{self.name}': map() must lie along the map's axes, its origin is turned by "
-                f"{raster.T_map_origin[2]} rad"
-            )
-        return raster
+        with self._named("map()"):
+            return asked_map(self.system)
 
     def covariances(self) -> Float:
         """(n, 3, 3) online covariances in the map frame."""
         return np.array([e.covariance for e in self.estimates]).reshape(-1, 3, 3)
 
-    def _where(self) -> str:
-        return f"SLAM '{self.name}', scan {len(self.estimates)},"
+    @contextmanager
+    def _named(self, what: str) -> Iterator[None]:
+        try:
+            yield
+        except SlamFailedError as error:
+            raise error.at(f"SLAM '{self.name}', {what}") from error
 
     def take(self, frame: Frame) -> Estimate:
         """One update, timed; raises ``SlamFailedError`` when the system does."""
-        start = time.process_time()
-        try:
-            estimate: object = self.system.update(frame)
-        except Exception as error:
-            raise SlamFailedError(f"{self._where()} raised {told(error)}") from error
-        self.durations_s.append(time.process_time() - start)
-        if not isinstance(estimate, Estimate):
-            raise SlamFailedError(f"{self._where()} returned no Estimate but {estimate!r:.80}")
-        if estimate.stamp_ns != frame.stamp_ns:
-            raise SlamFailedError(
-                f"{self._where()} returned an estimate for {estimate.stamp_ns} ns instead of "
-                f"{frame.stamp_ns} ns"
-            )
+        clock = getattr(self.system, "processor_s", time.process_time)
+        start = clock()
+        with self._named(f"scan {len(self.estimates)},"):
+            estimate = asked(self.system, frame)
+        self.durations_s.append(clock() - start)
         self.estimates.append(estimate)
         return estimate
 

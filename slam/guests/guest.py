@@ -67,7 +67,7 @@ class Guest(ABC):
         points_robot = from_scan(frame.scan, np.asarray(twist), _BEAMS).points_robot
         T_map_robot, diagnostics = self._locate(points_robot, prediction)
         if not np.isfinite(T_map_robot).all():
-            raise SlamFailedError(f"{type(self).__name__} ended at {T_map_robot.tolist()}")
+            raise SlamFailedError(f"{type(self).__name__} ended at {T_map_robot.tolist()}", "nan")
         self._before, self._T_map_robot = frame.odometry, T_map_robot
         self._stamps.append(frame.stamp_ns)
         self._poses.append(T_map_robot)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 
 import numpy as np
@@ -92,23 +93,35 @@ def fail(_frame: Frame) -> Estimate:
 
 
 @pytest.mark.parametrize(
-    ("answer", "says"),
+    ("answer", "says", "outcome"),
     [
-        (fail, "raised ZeroDivisionError: too clever"),
-        (lambda frame: None, "returned no Estimate but None"),
+        (fail, "raised ZeroDivisionError: too clever", "raised"),
+        (lambda frame: None, "returned no Estimate but None", "bad"),
+        (
+            lambda frame: Estimate(
+                stamp_ns=frame.stamp_ns, T_map_robot=np.zeros(2), covariance=np.eye(3)
+            ),
+            "T_map_robot must have shape (3)",
+            "bad",
+        ),
         (
             lambda frame: Estimate(
                 stamp_ns=frame.stamp_ns, T_map_robot=[0, float("nan"), 0], covariance=np.eye(3)
             ),
             "T_map_robot must be finite",
+            "nan",
         ),
         (
             lambda frame: Estimate(stamp_ns=7, T_map_robot=np.zeros(3), covariance=np.eye(3)),
             "for 7 ns instead of 2 ns",
+            "bad",
         ),
     ],
 )
-def test_a_failing_guest_is_named_with_the_scan(answer, says):
+def test_a_failing_guest_is_named_with_the_scan_and_how_it_failed(answer, says, outcome):
     replay = Replay.of({"guest": Guest(answer)})
-    with pytest.raises(SlamFailedError, match=rf"SLAM 'guest', scan 2, .*{re.escape(says)}"):
+    with pytest.raises(SlamFailedError, match=rf"SLAM 'guest', scan 2, .*{re.escape(says)}") as got:
         list(replay.run(frames()))
+    assert got.value.outcome == outcome
+    copied = pickle.loads(pickle.dumps(got.value))
+    assert (str(copied), copied.outcome) == (str(got.value), outcome)
