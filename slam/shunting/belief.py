@@ -24,9 +24,10 @@ from slam.shunting.matching import Match
 from slam.shunting.motion import Prediction
 from slam.shunting.residuals import Evidence
 
-LATTICE_CELLS = 0.065  # what surfaces are off by without any shared residual, 1 sigma
-SHARED_TIMES = 2.3  # the pose's error in units of the residual that surfaces share
+LATTICE_CELLS = 0.055  # what surfaces are off by without any shared residual, 1 sigma
+SHARED_TIMES = 2.6  # the pose's error in units of the residual that surfaces share
 NEW_TIMES = 0.25  # ... of which so much stays, when a map is all written anew
+TURN_TIMES = 0.7  # ... of which so much turns it: surfaces do not all err the same way
 SHARED_S, VIEW_S = 20.0, 1.0  # over which shared residuals and directions of surfaces are averaged
 AT_FIRST = 200.0  # pairs of points that the scanner's usual residual counts as
 USUAL_M = 0.002  # that residual
@@ -102,7 +103,7 @@ class Belief:
             prediction.T_map_robot - T_map_before,
             prediction.covariance,
             data,
-            (variance * strength, NEW_TIMES**2 * new * variance * strength, frames),
+            (variance * strength, NEW_TIMES**2 * new * variance * strength, frames, TURN_TIMES),
         )
         self.covariance = self._drift + self._blind + self._shared
 

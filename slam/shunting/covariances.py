@@ -93,12 +93,13 @@ def advance(
     motion: NDArray[np.float64],
     prior: NDArray[np.float64],
     data: NDArray[np.float64],
-    variances: tuple[float, float, float],
+    variances: tuple[float, float, float, float],
 ) -> None:
     """One frame; all arrays (3, 3) in the map frame, changed in place but the last three.
 
     ``data``: information of the match, with the weight it was given. ``variances``: per unit of
-    information, of the shared error and of what is newly written; frames in which the first stays.
+    information, of the shared error and of what is newly written; frames in which the first stays;
+    by how much less (standard deviation) surfaces agree in their error of the heading.
     """
     F, N = np.zeros((3, 3)), np.empty((3, 3))
     F[0, 0] = F[1, 1] = F[2, 2] = 1.0
@@ -122,8 +123,9 @@ def advance(
     _sandwich(M, data, moved)
     for i in range(3):
         for j in range(3):
-            shared[i, j] = variances[0] * moved[i, j]
-            newest[i, j] = variances[1] * moved[i, j]
+            turns = (variances[3] if i == 2 else 1.0) * (variances[3] if j == 2 else 1.0)
+            shared[i, j] = turns * variances[0] * moved[i, j]
+            newest[i, j] = turns * variances[1] * moved[i, j]
             drift[i, j] += newest[i, j]
 
 

@@ -63,7 +63,9 @@ def _run_all() -> None:
     seen = from_scan(Scan(stamp_ns=0, ranges=ranges, spec=spec), np.zeros(3), config)
     look(network, 0.3, seen, origin, 1.0, 0)
     whole = [np.eye(3) for _ in range(4)]
-    advance(whole[0], whole[1], whole[2], whole[3], origin, covariance, covariance, (1.0, 1.0, 1.0))
+    advance(
+        whole[0], whole[1], whole[2], whole[3], origin, covariance, covariance, (1.0, 1.0, 1.0, 1.0)
+    )
     observable(covariance, 0.0, np.eye(3))
     innovation(covariance, covariance, covariance, origin, 1.0)
     for write in (False, True):
