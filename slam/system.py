@@ -7,7 +7,8 @@
         def map(self) -> Raster | None: ...
         def trajectory(self) -> Trajectory: ...
 
-``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class.
+``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class,
+``create("pipe:./my_slam --option")`` a program in any language (``slam.guests.pipe``).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import inspect
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -126,12 +128,18 @@ def describe(name: str) -> str:
 
 
 def create(name: str, **config: Any) -> SlamSystem:
-    """A fresh SLAM by registered name or by ``module:Class``; ``config`` goes to its constructor.
+    """A fresh SLAM by registered name, as ``module:Class`` or as ``pipe:COMMAND``.
+
+    ``config`` goes to its constructor.
 
     Raises ``UnknownNameError`` with the nearest known name, or what is wrong with the entry, and
     ``InvalidValueError`` for options that its constructor does not have.
     """
-    if ":" in name:
+    if name.startswith("pipe:"):
+        from slam.guests.pipe import PipeSlam  # it imports this module
+
+        factory: Factory = partial(PipeSlam, name.removeprefix("pipe:"))
+    elif ":" in name:
         factory = _load(name)
     elif name in _registry:
         factory = _registry[name]
@@ -139,11 +147,14 @@ def create(name: str, **config: Any) -> SlamSystem:
         near = difflib.get_close_matches(name, _registry, n=1)
         hint = f" Did you mean '{near[0]}'?" if near else ""
         raise UnknownNameError(
-            f"no SLAM is called '{name}'.{hint} Known: {', '.join(names())}, or module:Class."
+            f"no SLAM is called '{name}'.{hint} Known: {', '.join(names())}, or module:Class, "
+            "or pipe:COMMAND."
         )
     _check_options(name, factory, config)
     try:
         system = factory(**config)
+    except SlamFailedError as error:
+        raise error.at(f"SLAM '{name}' cannot be made:") from error
     except MobiliaError:
         raise
     except Exception as error:

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A SLAM in a process of its own, in any language, spoken to over a pipe (``protocol``).
+
+``create("pipe:./my_slam --option")`` starts such a command; ``guarded("my_package:MySlam")`` runs a
+Python class the same way, so that neither its crash nor its endless loop is ours.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shlex
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from slam.errors import InvalidValueError, SlamFailedError
+from slam.frames import Float, Frame, LaserSpec
+from slam.guests import protocol
+from slam.guests.wire import Wire
+from slam.system import Estimate, Raster, SlamSystem, create
+from slam.trajectory import Trajectory
+
+PREFIX = "pipe:"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """How long an answer may take, seconds of wall-clock time.
+
+    scan_s   one scan
+    first_s  its start, the first scan after it, a reset, the map and the final poses: compilers and
+             great maps are no hang
+    """
+
+    scan_s: float = 10.0
+    first_s: float = 120.0
+
+    def __post_init__(self) -> None:
+        for name in ("scan_s", "first_s"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not 0.0 < value < math.inf:
+                raise InvalidValueError(f"Limits.{name} must be > 0 s and finite, got {value!r}")
+
+
+class PipeSlam:
+    """The system behind a command. After a failure it is over; ``reset`` starts it anew.
+
+    command      a line as a shell would split it (no shell runs it), or its words
+    scan_limit_s, first_limit_s  see ``Limits``
+    environment  of the command, None: ours
+
+    Raises ``InvalidValueError`` for a command that cannot be started, ``SlamFailedError`` with its
+    outcome for everything that goes wrong behind it.
+    """
+
+    def __init__(
+        self,
+        command: str | Sequence[str],
+        *,
+        scan_limit_s: float = Limits.scan_s,
+        first_limit_s: float = Limits.first_s,
+        environment: dict[str, str] | None = None,
+    ) -> None:
+        self.limits = Limits(scan_s=scan_limit_s, first_s=first_limit_s)
+        self._command = _words(command)
+        self._environment = environment
+        self._start()
+
+    def _start(self) -> None:
+        self._wire = Wire(self._command, self._environment, farewell=protocol.line({"type": "bye"}))
+        with self._over_if_it_fails():
+            hello = protocol.line(protocol.hello_message())
+            said = self._ask("hello", hello, self.limits.first_s)
+            protocol.check_hello(said)
+        self._has_map, self._has_trajectory = (
+            said.get(key) is True for key in ("map", "trajectory")
+        )
+        self._forget()
+
+    def _forget(self) -> None:
+        self._laser: LaserSpec | None = None
+        self._stamps: list[int] = []
+        self._poses: list[Float] = []
+
+    def _ask(self, wanted: str, request: bytes, limit_s: float) -> dict[str, Any]:
+        """The answer, which must be of the type ``wanted``."""
+        if not self._wire.open:
+            raise SlamFailedError("is over since it failed")
+        with self._over_if_it_fails():
+            message = protocol.message_of(self._wire.ask(request, limit_s))
+            if message.get("type") not in (wanted, "error"):
+                raise SlamFailedError(
+                    f"answered {message.get('type')!r:.40} where {wanted!r} was expected", "bad"
+                )
+        if message["type"] == "error":
+            raise protocol.failure_of(message)
+        return message
+
+    @contextmanager
+    def _over_if_it_fails(self) -> Iterator[None]:
+        """Who is out of step once is not asked again."""
+        try:
+            yield
+        except SlamFailedError:
+            self.close()
+            raise
+
+    def reset(self) -> None:
+        """Forget everything; the next frame is the first."""
+        if not self._wire.open:
+            self._start()
+            return
+        self._ask("reset", protocol.line({"type": "reset"}), self.limits.first_s)
+        self._forget()
+
+    def update(self, frame: Frame) -> Estimate:
+        """Tell the frame, without truth, and hear the estimate."""
+        request = protocol.frame_line(frame, self._laser)
+        limit_s = self.limits.scan_s if self._stamps else self.limits.first_s
+        with self._over_if_it_fails():
+            message = self._ask("estimate", request, limit_s)
+            estimate = protocol.estimate_of(message, frame.stamp_ns)
+        if frame.scan is not None:
+            self._laser = frame.scan.spec
+        self._stamps.append(frame.stamp_ns)
+        self._poses.append(estimate.T_map_robot)
+        return estimate
+
+    def map(self) -> Raster | None:
+        """Its map, None where its hello promised none."""
+        if not self._has_map:
+            return None
+        request = protocol.line({"type": "map"})
+        return protocol.map_of(self._ask("map", request, self.limits.first_s))
+
+    def trajectory(self) -> Trajectory:
+        """Its final poses; the online ones where its hello promised none."""
+        if self._has_trajectory:
+            request = protocol.line({"type": "trajectory"})
+            return protocol.trajectory_of(self._ask("trajectory", request, self.limits.first_s))
+        return Trajectory(
+            stamps_ns=np.array(self._stamps, dtype=np.int64),
+            poses=np.array(self._poses).reshape(-1, 3),
+        )
+
+    def processor_s(self) -> float:
+        """Processor time its process has used, s; wall-clock time where no system tells."""
+        spent = self._wire.processor_s()
+        return time.monotonic() if spent is None else spent
+
+    def peak_memory_bytes(self) -> int | None:
+        """The most resident memory its process has had."""
+        return self._wire.peak_memory_bytes()
+
+    def close(self) -> None:
+        """End its process; happens by itself when the object goes."""
+        self._wire.close()
+
+
+def _words(command: str | Sequence[str]) -> list[str]:
+    try:
+        words = shlex.split(command) if isinstance(command, str) else list(command)
+    except ValueError as error:
+        raise InvalidValueError(f"'{PREFIX}{command}': {error}") from error
+    if not words:
+        raise InvalidValueError(f"'{PREFIX}' needs a command, as in {PREFIX}./my_slam --option")
+    return words
+
+
+def guarded(name: str, limits: Limits | None = None, **config: Any) -> PipeSlam:
+    """``create(name, **config)`` in a child process: what it does there cannot stop this one."""
+    limits = limits or Limits()
+    words = [sys.executable, "-m", "slam.guests.serve", name]
+    if config:
+        words += ["--options", json.dumps(config)]
+    path = os.pathsep.join(folder for folder in sys.path if folder)
+    return PipeSlam(
+        words,
+        scan_limit_s=limits.scan_s,
+        first_limit_s=limits.first_s,
+        environment={**os.environ, "PYTHONPATH": path},
+    )
+
+
+def limited(name: str, limits: Limits | None) -> SlamSystem:
+    """``create(name)`` for comparisons: with limits, whatever is not ours runs in a child."""
+    if limits is None or ":" not in name:
+        return create(name)
+    if name.startswith(PREFIX):
+        return create(name, scan_limit_s=limits.scan_s, first_limit_s=limits.first_s)
+    return guarded(name, limits)

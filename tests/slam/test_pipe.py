@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A SLAM in a process of its own: heard exactly, judged by how it fails, never left behind."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from slam import create
+from slam.errors import InvalidValueError, SlamFailedError, UnknownNameError
+from slam.frames import Frame
+from slam.guests import Limits, PipeSlam, guarded, limited, protocol
+from slam.guests.serve import Server
+from slam.replay import Track
+from tests.world2d import World2D, arena, frames, laser, wander
+
+CLIENT = """
+import json, os, signal, subprocess, sys, time
+fault, count = sys.argv[1], 0
+def say(**words):
+    sys.stdout.write(json.dumps(words) + "\\n"); sys.stdout.flush()
+for line in sys.stdin:
+    message = json.loads(line)
+    kind = message["type"]
+    if kind == "hello":
+        if fault == "mute": time.sleep(60)
+        if fault == "future": say(type="hello", protocol="mobilia-slam", version=2); continue
+        say(type="hello", protocol="mobilia-slam", version=1, map=fault == "map", trajectory=False)
+    elif kind == "frame":
+        count += 1
+        if count == 1 and fault == "slow start": time.sleep(0.5)
+        if count == 3:
+            if fault == "crash": os.kill(os.getpid(), signal.SIGSEGV)
+            if fault == "exit": sys.stderr.write("out of\\nideas\\n"); sys.exit(3)
+            if fault == "close": os.close(1); time.sleep(60)
+            if fault == "hang": time.sleep(60)
+            if fault == "spin": signal.signal(signal.SIGTERM, signal.SIG_IGN); exec("while 1: pass")
+            if fault == "family":
+                subprocess.Popen(["sleep", "600"]); sys.stderr.write("kin\\n"); time.sleep(60)
+            if fault == "garbage": print("Segmentation fault (just kidding)", flush=True); continue
+            if fault == "half": sys.stdout.write('{"type":'); sys.stdout.flush(); time.sleep(60)
+            if fault == "chatter": sys.stderr.write("x" * 1000000 + "\\n")
+            if fault == "twice": say(type="estimate", stamp_ns=message["stamp_ns"], T_map_robot=[0]*3)
+            if fault == "error": say(type="error", message="no idea\\nat all"); continue
+            if fault == "other": say(type="map"); continue
+            if fault == "nan":
+                print('{"type":"estimate","stamp_ns":%d,"T_map_robot":[nan,0,0]}' % message["stamp_ns"],
+                      flush=True); continue
+            if fault == "short": say(type="estimate", stamp_ns=message["stamp_ns"], T_map_robot=[1]); continue
+            if fault == "stamp": say(type="estimate", stamp_ns=1, T_map_robot=[0]*3); continue
+        say(type="estimate", stamp_ns=message["stamp_ns"], T_map_robot=[count, 0, 0])
+    elif kind == "reset":
+        count = 0; say(type="reset")
+    elif kind == "map":
+        say(type="error", message="lost it")
+    else:
+        break
+"""  # noqa: E501
+
+
+@pytest.fixture(scope="module")
+def stream() -> list[Frame]:
+    return frames(World2D(arena()), wander(4.0), rate_hz=5.0, spec=laser(181), seed=4)[:8]
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("client") / "client.py"
+    path.write_text(CLIENT)
+    return path
+
+
+def piped(client: Path, fault: str, scan_s: float = 5.0) -> PipeSlam:
+    command = [sys.executable, "-S", "-E", str(client), fault]
+    return PipeSlam(command, scan_limit_s=scan_s, first_limit_s=10.0)
+
+
+def gone(pid: int, within_s: float = 5.0) -> bool:
+    """Whether the process ends; one that nobody has reaped yet has ended."""
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            return True
+        if state == "Z":
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_a_good_guest_comes_through_and_starts_anew(client, stream):
+    slam = piped(client, "none")
+    track = Track("good", slam)
+    assert track.survive(stream) is None
+    np.testing.assert_array_equal(track.online().poses[:, 0], np.arange(1, 9))
+    np.testing.assert_array_equal(track.covariances(), 0.0)
+    assert track.map() is None
+    assert track.final() is None
+    assert all(seconds >= 0.0 for seconds in track.durations_s)
+    slam.reset()
+    assert len(slam.trajectory()) == 0
+    assert slam.update(stream[5]).T_map_robot[0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("fault", "outcome", "says"),
+    [
+        ("crash", "raised", "its process was ended by SIGSEGV"),
+        ("exit", "raised", "its process ended with status 3; its last words: 'out of | ideas'"),
+        ("close", "raised", "closed its standard output"),
+        ("hang", "hung", "no answer within 0.3 s"),
+        ("spin", "hung", "no answer within 0.3 s"),
+        ("half", "hung", "no answer within 0.3 s"),
+        ("garbage", "bad", "no JSON object but 'Segmentation fault (just kidding)'"),
+        ("error", "raised", "no idea at all"),
+        ("other", "bad", "answered 'map' where 'estimate' was expected"),
+        ("nan", "nan", "must be finite"),
+        ("short", "bad", "1 numbers as 'T_map_robot', not 3"),
+        ("stamp", "bad", "answered for 1 ns instead of"),
+    ],
+)
+def test_each_fault_ends_the_guest_and_nothing_else(client, stream, fault, outcome, says):
+    slam = piped(client, fault, scan_s=0.3 if outcome == "hung" else 5.0)
+    track = Track(fault, slam)
+    failure = track.survive(stream)
+    assert isinstance(failure, SlamFailedError)
+    assert failure.outcome == outcome
+    assert str(failure).startswith(f"SLAM '{fault}', scan 2, ")
+    assert says in str(failure)
+    assert "\n" not in str(failure)
+    assert len(track.estimates) == 2
+    assert gone(slam._wire.pid)
+    with pytest.raises(SlamFailedError, match="is over since it failed"):
+        slam.update(stream[4])
+    slam.reset()
+    assert slam.update(stream[4]).T_map_robot[0] == 1.0
+
+
+def test_an_answer_too_many_puts_it_out_of_step(client, stream):
+    failure = Track("twice", piped(client, "twice")).survive(stream)
+    assert failure is not None
+    assert failure.outcome == "bad"
+    assert "scan 3" in str(failure)
+
+
+def test_much_said_on_standard_error_blocks_nothing(client, stream):
+    assert Track("chatter", piped(client, "chatter")).survive(stream) is None
+
+
+def test_its_children_end_with_it(client, stream):
+    slam = piped(client, "family", scan_s=0.5)
+    group = slam._wire.pid
+    failure = Track("family", slam).survive(stream)
+    assert failure is not None
+    assert "its last words: 'kin'" in str(failure)
+    left = [p for p in Path("/proc").glob("[0-9]*") if _group(p) == group]
+    assert all(gone(int(p.name)) for p in left)
+
+
+def _group(process: Path) -> int | None:
+    try:
+        return int((process / "stat").read_text().rpartition(")")[2].split()[2])
+    except (OSError, ValueError):
+        return None
+
+
+def test_the_first_scan_may_take_longer(client, stream):
+    assert Track("slow", piped(client, "slow start", scan_s=0.25)).survive(stream[:2]) is None
+
+
+def test_a_guest_that_takes_no_more_input_hangs(stream):
+    hello = '{"type":"hello","protocol":"mobilia-slam","version":1}'
+    slam = PipeSlam(["sh", "-c", f"read x; echo '{hello}'; exec sleep 60"], first_limit_s=0.5)
+    failure = Track("deaf", slam).survive(stream * 40)  # one frame would fit into the pipe
+    assert failure is not None
+    assert failure.outcome == "hung"
+
+
+def test_a_map_that_fails_leaves_the_poses(client, stream):
+    track = Track("map", piped(client, "map"))
+    assert track.survive(stream) is None
+    with pytest.raises(SlamFailedError, match=r"SLAM 'map', map\(\) lost it"):
+        track.map()
+    assert len(track.online()) == 8
+    assert track.final() is None
+
+
+def test_it_ends_when_nobody_holds_it_any_more(client, stream):
+    slam = piped(client, "none")
+    pid = slam._wire.pid
+    slam.update(stream[0])
+    assert not gone(pid, 0.05)
+    del slam
+    gc.collect()
+    assert gone(pid)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("pipe:", "needs a command"),
+        ("pipe:./not-there --x", "cannot start './not-there': No such file"),
+        ("pipe:echo 'x", "No closing quotation"),
+    ],
+)
+def test_a_command_that_cannot_be_is_said_at_once(name, says):
+    with pytest.raises(InvalidValueError, match=says):
+        create(name)
+
+
+def test_a_guest_of_another_version_or_without_a_word_is_not_made(client):
+    with pytest.raises(SlamFailedError, match=r"cannot be made: speaks 'mobilia-slam' version 2"):
+        create(f"pipe:{sys.executable} {client} future")
+    with pytest.raises(SlamFailedError, match=r"no answer within 0\.3 s") as got:
+        create(f"pipe:{sys.executable} {client} mute", first_limit_s=0.3)
+    assert got.value.outcome == "hung"
+    with pytest.raises(SlamFailedError, match="cannot be made: its process ended with status 0"):
+        create("pipe:true")
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf"), True])
+def test_limits_are_checked(value):
+    with pytest.raises(InvalidValueError, match=r"Limits\.scan_s must be > 0 s"):
+        Limits(scan_s=value)
+
+
+SYSTEMS = '''
+import sys
+from slam.odometry import OdometrySlam
+
+class Looping(OdometrySlam):
+    """Prints where the protocol is spoken, reads what is not for it, then never comes back."""
+    def __init__(self, word="hello"):
+        super().__init__()
+        self.word = word
+    def update(self, frame):
+        print(self.word, sys.stdin.read(), flush=True)
+        while len(self._stamps) == 6: pass
+        return super().update(frame)
+'''
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "own_systems.py").write_text(SYSTEMS)
+    return folder
+
+
+def test_a_class_behind_the_pipe_says_the_same_as_here_and_its_loop_is_not_ours(
+    own, stream, monkeypatch
+):
+    monkeypatch.syspath_prepend(own)
+    child = Track("child", guarded("own_systems:Looping", Limits(scan_s=0.5), word="no idea"))
+    here = Track("here", create("odometry"))
+    assert here.survive(stream[:6]) is None
+    assert child.survive(stream[:6]) is None
+    assert child.final() is None
+    assert child.map() is None
+    failure = child.survive(stream[6:])
+    assert failure is not None
+    assert failure.outcome == "hung"
+    assert "last words: 'no idea" in str(failure)
+    np.testing.assert_array_equal(child.online().poses, here.online().poses)
+    np.testing.assert_array_equal(child.covariances(), here.covariances())
+    assert sum(child.durations_s) > 0.0
+    assert gone(child.system._wire.pid)
+
+
+def test_only_what_is_not_ours_is_put_behind_a_pipe():
+    assert not isinstance(limited("odometry", Limits()), PipeSlam)
+    assert not isinstance(limited("slam.odometry:OdometrySlam", None), PipeSlam)
+    with pytest.raises(UnknownNameError):
+        limited("shuntin", Limits())
+
+
+def asked(server: Server, **message: object) -> dict[str, object]:
+    return protocol.message_of(server.answer(protocol.line(message)))
+
+
+def test_the_other_end_answers_whatever_it_is_told(stream):
+    hello = protocol.hello_message()
+    server = Server("slam.odometry:OdometrySlam", {})
+    assert asked(server, type="reset")["message"] == "hello comes first"
+    assert asked(server, **hello)["version"] == 1
+    assert asked(server, type="frame")["outcome"] == "bad"
+    assert asked(server, type="song")["outcome"] == "bad"
+    said = protocol.message_of(server.answer(protocol.frame_line(stream[0], None)))
+    assert said["stamp_ns"] == stream[0].stamp_ns
+    assert asked(server, type="trajectory")["stamps_ns"] == [stream[0].stamp_ns]
+    assert asked(server, type="reset")["type"] == "reset"
+    assert asked(server, type="trajectory")["stamps_ns"] == []
+    nowhere = asked(Server("not_there:X", {}), **hello)
+    assert "cannot import 'not_there'" in str(nowhere["message"])
+    assert "unexpected keyword" in str(asked(Server("odometry", {"x": 1}), **hello)["message"])
+
+
+def test_a_class_does_not_outlive_a_mobilia_that_was_killed(own):
+    code = (
+        f"import sys; sys.path.insert(0, {str(own)!r})\n"
+        "from slam.guests import guarded\n"
+        "slam = guarded('own_systems:Looping')\n"
+        "print(slam._wire.pid, flush=True); sys.stdin.read()"
+    )
+    parent = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stdin=subprocess.PIPE
+    )
+    with parent:
+        pid = int(parent.stdout.readline())
+        os.kill(parent.pid, signal.SIGKILL)
+    assert gone(pid)
