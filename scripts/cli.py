@@ -12,11 +12,13 @@ from rich.logging import RichHandler
 
 from scripts import interrupt
 from scripts.bench import bench
+from scripts.compare.verb import compare
 from scripts.console import console, fail, note
 from scripts.demo import demo
 from scripts.export import export
 from scripts.generate import generate
 from scripts.listing import listing
+from scripts.many import ManyValues
 from scripts.reproduce.verb import reproduce
 from scripts.run import run
 from scripts.sensor_card import sensor_card
@@ -45,6 +47,7 @@ app.command("list")(listing)
 app.command("bench")(bench)
 app.command("sensor-card")(sensor_card)
 app.command("reproduce")(reproduce)
+app.command("compare", cls=ManyValues)(compare)
 
 
 @app.callback()

@@ -67,19 +67,19 @@ def generate(
     console.print(f"{escape(str(out))}: check it with [bold]mobilia verify[/bold]", soft_wrap=True)
 
 
-def sweep(text: str) -> tuple[float, ...]:
+def sweep(text: str, option: str = "--dynamism-sweep") -> tuple[float, ...]:
     """``0:1:0.25`` -> (0, 0.25, 0.5, 0.75, 1); ``InvalidValueError`` for anything else."""
     try:
         start, stop, step = (float(word) for word in text.split(":"))
     except ValueError:
-        raise InvalidValueError(f"--dynamism-sweep must be start:stop:step, got {text!r}") from None
+        raise InvalidValueError(f"{option} must be start:stop:step, got {text!r}") from None
     if not (step > 0.0 and 0.0 <= start <= stop <= 1.0):
         raise InvalidValueError(
-            f"--dynamism-sweep needs step > 0 and 0 <= start <= stop <= 1, got {text!r}"
+            f"{option} needs step > 0 and 0 <= start <= stop <= 1, got {text!r}"
         )
     count = int((stop - start) / step + 1e-9) + 1
     if count > MAX_SWEEP:
-        raise InvalidValueError(f"--dynamism-sweep {text!r}: {count} levels, at most {MAX_SWEEP}")
+        raise InvalidValueError(f"{option} {text!r}: {count} levels, at most {MAX_SWEEP}")
     return tuple(round(start + k * step, 9) for k in range(count))
 
 

@@ -72,9 +72,15 @@ def _digest(path: Path) -> str:
 
 
 def run_jobs(
-    jobs: Iterable[Job], folder: Path, *, processes: int = 1, title: str = "jobs"
+    jobs: Iterable[Job],
+    folder: Path,
+    *,
+    processes: int = 1,
+    cluster: str | None = None,
+    title: str = "jobs",
 ) -> dict[str, Path]:
-    """Make what is missing, on ``processes`` processes; the file of each job by its name.
+    """Make what is missing, on ``processes`` processes or on a Dask ``cluster`` that sees
+    ``folder``; the file of each job by its name.
 
     A job that fails stops the rest and is named in the error; results that are whole stay, and the
     next call goes on from them. Raises ``InvalidValueError`` for two jobs of one name.
@@ -97,23 +103,11 @@ def run_jobs(
             bar.advance(task)
             bar.update(task, unit=f"{int(bar.tasks[0].completed)}/{len(wanted)}")
 
-        if processes == 1 or len(missing) < 2:
-            for job in missing:
-                interrupt.check()
-                make(job, files[job.name])
-                advance()
-        else:
-            _in_parallel(missing, files, min(processes, len(missing)), advance)
+        pairs = [(job, files[job.name]) for job in missing]
+        for _ in workers.each(_make_pair, pairs, jobs=processes, cluster=cluster, shared=folder):
+            interrupt.check()
+            advance()
     return files
-
-
-def _in_parallel(
-    jobs: list[Job], files: Mapping[str, Path], processes: int, advance: Callable[[], None]
-) -> None:
-    pairs = [(job, files[job.name]) for job in jobs]
-    for _ in workers.each(_make_pair, pairs, jobs=processes):
-        interrupt.check()
-        advance()
 
 
 def _make_pair(pair: tuple[Job, Path]) -> None:

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One SLAM on one recorded run: what it believed, and the row that scores it."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scripts.compare.columns import scored
+from scripts.compare.maps import MapJudge
+from scripts.compare.memory import PeakMemory
+from scripts.compare.recording import Recording, load
+from slam.errors import SlamFailedError
+from slam.frames import Float, Frame
+from slam.replay import Track
+from slam.system import Raster, create
+
+WARM_SCANS = 12  # of a throw-away instance, so that no figure holds the loading of code
+UNKNOWN = 255  # of a map on file; else 0 (free) to 254 (occupied)
+_warm: set[str] = set()
+
+
+def enter(path: Path, *, recording: str, slam: str) -> None:
+    """A job: run ``slam`` over the file ``recording`` (beside ``path``'s folder), write ``path``.
+
+    A SLAM that fails is scored as such; only one that cannot be made at all is an error.
+    """
+    drive = load(path.parent.parent / recording)
+    frames = [frame.without_truth() for frame in drive.frames]
+    _warm_up(slam, frames)
+    run = Entry(slam, drive)
+    run.over(frames)
+    np.savez_compressed(path, **run.arrays())
+
+
+def _warm_up(slam: str, frames: list[Frame]) -> None:
+    if slam in _warm:
+        return
+    track = Track(name=slam, system=create(slam))
+    with suppress(SlamFailedError):  # the run itself will tell
+        for frame in frames[:WARM_SCANS]:
+            track.take(frame)
+        track.map()
+    _warm.add(slam)
+
+
+class Entry:
+    """A SLAM's run, scan by scan, with its maps judged on the way."""
+
+    def __init__(self, slam: str, drive: Recording) -> None:
+        self.drive = drive
+        self.judge = MapJudge(drive)
+        self.memory = PeakMemory()
+        self.track = Track(name=slam, system=create(slam))
+        self.failure: SlamFailedError | None = None
+        self.raster: Raster | None = None
+        self.final: Any = None
+
+    def over(self, frames: list[Frame]) -> None:
+        """All scans, or those up to its failure."""
+        try:
+            for k, frame in enumerate(frames):
+                self.memory.begin()
+                self.track.take(frame)
+                self.memory.end()
+                self.judge.look(k)
+                if self.judge.wants(k):
+                    self.raster = self.track.map()
+                    self.judge.judge(k, self.raster)
+            self.raster = self.track.map()
+            self.final = self.track.final()
+        except SlamFailedError as error:
+            self.failure = error
+
+    def arrays(self) -> dict[str, Any]:
+        """What the file holds: arrays, and the row of ``runs.csv`` as JSON."""
+        track, raster = self.track, self.raster
+        online = track.online()
+        row = scored(track, self.final, self.failure, self.drive.truth())
+        row |= {"peak_memory_mb": self.memory.growth_mb, **self.judge.scores()}
+        arrays: dict[str, Any] = {
+            "stamps_ns": online.stamps_ns,
+            "poses": online.poses,
+            "covariances": track.covariances(),
+            "converged": np.array([e.converged for e in track.estimates], dtype=np.bool_),
+            "milliseconds": np.array(track.durations_s) * 1e3,
+            "row": json.dumps(row),
+        }
+        if raster is not None:
+            arrays |= {
+                "map": _bytes(raster.values),
+                "map_resolution_m": raster.resolution_m,
+                "T_map_origin": raster.T_map_origin,
+            }
+        return arrays
+
+
+def _bytes(values: Float | Any) -> Any:
+    """A raster's values in 0..254, ``UNKNOWN`` for NaN."""
+    known = np.nan_to_num(values) * 254.0
+    return np.where(np.isnan(values), UNKNOWN, np.round(known)).astype(np.uint8)

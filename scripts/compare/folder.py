@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tables and files of a comparison, and how to read them back.
+
+compared = read(Path("out/compare"))
+compared.runs[0]["ate_unaligned_m"]                     # a row of runs.csv, None for empty
+run = compared.run("office", 0.5, 100)                   # a file of runs/
+run.believed("shunting").poses, run.truth, run.static_map
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scripts.compare.columns import COLUMNS
+from scripts.compare.plan import Run
+from slam.errors import LogFormatError
+from slam.files import replacing, write_text
+from slam.frames import Float
+from slam.system import Raster
+
+SCHEMA = 1
+RUNS, RUNS_JSON, LEVELS, PAIRED = "runs.csv", "runs.json", "levels.csv", "paired.csv"
+UNKNOWN = 255
+Row = dict[str, Any]
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> None:
+    """One line for each row; None and NaN are empty, numbers are written so that they read back."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for row in rows:
+        writer.writerow([_cell(row.get(column)) for column in columns])
+    write_text(path, text.getvalue())
+
+
+def _cell(value: Any) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def write_json(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """``{"schema": 1, "runs": [...]}``; null where a cell is empty."""
+    plain = [{name: _plain(row.get(name)) for name in COLUMNS} for row in rows]
+    text = json.dumps({"schema": SCHEMA, "runs": plain}, indent=1, allow_nan=False)
+    write_text(path, text + "\n")
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def merge(path: Path, recording: Path, entries: Mapping[str, Path]) -> list[Row]:
+    """Write ``runs/<run>.npz`` from a recording and each SLAM's entry; the rows, SLAM by SLAM."""
+    with np.load(recording) as file:
+        arrays = {name: file[name] for name in _OF_RECORDING}
+    rows: list[Row] = []
+    for k, (slam, entry) in enumerate(entries.items()):
+        with np.load(entry) as file:
+            rows.append({"slam": slam, **json.loads(file["row"].item())})
+            arrays |= {f"slam{k}_{name}": file[name] for name in file.files if name != "row"}
+    arrays["slams"] = np.array(list(entries))
+    arrays["schema"] = np.array(SCHEMA)
+    with replacing(path) as temporary:
+        np.savez_compressed(temporary, **arrays)
+    return rows
+
+
+_OF_RECORDING = (
+    "stamps_ns", "truth", "ranges", "hit", "mover_poses", "moving", "names", "kinds", "radii_m",
+    "closed", "static_map", "static_map_resolution_m", "T_world_origin",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Believed:
+    """What one SLAM said, at the scans that it answered.
+
+    stamps_ns (k,); poses (k, 3) in the map frame, which is the robot's true first pose;
+    covariances (k, 3, 3); converged (k,); milliseconds (k,) of processor time
+    map  its last one, in the map frame; None for a SLAM without
+    """
+
+    stamps_ns: NDArray[np.int64]
+    poses: Float
+    covariances: Float
+    converged: NDArray[np.bool_]
+    milliseconds: Float
+    map: Raster | None
+
+
+class RunFile:
+    """A file of ``runs/``.
+
+    slams      names in order
+    stamps_ns  (n,); ``truth`` (n, 3) T_world_robot; ``ranges`` (n, beams) m of the shared scans
+    mover_poses (n, m, 3), ``moving`` (n, m), ``names``, ``kinds``, ``radii_m`` of the movers
+    hit        (n, beams) the mover that each beam met, -1 static, -2 nothing
+    static_map what never moves, in the world frame
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            with np.load(path) as file:
+                self._arrays = dict(file)
+        except (OSError, ValueError) as error:
+            raise LogFormatError(path, f"no run of a comparison: {error}") from error
+        a = self._arrays
+        self.slams: list[str] = a["slams"].tolist()
+        self.stamps_ns, self.truth, self.ranges = a["stamps_ns"], a["truth"], a["ranges"]
+        self.mover_poses, self.moving, self.hit = a["mover_poses"], a["moving"], a["hit"]
+        self.names, self.kinds = a["names"].tolist(), a["kinds"].tolist()
+        self.radii_m = a["radii_m"]
+        self.static_map = Raster(
+            values=a["static_map"].astype(np.float32),
+            resolution_m=float(a["static_map_resolution_m"]),
+            T_map_origin=a["T_world_origin"],
+        )
+
+    def believed(self, slam: str) -> Believed:
+        """What that SLAM said."""
+        k = self.slams.index(slam)
+        a = {n.partition("_")[2]: v for n, v in self._arrays.items() if n.startswith(f"slam{k}_")}
+        raster = None
+        if "map" in a:
+            values = a["map"].astype(np.float32) / np.float32(254.0)
+            values[a["map"] == UNKNOWN] = np.nan
+            raster = Raster(
+                values=values,
+                resolution_m=float(a["map_resolution_m"]),
+                T_map_origin=a["T_map_origin"],
+            )
+        return Believed(
+            stamps_ns=a["stamps_ns"],
+            poses=a["poses"],
+            covariances=a["covariances"],
+            converged=a["converged"],
+            milliseconds=a["milliseconds"],
+            map=raster,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """The folder of a comparison."""
+
+    folder: Path
+
+    @cached_property
+    def recipe(self) -> Row:
+        """``recipe.json``."""
+        return _json(self.folder / "recipe.json")
+
+    @cached_property
+    def runs(self) -> list[Row]:
+        """Rows of ``runs.csv``: numbers as floats (seed and counts too), empty as None."""
+        return _table(self.folder / RUNS)
+
+    @cached_property
+    def levels(self) -> list[Row]:
+        """Rows of ``levels.csv``."""
+        return _table(self.folder / LEVELS)
+
+    @cached_property
+    def paired(self) -> list[Row]:
+        """Rows of ``paired.csv``."""
+        return _table(self.folder / PAIRED)
+
+    def run(self, scene: str, dynamism: float, seed: int) -> RunFile:
+        """One simulated run with all SLAMs."""
+        name = Run(scene=scene, dynamism=dynamism, seed=int(seed)).name
+        return RunFile(self.folder / "runs" / f"{name}.npz")
+
+
+def read(folder: Path) -> Compared:
+    """A comparison on file; ``LogFormatError`` for a folder that holds none."""
+    compared = Compared(folder)
+    if compared.recipe.get("settings", {}).get("compare_schema") != SCHEMA:
+        raise LogFormatError(folder, f"no comparison of schema {SCHEMA}")
+    return compared
+
+
+_WORDS = frozenset(
+    {"scene", "slam", "slam_a", "slam_b", "outcome", "failure", "metric", "statistic"}
+)
+
+
+def _table(path: Path) -> list[Row]:
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            return [{k: _value(k, v) for k, v in row.items()} for row in csv.DictReader(file)]
+    except (OSError, ValueError) as error:
+        raise LogFormatError(path, f"no table of a comparison: {error}") from error
+
+
+def _value(column: str, cell: str) -> Any:
+    if cell == "":
+        return None
+    return cell if column in _WORDS else float(cell)
+
+
+def _json(path: Path) -> Row:
+    try:
+        data: Row = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise LogFormatError(path, f"no comparison: {error}") from error
+    return data

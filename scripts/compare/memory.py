@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Peak memory of what runs in this process, from the kernel's own high-water mark (Linux)."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import math
+from pathlib import Path
+
+_STATUS, _CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
+_RESET_PEAK = "5"
+
+
+class PeakMemory:
+    """Growth of the process's resident memory over what it was at the start, at its highest.
+
+    Between ``begin`` and ``end`` the high-water mark counts, elsewhere nothing: what a comparison
+    itself holds for a moment is left out, what it keeps is not. NaN where the kernel does not say.
+    """
+
+    def __init__(self) -> None:
+        gc.collect()
+        _give_back()
+        self._base_kb = _reading("VmRSS")
+        self._peak_kb = self._base_kb
+
+    def begin(self) -> None:
+        """Forget the peak so far."""
+        try:
+            _CLEAR.write_text(_RESET_PEAK)
+        except OSError:
+            self._peak_kb = math.nan
+
+    def end(self) -> None:
+        """Note the peak since ``begin``."""
+        self._peak_kb = max(self._peak_kb, _reading("VmHWM"))  # NaN stays: it compares False
+
+    @property
+    def growth_mb(self) -> float:
+        """MB (1e6 bytes)."""
+        return (self._peak_kb - self._base_kb) * 1024.0 / 1e6
+
+
+def _give_back() -> None:
+    """Return freed memory to the system, so that the next one's growth shows."""
+    try:
+        ctypes.CDLL(None).malloc_trim(0)
+    except (OSError, AttributeError):  # another C library
+        return
+
+
+def _reading(name: str) -> float:
+    """kB of that line of the status file, NaN without one."""
+    try:
+        for line in _STATUS.read_text().splitlines():
+            if line.startswith(name + ":"):
+                return float(line.split()[1])
+    except OSError:
+        pass
+    return math.nan

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is to be compared, and the jobs that it takes: one a run, and one for each SLAM on it."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import scenes
+import sim
+import slam
+from scripts.compare import columns, entry, maps, recording
+from scripts.jobs import Job
+from scripts.session import file_name
+from sim.recording.recipe import Recipe
+from slam.errors import InvalidValueError
+
+RECORDINGS, ENTRIES = "recordings", "entries"
+MAX_RUNS = 100_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One simulated run; ``name`` as in the files: ``office_d0.25_s100``."""
+
+    scene: str
+    dynamism: float
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Letters, digits, - _ . only."""
+        return f"{file_name(self.scene)}_d{self.dynamism:g}_s{self.seed}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Every SLAM on every scene at every level with every seed.
+
+    slams, scenes  by name or as module:Class, module:function
+    levels    of dynamism, each in [0, 1]
+    seeds     whole numbers >= 0, the same at every level
+    seconds   of driving
+    every     one scan in so many is kept (of 37.5 a second)
+    scanner   "full", "noise" or "ideal"
+    """
+
+    slams: tuple[str, ...]
+    scenes: tuple[str, ...]
+    levels: tuple[float, ...]
+    seeds: tuple[int, ...]
+    seconds: float = 60.0
+    every: int = 8
+    scanner: str = "full"
+
+    def __post_init__(self) -> None:
+        for name in ("slams", "scenes", "levels", "seeds"):
+            values = getattr(self, name)
+            if not values or len(set(values)) != len(values):
+                raise InvalidValueError(f"Plan.{name} must be one or more, each once, got {values}")
+        if isinstance(self.every, bool) or not 1 <= self.every <= 1000:
+            raise InvalidValueError(f"Plan.every must be 1 to 1000, got {self.every}")
+        if len(self.scenes) * len(self.levels) * len(self.seeds) > MAX_RUNS:
+            raise InvalidValueError(f"a comparison has at most {MAX_RUNS} runs")
+        for run in self.runs():
+            self.recipe(run)  # complains of values that cannot be
+
+    def runs(self) -> list[Run]:
+        """Every simulated run, scene by scene, level by level."""
+        return [
+            Run(scene=scene, dynamism=level, seed=seed)
+            for scene in self.scenes
+            for level in self.levels
+            for seed in self.seeds
+        ]
+
+    def recipe(self, run: Run) -> Recipe:
+        """Of a run's simulation."""
+        return Recipe(**asdict(run), seconds=self.seconds, scanner=self.scanner)
+
+    def recordings(self) -> dict[str, Job]:
+        """The jobs that simulate, by the names of the runs."""
+        code = (*_sources(sim, scenes), Path(recording.__file__))
+        return {
+            run.name: Job(
+                name=run.name,
+                call=recording.record,
+                arguments={**asdict(self.recipe(run)), "every": self.every},
+                code=code,
+            )
+            for run in self.runs()
+        }
+
+    def entries(self) -> Iterator[tuple[Run, str, Job]]:
+        """The jobs that run a SLAM over a recording: run, SLAM, job."""
+        recordings = {name: job.file_name() for name, job in self.recordings().items()}
+        own = (*_sources(slam), *(Path(str(m.__file__)) for m in (columns, entry, maps)))
+        for name in self.slams:
+            code = (*own, *_source_of(name))
+            for run in self.runs():
+                file = f"{RECORDINGS}/{recordings[run.name]}"
+                arguments: dict[str, Any] = {"recording": file, "slam": name}
+                job = Job(
+                    name=f"{run.name}_{file_name(name)}",
+                    call=entry.enter,
+                    arguments=arguments,
+                    code=code,
+                )
+                yield run, name, job
+
+
+def _sources(*packages: Any) -> tuple[Path, ...]:
+    return tuple(Path(package.__file__).parent for package in packages)
+
+
+def _source_of(slam: str) -> tuple[Path, ...]:
+    """The file of a SLAM's own module: with it changed, its runs are made again."""
+    if ":" not in slam:
+        return ()
+    spec = importlib.util.find_spec(slam.partition(":")[0])
+    return (Path(spec.origin),) if spec and spec.origin and spec.has_location else ()

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One simulated run on file: what every SLAM gets, and the truth that scores it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.moments import Moment, toured
+from sim.recording.recipe import Recipe
+from sim.simulation import Simulation
+from slam.frames import BeamClass, Float, Frame, LaserSpec, Odometry, Scan
+from slam.system import Raster
+from slam.trajectory import Trajectory
+
+NOTHING, STATIC = -2, -1  # of ``Recording.hit``
+_SPEC = ("n_beams", "angle_min", "angle_increment", "range_min", "range_max")
+_SPEC_ARRAYS = ("beam_time_offsets", "T_robot_laser")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """n thinned scans of one run, of a scene with m movers.
+
+    frames    n of them, with truth and without labels
+    hit       (n, beams) int16: the mover that each beam met, ``STATIC`` or ``NOTHING``
+    poses     (n, m, 3) m, m, rad of the movers in the world, doors at their hinge along the leaf
+    moving    (n, m) whether each of them moves
+    names, kinds, radii_m  of the movers; a door's radius is the width of its leaf
+    closed    (m, 3) pose of a door's closed leaf; of others where they were put
+    static_map  what never moves, cut at the scan plane, in the world
+    returns   (4,) all beams of the whole run by ``BeamClass``, scans left out by thinning included
+    """
+
+    frames: Sequence[Frame]
+    hit: NDArray[np.int16]
+    poses: Float
+    moving: NDArray[np.bool_]
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    radii_m: Float
+    closed: Float
+    static_map: Raster
+    returns: NDArray[np.int64]
+
+    def truth(self) -> Trajectory:
+        """True poses in the world."""
+        return Trajectory(
+            stamps_ns=np.array([frame.stamp_ns for frame in self.frames]),
+            poses=np.array([frame.truth for frame in self.frames]),
+        )
+
+    def share_of_returns(self, kind: BeamClass) -> float:
+        """Of all beams that met something, those that met something of that class."""
+        return float(self.returns[kind] / max(self.returns[BeamClass.STATIC :].sum(), 1))
+
+
+def record(path: Path, *, every: int, **recipe: Any) -> None:
+    """A job: simulate ``Recipe(**recipe)``, keep every ``every``-th scan, write it to ``path``."""
+    wanted = Recipe(**recipe)
+    simulation = Simulation(**wanted.simulation())
+    scene = simulation.world.scene
+    mover_of_body = simulation.world.bodies.mover_of_body
+    thinned, returns = _Thinned(), np.zeros(len(BeamClass), dtype=np.int64)
+    for k, moment in enumerate(toured(simulation, wanted.seconds)):
+        labels = moment.frame.labels
+        assert labels is not None
+        returns += np.bincount(labels.kind, minlength=len(BeamClass))
+        thinned.pass_by(moment.frame)
+        if k % every == 0:
+            mover = np.where(labels.body >= 0, mover_of_body[labels.body], NOTHING)
+            thinned.keep(moment, mover)
+    truth_map = scene.static_map
+    arrays: dict[str, Any] = thinned.arrays() | _spec_arrays(simulation.spec)
+    np.savez_compressed(
+        path,
+        **arrays,
+        names=np.array([mover.name for mover in scene.movers]),
+        kinds=np.array([mover.kind for mover in scene.movers]),
+        radii_m=np.array([mover.radius for mover in scene.movers]),
+        closed=np.array([scene.initial[mover.name] for mover in scene.movers]),
+        static_map=truth_map.values.astype(np.uint8),
+        static_map_resolution_m=truth_map.resolution_m,
+        T_world_origin=truth_map.T_map_origin,
+        returns=returns,
+    )
+
+
+class _Thinned:
+    """The kept scans, each with the covariance of all the motion since the one before."""
+
+    def __init__(self) -> None:
+        self._lists: dict[str, list[Any]] = {}
+        self._covariance = np.zeros((3, 3))
+
+    def pass_by(self, frame: Frame) -> None:
+        """Motion of a scan, kept or not."""
+        if frame.odometry.increment_covariance is not None:
+            self._covariance = self._covariance + frame.odometry.increment_covariance
+
+    def keep(self, moment: Moment, mover: NDArray[np.int64]) -> None:
+        """A scan that everybody gets."""
+        frame = moment.frame
+        assert frame.scan is not None
+        twist = frame.odometry.twist
+        row = {
+            "stamps_ns": frame.stamp_ns,
+            "truth": frame.truth,
+            "ranges": frame.scan.ranges,
+            "T_odom_robot": frame.odometry.T_odom_robot,
+            "increment_covariances": self._covariance,
+            "twists": np.zeros(3) if twist is None else twist,
+            "hit": mover.astype(np.int16),
+            "mover_poses": moment.poses,
+            "moving": moment.moving,
+        }
+        for name, value in row.items():
+            self._lists.setdefault(name, []).append(value)
+        self._covariance = np.zeros((3, 3))
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """One array for each name, a row a scan."""
+        return {name: np.array(values) for name, values in self._lists.items()}
+
+
+def _spec_arrays(spec: LaserSpec) -> dict[str, Any]:
+    return {f"laser_{name}": getattr(spec, name) for name in (*_SPEC, *_SPEC_ARRAYS)}
+
+
+def load(path: Path) -> Recording:
+    """Inverse of ``record``."""
+    with np.load(path) as file:
+        a = dict(file)
+    scalars = {name: a[f"laser_{name}"].item() for name in _SPEC}
+    spec = LaserSpec(**scalars, **{name: a[f"laser_{name}"] for name in _SPEC_ARRAYS})
+    frames = [
+        Frame(
+            stamp_ns=int(stamp_ns),
+            odometry=Odometry(
+                stamp_ns=int(stamp_ns),
+                T_odom_robot=a["T_odom_robot"][k],
+                increment_covariance=a["increment_covariances"][k],
+                twist=a["twists"][k],
+            ),
+            scan=Scan(stamp_ns=int(stamp_ns), ranges=a["ranges"][k], spec=spec),
+            truth=a["truth"][k],
+        )
+        for k, stamp_ns in enumerate(a["stamps_ns"])
+    ]
+    return Recording(
+        frames=frames,
+        hit=a["hit"],
+        poses=a["mover_poses"],
+        moving=a["moving"],
+        names=tuple(a["names"].tolist()),
+        kinds=tuple(a["kinds"].tolist()),
+        radii_m=a["radii_m"],
+        closed=a["closed"],
+        static_map=Raster(
+            values=a["static_map"].astype(np.float32),
+            resolution_m=float(a["static_map_resolution_m"]),
+            T_map_origin=a["T_world_origin"],
+        ),
+        returns=a["returns"],
+    )

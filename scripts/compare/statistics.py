@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Medians with intervals, and differences of pairs: two SLAMs on the same frames.
+
+Runs without a number take no part, except that a failed SLAM's errors count as infinite.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest
+
+RESAMPLES = 2000
+SEED = 20070411  # of every bootstrap: the same table gives the same intervals
+CONFIDENCE = 0.95
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """As ``numpy.quantile`` with its default, but infinite values are allowed; NaN of nothing."""
+    if not values:
+        return math.nan
+    ranked = sorted(values)
+    at = share * (len(ranked) - 1)
+    k = min(int(at), len(ranked) - 2) if len(ranked) > 1 else 0
+    return _between(ranked[k], ranked[min(k + 1, len(ranked) - 1)], at - k)
+
+
+def _between(low: float, high: float, share: float) -> float:
+    if share == 0.0 or low == high:
+        return low
+    if share == 1.0:
+        return high
+    return 0.0 if low == -math.inf and high == math.inf else low + share * (high - low)
+
+
+def median_interval(values: Sequence[float]) -> tuple[float, float]:
+    """Percentile-bootstrap 95 % interval of the median, infinite values allowed."""
+    if not values:
+        return math.nan, math.nan
+    n = len(values)
+    draws = np.random.default_rng(SEED).integers(0, n, (RESAMPLES, n))
+    ranked = np.sort(np.array(values, dtype=np.float64)[draws], axis=1)
+    low, high = ranked[:, (n - 1) // 2], ranked[:, n // 2]
+    with np.errstate(invalid="ignore"):
+        medians = np.where(low == high, low, low + 0.5 * (high - low))
+    medians[np.isnan(medians)] = 0.0  # as in _between
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    listed = medians.tolist()
+    return quantile(listed, tail), quantile(listed, 1.0 - tail)
+
+
+def share_interval(hits: int, n: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a share."""
+    if n == 0:
+        return math.nan, math.nan
+    interval = binomtest(hits, n).proportion_ci(CONFIDENCE, method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+def paired(a: Sequence[float], b: Sequence[float], *, less_is_better: bool) -> dict[str, Any]:
+    """``a`` against ``b``, run by run: median of a - b with its interval, who won, sign test.
+
+    Two infinite values are a tie of difference 0.
+    """
+    differences = [0.0 if x == y else x - y for x, y in zip(a, b, strict=True)]
+    below, above = sum(d < 0.0 for d in differences), sum(d > 0.0 for d in differences)
+    wins, losses = (below, above) if less_is_better else (above, below)
+    low, high = median_interval(differences)
+    decided = wins + losses
+    return {
+        "n": len(differences),
+        "median_difference": quantile(differences, 0.5),
+        "low": low,
+        "high": high,
+        "wins": wins,
+        "ties": len(differences) - decided,
+        "losses": losses,
+        "p_sign": float(binomtest(wins, decided).pvalue) if decided else 1.0,
+    }

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options that take several words: ``--slam a b c`` is ``--slam a --slam b --slam c``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from typer.core import TyperCommand
+
+
+class ManyValues(TyperCommand):
+    """A command whose list options take all the words up to the next option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat each list option before every one of its words."""
+        lists = {
+            name
+            for parameter in self.params
+            if getattr(parameter, "multiple", False)
+            for name in parameter.opts
+        }
+        return super().parse_args(ctx, repeated(args, lists))
+
+
+def repeated(args: list[str], lists: set[str]) -> list[str]:
+    """``args`` with the words after each option of ``lists`` given to that option one by one."""
+    out: list[str] = []
+    option, first = "", False  # the list option whose words these are; whether its first comes next
+    for word in args:
+        if word.startswith("-") and word != "-":
+            option, first = (word, True) if word in lists else ("", False)
+            out.append(word)
+            continue
+        out += [word] if first or not option else [option, word]
+        first = False
+    return out
