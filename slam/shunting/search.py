@@ -8,6 +8,7 @@ its heading alone costs, so no bound is ever too low and the result equals exhau
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -15,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import njit
+from slam.compiling import announced
 from slam.frames import Float
 from slam.shunting.bounds import Lattice, Search, levels_of
-from slam.shunting.cells import MASK, SHIFT, SIDE, Cells
+from slam.shunting.cells import MASK, SHIFT, SIDE, Cells, no_cells
 from slam.shunting.impressions import SIGMA_CELLS, Observations
 from slam.shunting.network import Network
 
@@ -111,10 +113,25 @@ def _kernel() -> Float:
     return taps / math.sqrt(math.pi * SIGMA_CELLS**2)
 
 
+@functools.cache
+def _get_ready() -> None:
+    """Run every kernel of a search once, the first time in a process."""
+    with announced("the kernels of the wide search"):
+        field, bases = np.zeros((2 * SIDE, 2 * SIDE), np.uint8), np.empty((1, 1, 2), np.int32)
+        _field(no_cells(), 0.3, 0, 0, _kernel(), field)
+        place(np.ones((1, 2)), np.zeros(3), np.zeros(1), 0.2, 0, 0, bases)
+        lattice = Lattice(
+            levels=levels_of(field, 1), bases=bases, turns=np.zeros(1), reach=1, pitch=0.2,
+            precision=np.eye(3), gain=1.0,
+        )  # fmt: skip
+        Search(lattice, threads=1).best()
+
+
 def field_of(
     network: Network, short_term: float, i0: int, j0: int, rows: int, columns: int
 ) -> NDArray[np.uint8]:
     """(rows, columns) smoothed activities from neuron (i0, j0) on, which begins a block."""
+    _get_ready()
     field = np.zeros((rows, columns), np.uint8)
     _field(network.cells, short_term, i0, j0, _kernel(), field)
     return field
