@@ -16,6 +16,7 @@ from scripts.compare.memory import PeakMemory
 from scripts.compare.recording import Recording, load
 from slam.errors import SlamFailedError
 from slam.frames import Float, Frame
+from slam.guests import Limits, PipeSlam, limited
 from slam.replay import Track
 from slam.system import Raster, create
 
@@ -24,24 +25,26 @@ UNKNOWN = 255  # of a map on file; else 0 (free) to 254 (occupied)
 _warm: set[str] = set()
 
 
-def enter(path: Path, *, recording: str, slam: str) -> None:
+def enter(path: Path, *, recording: str, slam: str, scan_limit_s: float = Limits.scan_s) -> None:
     """A job: run ``slam`` over the file ``recording`` (beside ``path``'s folder), write ``path``.
 
-    A SLAM that fails is scored as such; only one that cannot be made at all is an error.
+    A SLAM that fails, even at its start, is scored as such. Whatever is not ours runs in a process
+    of its own, which it may crash or hang for ``scan_limit_s`` at a scan.
     """
     drive = load(path.parent.parent / recording)
     frames = [frame.without_truth() for frame in drive.frames]
-    _warm_up(slam, frames)
-    run = Entry(slam, drive)
+    limits = Limits(scan_s=scan_limit_s)
+    _warm_up(slam, frames, limits)
+    run = Entry(slam, drive, limits)
     run.over(frames)
     np.savez_compressed(path, **run.arrays())
 
 
-def _warm_up(slam: str, frames: list[Frame]) -> None:
-    if slam in _warm:
+def _warm_up(slam: str, frames: list[Frame], limits: Limits) -> None:
+    if slam in _warm or ":" in slam:  # the latter begin anew with each run
         return
-    track = Track(name=slam, system=create(slam))
     with suppress(SlamFailedError):  # the run itself will tell
+        track = Track(name=slam, system=limited(slam, limits))
         for frame in frames[:WARM_SCANS]:
             track.take(frame)
         track.map()
@@ -51,17 +54,23 @@ def _warm_up(slam: str, frames: list[Frame]) -> None:
 class Entry:
     """A SLAM's run, scan by scan, with its maps judged on the way."""
 
-    def __init__(self, slam: str, drive: Recording) -> None:
+    def __init__(self, slam: str, drive: Recording, limits: Limits) -> None:
         self.drive = drive
         self.judge = MapJudge(drive)
         self.memory = PeakMemory()
-        self.track = Track(name=slam, system=create(slam))
         self.failure: SlamFailedError | None = None
+        self.track = Track(name=slam, system=create("odometry"))  # if it cannot be made
+        try:
+            self.track.system = limited(slam, limits)
+        except SlamFailedError as error:
+            self.failure = error
         self.raster: Raster | None = None
         self.final: Any = None
 
     def over(self, frames: list[Frame]) -> None:
         """All scans, or those up to its failure."""
+        if self.failure is not None:
+            return
         try:
             for k, frame in enumerate(frames):
                 self.memory.begin()
@@ -81,7 +90,7 @@ class Entry:
         track, raster = self.track, self.raster
         online = track.online()
         row = scored(track, self.final, self.failure, self.drive.truth())
-        row |= {"peak_memory_mb": self.memory.growth_mb, **self.judge.scores()}
+        row |= {"peak_memory_mb": self._peak_memory_mb(), **self.judge.scores()}
         arrays: dict[str, Any] = {
             "stamps_ns": online.stamps_ns,
             "poses": online.poses,
@@ -97,6 +106,12 @@ class Entry:
                 "T_map_origin": raster.T_map_origin,
             }
         return arrays
+
+    def _peak_memory_mb(self) -> float | None:
+        if not isinstance(self.track.system, PipeSlam):
+            return self.memory.growth_mb
+        grown = self.track.system.memory_growth_bytes()
+        return None if grown is None else grown / 1e6
 
 
 def _bytes(values: Float | Any) -> Any:

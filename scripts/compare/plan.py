@@ -17,6 +17,7 @@ from scripts.jobs import Job
 from scripts.session import file_name
 from sim.recording.recipe import Recipe
 from slam.errors import InvalidValueError
+from slam.guests import Limits
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
@@ -46,6 +47,7 @@ class Plan:
     seconds   of driving
     every     one scan in so many is kept (of 37.5 a second)
     scanner   "full", "noise" or "ideal"
+    scan_limit_s  that module:Class and pipe:COMMAND may take for a scan before they count as hung
     """
 
     slams: tuple[str, ...]
@@ -55,8 +57,10 @@ class Plan:
     seconds: float = 60.0
     every: int = 8
     scanner: str = "full"
+    scan_limit_s: float = Limits.scan_s
 
     def __post_init__(self) -> None:
+        Limits(scan_s=self.scan_limit_s)
         for name in ("slams", "scenes", "levels", "seeds"):
             values = getattr(self, name)
             if not values or len(set(values)) != len(values):
@@ -103,6 +107,8 @@ class Plan:
             for run in self.runs():
                 file = f"{RECORDINGS}/{recordings[run.name]}"
                 arguments: dict[str, Any] = {"recording": file, "slam": name}
+                if ":" in name:  # ours are not limited
+                    arguments["scan_limit_s"] = self.scan_limit_s
                 job = Job(
                     name=f"{run.name}_{file_name(name)}",
                     call=entry.enter,

@@ -28,14 +28,14 @@ from scripts.jobs import Job, run_jobs
 from scripts.output import RECIPE, machine, write_recipe
 from slam.errors import InvalidValueError, OutputError
 from slam.frames import BeamClass
-from slam.system import create
+from slam.guests import Limits, limited
 
 LOCK = ".lock"
 
 
 def compare(
     slam: Annotated[
-        list[str], typer.Option(help="SLAMs, by name or as module:Class: --slam A B C.")
+        list[str], typer.Option(help="SLAMs, by name, module:Class or pipe:COMMAND: --slam A B C.")
     ],
     out: Annotated[Path, typer.Option(help="Folder of the comparison.")],
     scene: Annotated[list[str] | None, typer.Option(help="Scenes; default arena office.")] = None,
@@ -49,6 +49,9 @@ def compare(
     seconds: Annotated[float, typer.Option(help="Length of a run, s.")] = 60.0,
     every: Annotated[int, typer.Option(help="One scan in so many is used, of 37.5 a second.")] = 8,
     scanner: Annotated[str, typer.Option(help="full, noise (statistical only) or ideal.")] = "full",
+    scan_limit: Annotated[
+        float, typer.Option(help="After which a SLAM from outside counts as hung at a scan, s.")
+    ] = Limits.scan_s,
     jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
     cluster: Annotated[
         str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
@@ -72,6 +75,7 @@ def compare(
         seconds=seconds,
         every=every,
         scanner=scanner,
+        scan_limit_s=scan_limit,
     )
     started = time.perf_counter()
     rows = carry_out(plan, out, jobs=jobs, cluster=cluster)
@@ -111,7 +115,7 @@ def carry_out(
     for name in plan.scenes:
         registry.build(name)  # wrong names are told before anything starts
     for name in plan.slams:
-        create(name)
+        limited(name, Limits())
     out = out.absolute()
     with _locked(out):
         settings = {"compare_schema": files.SCHEMA, **asdict(plan), "lost_rule": LOST_RULE}

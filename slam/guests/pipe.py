@@ -79,6 +79,7 @@ class PipeSlam:
             hello = protocol.line(protocol.hello_message())
             said = self._ask("hello", hello, self.limits.first_s)
             protocol.check_hello(said)
+        self._born_bytes = self._wire.memory_bytes("VmRSS")
         self._has_map, self._has_trajectory = (
             said.get(key) is True for key in ("map", "trajectory")
         )
@@ -155,9 +156,10 @@ class PipeSlam:
         spent = self._wire.processor_s()
         return time.monotonic() if spent is None else spent
 
-    def peak_memory_bytes(self) -> int | None:
-        """The most resident memory its process has had."""
-        return self._wire.peak_memory_bytes()
+    def memory_growth_bytes(self) -> int | None:
+        """The most resident memory its process has had, over that after its hello."""
+        peak = self._wire.memory_bytes("VmHWM")
+        return None if peak is None or self._born_bytes is None else peak - self._born_bytes
 
     def close(self) -> None:
         """End its process; happens by itself when the object goes."""
@@ -181,12 +183,15 @@ def guarded(name: str, limits: Limits | None = None, **config: Any) -> PipeSlam:
     if config:
         words += ["--options", json.dumps(config)]
     path = os.pathsep.join(folder for folder in sys.path if folder)
-    return PipeSlam(
-        words,
-        scan_limit_s=limits.scan_s,
-        first_limit_s=limits.first_s,
-        environment={**os.environ, "PYTHONPATH": path},
-    )
+    try:
+        return PipeSlam(
+            words,
+            scan_limit_s=limits.scan_s,
+            first_limit_s=limits.first_s,
+            environment={**os.environ, "PYTHONPATH": path},
+        )
+    except SlamFailedError as error:
+        raise error.at(f"SLAM '{name}' cannot be made:") from error
 
 
 def limited(name: str, limits: Limits | None) -> SlamSystem:

@@ -158,11 +158,11 @@ class Wire:
             return time.clock_gettime((~self.pid << 3) | 2)  # Linux: the clock of that process
         return None
 
-    def peak_memory_bytes(self) -> int | None:
-        """The most resident memory it has had; None where that cannot be known."""
+    def memory_bytes(self, line: str) -> int | None:
+        """Resident memory, "VmRSS" now or "VmHWM" at its most; None where that cannot be known."""
         with suppress(OSError, ValueError):
             for row in Path(f"/proc/{self.pid}/status").read_text().splitlines():
-                if row.startswith("VmHWM:"):
+                if row.startswith(line + ":"):
                     return int(row.split()[1]) * 1024
         return None
 
