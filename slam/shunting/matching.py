@@ -56,6 +56,7 @@ class Match:
     score        reward at full weight - 1/2 Mahalanobis^2: comparable between matches of a frame
     tau          weight the reward had in the end
     searched     whether the wide search ran; ``evaluations`` candidate poses it scored
+    slipped      whether it was found against the odometry
     """
 
     T_map_robot: Float
@@ -65,6 +66,7 @@ class Match:
     tau: float
     searched: bool = False
     evaluations: int = 0
+    slipped: bool = False
 
 
 class Matcher:

@@ -19,6 +19,7 @@ from slam.shunting.impressions import Observations, stamp
 from slam.shunting.matching import Match, Matcher
 from slam.shunting.motion import Prediction, inverted, turned
 from slam.shunting.network import Network
+from slam.shunting.search import SearchWindow
 
 MOST = 6  # hypotheses from one search of the map
 AGAIN_S = 1.0  # between two searches of the map
@@ -29,6 +30,17 @@ HOPELESS = 0.6  # of the usual support: below it on average, or of the best one'
 ALIAS = 0.9  # a second hypothesis with this share of the best one's support: wait
 SCANS, ON_M, ON_RAD, ON_S = 5, 0.3, 0.35, 1.0  # least evidence: scans, and way or turn or time
 SAME_M, SAME_RAD = 0.3, 0.2  # nearer hypotheses are one
+# Weight in view (0.1 m of surface each) from which on a frame can deny the map, or tell a place:
+TELLING = 40.0  # less may be a few things that moved, and fits in many places
+SLIPPED = np.diag([0.2**2, 0.2**2, 0.2**2])  # of a motion that odometry did not see,
+SHOVED_MPS, SHOVED_RADPS = 2.0, 3.5  # which is no faster,
+FARTHEST_M, FARTHEST_RAD = 0.6, 0.5  # and not searched for farther,
+SURE = 0.9  # and leads to a place with so much of the usual support
+
+
+def _near(one: Float, other: Float) -> bool:
+    x, y, turn = (one - other).tolist()
+    return bool(x * x + y * y < SAME_M**2 and abs(se2.wrap(turn)) < SAME_RAD)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,10 +49,12 @@ class Hypothesis:
 
     match    of the latest scan there
     support  mean over ``scans`` of matched share times share of the map in view that is confirmed
+    seen     mean of the weight that was in view
     """
 
     match: Match
     support: float
+    seen: float
     scans: int = 1
     way_m: float = 0.0
     turned_rad: float = 0.0
@@ -53,9 +67,7 @@ class Hypothesis:
 
     def same_as(self, other: Hypothesis) -> bool:
         """Whether both are the same place."""
-        d = self.match.T_map_robot - other.match.T_map_robot
-        near = d[0] * d[0] + d[1] * d[1] < SAME_M**2
-        return bool(near and abs(se2.wrap(float(d[2]))) < SAME_RAD)
+        return _near(self.match.T_map_robot, other.match.T_map_robot)
 
 
 class Recovery:
@@ -78,25 +90,38 @@ class Recovery:
         self.elapsed_s += prediction.elapsed
         self._since_search_s += prediction.elapsed
         found = [self._carried(h, observations, prediction) for h in self.hypotheses]
-        found.append(Hypothesis(match=here, support=self._support(observations, here)))
+        found.append(self._new(observations, here))
         if self._since_search_s >= AGAIN_S and len(observations.points_robot) > 0:
             self._since_search_s = 0.0
             short_term = self._matcher.reward.short_term
             for place in places(self._network, short_term, observations.points_robot, MOST):
                 match = self._climb(observations, place, COARSE)
-                found.append(Hypothesis(match=match, support=self._support(observations, match)))
+                found.append(self._new(observations, match))
         self.hypotheses = _kept(found, usual)
-        return self._accepted(usual)
+        return self._accepted(usual, prediction.T_map_robot)
 
-    def _accepted(self, usual: float) -> Match | None:
+    def _new(self, observations: Observations, match: Match) -> Hypothesis:
+        seen = float(observations.weights.sum())
+        return Hypothesis(match=match, support=self._support(observations, match), seen=seen)
+
+    def _accepted(self, usual: float, predicted: Float) -> Match | None:
+        """The match of the best hypothesis, if it is good and no other is.
+
+        Where dead reckoning leads is believed before places that only look as good: a room may be
+        symmetric, and to be carried through it is rare.
+        """
         if not self.hypotheses:
             return None
         best = self.hypotheses[0]
-        alike = any(h.support > ALIAS * best.support for h in self.hypotheses[1:])
-        enough = ENOUGH_LATER if best.tried(LATER) else ENOUGH
-        if alike or not best.tried() or best.support < enough * usual:
+        rivals = [h for h in self.hypotheses if h.support > ALIAS * best.support]
+        going_on = [h for h in rivals if _near(h.match.T_map_robot, predicted)]
+        if going_on:
+            best = going_on[0]
+        elif len(rivals) > 1:
             return None
-        return best.match
+        enough = ENOUGH_LATER if best.tried(LATER) else ENOUGH
+        told = best.tried() and best.seen >= TELLING
+        return best.match if told and best.support >= enough * usual else None
 
     def _carried(
         self, old: Hypothesis, observations: Observations, prediction: Prediction
@@ -112,6 +137,7 @@ class Recovery:
             old,
             match=match,
             support=old.support + (support - old.support) / scans,
+            seen=old.seen + (float(observations.weights.sum()) - old.seen) / scans,
             scans=scans,
             way_m=old.way_m + math.hypot(float(increment[0]), float(increment[1])),
             turned_rad=old.turned_rad + abs(float(increment[2])),
@@ -139,6 +165,31 @@ def support(network: Network, observations: Observations, match: Match) -> float
     network.release()
     total = confirmed + contradicted
     return match.matched * confirmed / total if total > 0.0 else 0.0
+
+
+def slipped(
+    network: Network,
+    matcher: Matcher,
+    observations: Observations,
+    prediction: Prediction,
+    usual: float,
+) -> Match | None:
+    """The place around the prediction that explains a frame about as well as ``usual``.
+
+    A robot that is shoved, or whose wheels slip, moves far beyond what its odometry says; under
+    that prior the right place is out of reach. None where too little is in view to tell.
+    """
+    if float(observations.weights.sum()) < TELLING:
+        return None
+    elapsed = prediction.elapsed
+    window = SearchWindow(
+        reach_m=min(SHOVED_MPS * elapsed, FARTHEST_M),
+        turn_rad=min(SHOVED_RADPS * elapsed, FARTHEST_RAD),
+    )
+    loose = inverted(SLIPPED)
+    match = matcher.search(network, observations, prediction.T_map_robot, loose, window)
+    sure = support(network, observations, match) >= SURE * usual
+    return replace(match, slipped=True) if sure else None
 
 
 def _kept(found: list[Hypothesis], usual: float) -> list[Hypothesis]:

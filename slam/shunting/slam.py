@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Self
@@ -30,7 +31,7 @@ from slam.shunting.loops import Loops
 from slam.shunting.matching import Match, Matcher
 from slam.shunting.motion import Prediction, inverted, turned
 from slam.shunting.network import Network
-from slam.shunting.recovery import COARSE, Recovery
+from slam.shunting.recovery import COARSE, SLIPPED, TELLING, Recovery, slipped
 from slam.shunting.residuals import Evidence, look
 from slam.shunting.search import SearchWindow
 from slam.shunting.warmup import warm_up
@@ -109,6 +110,8 @@ class ShuntingSlam:
         evidence = None
         if self._recovery is None:
             match = self._match(observations, prediction)
+            if match.slipped:
+                prediction = replace(prediction, covariance=SLIPPED)
             evidence = self._look(observations, match, prediction.elapsed)
             state = self._integrate(observations, match, prediction.elapsed)
         else:
@@ -116,7 +119,7 @@ class ShuntingSlam:
         if state == "tracking" and len(observations.points_robot) == 0:
             state = "blind"  # odometry alone
         self._belief.update(self._T_map_robot, prediction, match, evidence)
-        if state == "tracking":
+        if state == "tracking" and not match.slipped:
             self._increments.learn(prediction, match)
         else:
             self._increments.skip()
@@ -179,7 +182,11 @@ class ShuntingSlam:
             found = self._matcher.search(self.network, observations, predicted, precision, window)
             if found.score > match.score:
                 match = found
-        return match
+        if match.matched >= 0.7 * good or not self._is_worth_searching():
+            return match
+        usual = self._usual_support()
+        shoved = slipped(self.network, self._matcher, observations, prediction, usual)
+        return match if shoved is None else shoved
 
     def _look(self, observations: Observations, match: Match, elapsed: float) -> Evidence:
         short_term = self._matcher.reward.short_term
@@ -204,8 +211,9 @@ class ShuntingSlam:
         step = min(elapsed, LONGEST_LOOK_S)
         doubtful = False
         share = match.matched / max(self._usual_match(), 1e-9)
-        suspicious = self.config.freeze_below > 0.0 and self._is_worth_searching()
-        if share < max(self.config.freeze_below, SUSPICIOUS if suspicious else 0.0):
+        telling = float(observations.weights.sum()) >= TELLING
+        suspicious = telling and self.config.freeze_below > 0.0 and self._is_worth_searching()
+        if telling and share < max(self.config.freeze_below, SUSPICIOUS if suspicious else 0.0):
             confirmed, contradicted, _ = self.network.integrate(
                 observations.view, T_map_laser, step, write=False
             )
