@@ -12,7 +12,7 @@ from typing import Any
 import scenes
 import sim
 import slam
-from scripts.compare import columns, entry, maps, recording
+from scripts.compare import columns, entry, maps, places, recording, sight
 from scripts.jobs import Job
 from scripts.session import file_name
 from sim.recording.recipe import Recipe
@@ -21,6 +21,7 @@ from slam.guests import Limits
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
+_SCORING = (columns, entry, maps, places, sight)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +102,7 @@ class Plan:
     def entries(self) -> Iterator[tuple[Run, str, Job]]:
         """The jobs that run a SLAM over a recording: run, SLAM, job."""
         recordings = {name: job.file_name() for name, job in self.recordings().items()}
-        own = (*_sources(slam), *(Path(str(m.__file__)) for m in (columns, entry, maps)))
+        own = (*_sources(slam), *(Path(str(m.__file__)) for m in _SCORING))
         for name in self.slams:
             code = (*own, *_source_of(name))
             for run in self.runs():

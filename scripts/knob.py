@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Does the knob mean anything? ``python -m scripts.knob out/compare --out dynamism.png``.
+
+Reads the folder of ``mobilia compare``: a picture of error and losses against dynamism, and
+Spearman's rank correlation of dynamism with them over the medians of the levels. Beside both stands
+what was observed: the share of returns that came from something moving.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.stats import spearmanr
+
+from scripts.compare.columns import LOST_RULE
+from scripts.compare.folder import Compared, read
+from scripts.figures import color_of, save
+from slam.errors import InvalidValueError, MobiliaError
+
+PICTURE = Path("docs/pictures/dynamism.png")
+ATE, LOST, MOVING = "ate_unaligned_m", "lost", "moving_share_of_returns"
+LEAST_LEVELS = 3
+_BAND = 0.15
+
+
+class Curve:
+    """One metric of one SLAM in one scene: (n,) levels, values, low and high of the interval."""
+
+    def __init__(self, compared: Compared, scene: str, slam: str, metric: str) -> None:
+        wanted = {"scene": scene, "slam": slam, "metric": metric}
+        rows = [row for row in compared.levels if all(row[key] == wanted[key] for key in wanted)]
+        rows.sort(key=lambda row: row["dynamism"])
+        self.levels, self.values, self.low, self.high = (
+            np.array([row[key] for row in rows], dtype=np.float64)
+            for key in ("dynamism", "value", "low", "high")
+        )
+
+    def correlation(self) -> float:
+        """Spearman's rho of level and value; NaN where the values are all the same."""
+        if len(self.levels) < LEAST_LEVELS or len(set(self.values.tolist())) == 1:
+            return float("nan")
+        return float(spearmanr(self.levels, self.values).statistic)
+
+
+def correlations(compared: Compared) -> list[dict[str, Any]]:
+    """A row for each scene and SLAM: rho of dynamism with the median ATE and the share lost."""
+    settings = compared.recipe["settings"]
+    if len(settings["levels"]) < LEAST_LEVELS:
+        raise InvalidValueError(
+            f"a rank correlation needs {LEAST_LEVELS} levels, {compared.folder} has "
+            f"{settings['levels']}"
+        )
+    return [
+        {
+            "scene": scene,
+            "slam": slam,
+            "ate": Curve(compared, scene, slam, ATE).correlation(),
+            "lost": Curve(compared, scene, slam, LOST).correlation(),
+            "moving": Curve(compared, scene, slam, MOVING).correlation(),
+        }
+        for scene in settings["scenes"]
+        for slam in settings["slams"]
+    ]
+
+
+def picture(compared: Compared, path: Path) -> None:
+    """Error above, losses below, a column for each scene."""
+    settings = compared.recipe["settings"]
+    scenes, slams = settings["scenes"], settings["slams"]
+    mpl.rcParams.update(
+        {"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False,
+         "axes.spines.right": False, "figure.constrained_layout.use": True}
+    )  # fmt: skip
+    figure = Figure(figsize=(4.2 * len(scenes), 5.2))
+    grid: Any = figure.subplots(
+        2, len(scenes), sharex=True, sharey="row", squeeze=False, height_ratios=(1.5, 1.0)
+    )
+    for column, scene in enumerate(scenes):
+        errors, losses = grid[0][column], grid[1][column]
+        for k, slam in enumerate(slams):
+            color = color_of(slam, slams)
+            _draw(errors, Curve(compared, scene, slam, ATE), 100.0, color, slam)
+            shifted = 0.008 * (k - 0.5 * (len(slams) - 1))
+            _draw(losses, Curve(compared, scene, slam, LOST), 100.0, color, slam, shifted)
+        errors.set(title=scene, yscale="log")
+        _name_levels(losses, Curve(compared, scene, slams[0], MOVING))
+    runs = len(settings["seeds"])
+    grid[0][0].set_ylabel("ATE in cm, unaligned\n(median, 95 % interval)")
+    grid[1][0].set_ylabel("runs lost in %\n(95 % interval)")
+    grid[1][0].set_ylim(-4.0, 104.0)
+    grid[0][0].legend(
+        *grid[0][-1].get_legend_handles_labels(), frameon=False, loc="best", fontsize=8
+    )
+    figure.supxlabel(
+        f"dynamism (below: share of returns from things that move); {runs} runs of "
+        f"{settings['seconds']:g} s a point",
+        fontsize=9,
+    )
+    save(figure, path)
+
+
+def _draw(ax: Axes, curve: Curve, scale: float, color: str, label: str, shift: float = 0.0) -> None:
+    top = np.where(np.isfinite(curve.high), curve.high, np.nan)
+    ax.fill_between(
+        curve.levels + shift, curve.low * scale, top * scale, color=color, alpha=_BAND, lw=0.0
+    )
+    ax.plot(
+        curve.levels + shift, curve.values * scale, "o-", color=color, lw=1.6, ms=4, label=label
+    )
+
+
+def _name_levels(ax: Axes, moving: Curve) -> None:
+    names = [
+        f"{level:g}\n{100.0 * share:.1f} %"
+        for level, share in zip(moving.levels, moving.values, strict=True)
+    ]
+    ax.set_xticks(moving.levels, names)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the correlations, write the picture."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="of mobilia compare")
+    parser.add_argument("--out", type=Path, default=PICTURE)
+    wanted = parser.parse_args(arguments)
+    try:
+        compared = read(wanted.folder)
+        rows = correlations(compared)
+        picture(compared, wanted.out)
+    except MobiliaError as error:
+        print(error, file=sys.stderr)
+        return 1
+    print("Spearman's rho with dynamism, over the medians of the levels (nan: all the same)")
+    print(f"{'scene':12s}{'SLAM':16s}{'ATE':>8s}{'lost':>8s}{'moving share':>14s}")
+    for row in rows:
+        print(
+            f"{row['scene']:12s}{row['slam']:16s}{row['ate']:8.2f}{row['lost']:8.2f}"
+            f"{row['moving']:14.2f}"
+        )
+    print(f"lost: {LOST_RULE}\n{wanted.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
