@@ -19,6 +19,7 @@ from scripts.export import export
 from scripts.generate import generate
 from scripts.listing import listing
 from scripts.many import ManyValues
+from scripts.render import render
 from scripts.reproduce.verb import reproduce
 from scripts.run import run
 from scripts.sensor_card import sensor_card
@@ -40,6 +41,7 @@ app = typer.Typer(
 )
 app.command("demo")(demo)
 app.command("run")(run)
+app.command("render")(render)
 app.command("generate")(generate)
 app.command("verify")(verify)
 app.command("export")(export)

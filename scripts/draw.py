@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,12 @@ BLUE: Color = (31, 97, 190)  # the paper's raw LIDAR
 ORANGE: Color = (222, 110, 24)  # odometry
 GREEN: Color = (22, 140, 90)  # truth
 RED: Color = (206, 44, 60)  # the SLAM's estimate
+# what a beam hit
+AZURE: Color = (18, 116, 255)  # static
+TEAL: Color = (0, 150, 158)  # semi-static
+MAGENTA: Color = (222, 0, 128)  # moving
+VIOLET: Color = (140, 84, 206)  # a mixed pixel
+GRAY: Color = (164, 168, 176)  # no return
 
 
 @lru_cache(maxsize=8)
@@ -60,6 +67,35 @@ def text(
     patch = image[y : y + height, x : x + width]
     patch[:] = (patch * (1.0 - alpha) + np.array(color, np.float32) * alpha).astype(np.uint8)
     return x + int(mask.shape[1])
+
+
+def text_width(words: str, size: int, bold: bool = False) -> int:
+    """How many px ``text`` would take."""
+    return int(_glyphs(words, size, bold).shape[1])
+
+
+def length(meters: float) -> str:
+    """A length in the unit that people would use."""
+    if abs(meters) >= 1.0:
+        return f"{meters:.4g} m"
+    return f"{meters * 100.0:.3g} cm" if abs(meters) >= 0.01 else f"{meters * 1000.0:.3g} mm"
+
+
+def measured(meters: float) -> str:
+    """An error: metres with two decimals, below that centimetres with one."""
+    return f"{meters:.2f} m" if meters >= 1.0 else f"{meters * 100.0:.1f} cm"
+
+
+def round_down(value: float) -> float:
+    """The greatest 1, 2 or 5 times a power of ten that is not greater than ``value`` > 0."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step == 1.0 or step * power <= value)
+
+
+def paler(color: Color, share: float) -> Color:
+    """``color`` with that share of paper in it."""
+    red, green, blue = (round(c + share * (p - c)) for c, p in zip(color, PAPER, strict=True))
+    return red, green, blue
 
 
 def paste(image: Picture, part: Picture, at: tuple[int, int], size: tuple[int, int]) -> None:

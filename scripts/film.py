@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""H.264 films without a window: frames are composed as arrays and piped to ffmpeg."""
+"""H.264 films without a window: pictures are composed as arrays and piped to ffmpeg."""
 
 from __future__ import annotations
 
+import math
+import re
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,14 +14,17 @@ from typing import Any
 
 import imageio.v2 as imageio
 import imageio_ffmpeg
-import numpy as np
 
-from scripts import draw
 from scripts.draw import Picture
-from slam.errors import MissingDependencyError, OutputError
+from slam.errors import InvalidValueError, MissingDependencyError, OutputError
 from slam.files import replacing
 
-WIDTH, HEIGHT = 1280, 720
+Size = tuple[int, int]
+
+SIZE: Size = (1280, 720)
+FPS = 30.0
+FILM_S = 60.0  # a longer run is shown faster, unless a speed is asked for
+_SIZES = (320, 4096)
 
 
 def require_ffmpeg() -> None:
@@ -33,14 +38,67 @@ def require_ffmpeg() -> None:
         ) from error
 
 
+def size_of(words: str) -> Size:
+    """``1280x720`` as (width, height); even numbers, as H.264 wants them."""
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", words.strip())
+    if found is None:
+        raise InvalidValueError(f"--size must be WIDTHxHEIGHT such as 1280x720, got '{words}'")
+    width, height = int(found[1]), int(found[2])
+    low, high = _SIZES
+    if not (low <= width <= high and low // 2 <= height <= high) or width % 2 or height % 2:
+        raise InvalidValueError(
+            f"--size must be even numbers from {low}x{low // 2} to {high}x{high}, got {words}"
+        )
+    return width, height
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pace:
+    """Which moments of a run become pictures.
+
+    fps     pictures per second of film
+    speed   seconds of the run per second of film
+    from_s, to_s  the part that is shown, s since the first frame
+    """
+
+    fps: float = FPS
+    speed: float = 1.0
+    from_s: float = 0.0
+    to_s: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.fps <= 240.0:
+            raise InvalidValueError(f"fps must lie in 1..240, got {self.fps}")
+        if not 0.01 <= self.speed <= 1e4:
+            raise InvalidValueError(f"speed must lie in 0.01..10000, got {self.speed}")
+        if not 0.0 <= self.from_s < self.to_s:
+            raise InvalidValueError(
+                f"a film must go from 0 s or later to a later moment, got {self.from_s} to "
+                f"{self.to_s} s"
+            )
+
+    @classmethod
+    def within_a_minute(cls, duration_s: float, fps: float = FPS) -> Pace:
+        """Real time, faster where the film would last longer than ``FILM_S``."""
+        return cls(fps=fps, speed=max(1.0, duration_s / FILM_S))
+
+    def due(self, seconds: float) -> int:
+        """How many pictures the film has up to a moment of the run."""
+        if seconds < self.from_s:
+            return 0
+        shown = min(seconds, self.to_s) - self.from_s
+        return math.floor(shown * self.fps / self.speed + 1e-6) + 1
+
+
 @contextmanager
 def film(path: Path, fps: float) -> Iterator[Film]:
     """A film that appears under ``path`` when the block ends well, and not at all otherwise."""
     require_ffmpeg()
     with replacing(path) as temporary:
         writer = imageio.get_writer(
-            temporary, fps=fps, codec="libx264", pixelformat="yuv420p", macro_block_size=16,
-            ffmpeg_params=["-preset", "veryfast", "-crf", "21"], ffmpeg_log_level="error",
+            temporary, format="FFMPEG", fps=fps, codec="libx264", pixelformat="yuv420p",
+            macro_block_size=2, ffmpeg_log_level="error",
+            ffmpeg_params=["-preset", "veryfast", "-crf", "21", "-movflags", "+faststart"],
         )  # fmt: skip
         try:
             yield Film(writer, path)
@@ -66,25 +124,3 @@ class Film:
             raise OutputError(f"cannot write {self.path}: ffmpeg stopped ({why})") from error
         self.frames += 1
         self.last = picture
-
-
-@dataclass(frozen=True)
-class Pane:
-    """One part of a film frame: its title and its box (x, y, width, height) in pixels."""
-
-    title: str
-    x: int
-    y: int
-    width: int
-    height: int
-
-
-def compose(headline: str, parts: Sequence[tuple[Pane, Picture]]) -> Picture:
-    """A 1280 x 720 frame: a headline, and each picture in its pane under its title."""
-    canvas: Picture = np.full((HEIGHT, WIDTH, 3), draw.PAPER, np.uint8)
-    draw.text(canvas, headline, (16, 10), 17, draw.INK, bold=True)
-    for pane, picture in parts:
-        draw.paste(canvas, picture, (pane.x, pane.y), (pane.width, pane.height))
-        if pane.title:
-            draw.text(canvas, pane.title, (pane.x, pane.y - 20), 13, draw.MUTED)
-    return canvas

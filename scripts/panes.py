@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The panes a film is put together from: a map with trails and a running error chart."""
+"""The pane of the map: what a SLAM believes, where it thinks it is, and where it truly is."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from array import array
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -17,6 +18,11 @@ from slam import se2
 from slam.frames import Float
 from slam.system import Raster
 
+SIGMAS = 3.0  # of the ellipses
+MAX_TRAIL = 1500  # points of a trail as drawn
+FOLLOW_M = 9.0  # around the path, in a view that follows it
+STEP_M = 4.0  # such a view grows in steps: a sliding picture is hard to watch
+
 
 def _activity_colors() -> Picture:
     """256 RGB colours from paper (nothing) over amber (an impression) to ink (certain)."""
@@ -26,7 +32,7 @@ def _activity_colors() -> Picture:
     )
     levels = np.linspace(0.0, 1.0, 256)
     table = np.stack([np.interp(levels, stops, colors[:, k]) for k in range(3)], axis=1)
-    return table.astype(np.uint8)
+    return table.astype(np.uint8)[:, None]
 
 
 _COLORS = _activity_colors()
@@ -63,9 +69,31 @@ class View:
         return out
 
 
+class Trail:
+    """Where something has been, (x, y) m in the map frame, and its pose now."""
+
+    def __init__(self) -> None:
+        self._xy = array("d")
+        self.pose: Float = np.zeros(3)
+
+    def add(self, T_map_robot: Float) -> None:
+        """The next pose."""
+        self._xy.extend(T_map_robot[:2].tolist())
+        self.pose = T_map_robot
+
+    def __len__(self) -> int:
+        return len(self._xy) // 2
+
+    def points(self) -> Float:
+        """(k, 2) m: all of it in at most ``MAX_TRAIL`` points, the last among them."""
+        xy = np.array(self._xy).reshape(-1, 2)
+        step = max(1, -(-len(xy) // MAX_TRAIL))
+        return np.vstack([xy[:-1:step], xy[-1:]])
+
+
 def raster_picture(raster: Raster, view: View, T_view_map: Float) -> Picture:
     """A map raster drawn into ``view``; ``T_view_map`` turns the map for display only."""
-    levels = (np.nan_to_num(raster.values) * 255.0).astype(np.uint8)
+    levels = (np.nan_to_num(raster.values) * np.float32(255.0)).astype(np.uint8)
     T = se2.compose(T_view_map, raster.T_map_origin)
     c, s = math.cos(T[2]), math.sin(T[2])
     k = raster.resolution_m * view.scale
@@ -81,18 +109,18 @@ def raster_picture(raster: Raster, view: View, T_view_map: Float) -> Picture:
     warped = cv2.warpAffine(
         levels, affine, (view.width, view.height), flags=cv2.INTER_LINEAR, borderValue=0
     )
-    picture: Picture = _COLORS[warped]
+    picture: Picture = cv2.applyColorMap(warped, _COLORS).astype(np.uint8, copy=False)
     return picture
 
 
-def draw_trail(picture: Picture, view: View, poses: Sequence[Float], color: Color) -> None:
-    """The path so far and a triangle for the robot now."""
-    if not poses:
-        return
-    points = np.array([pose[:2] for pose in poses])
-    draw.polyline(picture, view.pixels(points), color, 2)
-    body = se2.transform(poses[-1], np.array([[0.28, 0.0], [-0.2, 0.19], [-0.2, -0.19]]))
-    fixed = np.round(view.pixels(body) * 16.0).astype(np.int32)
+def draw_trail(
+    picture: Picture, view: View, points: Float, T_view_robot: Float, color: Color, thickness: int
+) -> None:
+    """The path so far and a triangle for the robot now, both in the frame of the view."""
+    draw.polyline(picture, view.pixels(points), color, thickness)
+    size = max(1.0, 9.0 / (0.28 * view.scale))  # never smaller than 9 px
+    body = np.array([[0.28, 0.0], [-0.2, 0.19], [-0.2, -0.19]]) * size
+    fixed = np.round(view.pixels(se2.transform(T_view_robot, body)) * 16.0).astype(np.int32)
     cv2.fillPoly(picture, [fixed], color, cv2.LINE_AA, 4)
 
 
@@ -113,10 +141,12 @@ def draw_points(picture: Picture, view: View, points: Float, color: Color) -> No
 def draw_ellipse(
     picture: Picture, view: View, T_view_robot: Float, covariance: NDArray[np.float64], color: Color
 ) -> None:
-    """The 3-sigma position ellipse, drawn no smaller than 3 px so that it can be seen."""
+    """The position ellipse of ``SIGMAS``, drawn no smaller than 3 px so that it can be seen."""
     values, vectors = np.linalg.eigh(covariance[:2, :2])
-    axes = np.maximum(3.0 * np.sqrt(np.maximum(values, 0.0)) * view.scale, 3.0)
+    axes = np.maximum(SIGMAS * np.sqrt(np.maximum(values, 0.0)) * view.scale, 3.0)
     center = view.pixels(T_view_robot[None, :2])[0]
+    if not (np.abs(center) < 1e4).all() or axes.max() > 1e4:
+        return
     angle = -math.degrees(math.atan2(vectors[1, 1], vectors[0, 1]))
     cv2.ellipse(
         picture,
@@ -127,46 +157,66 @@ def draw_ellipse(
     )
 
 
-def error_chart(
-    series: Mapping[str, tuple[Sequence[float], Sequence[float], Color]],
-    duration_s: float,
-    size: tuple[int, int],
-) -> Picture:
-    """Position errors (m, log scale) over time; ``series``: name -> (seconds, errors, colour)."""
-    width, height = size
-    duration_s = max(duration_s, 1.0)
-    picture: Picture = np.full((height, width, 3), draw.PAPER, np.uint8)
-    left, right, top, bottom = 58, 26, 26, 24
-    worst = max((max(errors) for _, errors, _ in series.values() if errors), default=1.0)
-    low, high = -3.0, (2.0 if worst > 12.0 else 1.0)  # 1 mm .. 10 or 100 m
-    names = ("1 mm", "1 cm", "10 cm", "1 m", "10 m", "100 m")[: round(high - low) + 1]
-    box_w, box_h = width - left - right, height - top - bottom
-    for decade, label in enumerate(names, -3):
-        y = top + round(box_h * (high - decade) / (high - low))
-        cv2.line(picture, (left, y), (width - right, y), draw.GRID, 1)
-        draw.text(picture, label, (8, y - 7), 11, draw.MUTED)
-    step = 10.0 if duration_s <= 130.0 else 10.0 ** math.floor(math.log10(duration_s / 2.0))
-    for k in range(int(duration_s / step) + 1):
-        x = left + round(box_w * k * step / duration_s)
-        cv2.line(picture, (x, top), (x, height - bottom), draw.GRID, 1)
-        draw.text(picture, f"{k * step:.0f} s", (x - 8, height - bottom + 6), 11, draw.MUTED)
-    x = draw.text(picture, "position error, unaligned", (8, 6), 13, draw.INK, bold=True) + 16
-    for name, (seconds, errors, color) in series.items():
-        x = draw.text(picture, f"{name} {_length(errors[-1])}" if errors else name, (x, 7), 12,
-                      color, bold=True) + 16  # fmt: skip
-        if errors:
-            level = np.log10(np.maximum(np.asarray(errors), 1e-3))
-            level = np.clip(level, low, high)
-            pixels = np.stack(
-                [
-                    left + box_w * np.asarray(seconds) / duration_s,
-                    top + box_h * (high - level) / (high - low),
-                ],
-                axis=1,
-            )
-            draw.polyline(picture, pixels, color, 2)
-    return picture
+def scale_bar(picture: Picture, view: View, unit: float) -> None:
+    """A length of 1, 2 or 5 times a power of ten in the lower left corner."""
+    longest = view.width / view.scale / 4.0
+    meters = draw.round_down(longest)
+    x, y = round(12 * unit), view.height - round(12 * unit)
+    thick = max(1, round(3 * unit))
+    picture[y : y + thick, x : x + round(meters * view.scale)] = draw.INK
+    draw.text(picture, draw.length(meters), (x, y - round(18 * unit)), round(12 * unit), draw.INK)
 
 
-def _length(meters: float) -> str:
-    return f"{meters:.2f} m" if meters >= 1.0 else f"{meters * 100.0:.1f} cm"
+@dataclass(eq=False)
+class MapPane:
+    """Paints the map of one SLAM with trails, scan and ellipse.
+
+    bounds  xmin, ymin, xmax, ymax (m) of the view, None: it follows the path
+    """
+
+    width: int
+    height: int
+    unit: float
+    bounds: tuple[float, float, float, float] | None = None
+    _under: Picture | None = None
+    _view: View = field(default_factory=lambda: View(0.0, 0.0, 1.0, 1, 1))
+
+    def refresh(self, raster: Callable[[], Raster | None], path: Trail, T_view_map: Float) -> None:
+        """Draw the map anew: a third of the cost of a frame, and it changes slowly."""
+        self._view = View.fitting(self._bounds(path, T_view_map), self.width, self.height)
+        found = raster()
+        if found is None:
+            self._under = np.full((self.height, self.width, 3), draw.PAPER, np.uint8)
+        else:
+            self._under = raster_picture(found, self._view, T_view_map)
+        scale_bar(self._under, self._view, self.unit)
+
+    def paint(
+        self,
+        trails: list[tuple[Trail, Color, int]],
+        points_map: Float,
+        covariance: NDArray[np.float64],
+        T_view_map: Float,
+    ) -> Picture:
+        """A fresh picture. ``trails`` with their colour and width, the SLAM's own the last."""
+        assert self._under is not None
+        picture, view = self._under.copy(), self._view
+        for trail, color, width in trails:
+            points = se2.transform(T_view_map, trail.points())
+            pose = se2.compose(T_view_map, trail.pose)
+            draw_trail(picture, view, points, pose, color, max(1, round(width * self.unit)))
+        draw_points(picture, view, se2.transform(T_view_map, points_map), draw.BLUE)
+        own, color, _ = trails[-1]
+        turn = se2.rotation(float(T_view_map[2]))
+        turned = turn @ covariance[:2, :2] @ turn.T
+        draw_ellipse(picture, view, se2.compose(T_view_map, own.pose), turned, color)
+        return picture
+
+    def _bounds(self, path: Trail, T_view_map: Float) -> tuple[float, float, float, float]:
+        if self.bounds is not None:
+            xmin, ymin, xmax, ymax = self.bounds
+            return xmin - 0.4, ymin - 0.4, xmax + 0.4, ymax + 0.4
+        points = se2.transform(T_view_map, path.points())
+        low = np.floor((points.min(axis=0) - FOLLOW_M) / STEP_M) * STEP_M
+        high = np.ceil((points.max(axis=0) + FOLLOW_M) / STEP_M) * STEP_M
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])

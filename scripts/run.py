@@ -9,11 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
-from scripts.session import Outputs, primary_of, run_session, systems_named
-from scripts.show import Show
+from scripts.footage import of_log
+from scripts.session import Outputs, run_session
 from slam.errors import InvalidValueError
-from slam.logs import open_log
-from slam.replay import Replay
 
 
 def run(
@@ -82,33 +80,16 @@ def run(
 
 def on_log(names: list[str], path: Path, out: Path, overwrite: bool, film: bool) -> dict[str, Any]:
     """Run SLAMs on a recorded log."""
-    replay = Replay.of(systems_named(names))
-    stream = open_log(path)
-    primary = primary_of(replay)
-    show = Show(
-        replay=replay,
-        primary=primary,
-        title=path.name,
-        duration_s=_duration_s(stream),
-        truth_name=stream.metadata.truth or "truth",
-    )
+    footage = of_log(path)
+    show = footage.show(names)
     settings = {
-        "slams": list(replay.tracks),
+        "slams": list(show.replay.tracks),
         "log": path.name,
         "log_sha256": hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None,
-        "log_facts": dict(stream.metadata.extra),
+        "log_facts": dict(footage.stream.metadata.extra),
     }
     return run_session(
-        stream,
-        replay,
+        footage.stream,
         show,
         Outputs(folder=out, command="run", settings=settings, overwrite=overwrite, film=film),
     )
-
-
-def _duration_s(stream: Any) -> float:
-    first = last = None
-    for frame in stream:
-        first = frame.stamp_ns if first is None else first
-        last = frame.stamp_ns
-    return (last - first) / 1e9 if first is not None and last is not None else 0.0

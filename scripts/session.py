@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,10 +14,11 @@ from typing import Any
 import imageio.v2 as imageio
 from rich.markup import escape
 
-from scripts import figures, interrupt, score
-from scripts.console import console, progress
-from scripts.film import Film, film, require_ffmpeg
+from scripts import figures, score
+from scripts.console import console
+from scripts.film import FPS, Pace, film, require_ffmpeg
 from scripts.output import machine, whole_folder, write_recipe
+from scripts.shoot import shoot, watched
 from scripts.show import Show
 from slam.errors import InvalidValueError
 from slam.files import write_text
@@ -27,9 +28,6 @@ from slam.replay import Replay
 from slam.shunting import ShuntingSlam
 from slam.system import SlamSystem, create
 from slam.trajectory import write_tum
-
-FILM_FPS = 30
-FILM_S = 60.0  # longer runs are shown faster
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,10 +39,10 @@ class Outputs:
     settings: Mapping[str, Any]
     overwrite: bool = False
     film: bool = True
-    film_fps: int = FILM_FPS
+    film_fps: float = FPS
 
 
-def systems_named(names: list[str]) -> dict[str, SlamSystem]:
+def systems_named(names: Sequence[str]) -> dict[str, SlamSystem]:
     """Fresh systems by name, odometry among them as the null system."""
     if not names:
         raise InvalidValueError("name at least one SLAM")
@@ -57,19 +55,21 @@ def primary_of(replay: Replay) -> str:
     return next((n for n in replay.tracks if n != "odometry"), "odometry")
 
 
-def run_session(stream: Stream, replay: Replay, show: Show, outputs: Outputs) -> dict[str, Any]:
+def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
     """Replay ``stream``, write everything into ``outputs.folder``, print the table.
 
     The folder appears when it is whole. Returns what ``results.json`` holds.
     """
+    replay = show.replay
     if outputs.film:
         require_ffmpeg()
     with whole_folder(outputs.folder, overwrite=outputs.overwrite) as folder:
-        stride, fps = pace(stream, show.duration_s, outputs.film_fps)
-        reel = film(folder / "film.mp4", fps) if outputs.film else nullcontext()
+        show.pace = Pace.within_a_minute(show.duration_s, outputs.film_fps)
+        reel = film(folder / "film.mp4", show.pace.fps) if outputs.film else nullcontext()
         started = time.perf_counter()
         with reel as opened:
-            _replay(stream, replay, show, opened, stride)
+            for _ in watched(shoot(stream, show, opened), stream, show.title):
+                pass
         wall_s = time.perf_counter() - started
         results = score.results(replay, wall_s, machine())
         _write(folder, replay, show, results)
@@ -79,37 +79,6 @@ def run_session(stream: Stream, replay: Replay, show: Show, outputs: Outputs) ->
     score.print_table(results, show.title)
     _tell(outputs)
     return results
-
-
-def pace(stream: Stream, duration_s: float, fps: float) -> tuple[int, float]:
-    """(frames per picture, pictures per second): real time up to a minute, faster beyond.
-
-    A stream slower than ``fps`` gets a picture a frame, shown at ``fps``: nobody wants to wait
-    three seconds for each scan of a sparse log.
-    """
-    if not stream.length or duration_s <= 0.0:
-        return 1, fps
-    rate = stream.length / duration_s
-    if rate < fps:
-        return max(1, round(stream.length / (FILM_S * fps))), fps
-    stride = max(1, round(rate / fps))
-    return max(stride, round(stream.length / (FILM_S * fps))), rate / stride
-
-
-def _replay(stream: Stream, replay: Replay, show: Show, reel: Film | None, stride: int) -> None:
-    """Every frame through every SLAM; every so many frames a picture into the film."""
-    with progress() as bar:
-        warming = "compiling inner loops (the first run only)"
-        task = bar.add_task(warming, total=stream.length, unit="")
-        for count, frame in enumerate(replay.run(stream), 1):
-            interrupt.check()
-            show.note(frame)
-            if reel is not None and (count % stride == 0 or count == stream.length):
-                reel.add(show.paint(frame))
-            if count == 1:
-                bar.update(task, description=escape(show.title))
-            if count % 25 == 0 or count == stream.length:
-                bar.update(task, completed=count, unit=f"{count}/{stream.length} scans")
 
 
 def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any]) -> None:

@@ -28,6 +28,7 @@ Picture = NDArray[np.uint8]
 
 SHIFT = 4  # fractional bits of pixel coordinates given to OpenCV
 SCAN_FILL = (255, 190, 120)
+LABEL_FILL = (96, 168, 255)  # under hits that have colours of their own
 SCAN_SHARE = 0.34
 SCAN_HIT = (214, 64, 24)
 TRAILS = {
@@ -70,6 +71,7 @@ class MapView:
         *,
         feet: ArrayLike | None = None,
         scan: tuple[ArrayLike, ArrayLike] | None = None,
+        colours: NDArray[np.uint8] | None = None,
         trails: Mapping[str, ArrayLike] | None = None,
         caption: str = "",
     ) -> Picture:
@@ -79,6 +81,7 @@ class MapView:
                  direction of its leaf. Rows with NaN are not drawn
         feet     optional (n_people, 2, 3) world poses of the ankles, left and right
         scan     optional pose of the laser (3,) and hits (k, 2) m in beam order; NaN: no return
+        colours  optional (k, 3) RGB of the hits
         trails   optional paths (k, 2) m by name, drawn in this order with a legend
         caption  text in the lower right corner
 
@@ -91,12 +94,12 @@ class MapView:
             )
         picture: Picture = self.plan.picture.copy()
         if scan is not None:
-            self._draw_fan(picture, *scan)
+            self._draw_fan(picture, *scan, SCAN_FILL if colours is None else LABEL_FILL)
         for name, path in (trails or {}).items():
             self._draw_trail(picture, np.asarray(path, dtype=np.float64), _trail_colour(name))
         self._draw_movers(picture, places, feet)
         if scan is not None:
-            self._draw_hits(picture, scan[1])
+            self._draw_hits(picture, scan[1], colours)
         self._write(picture, list(trails or {}), caption)
         return picture
 
@@ -126,7 +129,9 @@ class MapView:
             for line in lines:
                 cv2.fillConvexPoly(picture, line, shape.colour, cv2.LINE_AA, SHIFT)
 
-    def _draw_fan(self, picture: Picture, T_world_laser: ArrayLike, points: ArrayLike) -> None:
+    def _draw_fan(
+        self, picture: Picture, T_world_laser: ArrayLike, points: ArrayLike, fill: icons.Colour
+    ) -> None:
         """The swept area, see-through."""
         hits = np.asarray(points, dtype=np.float64)
         hits = hits[np.isfinite(hits).all(axis=1)]
@@ -140,15 +145,20 @@ class MapView:
         if not window.size:
             return
         tinted = window.copy()
-        cv2.fillPoly(tinted, [_fixed(outline - low)], SCAN_FILL, cv2.LINE_AA, SHIFT)
+        cv2.fillPoly(tinted, [_fixed(outline - low)], fill, cv2.LINE_AA, SHIFT)
         cv2.addWeighted(tinted, SCAN_SHARE, window, 1.0 - SCAN_SHARE, 0.0, dst=window)
 
-    def _draw_hits(self, picture: Picture, points: ArrayLike) -> None:
+    def _draw_hits(
+        self, picture: Picture, points: ArrayLike, colours: NDArray[np.uint8] | None
+    ) -> None:
         hits = np.asarray(points, dtype=np.float64)
-        hits = hits[np.isfinite(hits).all(axis=1)]
-        radius = round(max(1.1, 0.022 * self.plan.scale) * (1 << SHIFT))
-        for column, row in _fixed(self.plan.to_pixels(hits)).tolist():
-            cv2.circle(picture, (column, row), radius, SCAN_HIT, cv2.FILLED, cv2.LINE_AA, SHIFT)
+        known = np.isfinite(hits).all(axis=1)
+        places = _fixed(self.plan.to_pixels(hits[known])).tolist()
+        drawn = [SCAN_HIT] * len(places) if colours is None else colours[known].tolist()
+        least = 1.1 if colours is None else 1.7  # a colour wants more than a pixel
+        radius = round(max(least, 0.022 * self.plan.scale) * (1 << SHIFT))
+        for place, colour in zip(places, drawn, strict=True):
+            cv2.circle(picture, place, radius, colour, cv2.FILLED, cv2.LINE_AA, SHIFT)
 
     def _draw_trail(self, picture: Picture, path: Float, colour: icons.Colour) -> None:
         if len(path) < 2:

@@ -6,8 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scripts.draw import GREEN, ORANGE
-from scripts.panes import View, draw_trail, error_chart, raster_picture
+from scripts.close_up import CloseUp, off_by
+from scripts.draw import GREEN, RED
+from scripts.panes import MAX_TRAIL, Trail, View, draw_trail, raster_picture
 from slam import se2
 from slam.system import Raster
 
@@ -33,12 +34,37 @@ def test_unknown_is_paper_and_trails_end_in_a_robot():
     view = View.fitting((0.0, 0.0, 4.0, 4.0), 100, 100)
     picture = raster_picture(raster, view, np.zeros(3))
     assert (picture == picture[0, 0]).all()
-    draw_trail(picture, view, [np.zeros(3), np.array([2.0, 2.0, 0.0])], GREEN)
+    here = np.array([2.0, 2.0, 0.0])
+    draw_trail(picture, view, np.array([[0.0, 0.0], [2.0, 2.0]]), here, GREEN, 2)
     assert (picture[50, 50] == GREEN).all()
 
 
-def test_the_error_chart_takes_empty_and_single_point_series():
-    chart = error_chart(
-        {"odometry": ([], [], ORANGE), "shunting": ([1.0], [0.02], GREEN)}, 60.0, (600, 120)
-    )
-    assert chart.shape == (120, 600, 3)
+def test_a_long_trail_keeps_its_ends():
+    trail = Trail()
+    for k in range(4 * MAX_TRAIL + 1):
+        trail.add(np.array([float(k), -float(k), 0.0]))
+    points = trail.points()
+    assert len(points) <= MAX_TRAIL + 1
+    assert points[0].tolist() == [0.0, 0.0]
+    assert points[-1].tolist() == [4.0 * MAX_TRAIL, -4.0 * MAX_TRAIL]
+
+
+def test_the_close_up_shows_truth_and_estimate_however_far_apart():
+    pane = CloseUp((150, 150), 1.0, RED)
+    for gap in (0.0, 0.004, 0.3, 7.0, 0.01):
+        truth = np.array([5.0 + gap, 5.0, 0.3])
+        picture = pane.paint(np.array([5.0, 5.0, 0.3]), truth, 1e-4 * np.eye(2))
+        assert (picture[75, 75] == RED).all()
+        if gap > 0.0:
+            assert (picture == GREEN).all(axis=2).any()
+
+
+@pytest.mark.parametrize(
+    ("error", "says"), [((0.02, 0.0), "2.0 cm off, 2.0 σ"), ((0.0, 1.5), "1.50 m off, 75.0 σ")]
+)
+def test_how_far_off_is_told_in_its_own_sigmas(error, says):
+    assert off_by(np.array(error), np.diag([1e-4, 4e-4])) == says
+
+
+def test_a_covariance_of_nothing_has_no_sigmas():
+    assert off_by(np.array([0.02, 0.0]), np.zeros((2, 2))) == "2.0 cm off"

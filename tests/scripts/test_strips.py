@@ -20,7 +20,8 @@ def plain(level: int) -> np.ndarray:
 def test_pictures_stand_side_by_side_in_the_order_of_time(tmp_path: Path):
     path = tmp_path / "strip.png"
     whole = strip([plain(10), plain(20), plain(30)], [0.0, 1.5, 3.0], path, cell_width=80)
-    np.testing.assert_array_equal(np.asarray(Image.open(path)), whole)
+    with Image.open(path) as image:
+        np.testing.assert_array_equal(np.asarray(image), whole)
     for k, level in enumerate((10, 20, 30)):
         x = MARGIN + k * (80 + GAP)
         cell = whole[6 + LABEL : 6 + LABEL + 45, x : x + 80]
