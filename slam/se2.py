@@ -59,9 +59,10 @@ def transform(T_a_b: ArrayLike, points_b: ArrayLike) -> Array:
     points = np.asarray(points_b, dtype=np.float64)
     x, y, theta = np.asarray(T_a_b, dtype=np.float64).tolist()
     c, s = math.cos(theta), math.sin(theta)
+    px, py = points[..., 0], points[..., 1]
     out = np.empty_like(points)
-    out[..., 0] = c * points[..., 0] - s * points[..., 1] + x
-    out[..., 1] = s * points[..., 0] + c * points[..., 1] + y
+    out[..., 0] = c * px - s * py + x
+    out[..., 1] = s * px + c * py + y
     return out
 
 

@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from slam._jit import njit
+
 SIDE = 8  # neurons along a block's edge
 SHIFT, MASK = 3, 7  # i >> SHIFT is the block of neuron i, i & MASK its place inside
 
@@ -109,21 +111,24 @@ def living(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     return cells.directory[rows, columns], np.stack([columns, rows], axis=1) + cells.corner
 
 
+@njit
 def forget_impressions(cells: Cells) -> None:
     """Release the scratch of the present impressions; blocks that never came to life die."""
-    touched = cells.touched[: cells.counts[TOUCHED_COUNT]]
-    cells.scratch_of[touched[:, 0]] = -1
+    for k in range(cells.counts[TOUCHED_COUNT]):
+        slot, born = cells.touched[k, 0], cells.touched[k, 3]
+        cells.scratch_of[slot] = -1
+        row, column = cells.touched[k, 2] - cells.corner[1], cells.touched[k, 1] - cells.corner[0]
+        if born == 0 or cells.directory[row, column] != slot:
+            continue  # what died in the update is free already
+        alive = False
+        for j in range(SIDE):
+            for i in range(SIDE):
+                alive |= cells.x[slot, j, i] != 0.0 or cells.age[slot, j, i] != 0.0
+        if not alive:
+            cells.directory[row, column] = -1
+            cells.free[cells.counts[FREE_COUNT]] = slot
+            cells.counts[FREE_COUNT] += 1
     cells.counts[TOUCHED_COUNT] = 0
-    born = touched[touched[:, 3] == 1]
-    if len(born) == 0:
-        return
-    slots, columns, rows = born[:, 0], born[:, 1] - cells.corner[0], born[:, 2] - cells.corner[1]
-    silent = ~(cells.x[slots].any(axis=(1, 2)) | cells.age[slots].any(axis=(1, 2)))
-    silent &= cells.directory[rows, columns] == slots  # what died in the update is free already
-    cells.directory[rows[silent], columns[silent]] = -1
-    unused, dead = int(cells.counts[FREE_COUNT]), slots[silent]
-    cells.free[unused : unused + len(dead)] = dead
-    cells.counts[FREE_COUNT] += len(dead)
 
 
 def dense(

@@ -138,20 +138,23 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
         rank[np.argsort(bearings, kind="stable")] = np.arange(n)
         beams = rank[beams]
         in_order = np.argsort(beams)
-        points, beams = points[in_order], beams[in_order]
+        points, beams = points.take(in_order, axis=0), beams[in_order]
     onward, tangents = np.zeros(count, np.bool_), np.zeros((count, 2))
     near = NEAR_JOIN_CELLS * config.cell_m
     join(points, beams, spec.T_robot_laser, near, onward, tangents)
     clear = np.zeros(count, np.bool_)
     if unveiled(points, beams, spec.T_robot_laser, onward, clear) < count:
-        points, onward, tangents = points[clear], onward[clear], tangents[clear]
+        kept = np.flatnonzero(clear)  # a mask of rows takes ten times as long
+        points, onward = points.take(kept, axis=0), onward.take(kept)
+        tangents = tangents.take(kept, axis=0)
     facings = np.zeros(len(points), np.uint8)
     face(points, spec.T_robot_laser, onward, facings)
     variance = max(SIGMA_CELLS * config.cell_m, SENSOR_SIGMA_M) ** 2
     covariances = np.zeros((len(points), 3))
     covariances[:, 0] = covariances[:, 2] = variance
-    distances = np.sqrt((points * points).sum(axis=1))
-    weights = np.clip(distances * spec.angle_increment / SPACING_M, LEAST_WEIGHT, 1.0)
+    x, y = points[:, 0], points[:, 1]
+    shares = np.sqrt(x * x + y * y) * spec.angle_increment / SPACING_M
+    weights = np.minimum(np.maximum(shares, LEAST_WEIGHT), 1.0)
     view = view_of_beams(bearings, free, spec.angle_increment, config.cell_m)
     return Observations(
         points_robot=points,
@@ -343,7 +346,7 @@ def stamp(network: Network, observations: Observations, T_map_robot: Float) -> N
     points_map = se2.transform(T_map_robot, observations.points_robot)
     if len(points_map) == 0:
         return
-    largest = float(observations.covariances[:, [0, 2]].max())
+    largest = float(observations.covariances[:, ::2].max())
     edge = max(3.0 * network.cell, 4.0 * math.sqrt(largest)) + network.cell
     x, y = points_map[:, 0], points_map[:, 1]
     network.cover(

@@ -25,14 +25,12 @@ def _spread(points_robot: Float, T_map_robot: Float, covariance: Float) -> Float
     """(n, 3) xx, xy, yy of points (robot frame) that a pose's (3, 3) ``covariance`` smears."""
     (xx, xy, xt), (_, yy, yt), (_, _, tt) = turned(covariance, -float(T_map_robot[2])).tolist()
     x, y = points_robot[:, 0], points_robot[:, 1]
-    return np.stack(
-        [
-            xx - 2.0 * xt * y + tt * y * y,
-            xy + xt * x - yt * y - tt * x * y,
-            yy + 2.0 * yt * x + tt * x * x,
-        ],
-        axis=1,
-    )
+    ttx, tty = tt * x, tt * y
+    out = np.empty((len(x), 3))
+    out[:, 0] = xx - 2.0 * xt * y + tty * y
+    out[:, 1] = xy + xt * x - yt * y - ttx * y
+    out[:, 2] = yy + 2.0 * yt * x + ttx * x
+    return out
 
 
 def seen_by(observations: Observations) -> Seen:

@@ -15,6 +15,7 @@ from slam.shunting.turning import TurnBias
 FLOOR_M, FLOOR_RAD = 0.002, 0.0015  # standard deviation per sqrt(0.2 s): skew, a match's own
 # The matcher is given a stated covariance no tighter than this: else the map slips unnoticed.
 LEAST_SCALE, LEAST_M, LEAST_RAD = 2.25, 0.004, 0.003
+IDENTITY = np.eye(3)
 LEAST_VARIANCE = 1e-12  # of an increment, m^2 and rad^2
 # Without a covariance: a worn robot on a log, see ``assumed_covariance``.
 ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
@@ -79,6 +80,19 @@ def assumed_covariance(increment: Float) -> Float:
     return np.diag([sd_xy**2, sd_xy**2, sd_theta**2])
 
 
+def _widened(covariance: Float, widths: tuple[float, float], floor: tuple[float, float]) -> Float:
+    """Standard deviations of position and heading times ``widths``, variances plus ``floor``."""
+    (xx, xy, xt), (yx, yy, yt), (tx, ty, tt) = covariance.tolist()
+    (a, b), (m2, rad2) = widths, floor
+    return np.array(
+        [
+            [xx * a * a + m2, xy * a * a, xt * a * b],
+            [yx * a * a, yy * a * a + m2, yt * a * b],
+            [tx * b * a, ty * b * a, tt * b * b + rad2],
+        ]
+    )
+
+
 def predict(
     T_map_before: Float,
     before: Odometry,
@@ -97,16 +111,19 @@ def predict(
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
     given = now.increment_covariance
     unscaled = assumed_covariance(increment) if given is None else np.asarray(given)
-    unscaled = unscaled + LEAST_VARIANCE * np.eye(3)
+    unscaled = unscaled + LEAST_VARIANCE * IDENTITY
     share = min(max(elapsed, 1e-3), 1.0) / 0.2
     floor = share * FLOOR_M**2, share * FLOOR_RAD**2
-    widths = np.array([math.sqrt(scales[0]), math.sqrt(scales[0]), math.sqrt(scales[1])])
-    in_robot = unscaled * widths[:, None] * widths + np.diag([floor[0], floor[0], floor[1]])
+    widths = math.sqrt(scales[0]), math.sqrt(scales[1])
+    in_robot = _widened(unscaled, widths, floor)
     loosened = np.zeros((3, 3))
     if given is not None:
-        more = np.sqrt([max(LEAST_SCALE - scale, 0.0) for scale in (scales[0], *scales)])
+        more = (
+            math.sqrt(max(LEAST_SCALE - scales[0], 0.0)),
+            math.sqrt(max(LEAST_SCALE - scales[1], 0.0)),
+        )
         rest = share * LEAST_M**2 - floor[0], share * LEAST_RAD**2 - floor[1]
-        loosened = unscaled * more[:, None] * more + np.diag([rest[0], rest[0], rest[1]])
+        loosened = _widened(unscaled, more, rest)
     if now.twist is not None:
         twist = np.asarray(now.twist)
     elif 0.0 < elapsed < 0.5:
