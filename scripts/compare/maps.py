@@ -2,8 +2,7 @@
 """How well a map tells what is there now, judged against the simulation while it is being made.
 
 A map is laid into the world by the robot's true first pose, so drift counts. A cell is occupied
-above 0.5. Judged once a second, and after every scan while the place of something that was moved is
-being watched:
+above 0.5. Judged once a second, and after every scan while a place that was seen empty is believed:
 
 ghost_rate         share of occupied cells with nothing within ``NEAR_M``: neither what never moves
                    nor a mover's hull. ``ghost_left_rate``: those where a mover was seen before
@@ -76,12 +75,16 @@ class Believed:
     """A map, asked in world coordinates."""
 
     def __init__(self, raster: Raster, T_world_map: Float) -> None:
-        self._raster, self._T_map_world = raster, se2.inverse(T_world_map)
-        values = np.nan_to_num(raster.values)
-        self._reach = cv2.dilate(values, disc(REACH_M, raster.resolution_m))
-        row, column = np.nonzero(values > BELIEVED)
+        self._raster, self._T_world_map = raster, T_world_map
+        self._T_map_world = se2.inverse(T_world_map)
+        self._reach = cv2.dilate(np.nan_to_num(raster.values), disc(REACH_M, raster.resolution_m))
+
+    def occupied(self) -> Float:
+        """(n, 2) m in the world: the centres of the occupied cells."""
+        raster = self._raster
+        row, column = np.nonzero(raster.values > BELIEVED)  # False for NaN
         cells = np.stack([column + 0.5, row + 0.5], axis=1) * raster.resolution_m
-        self.occupied: Float = se2.transform(T_world_map, cells + raster.T_map_origin[:2])
+        return se2.transform(self._T_world_map, cells + raster.T_map_origin[:2])
 
     def holds(self, points: Float) -> bool:
         """Whether half of points (n, 2) m in the world have an occupied cell within reach."""
@@ -122,7 +125,7 @@ class MapJudge:
     def wants(self, k: int) -> bool:
         """Whether the map after scan k is to be judged."""
         due = float(self._seconds[k]) >= self._next_s
-        return due or any(old.watched for old in self.places.left)
+        return due or any(old.fading for old in self.places.left)
 
     def judge(self, k: int, raster: Raster | None) -> None:
         """Score the map after scan k; None for a SLAM without."""
@@ -138,7 +141,7 @@ class MapJudge:
         if seconds < self._next_s:
             return
         self._next_s += EVERY_S
-        self._ghosts.append(self._ghost_rates(believed.occupied, k))
+        self._ghosts.append(self._ghost_rates(believed.occupied(), k))
         new = self.places.new_objects(k, self._per_s)
         self._found += [believed.holds(points) for points in new]
         self._right += self._doors_right(believed, k)

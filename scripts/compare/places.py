@@ -56,8 +56,13 @@ class OldPlace:
 
     @property
     def watched(self) -> bool:
-        """Whether the next map matters."""
+        """Whether maps still matter."""
         return not self.over and self.half_life_s is None
+
+    @property
+    def fading(self) -> bool:
+        """Whether every map matters: it has been seen empty and is still believed."""
+        return self.watched and self.seen_empty_s is not None
 
 
 class Places:
@@ -105,12 +110,13 @@ class Places:
             self.left.append(OldPlace(points, believed=self._believes(points)))
 
     def _watch(self, old: OldPlace, k: int, sight: Sight, seconds: float) -> None:
+        empty = sight.emptied(old.points).mean() >= 0.5
+        if old.believed is None or (old.seen_empty_s is None and not empty):
+            return
         if (clearance(old.points, self._drive, k) < 0.5 * APART_M).any():
             old.over = old.seen_empty_s is not None  # not gone yet, or taken again
             return
-        if sight.emptied(old.points).mean() < 0.5:
-            return
-        if old.believed is None:
+        if not empty:
             return
         if old.seen_empty_s is None:
             if not old.believed:
