@@ -35,15 +35,14 @@ WORLDS: dict[str, tuple[dict[str, Any], ...]] = {
         {"scene": "office", "dynamism": 0.5},
     ),
 }
-_WIDE = (0.999, 0.9999, 0.99999, 0.999999)
 VALUES: dict[str, tuple[Any, ...]] = {
-    "individual_gate": _WIDE,
-    "joint_gate": (0.99, *_WIDE),
-    "posterior_gate": (0.99, *_WIDE[:3]),
-    "noise_scale": (1.0, 1.25, 1.5, 2.0),
-    "confirm_looks": (2, 3, 5, 8, 12),
-    "detection": (0.5, 0.8, 0.9, 0.95),
-    "memory_looks": (2.0, 4.0, 8.0, 15.0),
+    "individual_gate": (0.999, 0.9999, 0.999999),
+    "joint_gate": (0.99, 0.999, 0.999999),
+    "posterior_gate": (0.99, 0.9999, 0.99999),
+    "noise_scale": (1.0, 1.25, 2.0),
+    "confirm_looks": (2, 4, 8, 12),
+    "detection": (0.7, 0.8, 0.9),
+    "memory_looks": (2.0, 4.0, 8.0),
     "separation_m": (0.0, 0.15, 0.3),
 }
 SECONDS = 30.0

@@ -51,9 +51,13 @@ def reproduce(plan: Plan) -> None:
         numbers = [run.numbers for run in runs]
         paper_table(report, TABLE_3, numbers, ("EKF", "shunting", "shunting, paper preset"))
         told = "; ".join(below_printed(TABLE_3, numbers, "shunting", limits=LIMITS))
-        report.say(f"Shunting on beams, medians, against the project's targets: {told}.")
+        report.say(
+            f"Table 3, {TITLES[variant]}: shunting on beams, medians, against the project's "
+            f"targets: {told}. RMSE, medians with quartiles:",
+            quote=True,
+        )
         score_table(report, runs)
-        report.say(verdict(runs))
+        report.say(verdict(runs), quote=True)
     for variant, runs in by_variant.items():
         single = runs[0]
         errors = {

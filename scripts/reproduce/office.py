@@ -32,7 +32,7 @@ def reproduce(plan: Plan) -> None:
     )
     report.say(RULE)
     score_table(report, runs)
-    report.say(verdict(runs))
+    report.say(verdict(runs), quote=True)
     for name, file in (("shunting", "fig13"), ("shunting, paper preset", "fig13-paper")):
         report.figure(file, fig13(runs[0], name), f"Fig. 13: office, {name}, single run")
     report.figure("rmse", fig_rmse({"office": runs}), "RMSE of every seed; bars are medians")

@@ -37,6 +37,8 @@ class Report:
     plan: Plan
     started: float = field(default_factory=time.perf_counter)
     lines: list[str] = field(default_factory=list)
+    quoted: list[str] = field(default_factory=list)  # what the page of all experiments repeats
+    made: tuple[int, int] = (0, 0)  # runs made in this call, and of how many
     recipe: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -46,10 +48,10 @@ class Report:
 
     def run(self, jobs: Iterable[Job]) -> dict[str, Run]:
         """Make the runs that are missing; all of them."""
-        listed = list(jobs)
-        files = run_jobs(
-            listed, self.folder / "runs", processes=self.plan.processes, title=self.name
-        )
+        listed, runs = list(jobs), self.folder / "runs"
+        missing = sum(not (runs / job.file_name()).exists() for job in listed)
+        self.made = (missing, len(listed))
+        files = run_jobs(listed, runs, processes=self.plan.processes, title=self.name)
         self.recipe["runs"] = {job.name: dict(job.arguments) for job in listed}
         return {name: load_run(file) for name, file in files.items()}
 
@@ -57,16 +59,22 @@ class Report:
         """A section of the page."""
         self.lines += ["", f"## {text}", ""]
 
-    def say(self, text: str) -> None:
-        """A paragraph."""
-        self.lines += [text, ""]
+    def say(self, text: str, *, quote: bool = False) -> None:
+        """A paragraph; with ``quote`` in the summary too."""
+        self._add([text, ""], quote)
 
-    def table(self, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    def table(
+        self, head: Sequence[str], rows: Iterable[Sequence[str]], *, quote: bool = False
+    ) -> None:
         """A table; the first column is words, the others are numbers."""
-        self.lines.append("| " + " | ".join(head) + " |")
-        self.lines.append("|" + "---|" + "---:|" * (len(head) - 1))
-        self.lines += ["| " + " | ".join(row) + " |" for row in rows]
-        self.lines.append("")
+        lines = ["| " + " | ".join(head) + " |", "|" + "---|" + "---:|" * (len(head) - 1)]
+        lines += ["| " + " | ".join(row) + " |" for row in rows]
+        self._add([*lines, ""], quote)
+
+    def _add(self, lines: list[str], quote: bool) -> None:
+        self.lines += lines
+        if quote:
+            self.quoted += lines
 
     def figure(self, name: str, figure: Figure, caption: str) -> None:
         """``name``.png and ``name``.svg, and the picture in the page."""
@@ -83,15 +91,17 @@ class Report:
         """Write the page and the recipe; the page says on which machine and how long."""
         wall_s = time.perf_counter() - self.started
         made_on = machine()
-        head = [
-            f"# {title}",
-            "",
-            f"Wall time of this call {wall_s:.0f} s with {self.plan.processes} processes on "
+        made, whole = self.made
+        kept = f" ({whole - made} of {whole} runs were there already)" if made < whole else ""
+        said = (
+            f"Wall time of this call {wall_s:.0f} s{kept} with {self.plan.processes} processes on "
             f"{made_on['processor']}, {made_on['cores']} cores"
-            + (" (quick: too short and too few to conclude from)." if self.plan.quick else "."),
-            "",
-        ]
-        write_text(self.folder / "README.md", "\n".join(head + self.lines).rstrip() + "\n")
+            + (" (quick: too short and too few to conclude from)." if self.plan.quick else ".")
+        )
+        page = [f"# {title}", "", said, "", *self.lines]
+        write_text(self.folder / "README.md", "\n".join(page).rstrip() + "\n")
+        summary = [*self.quoted, said]
+        write_text(self.folder / "summary.md", "\n".join(summary).rstrip() + "\n")
         settings = {
             key: str(value) if key in ("out", "data") else value
             for key, value in asdict(self.plan).items()

@@ -42,7 +42,7 @@ def score_table(report: Report, runs: Sequence[Run]) -> None:
             ]
         )
     head = ["", "RMSE, m", "worst, m", "heading RMSE, rad", "failed", "CPU per scan, ms"]
-    report.table([*head, "seeds won : lost against the EKF"], rows)
+    report.table([*head, "seeds won : lost against the EKF"], rows, quote=True)
 
 
 def verdict(runs: Sequence[Run]) -> str:

@@ -90,12 +90,14 @@ def _scaling(report: Report, frame: Frame, rooms: tuple[int, ...]) -> None:
         [f"{a:.0f}", str(n), str(v), f"{u:.2f}", f"{m:.2f}"]
         for a, n, v, u, m in zip(s.area, s.alive, s.visited, s.update_ms, s.match_ms, strict=True)
     ]
-    report.table(["area, m²", "neurons alive", "visited", "update, ms", "matching, ms"], rows)
+    head = ["area, m²", "neurons alive", "visited", "update, ms", "matching, ms"]
+    report.table(head, rows, quote=True)
     same = "the same at every size" if len(set(s.visited)) == 1 else "**not the same**"
     report.say(
         f"Neurons visited: {same}. Times are medians of process time; the largest over the "
         f"smallest is {max(s.update_ms) / min(s.update_ms):.2f} for the update and "
-        f"{max(s.match_ms) / min(s.match_ms):.2f} for matching."
+        f"{max(s.match_ms) / min(s.match_ms):.2f} for matching.",
+        quote=True,
     )
     report.figure("scaling", figure, "One scan in maps of ever more area")
 
@@ -122,7 +124,7 @@ def _growth(report: Report, office: list[Frame], points: list[Frame]) -> None:
     axes[0].set(yscale="log", xlabel="area explored in m²", ylabel="neurons alive")
     axes[0].legend(frameon=False, fontsize=8)
     report.heading("Neurons stored (3.4: “n is always less than one thousand”)")
-    report.table(["", "explored, m²", "neurons, most", "below 1000"], rows)
+    report.table(["", "explored, m²", "neurons, most", "below 1000"], rows, quote=True)
     report.figure("neurons", figure, "Neurons alive against the area explored")
 
 

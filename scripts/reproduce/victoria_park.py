@@ -3,16 +3,25 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scripts.reproduce.census import Census, landmarks_of
+from scripts.reproduce.census import landmarks_of
 from scripts.reproduce.comparison import paper_table
 from scripts.reproduce.paper_numbers import TABLE_1
+from scripts.reproduce.park_scores import (
+    FASTEST,
+    FIRST_M,
+    GATE_M,
+    SLACK_M,
+    at_fixes,
+    first_fit,
+    good_fixes,
+    landmark_numbers,
+    pose_numbers,
+)
 from scripts.reproduce.report import (
     COLORS,
     Report,
@@ -21,21 +30,16 @@ from scripts.reproduce.report import (
     error_axes,
     new_figure,
 )
-from scripts.reproduce.runs import Plan, Run, job, save_run, statistics
+from scripts.reproduce.runs import Plan, Run, job, save_run
 from slam import create, se2
 from slam.ekf.slam import EkfSlam
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame
 from slam.logs import victoria_graph
 from slam.logs.victoria_park import GpsTrack, read_gps, read_victoria_park
-from slam.metrics import fit_se2
 from slam.replay import Track
 from slam.trajectory import Trajectory
 
-FIRST_M = 100.0  # the fixes up to here turn and move GPS into the map
-FASTEST, SLACK_M, GIVE_UP_S = 8.0, 1.0, 5.0  # m/s: the truck drives 6.6 m/s at most
-GATE_M = 3.0  # between a landmark and the graph's
-LOOP_NEAR_M, LOOP_FAR_M = 2.0, 100.0  # the graph is in one place again, after this way
 EVERY = 100  # scans between two looks at which landmarks there are
 SHUNTING: dict[str, Any] = {
     "cell_m": 0.3, "range_m": 30.0, "freeze_below": 0.0, "reward": 1.5, "trace_s": 10.0,
@@ -54,73 +58,6 @@ WHERE = (
     "(XiaoLiSean/fastSLAM on GitHub has both) and graph_known_association.txt (borglab/gtsam: "
     "examples/Data/victoria_park.txt)"
 )
-
-
-def good_fixes(gps: GpsTrack) -> NDArray[np.bool_]:
-    """The fixed rule for outliers: a fix the truck could have driven to from the last good one.
-
-    After ``GIVE_UP_S`` without a good one the next is taken as good.
-    """
-    good = np.zeros(len(gps.points), dtype=np.bool_)
-    last = -1
-    for k, (stamp_ns, point) in enumerate(zip(gps.stamps_ns.tolist(), gps.points, strict=True)):
-        if last >= 0:
-            dt = (stamp_ns - int(gps.stamps_ns[last])) * 1e-9
-            away = float(np.hypot(*(point - gps.points[last])))
-            if dt < GIVE_UP_S and away > SLACK_M + FASTEST * dt:
-                continue
-        good[k], last = True, k
-    return good
-
-
-def at_fixes(track: Trajectory, gps: GpsTrack) -> Float:
-    """(n, 2) positions of the laser at the fixes' times, linear between frames."""
-    return np.stack(
-        [np.interp(gps.stamps_ns, track.stamps_ns, track.poses[:, k]) for k in (0, 1)], axis=1
-    )
-
-
-def first_fit(track: Trajectory, gps: GpsTrack) -> Float:
-    """T_gps_map from the good fixes of the first ``FIRST_M`` of this track's own way."""
-    here = at_fixes(track, gps)
-    steps = np.hypot(*np.diff(here, axis=0).T)
-    first = good_fixes(gps) & (np.concatenate([[0.0], np.cumsum(steps)]) < FIRST_M)
-    return fit_se2(here[first], gps.points[first])
-
-
-def shape_fit(track: Trajectory, gps: GpsTrack) -> Float:
-    """T_gps_map from all good fixes, those beyond three times the median left out."""
-    here, good = at_fixes(track, gps), good_fixes(gps)
-    T = fit_se2(here[good], gps.points[good])
-    for _ in range(30):
-        away = np.hypot(*(se2.transform(T, here) - gps.points).T)
-        kept = good & (away < 3.0 * np.median(away[good]))
-        T = fit_se2(here[kept], gps.points[kept])
-    return T
-
-
-def loops(track: Trajectory) -> list[tuple[int, int]]:
-    """Pairs of frames at one place, a long way apart; one for each stretch of 10 m."""
-    steps = np.hypot(*np.diff(track.poses[:, :2], axis=0).T)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
-    chosen = [int(np.searchsorted(along, s)) for s in np.arange(0.0, along[-1], 10.0)]
-    out = []
-    for k in chosen:
-        away = np.hypot(*(track.poses[:, :2] - track.poses[k, :2]).T)
-        away[along > along[k] - LOOP_FAR_M] = np.inf
-        if away.min() < LOOP_NEAR_M:
-            out.append((int(away.argmin()), k))
-    return out
-
-
-def loop_errors(track: Trajectory, graph: Trajectory) -> Float:
-    """(n,) m: motion from the earlier to the later frame of a loop, against the graph's."""
-    errors = []
-    for a, b in loops(graph):
-        mine = se2.between(track.poses[a], track.poses[b])
-        told = se2.between(graph.poses[a], graph.poses[b])
-        errors.append(float(np.hypot(*(mine - told)[:2])))
-    return np.array(errors)
 
 
 def _read(data: str, scans: int) -> tuple[list[Frame], GpsTrack]:
@@ -195,9 +132,9 @@ def reproduce(plan: Plan) -> None:
     for name, run in by_name.items():
         if "final" in run.arrays:
             tracks[f"{name}, loops closed"] = _track(run, "final")
-    numbers = {name: _numbers(track, tracks["graph"], gps) for name, track in tracks.items()}
+    numbers = {name: pose_numbers(track, tracks["graph"], gps) for name, track in tracks.items()}
     for name, run in by_name.items():
-        numbers[name] |= _landmark_numbers(run, graph, tracks[name], tracks["graph"], gps)
+        numbers[name] |= landmark_numbers(run, graph, tracks[name], tracks["graph"], gps)
     _page(report, numbers, gps)
     report.figure("fig6", fig6(by_name, tracks, gps), "Fig. 6: maps over GPS (green)")
     _fig7(report, tracks, gps)
@@ -207,51 +144,6 @@ def reproduce(plan: Plan) -> None:
 
 def _track(run: Run, key: str = "poses") -> Trajectory:
     return Trajectory(stamps_ns=run.arrays["stamps"], poses=run.arrays[key])
-
-
-def _numbers(track: Trajectory, graph: Trajectory, gps: GpsTrack) -> dict[str, Any]:
-    good, here = good_fixes(gps), at_fixes(track, gps)
-    e = (se2.transform(first_fit(track, gps), here) - gps.points)[good]
-    shape = (se2.transform(shape_fit(track, gps), here) - gps.points)[good]
-    turned = se2.wrap_array(track.poses[:, 2] - graph.poses[:, 2])
-    closed = loop_errors(track, graph)
-    distance, shape_distance = np.hypot(*e.T), np.hypot(*shape.T)
-    return {
-        "rmse": float(np.sqrt((distance**2).mean())),
-        "median": float(np.median(distance)),
-        "p90": float(np.percentile(distance, 90)),
-        "shape median": float(np.median(shape_distance)),
-        "shape p90": float(np.percentile(shape_distance, 90)),
-        "loops": len(closed),
-        "loop median": float(np.median(closed)) if len(closed) else float("nan"),
-        "loop worst": float(closed.max()) if len(closed) else float("nan"),
-        **statistics(e, ("x", "y")),
-        **statistics(turned[:, None], ("θ",)),
-    }
-
-
-def _landmark_numbers(
-    run: Run, graph: Run, track: Trajectory, graph_track: Trajectory, gps: GpsTrack
-) -> dict[str, Any]:
-    """Landmarks against the graph's, both laid over GPS by their own first fixes."""
-    out = {"ms": run.numbers["ms"], "not converged": run.numbers["not converged"]}
-    if not run.numbers["sizes"]:
-        return out
-    T = se2.compose(se2.inverse(first_fit(graph_track, gps)), first_fit(track, gps))
-    seen = _in_reach(graph.arrays["found"], graph_track)
-    census = Census(seen)
-    ends = np.cumsum([0, *run.numbers["sizes"]])
-    for a, b in pairwise(ends.tolist()):
-        census.take(se2.transform(T, run.arrays["found"][a:b]), GATE_M)
-    return out | census.numbers() | {"landmarks": run.numbers["sizes"][-1]}
-
-
-def _in_reach(landmarks: Float, track: Trajectory) -> Float:
-    """Those of the graph that lie within 30 m of the way driven."""
-    way = track.poses[::10, :2]
-    away = np.hypot(*(landmarks[:, None, :] - way[None, :, :]).transpose(2, 0, 1))
-    near: Float = landmarks[away.min(axis=1) < 30.0]
-    return near
 
 
 def _page(report: Report, numbers: dict[str, dict[str, Any]], gps: GpsTrack) -> None:
@@ -271,10 +163,11 @@ def _page(report: Report, numbers: dict[str, dict[str, Any]], gps: GpsTrack) -> 
         values += [n["rmse"] / floor["rmse"], n["loop median"], n["loop worst"]]
         rows.append([name, *(f"{v:.2f}" for v in values)])
     head = ["", "RMSE, m", "median", "90 %", "shape median", "shape 90 %", "RMSE / graph's"]
-    report.table([*head, "loops median, m", "loops worst, m"], rows)
+    report.table([*head, "loops median, m", "loops worst, m"], rows, quote=True)
     report.say(
         f"{floor['loops']} loops. Target: shunting at most 1.2 times the graph: "
-        + ("met." if numbers["shunting"]["rmse"] <= 1.2 * floor["rmse"] else "**missed.**")
+        + ("met." if numbers["shunting"]["rmse"] <= 1.2 * floor["rmse"] else "**missed.**"),
+        quote=True,
     )
     report.say(
         "The graph's own associations are in part wrong and its odometry is trusted to 1 cm and "
@@ -300,7 +193,7 @@ def _page(report: Report, numbers: dict[str, dict[str, Any]], gps: GpsTrack) -> 
         "trees, so some of these are real. Deleted by mistake: once in the map, gone in the end."
     )
     head = ["", "in the map", "missed", "spurious", "deleted by mistake"]
-    report.table([*head, "scans not trusted", "CPU per scan, ms"], rows)
+    report.table([*head, "scans not trusted", "CPU per scan, ms"], rows, quote=True)
 
 
 def fig6(by_name: dict[str, Run], tracks: dict[str, Trajectory], gps: GpsTrack) -> Any:

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import njit
+from slam.ekf.algebra import cholesky, mirror, solve, times, times_transposed
 
 Float = NDArray[np.float64]
 
@@ -103,49 +104,7 @@ def disturb(P: Float, pose: Float, landmarks: Float, n: int, heading: float, Q: 
             if GQ[i, k] != 0.0:
                 for j in range(i + 1):
                     P[i, j] += GQ[i, k] * G[j, k]
-    _mirror(P, size)
-
-
-@njit
-def _mirror(P: Float, size: int) -> None:
-    for i in range(size):
-        for j in range(i):
-            P[j, i] = P[i, j]
-
-
-@njit
-def cholesky(S: Float) -> bool:
-    """Lower Cholesky factor of S (n, n) in place; False where S is not positive definite."""
-    n = len(S)
-    for j in range(n):
-        for k in range(j):
-            S[j, j] -= S[j, k] * S[j, k]
-        if not S[j, j] > 0.0:
-            return False
-        S[j, j] = math.sqrt(S[j, j])
-        for i in range(j + 1, n):
-            for k in range(j):
-                S[i, j] -= S[i, k] * S[j, k]
-            S[i, j] /= S[j, j]
-    return True
-
-
-@njit
-def solve(L: Float, b: Float) -> None:
-    """(L L')^-1 b in place, b (n, m) with n rows."""
-    n, m = b.shape
-    for i in range(n):
-        for k in range(i):
-            for j in range(m):
-                b[i, j] -= L[i, k] * b[k, j]
-        for j in range(m):
-            b[i, j] /= L[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            for j in range(m):
-                b[i, j] -= L[k, i] * b[k, j]
-        for j in range(m):
-            b[i, j] /= L[i, i]
+    mirror(P, size)
 
 
 @njit
@@ -214,30 +173,6 @@ def gather(P: Float, chosen: NDArray[np.int64]) -> Float:
 
 
 @njit
-def times(A: Float, B: Float) -> Float:
-    """A B in a fixed order of summation, zeros of A skipped."""
-    out = np.zeros((A.shape[0], B.shape[1]))
-    for i in range(A.shape[0]):
-        for k in range(A.shape[1]):
-            if A[i, k] != 0.0:
-                for j in range(B.shape[1]):
-                    out[i, j] += A[i, k] * B[k, j]
-    return out
-
-
-@njit
-def times_transposed(A: Float, B: Float) -> Float:
-    """A B' in a fixed order of summation, zeros of B skipped."""
-    out = np.zeros((A.shape[0], B.shape[0]))
-    for j in range(B.shape[0]):
-        for k in range(B.shape[1]):
-            if B[j, k] != 0.0:
-                for i in range(A.shape[0]):
-                    out[i, j] += A[i, k] * B[j, k]
-    return out
-
-
-@njit
 def absorb(
     pose: Float,
     landmarks: Float,
@@ -286,7 +221,7 @@ def _subtract_outer(P: Float, size: int, A: Float, Bt: Float) -> None:
             a = A[i, k]
             for j in range(i + 1):
                 P[i, j] -= a * Bt[k, j]
-    _mirror(P, size)
+    mirror(P, size)
 
 
 @njit

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
-from slam.ekf.association import METHODS, Gates
+from slam.ekf.association import METHODS
 from slam.ekf.config import EkfConfig
 from slam.ekf.corners import CornerConfig, corners
 from slam.ekf.filter import EkfFilter
+from slam.ekf.hypotheses import Gates
 from slam.ekf.lifecycle import (
     WITHOUT,
     Lifecycle,

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from slam import se2
-from slam.ekf.association import Gates, ipjc
+from slam.ekf.association import ipjc
 from slam.ekf.corners import corners
 from slam.ekf.filter import EkfFilter
+from slam.ekf.hypotheses import Gates
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame
 from slam.shunting.config import ShuntingConfig

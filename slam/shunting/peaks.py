@@ -41,6 +41,14 @@ def _between(before: float, here: float, after: float) -> float:
     return min(max(0.5 * (low - high) / bend, -0.5), 0.5)
 
 
+@inner
+def _reached(centre: float, reach: float, size: float, corner: int, blocks: int) -> tuple[int, int]:
+    """First and past-the-last of the directory's blocks within ``reach``, along one axis."""
+    first = math.floor(max((centre - reach) / size - corner, 0.0))
+    last = math.floor(min((centre + reach) / size - corner, blocks - 1.0))
+    return first, last + 1
+
+
 @njit
 def _peaks(
     cells: Cells,
@@ -55,15 +63,11 @@ def _peaks(
     count = 0
     size = SIDE * cell
     rows, columns = cells.directory.shape
-    for row in range(rows):
-        y0 = (row + cells.corner[1]) * size
-        if y0 > centre[1] + reach or y0 + size < centre[1] - reach:
-            continue
-        for column in range(columns):
+    first_row, past_row = _reached(centre[1], reach, size, cells.corner[1], rows)
+    first_column, past_column = _reached(centre[0], reach, size, cells.corner[0], columns)
+    for row in range(first_row, past_row):
+        for column in range(first_column, past_column):
             if cells.directory[row, column] < 0:
-                continue
-            x0 = (column + cells.corner[0]) * size
-            if x0 > centre[0] + reach or x0 + size < centre[0] - reach:
                 continue
             for place in range(SIDE * SIDE):
                 i = (column + cells.corner[0]) * SIDE + (place & MASK)

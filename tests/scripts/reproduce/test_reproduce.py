@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from scripts.reproduce import theory_data, victoria_park
+from scripts.reproduce import park_scores, theory_data
 from scripts.reproduce.census import Census
 from scripts.reproduce.comparison import below_printed
 from scripts.reproduce.paper_numbers import TABLE_1, TABLE_2, TABLE_3
+from scripts.reproduce.quote import quote
 from scripts.reproduce.runs import Plan, load_run, save_run, sign_test, spread, statistics
 from scripts.reproduce.verb import experiment
 from scripts.reproduce.verb import reproduce as verb
@@ -103,10 +104,29 @@ def whole(folder: Path) -> str:
     assert pictures == sorted(path.stem for path in folder.glob("*.svg"))
     assert all(f"({name}.png)" in page for name in pictures)
     assert "Wall time" in page
+    summary = (folder / "summary.md").read_text().strip().splitlines()
+    assert set(summary) <= set(page.splitlines())
     recipe = json.loads((folder / "recipe.json").read_text())
     assert recipe["settings"]["plan"]["quick"] is True
     assert {"machine", "wall_s"} <= set(recipe["settings"])
     return page
+
+
+def test_a_page_quotes_what_was_run_and_keeps_the_rest(tmp_path):
+    (tmp_path / "office").mkdir()
+    (tmp_path / "office" / "summary.md").write_text("new \\1 numbers\n")
+    page = tmp_path / "page.md"
+    page.write_text("<!-- office -->\nold\n<!-- /office -->\nby hand\n<!-- chairs -->\nkept\n")
+    assert quote(tmp_path, page) == ["office"]
+    told = page.read_text()
+    assert told.startswith("<!-- office -->\n\nnew \\1 numbers\n\n<!-- /office -->\nby hand\n")
+    assert told.endswith("<!-- chairs -->\nkept\n")
+    assert quote(tmp_path, page) == ["office"]
+    assert page.read_text() == told
+    (tmp_path / "chairs").mkdir()
+    (tmp_path / "chairs" / "summary.md").write_text("more\n")
+    with pytest.raises(InvalidValueError, match="/chairs"):
+        quote(tmp_path, page)
 
 
 def test_without_the_data_it_says_where_to_get_it(tmp_path):
@@ -133,11 +153,11 @@ def test_outliers_are_fixes_nobody_could_have_driven_to():
     stamps = np.arange(10, dtype=np.int64) * 200_000_000
     points = np.column_stack([0.5 * np.arange(10), np.zeros(10)])
     points[4] += [0.0, 30.0]
-    good = victoria_park.good_fixes(GpsTrack(stamps_ns=stamps, points=points))
+    good = park_scores.good_fixes(GpsTrack(stamps_ns=stamps, points=points))
     assert good.tolist() == [True] * 4 + [False] + [True] * 5
     # after a long gap anything goes
     stamps = stamps + np.where(np.arange(10) >= 4, 10_000_000_000, 0)
-    good = victoria_park.good_fixes(GpsTrack(stamps_ns=stamps, points=points))
+    good = park_scores.good_fixes(GpsTrack(stamps_ns=stamps, points=points))
     assert good[4]
 
 
@@ -145,12 +165,12 @@ def test_loops_are_returns_after_a_long_way():
     t = np.linspace(0.0, 4.0 * math.pi, 400)
     poses = np.column_stack([30.0 * np.cos(t), 30.0 * np.sin(t), t])
     track = Trajectory(stamps_ns=np.arange(400, dtype=np.int64), poses=poses)
-    pairs = victoria_park.loops(track)
+    pairs = park_scores.loops(track)
     assert pairs
     for a, b in pairs:
-        assert np.hypot(*(poses[a] - poses[b])[:2]) < victoria_park.LOOP_NEAR_M
+        assert np.hypot(*(poses[a] - poses[b])[:2]) < park_scores.LOOP_NEAR_M
         assert abs(b - a) > 100
-    np.testing.assert_allclose(victoria_park.loop_errors(track, track), 0.0, atol=1e-9)
+    np.testing.assert_allclose(park_scores.loop_errors(track, track), 0.0, atol=1e-9)
 
 
 def test_census_counts_what_is_missed_spurious_and_deleted():

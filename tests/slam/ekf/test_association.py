@@ -8,8 +8,9 @@ import pytest
 from scipy.stats import chi2
 
 from slam import se2
-from slam.ekf.association import METHODS, Gates, chi_square, individual, ipjc, jcbb
+from slam.ekf.association import METHODS, individual, ipjc, jcbb
 from slam.ekf.filter import EkfFilter
+from slam.ekf.hypotheses import Gates, chi_square
 
 GATES = Gates()
 

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hypotheses of association: by which gates they are judged, what the best one so far is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+MOST_NODES = 400  # hypotheses looked into; then the best one so far is the answer
+
+
+@lru_cache(maxsize=1024)
+def chi_square(probability: float, degrees: int) -> float:
+    """The value below which a chi-square variable lies with this probability."""
+    from scipy.special import gammaincinv  # 0.3 s that other SLAMs need not pay
+
+    return 2.0 * float(gammaincinv(degrees / 2.0, probability))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gates:
+    """Probabilities of chi-square.
+
+    individual  a pair under the prior, 2 dof
+    joint       k pairs, 2 k dof
+    posterior   what one more pair adds to the joint cost, 2 dof
+    """
+
+    individual: float = 0.999999
+    joint: float = 0.999999
+    posterior: float = 0.99999
+
+    def single(self) -> float:
+        """Limit of a pair's cost under the prior."""
+        return chi_square(self.individual, 2)
+
+    def together(self, pairs: int) -> float:
+        """Limit of the joint cost of so many pairs."""
+        return chi_square(self.joint, 2 * pairs)
+
+    def added(self) -> float:
+        """Limit of what a pair adds to the joint cost."""
+        return chi_square(self.posterior, 2)
+
+
+@dataclass(kw_only=True)
+class Effort:
+    """What a search did: ``nodes`` looked into, ``tests`` of a pair, and ``work``, the
+    multiplications of tests and acceptances to leading order; ``complete`` unless cut short."""
+
+    nodes: int = 0
+    tests: int = 0
+    work: int = 0
+    complete: bool = True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Association:
+    """``landmarks`` (k,) the landmark of each point or -1; ``cost`` the joint chi-square.
+
+    plausible  (k,) bool: some landmark lies within the point's individual gate, taken or not
+    """
+
+    landmarks: Ints
+    cost: float
+    plausible: NDArray[np.bool_]
+    effort: Effort
+
+    @property
+    def matched(self) -> int:
+        """Number of pairs."""
+        return int((self.landmarks >= 0).sum())
+
+
+@dataclass(kw_only=True)
+class Best:
+    """The best hypothesis so far: for each point its landmark's place or -1."""
+
+    landmarks: list[int]
+    pairs: int = 0
+    cost: float = 0.0
+    effort: Effort = field(default_factory=Effort)
+
+    def beaten_by(self, pairs: int, cost: float) -> bool:
+        """More pairs, or as many at less cost."""
+        return pairs > self.pairs or (pairs == self.pairs and cost < self.cost)
+
+    def keep(self, pairs: list[tuple[int, int]], cost: float) -> None:
+        """Take these pairs (point, landmark) for the best."""
+        self.pairs, self.cost = len(pairs), cost
+        self.landmarks = [-1] * len(self.landmarks)
+        for k, j in pairs:
+            self.landmarks[k] = j
