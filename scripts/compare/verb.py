@@ -89,7 +89,9 @@ def compare(
 
 
 def _words(values: list[str]) -> tuple[str, ...]:
-    return tuple(word for value in values for word in value.split(",") if word)
+    """Words may also be joined by commas, but for the command of a pipe, which may hold some."""
+    parts = ([value] if value.startswith("pipe:") else value.split(",") for value in values)
+    return tuple(word for words in parts for word in words if word)
 
 
 def levels(values: list[str]) -> tuple[float, ...]:
