@@ -20,7 +20,7 @@ CLAIM = 2.0  # sigmas of the band
 BAND_PALE = 0.82
 NEAR_M = 1.5  # of the people lane (``sim.events.NEAR_M``; logs film without the simulator)
 MAX_POINTS = 1200  # of a curve as drawn
-_LANES = {"chair": "chairs", "door": "doors", "person": "people", "unsure": "unsure"}
+_LANES = {"chair": "pushed", "door": "doors", "person": "people", "unsure": "unsure"}
 _HEADINGS_DEG = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 45.0, 90.0, 180.0)
 _LOW = -3.0  # 1 mm, as a power of ten m
 
@@ -103,7 +103,7 @@ class ErrorChart:
     ) -> Picture:
         """A fresh picture; ``kidnaps``: moments of, s."""
         own = series[self._primary]
-        worst = self._worst(series)
+        worst = max([self._worst(series), *own.claimed])
         high = next(power for power in (0.0, 1.0, 2.0) if power == 2.0 or worst <= 10.0**power)
         reach = self._reach(own)
         picture = self._grid(high, reach).copy()
@@ -171,7 +171,8 @@ class ErrorChart:
             left = box.x - draw.text_width(_LANES[lane], small) - self._px(5)
             draw.text(picture, _LANES[lane], (left, y - self._px(2)), small, draw.MUTED)
         x, y = box.x, box.y - self._px(18)
-        x = draw.text(picture, "events", (x, y), self._px(13), draw.INK, True) + self._px(14)
+        title = "events" if len(self._lanes) > 1 else "trust in itself"
+        x = draw.text(picture, title, (x, y), self._px(13), draw.INK, True) + self._px(14)
         keys = [("hit by the scanner", draw.MAGENTA), ("out of its sight", _faint(draw.MAGENTA))]
         for word, color in keys if len(self._lanes) > 1 else ():
             x = self._key(picture, (x, y), word, color)
@@ -240,6 +241,9 @@ class ErrorChart:
         for name, word in words.items():
             at = (x, y + 1)
             x = draw.text(picture, f"{name} {word}", at, self._px(12), self._colors[name], True)
+            x += self._px(12)
+        if not words:
+            x = draw.text(picture, "no truth to compare with", (x, y + 1), self._px(12), draw.MUTED)
             x += self._px(12)
         self._key(picture, (x, y), claim, draw.paler(self._colors[self._primary], BAND_PALE))
 

@@ -17,6 +17,8 @@ from scripts.stage import LogStage, Stage
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import NS_PER_S, Stream
 from slam.logs import open_log
+from slam.logs.bag import read_bag
+from slam.logs.bag_topics import is_bag
 from slam.replay import Replay
 
 if TYPE_CHECKING:
@@ -182,7 +184,7 @@ def of_episode(path: Path, *, view: str | None = "follow") -> Footage:
 
 def of_log(path: Path) -> Footage:
     """A log: its scans are all that is known of the world."""
-    stream = open_log(path)
+    stream = read_bag(path, labels=True) if is_bag(path) else open_log(path)
     first_ns = last_ns = None
     labelled, frames = False, 0
     for frame in stream:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import cv2
@@ -104,8 +103,9 @@ def raster_picture(raster: Raster, view: View, T_view_map: Float) -> Picture:
             [-s * k, -c * k, view.height - (T[1] - view.y) * view.scale - 0.5 * k * (s + c) - 0.5],
         ]
     )
-    if k < 1.0:  # warpAffine samples points: blur first so that thin walls do not vanish
-        levels = cv2.dilate(levels, np.ones((2, 2), np.uint8)).astype(np.uint8)
+    if k < 1.0:  # warpAffine samples points: widen first so that thin walls do not vanish
+        n = math.ceil(1.0 / k)
+        levels = cv2.dilate(levels, np.ones((n, n), np.uint8)).astype(np.uint8)
     warped = cv2.warpAffine(
         levels, affine, (view.width, view.height), flags=cv2.INTER_LINEAR, borderValue=0
     )
@@ -181,14 +181,20 @@ class MapPane:
     _under: Picture | None = None
     _view: View = field(default_factory=lambda: View(0.0, 0.0, 1.0, 1, 1))
 
-    def refresh(self, raster: Callable[[], Raster | None], path: Trail, T_view_map: Float) -> None:
-        """Draw the map anew: a third of the cost of a frame, and it changes slowly."""
+    def refresh(
+        self, raster: Raster | None, landmarks: Float | None, path: Trail, T_view_map: Float
+    ) -> None:
+        """Draw the map anew: a third of the cost of a frame, and it changes slowly.
+
+        landmarks  optional (n, 5) x, y, half axes (m), direction (rad) in the map frame
+        """
         self._view = View.fitting(self._bounds(path, T_view_map), self.width, self.height)
-        found = raster()
-        if found is None:
+        if raster is None:
             self._under = np.full((self.height, self.width, 3), draw.PAPER, np.uint8)
         else:
-            self._under = raster_picture(found, self._view, T_view_map)
+            self._under = raster_picture(raster, self._view, T_view_map)
+        if landmarks is not None:
+            self._draw_landmarks(self._under, landmarks, T_view_map)
         scale_bar(self._under, self._view, self.unit)
 
     def paint(
@@ -211,6 +217,20 @@ class MapPane:
         turned = turn @ covariance[:2, :2] @ turn.T
         draw_ellipse(picture, view, se2.compose(T_view_map, own.pose), turned, color)
         return picture
+
+    def _draw_landmarks(self, picture: Picture, landmarks: Float, T_view_map: Float) -> None:
+        """A dot for each, and its ellipse where that is larger."""
+        view = self._view
+        centers = view.pixels(se2.transform(T_view_map, landmarks[:, :2]))
+        turns = -np.degrees(landmarks[:, 4] + T_view_map[2])
+        axes = np.clip(2.0 * landmarks[:, 2:4] * view.scale, 6.0 * self.unit, 1e4)
+        for center, sizes, turn in zip(
+            centers.tolist(), axes.tolist(), turns.tolist(), strict=True
+        ):
+            if max(map(abs, center)) < 1e4:
+                cv2.ellipse(picture, (center, sizes, turn), draw.INK, 1, cv2.LINE_AA)
+                at = (round(center[0] * 16.0), round(center[1] * 16.0))
+                cv2.circle(picture, at, round(24 * self.unit), draw.INK, -1, cv2.LINE_AA, 4)
 
     def _bounds(self, path: Trail, T_view_map: Float) -> tuple[float, float, float, float]:
         if self.bounds is not None:

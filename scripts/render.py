@@ -101,7 +101,7 @@ def _render(
     with ExitStack() as stack:
         reel = stack.enter_context(film(out, show.pace.fps)) if out is not None else None
         log = stack.enter_context(RerunLog.writing(rerun, show)) if rerun is not None else None
-        snapshots = Snapshots(show, moments)
+        snapshots = Snapshots(show, moments, show.vignette)
         for frame in watched(shoot(footage.stream, show, reel), footage.stream, show.title):
             snapshots.note(frame)
             if log is not None:

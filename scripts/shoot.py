@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from rich.markup import escape
 
@@ -53,10 +53,13 @@ class Snapshots:
     """Keeps the pictures of a few moments while a run goes by.
 
     seconds  since the first frame, in rising order; a picture is of the first frame then or later
+    paint    which picture: ``show.vignette`` (for strips) or ``show.paint`` (the whole frame)
     """
 
-    def __init__(self, show: Show, seconds: Sequence[float]) -> None:
-        self._show, self._seconds = show, tuple(seconds)
+    def __init__(
+        self, show: Show, seconds: Sequence[float], paint: Callable[[Frame], Picture]
+    ) -> None:
+        self._show, self._seconds, self._paint = show, tuple(seconds), paint
         if list(self._seconds) != sorted(self._seconds):
             raise InvalidValueError(f"moments must be in rising order, got {list(seconds)}")
         self.pictures: list[Picture] = []
@@ -65,7 +68,7 @@ class Snapshots:
         """Take the pictures that are due."""
         now = self._show.seconds(frame)
         while not self.done() and now >= self._seconds[len(self.pictures)] - 1e-6:
-            self.pictures.append(self._show.paint(frame))
+            self.pictures.append(self._paint(frame))
         self._last = frame
 
     def done(self) -> bool:
@@ -75,13 +78,18 @@ class Snapshots:
     def finish(self) -> list[Picture]:
         """All of them; moments after the end of the run show its end."""
         while not self.done():
-            self.pictures.append(self._show.paint(self._last))
+            self.pictures.append(self._paint(self._last))
         return self.pictures
 
 
-def pictures_at(stream: Stream, show: Show, seconds: Sequence[float]) -> list[Picture]:
-    """Film frames of a run at these moments, without a film: what a strip is made of."""
-    snapshots = Snapshots(show, seconds)
+def pictures_at(
+    stream: Stream, show: Show, seconds: Sequence[float], *, whole: bool = False
+) -> list[Picture]:
+    """Pictures of a run at these moments for ``scripts.strips``, without a film.
+
+    Scan above map each (``Show.vignette``); ``whole``: all of the film frame.
+    """
+    snapshots = Snapshots(show, seconds, show.paint if whole else show.vignette)
     for frame in shoot(stream, show, None):
         snapshots.note(frame)
         if snapshots.done():

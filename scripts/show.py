@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import cv2
 import numpy as np
 
 from scripts import draw
@@ -23,9 +24,11 @@ from scripts.panes import SIGMAS, MapPane, Trail
 from scripts.scan_pane import legend, points_robot
 from scripts.stage import Stage
 from slam import se2
+from slam.ekf.slam import EkfSlam
 from slam.frames import NS_PER_S, Float, Frame
 from slam.replay import Replay, Track
 from slam.seen import SeenSpace
+from slam.shunting import ShuntingSlam
 
 SEEN_EVERY_NS = 200_000_000  # the areas of neighbouring scans overlap
 FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn anew
@@ -112,6 +115,12 @@ class Show:
             self._panes = _Panes(self)
         return self._panes.paint(frame, self.seconds(frame))
 
+    def vignette(self, frame: Frame) -> Picture:
+        """The scan above the map, without words: what a strip is made of."""
+        whole = self.paint(frame)
+        assert self._panes is not None
+        return self._panes.vignette(whole)
+
     # -- what the panes are told ----------------------------------------------------------
 
     def track(self) -> Track:
@@ -136,6 +145,12 @@ class Show:
         """The map drawn the way the world lies, where that is known; for display only."""
         first = self._first[1] if self._first else None
         return first if first is not None and self.stage.bounds is not None else np.zeros(3)
+
+    def holds(self) -> str:
+        """What the map of the primary track is made of, where that is known."""
+        kinds = ((ShuntingSlam, "activities, "), (EkfSlam, f"landmarks ({SIGMAS:g} σ), "))
+        system = self.track().system
+        return next((words for kind, words in kinds if isinstance(system, kind)), "")
 
     def names(self) -> list[str]:
         """What has a trail, the primary track last."""
@@ -173,7 +188,9 @@ class _Panes:
         T_view_map = show.T_view_map()
         if fresh:
             self._fresh_at = seconds
-            self._map.refresh(track.map, trails[show.primary], T_view_map)
+            system = track.system
+            known = system.landmarks().ellipses(SIGMAS) if isinstance(system, EkfSlam) else None
+            self._map.refresh(track.map(), known, trails[show.primary], T_view_map)
         canvas = self._base.copy()
         self._headline(canvas, seconds)
         drawn = [(trails[n], show.color(n), 4 if n == "truth" else 2) for n in show.names()]
@@ -191,6 +208,16 @@ class _Panes:
         self._say_off(canvas, covariance)
         return canvas
 
+    def vignette(self, whole: Picture) -> Picture:
+        """Two panes of a painted frame, one above the other, equally wide."""
+        parts = []
+        width = self._layout.scan.width
+        for box in (self._layout.scan, self._layout.map):
+            part = whole[box.y : box.y + box.height, box.x : box.x + box.width]
+            height = round(box.height * width / box.width)
+            parts.append(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA))
+        return np.vstack(parts)
+
     def _close_up(self, T_view_map: Float, covariance: Float) -> Picture:
         trails = self._show.trails
         here = se2.compose(T_view_map, trails[self._show.primary].pose)
@@ -203,7 +230,7 @@ class _Panes:
         trails, box, unit = self._show.trails, self._layout.close, self._layout.unit
         if "truth" not in trails:
             return
-        error = (trails[self._show.primary].pose - trails["truth"].pose)[:2]
+        error: Float = (trails[self._show.primary].pose - trails["truth"].pose)[:2]
         at = (box.x, box.y + box.height + round(6 * unit))
         draw.text(canvas, off_by(error, covariance[:2, :2]), at, round(13 * unit), bold=True)
 
@@ -227,7 +254,7 @@ class _Panes:
         self._time_x = x + round(24 * unit)
         self._key(canvas)
         titles = [
-            (layout.map, f"map of {show.primary}: activities, scan, trails"),
+            (layout.map, f"map of {show.primary}: {show.holds()}scan, trails"),
             (layout.close, f"close-up, {SIGMAS:g} σ ellipse"),
         ]
         if layout.camera is not None:

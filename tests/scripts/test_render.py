@@ -92,7 +92,7 @@ def test_a_part_at_double_speed(run: Path, tmp_path: Path):
 
 def test_the_same_seed_gives_the_same_pictures_byte_for_byte():
     first, second = (
-        pictures_at(f.stream, f.show(["shunting"]), [0.5, 1.5])
+        pictures_at(f.stream, f.show(["shunting"]), [0.5, 1.5], whole=True)
         for f in (of_scene(SETTINGS, view=None), of_scene(SETTINGS, view=None))
     )
     np.testing.assert_array_equal(first, second)
@@ -106,6 +106,7 @@ def test_the_pictures_do_not_depend_on_which_others_were_taken():
     (want,) = pictures_at(alone.stream, alone.show(["odometry"]), [1.5])
     got = pictures_at(among.stream, among.show(["odometry"]), [0.2, 0.9, 1.5])[-1]
     np.testing.assert_array_equal(got, want)
+    assert got.shape[1] == Layout.of((1280, 720), camera=False).scan.width
 
 
 def test_an_episode_is_filmed_with_its_world_and_truth(tmp_path: Path):
@@ -113,7 +114,7 @@ def test_an_episode_is_filmed_with_its_world_and_truth(tmp_path: Path):
     (folder,) = tmp_path.iterdir()
     with open_run(folder, view=None) as footage:
         assert footage.title == "arena · dynamism 0.5 · seed 1"
-        (picture,) = pictures_at(footage.stream, footage.show(["odometry"]), [0.5])
+        (picture,) = pictures_at(footage.stream, footage.show(["odometry"]), [0.5], whole=True)
     assert (picture == AZURE).all(axis=2).sum() > 100
     assert (picture == GREEN).all(axis=2).any()
 
@@ -125,7 +126,7 @@ def test_a_log_without_truth_is_filmed_without_it(tmp_path: Path):
     log.write_text("\n".join(bare) + "\n")
     with open_run(log) as footage:
         show = footage.show(["odometry"])
-        (picture,) = pictures_at(footage.stream, show, [0.9])
+        (picture,) = pictures_at(footage.stream, show, [0.9], whole=True)
     assert (picture == BLUE).all(axis=2).sum() > 100
     has_truth = "truth" in show.trails
     assert (picture == GREEN).all(axis=2).any() == has_truth
