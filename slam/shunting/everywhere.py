@@ -24,6 +24,7 @@ FAR_M = 20.0  # returns beyond turn too fast with the heading
 FEW = 120  # returns are enough
 APART_M, APART_RAD = 1.0, 0.5  # between two answers, at least one of them
 WORTH = 0.6  # answers worse than this share of the best are dropped
+STRIP = 16 * SIDE  # neurons pooled at a time, so that little of the map is ever laid out
 MAX_ACROSS = 40  # coarsest blocks along the map
 
 
@@ -50,16 +51,17 @@ def _pooling(cell: float) -> int:
     return pool
 
 
-def _coarse_field(network: Network, short_term: float, pool: int) -> NDArray[np.uint8]:
+def coarse_field(network: Network, short_term: float) -> NDArray[np.uint8]:
     """The whole map, pooled; row 0, column 0 at the corner of ``network.extent()``."""
-    extent = network.extent()
+    extent, pool = network.extent(), _pooling(network.cell)
     if extent is None:
         return np.zeros((0, 0), np.uint8)
     i0, j0, i1, j1 = extent
     coarse = np.zeros(((j1 - j0) // pool, (i1 - i0) // pool), np.uint8)
-    for row in range(0, j1 - j0, SIDE):  # one row of blocks at a time keeps it small
-        fine = field_of(network, short_term, i0, j0 + row, SIDE, i1 - i0)
-        coarse[row // pool : (row + SIDE) // pool] = _pooled(fine, pool)
+    for row in range(0, j1 - j0, STRIP):
+        rows = min(STRIP, j1 - j0 - row)
+        fine = field_of(network, short_term, i0, j0 + row, rows, i1 - i0)
+        coarse[row // pool : (row + rows) // pool] = _pooled(fine, pool)
     return _spread(coarse)
 
 
@@ -76,10 +78,12 @@ def places(
     points_robot: Float,
     most: int,
     about: tuple[Float, float, float] | None = None,
+    field: NDArray[np.uint8] | None = None,
 ) -> list[Float]:
     """Up to ``most`` poses T_map_robot, the best first, from which the points would fit the map.
 
-    ``about`` limits the search to a pose, so many m and so many rad around it. Answers are good to
+    ``about`` limits the search to a pose, so many m and so many rad around it; ``field`` is the
+    ``coarse_field`` of the network where that is at hand. Answers are good to
     about 0.1 m and 1 degree; to be refined by climbing.
     """
     near = points_robot[(points_robot * points_robot).sum(axis=1) < FAR_M**2]
@@ -89,7 +93,8 @@ def places(
     chosen = np.ascontiguousarray(near[:: math.ceil(len(near) / FEW)])
     pool = _pooling(network.cell)
     pitch = pool * network.cell
-    field = _coarse_field(network, short_term, pool)
+    if field is None:
+        field = coarse_field(network, short_term)
     i0, j0, i1, j1 = extent
     middle = np.array([0.5 * (i0 + i1) * network.cell, 0.5 * (j0 + j1) * network.cell, 0.0])
     reach = math.ceil(0.5 * max(field.shape))

@@ -14,12 +14,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Float
 from slam.posegraph import Edge, carried, optimise
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.everywhere import places
+from slam.shunting.everywhere import coarse_field, places
 from slam.shunting.impressions import Observations, stamp
 from slam.shunting.matching import Match, Matcher
 from slam.shunting.motion import inverted
@@ -75,6 +76,7 @@ class Loops:
         self._chain: list[Edge] = []  # step by step, without loops; and where it leads
         self._chained: list[Float] = []
         self._submaps: dict[int, Network] = {}
+        self._fields: dict[int, NDArray[np.uint8]] = {}  # of those that were searched
         self._step: Float = np.zeros(3)
         self._covariance: Float = np.zeros((3, 3))
         self._way_m = 0.0
@@ -218,7 +220,10 @@ class Loops:
         short_term = self._matcher.reward.short_term
         found: list[tuple[float, Match]] = []
         about = (predicted, gate, GATE_RAD)
-        for place in places(network, short_term, seen.points_robot, MOST, about):
+        if middle not in self._fields:
+            self._fields[middle] = coarse_field(network, short_term)
+        field = self._fields[middle]
+        for place in places(network, short_term, seen.points_robot, MOST, about, field):
             start = self._matcher.approach(network, seen, place, COARSE)
             match = self._matcher.climb(network, seen, start, place, inverted(COARSE))
             found.append((support(network, seen, match), match))

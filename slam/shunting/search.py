@@ -113,12 +113,15 @@ def _kernel() -> Float:
     return taps / math.sqrt(math.pi * SIGMA_CELLS**2)
 
 
+KERNEL = _kernel()
+
+
 @functools.cache
 def _get_ready() -> None:
     """Run every kernel of a search once, the first time in a process."""
     with announced("the kernels of the wide search"):
         field, bases = np.zeros((2 * SIDE, 2 * SIDE), np.uint8), np.empty((1, 1, 2), np.int32)
-        _field(no_cells(), 0.3, 0, 0, _kernel(), field)
+        _field(no_cells(), 0.3, 0, 0, KERNEL, field)
         place(np.ones((1, 2)), np.zeros(3), np.zeros(1), 0.2, 0, 0, bases)
         lattice = Lattice(
             levels=levels_of(field, 1), bases=bases, turns=np.zeros(1), reach=1, pitch=0.2,
@@ -133,7 +136,7 @@ def field_of(
     """(rows, columns) smoothed activities from neuron (i0, j0) on, which begins a block."""
     _get_ready()
     field = np.zeros((rows, columns), np.uint8)
-    _field(network.cells, short_term, i0, j0, _kernel(), field)
+    _field(network.cells, short_term, i0, j0, KERNEL, field)
     return field
 
 
