@@ -213,13 +213,15 @@ class Driver:
         )
         return v, omega
 
-    def use(self, grid: NavGrid) -> None:
+    def use(self, grid: NavGrid, *, afresh: bool = True) -> None:
         """Plan on this layout from now on (a door has opened, say).
 
         What must not be touched is still the first layout, and the discs of each ``command``.
+        ``afresh`` False: a plan that is made anew all the time is no progress by itself.
         """
         self._grid = grid
-        self._best = math.inf
+        if afresh:
+            self._best = math.inf
 
     def _next(self) -> None:
         self._index += 1

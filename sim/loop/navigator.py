@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From what a SLAM believes to the next command; knows goals, plan, scans and wheels, no truth.
+
+The way is the grid's (``sim.navgrid``), the steering the driver's (``sim.drive``): the same two
+that drive recorded episodes, there by truth.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenes.scene import Scene
+from sim.drive import Driver, TourConfig
+from sim.loop.config import LoopConfig
+from sim.loop.planner import LayoutPlanner, MapPlanner
+from sim.loop.sight import Sight
+from sim.navgrid import NavGrid
+from slam import se2
+from slam.frames import NS_PER_S, Float, Frame
+from slam.system import Estimate, Raster
+
+_FAR = 1e6
+PROGRESS_M = 0.25  # less than this nearer is no progress
+CLOSE_M, CLOSE_S = 0.4, 4.0  # this near without progress for this long: as near as one gets
+DOUBT_SPEED = 0.5  # share of the usual speed while the SLAM does not trust itself
+DOUBT_S, LOOK_S, LOOK_RADPS = 1.5, 12.0, 0.6  # then it stops and looks about, at most so long
+THIN_HALF_M = 0.25  # half the box that a thin thing is planned around
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decision:
+    """(v m/s, omega rad/s), and why the goal is over: "arrived", what it was given up for, or ""."""
+
+    v: float = 0.0
+    omega: float = 0.0
+    over: str = ""
+
+
+class Navigator:
+    """Steers to one goal after another.
+
+    start  (3,) T_world_map: where the robot was at the first frame, which it was told
+    """
+
+    def __init__(self, scene: Scene, start: Float, config: LoopConfig) -> None:
+        self.config, self._start = config, start
+        self._tour = TourConfig(goal_radius_m=0.5 * config.arrive_m, patience_s=8.0)
+        self._planner: LayoutPlanner | MapPlanner = (
+            LayoutPlanner(scene, self._tour)
+            if config.plan_on == "layout"
+            else MapPlanner(start, self._tour)
+        )
+        self._sight = Sight()
+        self._goal: Float = start[:2]
+        self._driver: Driver | None = None
+        self._layout: NavGrid | None = None
+        self._doubt_s = 0.0
+        self._stamp_ns: int | None = None
+
+    def aim(self, goal: Float) -> None:
+        """Go to (x, y) m in the world from now on."""
+        self._goal = np.asarray(goal, dtype=np.float64)
+        self._driver, self._layout, self._open = None, None, True
+        self._since_s, self._planned_s, self._idle_s = 0.0, -math.inf, 0.0
+        self._best = self._left = math.inf
+
+    def believed(self, estimate: Estimate) -> Float:
+        """(3,) T_world_robot by the SLAM."""
+        return se2.compose(self._start, estimate.T_map_robot)
+
+    def decide(
+        self, frame: Frame, estimate: Estimate, raster: Callable[[], Raster | None], lag_s: float
+    ) -> Decision:
+        """What to do from now on.
+
+        raster  asked for when a way is planned on the map
+        lag_s   how long ago the frame's stamp is
+        """
+        dt = 0.0 if self._stamp_ns is None else (frame.stamp_ns - self._stamp_ns) / NS_PER_S
+        self._stamp_ns = frame.stamp_ns
+        self._since_s += dt
+        self._sight.take(frame)
+        there = self.believed(estimate)
+        here = self._now(there, frame, lag_s)
+        self._doubt_s = 0.0 if estimate.converged else self._doubt_s + dt
+        distance = math.hypot(there[0] - self._goal[0], there[1] - self._goal[1])
+        if estimate.converged and distance < self.config.arrive_m:
+            return Decision(over="arrived")
+        if self._since_s - self._planned_s >= self.config.replan_s:
+            self._plan(here, raster)
+        over = self._progress(here, distance, dt, trusted=estimate.converged)
+        if over:
+            return Decision(over=over)
+        if DOUBT_S < self._doubt_s < DOUBT_S + LOOK_S:
+            return Decision(omega=LOOK_RADPS)
+        v, omega = self._steer(here, frame, dt)
+        share = 1.0 if estimate.converged else DOUBT_SPEED
+        return Decision(v=share * v, omega=share * omega)
+
+    def _now(self, there: Float, frame: Frame, lag_s: float) -> Float:
+        """The believed pose, carried on over ``lag_s`` by what the wheels did last."""
+        twist = frame.odometry.twist
+        return there if twist is None else se2.compose(there, se2.exp(twist, lag_s))
+
+    def _plan(self, here: Float, raster: Callable[[], Raster | None]) -> None:
+        """Ways round what stands there; if there is none, ways as if nothing did."""
+        self._planned_s = self._since_s
+        seen = raster() if isinstance(self._planner, MapPlanner) else None
+        layout = self._planner.grid(seen, np.array([here[:2], self._goal]))
+        left = layout.cost_near(layout.cost_to(self._goal), here[0], here[1])
+        self._open = left < _FAR
+        if left > self._left + PROGRESS_M:  # the map has grown: the way is longer than thought
+            self._best = left
+        self._layout = layout
+        grid = layout.with_boxes(self._boxes(here))
+        blocked = grid.cost_near(grid.cost_to(self._goal), here[0], here[1]) >= _FAR
+        if self._driver is None:
+            self._driver = Driver(self._planner.walls, self._goal[None], self._tour)
+        self._driver.use(layout if blocked else grid, afresh=False)
+
+    def _boxes(self, here: Float) -> Float:
+        """(n, 5) what is seen, as obstacles in the world."""
+        points, radii = self._sight.points_robot, self._sight.radii
+        boxes = np.zeros((len(points), 5))
+        boxes[:, :2] = se2.transform(here, points)
+        boxes[:, 2] = boxes[:, 3] = np.minimum(radii, THIN_HALF_M)
+        return boxes
+
+    def _progress(self, here: Float, distance: float, dt: float, *, trusted: bool) -> str:
+        """Why the goal is over now, or ""."""
+        layout = self._layout
+        assert layout is not None  # planned before
+        self._left = layout.cost_near(layout.cost_to(self._goal), here[0], here[1])
+        if self._left < self._best - PROGRESS_M:
+            self._best, self._idle_s = self._left, 0.0
+        else:
+            self._idle_s += dt
+        if self._idle_s >= CLOSE_S and trusted and distance < CLOSE_M:
+            return "arrived"
+        if not self._open and self._idle_s >= CLOSE_S:
+            return "no way"
+        if self._idle_s >= self.config.patience_s:
+            return "no progress"
+        return "time" if self._since_s >= self.config.limit_s else ""
+
+    def _steer(self, here: Float, frame: Frame, dt: float) -> tuple[float, float]:
+        """(v, omega) of the driver among what is seen."""
+        points = self._sight.points_robot
+        discs = np.zeros((len(points), 5))
+        discs[:, :2] = se2.transform(here, points)
+        discs[:, 2] = self._sight.radii
+        twist = frame.odometry.twist
+        velocity = (0.0, 0.0) if twist is None else (float(twist[0]), float(twist[2]))
+        assert self._driver is not None  # made with the first plan
+        return self._driver.command(here, velocity, discs, dt)

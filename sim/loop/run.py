@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One run in a closed loop: the room moves, the SLAM believes, the robot goes there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.loop.config import LoopConfig
+from sim.loop.navigator import Decision, Navigator
+from sim.loop.referee import Lost, Referee, Tally, lost
+from sim.simulation import Simulation
+from sim.world import World
+from slam import se2
+from slam.errors import SlamFailedError, UnknownNameError
+from slam.frames import Float, Frame
+from slam.replay import Track
+from slam.system import SlamSystem, told
+
+OUTCOMES = ("reached", "wrong", "given up", "failed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalResult:
+    """What became of one goal.
+
+    outcome        "reached": believed and true; "wrong": believed, but truly further than the
+                   tolerance; "given up"; "failed": the SLAM had failed
+    reason         of giving up: "no way", "no progress" or "time"; what failed
+    precision_m    true distance to the goal when it believed it had arrived, else None
+    precision_rad  then, the believed heading less the true one
+    time_s         simulated, from the last goal's end to this one's
+    driven_m       true way
+    tally          collisions and near misses
+    taken          what stands on the goal at the end, if anything does
+    """
+
+    goal: str
+    outcome: str
+    reason: str = ""
+    precision_m: float | None = None
+    precision_rad: float | None = None
+    time_s: float = 0.0
+    driven_m: float = 0.0
+    tally: Tally
+    taken: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoopRun:
+    """All goals of one run, and its path, a row for each update of the SLAM.
+
+    believed, true  (n, 3) T_world_robot
+    commands        (n, 2) m/s, rad/s from then on
+    trusted         (n,) whether the SLAM trusted itself
+    failure         why the SLAM ended, "" if it did not
+    """
+
+    goals: tuple[GoalResult, ...]
+    stamps_ns: NDArray[np.int64]
+    believed: Float
+    true: Float
+    commands: Float
+    trusted: NDArray[np.bool_]
+    lost: Lost
+    failure: str
+
+
+def goal_order(world: World, wanted: int | Sequence[str] | None = None) -> list[str]:
+    """Goals of the scene in the order of the seed's "driving" stream: all, so many, or these."""
+    names = sorted(world.scene.goals)
+    if wanted is not None and not isinstance(wanted, int):
+        for name in wanted:
+            if name not in world.scene.goals:
+                raise UnknownNameError(
+                    f"scene '{world.scene.name}' has no goal '{name}'. Known: {', '.join(names)}."
+                )
+        return list(wanted)
+    order = world.seeds.generator("driving").permutation(len(names))
+    return [names[k] for k in order][:wanted]
+
+
+def closed_loop(
+    simulation: Simulation,
+    system: SlamSystem,
+    *,
+    config: LoopConfig | None = None,
+    goals: int | Sequence[str] | None = None,
+    name: str = "slam",
+) -> LoopRun:
+    """Drive to each goal in turn, steered by ``system`` alone; it is reset first.
+
+    A SLAM that raises, or returns what is no estimate, ends the run: its goals are "failed". Raises
+    ``UnknownNameError`` for a goal that the scene does not have.
+    """
+    ride = _Ride(simulation, system, config or LoopConfig(), name)
+    results = [ride.to(goal) for goal in goal_order(simulation.world, goals)]
+    return ride.result(results)
+
+
+class _Ride:
+    """One run as it goes on."""
+
+    def __init__(
+        self, simulation: Simulation, system: SlamSystem, config: LoopConfig, name: str
+    ) -> None:
+        self._simulation, self._config = simulation, config
+        self._world = simulation.world
+        self._track = Track(name=name, system=system)
+        self._navigator = Navigator(
+            self._world.scene, np.array(self._world.robot_pose()), config
+        )
+        self._referee = Referee(self._world, config.near_m)
+        self._failure = ""
+        self._rows: list[tuple[int, Float, Float, tuple[float, float], bool]] = []
+        try:
+            system.reset()
+        except Exception as error:  # somebody else's code
+            self._failure = f"SLAM '{name}': reset() raised {told(error)}"
+
+    def to(self, goal: str) -> GoalResult:
+        """Drive to one goal."""
+        place = np.array(self._world.scene.goals[goal], dtype=np.float64)
+        began_ns, first = self._world.time_ns, len(self._rows)
+        self._navigator.aim(place)
+        over = ""
+        while not over and not self._failure:
+            try:
+                over = self._step().over
+            except SlamFailedError as error:
+                self._failure = str(error)
+        self._simulation.world.set_command(0.0, 0.0)
+        blank = GoalResult(
+            goal=goal,
+            outcome="failed",
+            reason=self._failure or over,
+            time_s=(self._world.time_ns - began_ns) * 1e-9,
+            driven_m=_way(np.array([row[2] for row in self._rows[first:]]).reshape(-1, 3)),
+            tally=self._referee.close(),
+            taken=self._referee.taken(place),
+        )
+        if self._failure:
+            return blank
+        if over != "arrived":
+            return replace(blank, outcome="given up")
+        _, believed, true, _, _ = self._rows[-1]
+        off = math.hypot(true[0] - place[0], true[1] - place[1])
+        return replace(
+            blank,
+            outcome="reached" if off <= self._config.tolerance_m else "wrong",
+            reason="",
+            precision_m=off,
+            precision_rad=se2.wrap(float(believed[2] - true[2])),
+        )
+
+    def _step(self) -> Decision:
+        """One update of the SLAM and the command that follows."""
+        frame, true = self._frame(self._config.scans if self._rows else 1)
+        estimate = self._track.take(frame)
+        lag_s = (self._world.time_ns - frame.stamp_ns) * 1e-9
+        decision = self._navigator.decide(frame, estimate, self._track.map, lag_s)
+        self._world.set_command(decision.v, decision.omega)
+        believed, command = self._navigator.believed(estimate), (decision.v, decision.omega)
+        self._rows.append((frame.stamp_ns, believed, true, command, estimate.converged))
+        return decision
+
+    def _frame(self, scans: int) -> tuple[Frame, Float]:
+        """The last of so many scans, with the covariance of all the motion since the one before,
+        without its truth; and its truth."""
+        covariance: Float = np.zeros((3, 3))
+        for _ in range(scans):
+            frame = self._simulation.observe()
+            self._referee.watch(self._simulation.contacts)
+            if frame.odometry.increment_covariance is not None:
+                covariance = covariance + frame.odometry.increment_covariance
+        assert frame.truth is not None  # the simulator always knows
+        odometry = replace(frame.odometry, increment_covariance=covariance)
+        return replace(frame, odometry=odometry).without_truth(), frame.truth
+
+    def result(self, goals: Sequence[GoalResult]) -> LoopRun:
+        """All of it."""
+        stamps = np.array([row[0] for row in self._rows], dtype=np.int64)
+        believed = np.array([row[1] for row in self._rows]).reshape(-1, 3)
+        true = np.array([row[2] for row in self._rows]).reshape(-1, 3)
+        return LoopRun(
+            goals=tuple(goals),
+            stamps_ns=stamps,
+            believed=believed,
+            true=true,
+            commands=np.array([row[3] for row in self._rows]).reshape(-1, 2),
+            trusted=np.array([row[4] for row in self._rows], dtype=np.bool_),
+            lost=lost(stamps.tolist(), believed, true),
+            failure=self._failure,
+        )
+
+
+def _way(path: Float) -> float:
+    """m along the positions of (n, 3)."""
+    steps = path[1:, :2] - path[:-1, :2]
+    return float(np.sqrt((steps * steps).sum(axis=1)).sum())
