@@ -12,6 +12,7 @@ from rich.logging import RichHandler
 
 from scripts import interrupt
 from scripts.bench import bench
+from scripts.closed_loop.verb import drive
 from scripts.compare.verb import compare
 from scripts.console import console, fail, note
 from scripts.demo import demo
@@ -50,6 +51,7 @@ app.command("bench")(bench)
 app.command("sensor-card")(sensor_card)
 app.command("reproduce")(reproduce)
 app.command("compare", cls=ManyValues)(compare)
+app.command("drive", cls=ManyValues)(drive)
 
 
 @app.callback()

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import math
 import os
@@ -19,6 +20,7 @@ from slam.errors import OutputError
 from slam.files import write_text
 
 RECIPE = "recipe.json"
+LOCK = ".lock"
 
 
 @contextmanager
@@ -49,6 +51,26 @@ def whole_folder(path: Path, *, overwrite: bool) -> Iterator[Path]:
         for parent in made:  # innermost first; one that holds something stays
             with suppress(OSError):
                 parent.rmdir()
+
+
+@contextmanager
+def locked_folder(out: Path) -> Iterator[None]:
+    """A folder of ours that grows, and nobody else's at the moment.
+
+    Raises ``OutputError`` for one that holds files without a recipe, or is being written now.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    others = [file.name for file in out.iterdir() if file.name != LOCK]
+    if others and not (out / RECIPE).exists():
+        raise OutputError(f"{out} holds files that mobilia did not write: choose another --out")
+    lock = out / LOCK
+    with lock.open("w") as held:
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise OutputError(f"{out} is being written by another process") from error
+        yield
+        lock.unlink(missing_ok=True)
 
 
 def _refuse(path: Path, overwrite: bool) -> None:

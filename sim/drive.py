@@ -22,6 +22,7 @@ from slam.frames import Float
 
 _FAR = 1e6
 _STEP_S = 0.15  # step of the rollout
+LOOK_AHEAD_M = 0.35  # where the cost-to-go is asked for beside where the robot would be
 _ACCEL, _ALPHA = 1.0, 3.0  # m/s2, rad/s2: what the drive's ramp does (``sim.robot.DriveConfig``)
 
 
@@ -92,13 +93,13 @@ def _score(
     v_asked: float,
     omega_asked: float,
     discs: NDArray[np.float64],
-    grid: tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, float],
+    grid: tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, float, float],
 ) -> float:
     """How good 2.1 s under a command would be; minus ``_FAR`` when it would collide.
 
     The speeds are ramped from what the robot does ``now``, as the drive will.
     """
-    clearance, cost_to_go, x0, y0, cell, radius = grid
+    clearance, cost_to_go, x0, y0, cell, radius, look = grid
     x, y, theta = pose[0], pose[1], pose[2]
     v, omega, run_over = now[0], now[1], 0.0
     start = min(_between(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, 0.0)) - radius
@@ -118,7 +119,7 @@ def _score(
         closest = min(closest, free)
     here = _field_at(cost_to_go, x0, y0, cell, x, y)
     ahead = _field_at(
-        cost_to_go, x0, y0, cell, x + 0.35 * math.cos(theta), y + 0.35 * math.sin(theta)
+        cost_to_go, x0, y0, cell, x + look * math.cos(theta), y + look * math.sin(theta)
     )
     if here >= _FAR:
         here = 50.0
@@ -132,7 +133,7 @@ def _choose(
     now: NDArray[np.float64],
     limits: tuple[float, float],
     discs: NDArray[np.float64],
-    grid: tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, float],
+    grid: tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, float, float],
 ) -> tuple[float, float, float]:
     """The best (v, omega) of the window, and its score."""
     v_max, omega_max = limits
@@ -165,6 +166,7 @@ class Driver:
         self.config = config
         self.goals = np.asarray(goals, dtype=np.float64)
         self.visited = 0
+        self.look_ahead_m = LOOK_AHEAD_M  # a robot that is to stop on its goal looks less far
         self._grid = self._walls = grid
         self._index = 0
         self._best = math.inf
@@ -209,17 +211,20 @@ class Driver:
             np.asarray(velocity, dtype=np.float64),
             (self.config.v_max_mps, self.config.omega_max_radps),
             np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 5),
-            (self._walls.clearance, to_go, grid.x0, grid.y0, grid.cell, radius),
+            (self._walls.clearance, to_go, grid.x0, grid.y0, grid.cell, radius, self.look_ahead_m),
         )
         return v, omega
 
-    def use(self, grid: NavGrid, *, afresh: bool = True) -> None:
+    def use(self, grid: NavGrid, *, walls: NavGrid | None = None, afresh: bool = True) -> None:
         """Plan on this layout from now on (a door has opened, say).
 
-        What must not be touched is still the first layout, and the discs of each ``command``.
-        ``afresh`` False: a plan that is made anew all the time is no progress by itself.
+        What must not be touched is still the first layout, or ``walls`` of the same extent, and the
+        discs of each ``command``. ``afresh`` False: a plan that is made anew all the time is no
+        progress by itself.
         """
         self._grid = grid
+        if walls is not None:
+            self._walls = walls
         if afresh:
             self._best = math.inf
 

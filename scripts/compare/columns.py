@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from slam import metrics
+from slam import lost, metrics
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import NS_PER_S
 from slam.replay import Track
 from slam.trajectory import Trajectory
 
-LOST_M, LOST_RAD, LOST_S = 0.5, math.radians(20.0), 1.0
-LOST_RULE = "position error > 0.5 m or heading error > 20 degrees for more than 1 s on end"
 SETTLED_S = 5.0  # NEES counts after this: before, the covariance is that of the known first pose
 STEADY_SCANS = 5  # timings count after this
 AXES = (("x", "m"), ("y", "m"), ("theta", "rad"))
@@ -71,21 +69,12 @@ def scored(
 
 
 def lost_at(online: Trajectory, truth: Trajectory) -> float | None:
-    """Seconds after the start at which the run was lost by ``LOST_RULE``; None if it never was."""
+    """Seconds after the start at which the run was lost (``slam.lost``); None if it never was."""
     if len(online) == 0:
         return None
     pairs = metrics.pose_errors(online, truth)
     seconds = (pairs.stamps_ns - truth.stamps_ns[0]) / NS_PER_S
-    bad = (pairs.distances > LOST_M) | (np.abs(pairs.errors[:, 2]) > LOST_RAD)
-    since: float | None = None
-    for second, is_bad in zip(seconds.tolist(), bad.tolist(), strict=True):
-        if not is_bad:
-            since = None
-            continue
-        since = second if since is None else since
-        if second - since > LOST_S:
-            return since
-    return None
+    return lost.lost_at(seconds, pairs.distances, pairs.errors[:, 2])
 
 
 def _failed_at_s(track: Track, truth: Trajectory) -> float:

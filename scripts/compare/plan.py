@@ -88,7 +88,7 @@ class Plan:
 
     def recordings(self) -> dict[str, Job]:
         """The jobs that simulate, by the names of the runs."""
-        code = (*_sources(sim, scenes), Path(recording.__file__))
+        code = (*sources(sim, scenes), Path(recording.__file__))
         return {
             run.name: Job(
                 name=run.name,
@@ -102,9 +102,9 @@ class Plan:
     def entries(self) -> Iterator[tuple[Run, str, Job]]:
         """The jobs that run a SLAM over a recording: run, SLAM, job."""
         recordings = {name: job.file_name() for name, job in self.recordings().items()}
-        own = (*_sources(slam), *(Path(str(m.__file__)) for m in _SCORING))
+        own = (*sources(slam), *(Path(str(m.__file__)) for m in _SCORING))
         for name in self.slams:
-            code = (*own, *_source_of(name))
+            code = (*own, *source_of(name))
             for run in self.runs():
                 file = f"{RECORDINGS}/{recordings[run.name]}"
                 arguments: dict[str, Any] = {"recording": file, "slam": name}
@@ -119,11 +119,12 @@ class Plan:
                 yield run, name, job
 
 
-def _sources(*packages: Any) -> tuple[Path, ...]:
+def sources(*packages: Any) -> tuple[Path, ...]:
+    """The folders of packages, for ``Job.code``."""
     return tuple(Path(package.__file__).parent for package in packages)
 
 
-def _source_of(slam: str) -> tuple[Path, ...]:
+def source_of(slam: str) -> tuple[Path, ...]:
     """The file of a SLAM's own module: with it changed, its runs are made again."""
     if ":" not in slam:
         return ()

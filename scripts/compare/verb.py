@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-import fcntl
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,18 +16,17 @@ from scenes import registry
 from scripts import workers
 from scripts.compare import folder as files
 from scripts.compare import tables
-from scripts.compare.columns import COLUMNS, DRIVES, LOST_RULE
+from scripts.compare.columns import COLUMNS, DRIVES
 from scripts.compare.plan import ENTRIES, RECORDINGS, Plan
 from scripts.compare.recording import load
 from scripts.console import console
 from scripts.generate import sweep
 from scripts.jobs import Job, run_jobs
-from scripts.output import RECIPE, machine, write_recipe
-from slam.errors import InvalidValueError, OutputError
+from scripts.output import locked_folder, machine, write_recipe
+from slam.errors import InvalidValueError
 from slam.frames import BeamClass
 from slam.guests import Limits, limited
-
-LOCK = ".lock"
+from slam.lost import LOST_RULE
 
 
 def compare(
@@ -119,7 +115,7 @@ def carry_out(
     for name in plan.slams:
         limited(name, Limits())
     out = out.absolute()
-    with _locked(out):
+    with locked_folder(out):
         settings = {"compare_schema": files.SCHEMA, **asdict(plan), "lost_rule": LOST_RULE}
         write_recipe(out, "compare", {**settings, "machine": machine()})
         simulations, entries = plan.recordings(), list(plan.entries())
@@ -151,23 +147,6 @@ def _about(recording: Path) -> dict[str, float]:
         drive.share_of_returns(BeamClass.SEMI_STATIC),
     )
     return dict(zip(DRIVES, values, strict=True))
-
-
-@contextmanager
-def _locked(out: Path) -> Iterator[None]:
-    """A folder that is ours, and nobody else's at the moment."""
-    out.mkdir(parents=True, exist_ok=True)
-    others = [file.name for file in out.iterdir() if file.name != LOCK]
-    if others and not (out / RECIPE).exists():
-        raise OutputError(f"{out} holds files that are no comparison: choose another --out")
-    lock = out / LOCK
-    with lock.open("w") as held:
-        try:
-            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise OutputError(f"{out} is being written by another process") from error
-        yield
-        lock.unlink(missing_ok=True)
 
 
 def _table(plan: Plan, scene: str, rows: list[dict[str, Any]]) -> Table:

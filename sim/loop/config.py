@@ -27,10 +27,10 @@ class LoopConfig:
 
     plan_on: str = "layout"
     scans: int = 4
-    arrive_m: float = 0.2
+    arrive_m: float = 0.1
     tolerance_m: float = 0.5
     patience_s: float = 20.0
-    limit_s: float = 60.0
+    limit_s: float = 90.0
     replan_s: float = 1.0
     near_m: float = 0.15
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenes.scene import Scene
-from sim.drive import Driver, TourConfig
+from sim.drive import LOOK_AHEAD_M, Driver, TourConfig
 from sim.loop.config import LoopConfig
 from sim.loop.planner import LayoutPlanner, MapPlanner
 from sim.loop.sight import Sight
@@ -26,6 +26,7 @@ from slam.system import Estimate, Raster
 _FAR = 1e6
 PROGRESS_M = 0.25  # less than this nearer is no progress
 CLOSE_M, CLOSE_S = 0.4, 4.0  # this near without progress for this long: as near as one gets
+SLOWEST_MPS, CREEP_M = 0.15, 0.1  # towards a goal: speed, and how far it looks ahead
 DOUBT_SPEED = 0.5  # share of the usual speed while the SLAM does not trust itself
 DOUBT_S, LOOK_S, LOOK_RADPS = 1.5, 12.0, 0.6  # then it stops and looks about, at most so long
 THIN_HALF_M = 0.25  # half the box that a thin thing is planned around
@@ -33,7 +34,7 @@ THIN_HALF_M = 0.25  # half the box that a thin thing is planned around
 
 @dataclass(frozen=True, kw_only=True)
 class Decision:
-    """(v m/s, omega rad/s), and why the goal is over: "arrived", what it was given up for, or ""."""
+    """(v m/s, omega rad/s), and why the goal is over: "arrived", why it is given up, or ""."""
 
     v: float = 0.0
     omega: float = 0.0
@@ -97,7 +98,7 @@ class Navigator:
             return Decision(over=over)
         if DOUBT_S < self._doubt_s < DOUBT_S + LOOK_S:
             return Decision(omega=LOOK_RADPS)
-        v, omega = self._steer(here, frame, dt)
+        v, omega = self._steer(here, frame, dt, distance)
         share = 1.0 if estimate.converged else DOUBT_SPEED
         return Decision(v=share * v, omega=share * omega)
 
@@ -110,7 +111,7 @@ class Navigator:
         """Ways round what stands there; if there is none, ways as if nothing did."""
         self._planned_s = self._since_s
         seen = raster() if isinstance(self._planner, MapPlanner) else None
-        layout = self._planner.grid(seen, np.array([here[:2], self._goal]))
+        layout, walls = self._planner.grids(seen, np.array([here[:2], self._goal]))
         left = layout.cost_near(layout.cost_to(self._goal), here[0], here[1])
         self._open = left < _FAR
         if left > self._left + PROGRESS_M:  # the map has grown: the way is longer than thought
@@ -119,8 +120,8 @@ class Navigator:
         grid = layout.with_boxes(self._boxes(here))
         blocked = grid.cost_near(grid.cost_to(self._goal), here[0], here[1]) >= _FAR
         if self._driver is None:
-            self._driver = Driver(self._planner.walls, self._goal[None], self._tour)
-        self._driver.use(layout if blocked else grid, afresh=False)
+            self._driver = Driver(walls, self._goal[None], self._tour)
+        self._driver.use(layout if blocked else grid, walls=walls, afresh=False)
 
     def _boxes(self, here: Float) -> Float:
         """(n, 5) what is seen, as obstacles in the world."""
@@ -147,13 +148,20 @@ class Navigator:
             return "no progress"
         return "time" if self._since_s >= self.config.limit_s else ""
 
-    def _steer(self, here: Float, frame: Frame, dt: float) -> tuple[float, float]:
-        """(v, omega) of the driver among what is seen."""
+    def _steer(self, here: Float, frame: Frame, dt: float, distance: float) -> tuple[float, float]:
+        """(v, omega) of the driver among what is seen, slower the nearer the goal."""
         points = self._sight.points_robot
         discs = np.zeros((len(points), 5))
         discs[:, :2] = se2.transform(here, points)
         discs[:, 2] = self._sight.radii
         twist = frame.odometry.twist
         velocity = (0.0, 0.0) if twist is None else (float(twist[0]), float(twist[2]))
+        # What it stands too near to already may be driven away from, not nearer to.
+        offset = discs[:, :2] - here[:2]
+        room = np.sqrt(offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1])
+        discs[:, 2] = np.minimum(discs[:, 2], room - self._tour.robot_radius_m)
         assert self._driver is not None  # made with the first plan
-        return self._driver.command(here, velocity, discs, dt)
+        self._driver.look_ahead_m = min(LOOK_AHEAD_M, max(CREEP_M, distance - CREEP_M))
+        v, omega = self._driver.command(here, velocity, discs, dt)
+        share = min(1.0, max(SLOWEST_MPS, distance) / max(abs(v), 1e-9))
+        return share * v, share * omega

@@ -31,12 +31,15 @@ class LayoutPlanner:
         xmin, ymin, xmax, ymax = scene.bounds
         bounds = (xmin - MARGIN_M, ymin - MARGIN_M, xmax + MARGIN_M, ymax + MARGIN_M)
         self._grid = NavGrid(bounds, scene.obstacles, tour.robot_radius_m - _KEPT_BACK_M)
-        self.walls = self._grid.with_boxes(np.zeros((0, 5)))
-        self.walls.clearance += SLACK_M
+        self._walls = self._grid.with_boxes(np.zeros((0, 5)))
+        self._walls.clearance += SLACK_M
 
-    def grid(self, raster: Raster | None, places: Float) -> NavGrid:
-        """The plan now; the SLAM's map and the ``places`` that must be on it do not matter."""
-        return self._grid
+    def grids(self, raster: Raster | None, places: Float) -> tuple[NavGrid, NavGrid]:
+        """The plan, and the walls that stop the robot whatever it sees.
+
+        The SLAM's map, and the ``places`` that must be on the plan, do not matter here.
+        """
+        return self._grid, self._walls
 
 
 class MapPlanner:
@@ -44,11 +47,12 @@ class MapPlanner:
 
     def __init__(self, T_world_map: Float, tour: TourConfig) -> None:
         self._T_world_map, self._radius = T_world_map, tour.robot_radius_m - _KEPT_BACK_M
-        everywhere = (-1e3, -1e3, 1e3, 1e3)  # nothing but what is seen may stop the robot
-        self.walls = NavGrid(everywhere, np.zeros((0, 5)), self._radius, cell=100.0)
 
-    def grid(self, raster: Raster | None, places: Float) -> NavGrid:
-        """The plan on the map as it is; ``places`` (n, 2) m must lie on it."""
+    def grids(self, raster: Raster | None, places: Float) -> tuple[NavGrid, NavGrid]:
+        """The plan on the map as it is, and no walls: only what is seen stops the robot.
+
+        ``places`` (n, 2) m must lie on it.
+        """
         corners = places
         boxes = np.zeros((0, 5))
         if raster is not None and raster.values.size:
@@ -56,7 +60,8 @@ class MapPlanner:
             corners = np.concatenate([places, boxes[:, :2]])
         low, high = corners.min(axis=0) - MARGIN_M, corners.max(axis=0) + MARGIN_M
         bounds = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
-        return NavGrid(bounds, boxes, self._radius)
+        plan = NavGrid(bounds, boxes, self._radius)
+        return plan, NavGrid(bounds, np.zeros((0, 5)), self._radius)
 
     def _boxes(self, raster: Raster) -> Float:
         """(n, 5) occupied cells as boxes in the world."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What truly happened: collisions, near misses, when the estimate was lost. Steers nothing."""
+"""What truly happened: collisions, near misses, goals taken by others. Steers nothing."""
 
 from __future__ import annotations
 
@@ -11,13 +11,10 @@ import numpy as np
 
 from sim.contacts import Contact
 from sim.world import World
-from slam import se2
 from slam.frames import NS_PER_S, Float
 
 APART_S = 1.0  # touching the same thing again within this is the same collision
 CLEAR_M = 0.4  # a near miss is over when the person is this far again
-LOST_M, LOST_RAD, LOST_S = 0.5, 0.35, 2.0  # lost: further off than this, for this long
-FOUND_M, FOUND_RAD = 0.25, 0.175  # found again: nearer than this, for as long
 
 
 @dataclass
@@ -112,32 +109,3 @@ class Referee:
             if mover.kind not in ("robot", "door") and room < 0.0:
                 return mover.name
         return ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Lost:
-    """``since_s`` when the estimate was lost first (None never), ``recovered_s`` found again."""
-
-    since_s: float | None = None
-    recovered_s: float | None = None
-
-
-def lost(stamps_ns: Sequence[int], believed: Float, true: Float) -> Lost:
-    """By the rule above; poses (n, 3) in one frame."""
-    since = recovered = out_from = in_from = None
-    for stamp, there, here in zip(stamps_ns, believed, true, strict=True):
-        now = (stamp - stamps_ns[0]) / NS_PER_S
-        off = math.hypot(there[0] - here[0], there[1] - here[1])
-        turned = abs(se2.wrap(float(there[2] - here[2])))
-        out = off > LOST_M or turned > LOST_RAD
-        found = off < FOUND_M and turned < FOUND_RAD
-        out_from = (now if out_from is None else out_from) if out else None
-        in_from = (now if in_from is None else in_from) if found else None
-        if since is None and out_from is not None and now - out_from >= LOST_S:
-            since = out_from
-        if (
-            since is not None and recovered is None
-            and in_from is not None and now - in_from >= LOST_S
-        ):  # fmt: skip
-            recovered = in_from if in_from > since else None
-    return Lost(since_s=since, recovered_s=recovered)

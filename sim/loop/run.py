@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from sim.loop.config import LoopConfig
 from sim.loop.navigator import Decision, Navigator
-from sim.loop.referee import Lost, Referee, Tally, lost
+from sim.loop.referee import Referee, Tally
 from sim.simulation import Simulation
 from sim.world import World
-from slam import se2
+from slam import lost, se2
 from slam.errors import SlamFailedError, UnknownNameError
-from slam.frames import Float, Frame
-from slam.replay import Track
-from slam.system import SlamSystem, told
+from slam.frames import NS_PER_S, Float, Frame
+from slam.replay import Track, judged
+from slam.system import SlamSystem
 
 OUTCOMES = ("reached", "wrong", "given up", "failed")
 
@@ -30,7 +30,7 @@ class GoalResult:
 
     outcome        "reached": believed and true; "wrong": believed, but truly further than the
                    tolerance; "given up"; "failed": the SLAM had failed
-    reason         of giving up: "no way", "no progress" or "time"; what failed
+    reason         of giving up: "no way", "no progress" or "time"; how it failed
     precision_m    true distance to the goal when it believed it had arrived, else None
     precision_rad  then, the believed heading less the true one
     time_s         simulated, from the last goal's end to this one's
@@ -57,7 +57,10 @@ class LoopRun:
     believed, true  (n, 3) T_world_robot
     commands        (n, 2) m/s, rad/s from then on
     trusted         (n,) whether the SLAM trusted itself
-    failure         why the SLAM ended, "" if it did not
+    goal_of         (n,) index into ``goals``
+    lost_s          when the estimate was lost first (``slam.lost``), s; None: never
+    found_s         when it was found again after that
+    failure         how the SLAM failed (``SlamFailedError.outcome``) and in words, "" if it did not
     """
 
     goals: tuple[GoalResult, ...]
@@ -66,8 +69,10 @@ class LoopRun:
     true: Float
     commands: Float
     trusted: NDArray[np.bool_]
-    lost: Lost
-    failure: str
+    goal_of: NDArray[np.int64]
+    lost_s: float | None
+    found_s: float | None
+    failure: tuple[str, str]
 
 
 def goal_order(world: World, wanted: int | Sequence[str] | None = None) -> list[str]:
@@ -111,40 +116,41 @@ class _Ride:
         self._simulation, self._config = simulation, config
         self._world = simulation.world
         self._track = Track(name=name, system=system)
-        self._navigator = Navigator(
-            self._world.scene, np.array(self._world.robot_pose()), config
-        )
+        self._navigator = Navigator(self._world.scene, np.array(self._world.robot_pose()), config)
         self._referee = Referee(self._world, config.near_m)
-        self._failure = ""
+        self._failure: SlamFailedError | None = None
         self._rows: list[tuple[int, Float, Float, tuple[float, float], bool]] = []
+        self._firsts: list[int] = []  # rows at which goals begin
         try:
-            system.reset()
-        except Exception as error:  # somebody else's code
-            self._failure = f"SLAM '{name}': reset() raised {told(error)}"
+            with judged():
+                system.reset()
+        except SlamFailedError as error:
+            self._failure = error.at(f"SLAM '{name}', reset()")
 
     def to(self, goal: str) -> GoalResult:
         """Drive to one goal."""
         place = np.array(self._world.scene.goals[goal], dtype=np.float64)
         began_ns, first = self._world.time_ns, len(self._rows)
+        self._firsts.append(first)
         self._navigator.aim(place)
         over = ""
-        while not over and not self._failure:
+        while not over and self._failure is None:
             try:
                 over = self._step().over
             except SlamFailedError as error:
-                self._failure = str(error)
+                self._failure = error
         self._simulation.world.set_command(0.0, 0.0)
         blank = GoalResult(
             goal=goal,
             outcome="failed",
-            reason=self._failure or over,
+            reason=over,
             time_s=(self._world.time_ns - began_ns) * 1e-9,
             driven_m=_way(np.array([row[2] for row in self._rows[first:]]).reshape(-1, 3)),
             tally=self._referee.close(),
             taken=self._referee.taken(place),
         )
-        if self._failure:
-            return blank
+        if self._failure is not None:
+            return replace(blank, reason=self._failure.outcome)
         if over != "arrived":
             return replace(blank, outcome="given up")
         _, believed, true, _, _ = self._rows[-1]
@@ -186,6 +192,12 @@ class _Ride:
         stamps = np.array([row[0] for row in self._rows], dtype=np.int64)
         believed = np.array([row[1] for row in self._rows]).reshape(-1, 3)
         true = np.array([row[2] for row in self._rows]).reshape(-1, 3)
+        seconds = (stamps - stamps[:1]) / NS_PER_S
+        offset = believed - true
+        distances = np.sqrt(offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1])
+        errors = seconds, distances, se2.wrap_array(offset[:, 2])
+        lost_s = lost.lost_at(*errors)
+        failure = self._failure
         return LoopRun(
             goals=tuple(goals),
             stamps_ns=stamps,
@@ -193,8 +205,10 @@ class _Ride:
             true=true,
             commands=np.array([row[3] for row in self._rows]).reshape(-1, 2),
             trusted=np.array([row[4] for row in self._rows], dtype=np.bool_),
-            lost=lost(stamps.tolist(), believed, true),
-            failure=self._failure,
+            goal_of=np.searchsorted(self._firsts, np.arange(len(stamps)), side="right") - 1,
+            lost_s=lost_s,
+            found_s=None if lost_s is None else lost.found_again_at(*errors, lost_s),
+            failure=("", "") if failure is None else (failure.outcome, str(failure)),
         )
 
 

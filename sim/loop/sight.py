@@ -21,11 +21,13 @@ from slam.frames import NS_PER_S, Float, Frame
 REACH_M = 3.0  # nothing further away matters to the next seconds
 MEMORY_S = 4.0  # of what is out of view
 THIN_M = 0.2  # a thing narrower than this has a foot wider than what is seen
-GAP_M = 0.12  # neighbouring returns further apart than this belong to two things
+WIDE_M = 0.6  # a thing at least this wide ends where it is seen to end
+GAP_M, GAP_PER_M = 0.12, 0.03  # returns of neighbouring beams further apart are of two things
 SPACING_M = 0.04  # of the points kept
 WIDE_RADIUS_M, THIN_RADIUS_M = 0.03, 0.29  # taken around a point
 THROUGH_M = 0.15  # a remembered point this far before what is seen is gone
 WIDE_S = 30.0  # how long a place counts as one where something wide was seen
+THIN, WIDE = 1, 2
 _SIDE, _CELL_M = 128, 0.1  # such places, on a grid that is reused as the robot moves on
 
 
@@ -81,8 +83,8 @@ def _scanned(
     twist: Float,
     now: float,
 ) -> tuple[Float, NDArray[np.int64]]:
-    """(n, 4) points of a scan, and the things they are of: (k, 4) first point, end, whether thin,
-    whether cut off by the edge of view or by something nearer."""
+    """(n, 4) points of a scan, and the things they are of: (k, 4) first point, end, THIN or WIDE or
+    neither, whether cut off by the edge of view or by something nearer."""
     n = len(ranges)
     out = np.empty((n, 4))
     things = np.empty((n, 4), dtype=np.int64)
@@ -94,20 +96,24 @@ def _scanned(
         angle = laser[2] + fan[0] + i * fan[1]
         x = laser[0] + ranges[i] * math.cos(angle)
         y = laser[1] + ranges[i] * math.sin(angle)
+        gap = GAP_M + GAP_PER_M * ranges[i]
         turned, moved = twist[2] * offsets[i], twist[0] * offsets[i]
         c, s = math.cos(turned), math.sin(turned)
         x, y = c * x - s * y + moved, s * x + c * y + twist[1] * offsets[i]
-        if last != i - 1 or (x - lx) ** 2 + (y - ly) ** 2 > GAP_M * GAP_M:
+        if last != i - 1 or (x - lx) ** 2 + (y - ly) ** 2 > gap * gap:
             k += 1
             things[k, 0] = count
             things[k, 3] = i == 0 or (valid[i - 1] and ranges[i - 1] < ranges[i])
             fx, fy = x, y
-        kx, ky = (x - out[count - 1, 0], y - out[count - 1, 1]) if count > things[k, 0] else (1.0, 1.0)
+        kx, ky = (
+            (x - out[count - 1, 0], y - out[count - 1, 1]) if count > things[k, 0] else (1.0, 1.0)
+        )
         if kx * kx + ky * ky >= SPACING_M * SPACING_M:
             out[count, 0], out[count, 1], out[count, 2], out[count, 3] = x, y, now, WIDE_RADIUS_M
             count += 1
         things[k, 1] = count
-        things[k, 2] = (x - fx) ** 2 + (y - fy) ** 2 < THIN_M * THIN_M
+        width2 = (x - fx) ** 2 + (y - fy) ** 2
+        things[k, 2] = THIN if width2 < THIN_M * THIN_M else WIDE if width2 > WIDE_M * WIDE_M else 0
         if i == n - 1 or (valid[i + 1] and ranges[i + 1] < ranges[i] - GAP_M):
             things[k, 3] = 1
         lx, ly, last = x, y, i
@@ -124,20 +130,21 @@ def _judge(
     """
     c, s = math.cos(T_odom_robot[2]), math.sin(T_odom_robot[2])
     for k in range(len(things)):
-        first, end, thin, cut = things[k]
+        first, end, size, cut = things[k]
         before = 0
         for p in range(first, end):
             x, y = points[p, 0], points[p, 1]
-            j = int(math.floor((T_odom_robot[0] + c * x - s * y) / _CELL_M)) % _SIDE
-            i = int(math.floor((T_odom_robot[1] + s * x + c * y) / _CELL_M)) % _SIDE
-            if not thin:
+            j = math.floor((T_odom_robot[0] + c * x - s * y) / _CELL_M) % _SIDE
+            i = math.floor((T_odom_robot[1] + s * x + c * y) / _CELL_M) % _SIDE
+            if size == WIDE:
                 wide[i, j] = points[p, 2]
+            if size != THIN:
                 continue
             for a in range(-1, 2):
                 for b in range(-1, 2):
                     if points[p, 2] - wide[(i + a) % _SIDE, (j + b) % _SIDE] < WIDE_S:
                         before = 1
-        if not thin or before == 1:
+        if size != THIN or before == 1:
             continue
         known = not cut
         for q in range(len(old)):
@@ -166,11 +173,11 @@ def _unseen(
             continue
         bearing = math.atan2(dy, dx) - laser[2]
         bearing -= math.tau * math.floor(bearing / math.tau + 0.5)
-        beam = int(math.floor((bearing - fan[0]) / fan[1] + 0.5))
-        if 0 <= beam < len(ranges):
-            hidden = valid[beam] and ranges[beam] < distance - THROUGH_M
-            if not hidden:
-                continue
+        beam = math.floor((bearing - fan[0]) / fan[1] + 0.5)
+        # What does not answer (black cloth, chrome) is not seen through.
+        seen = 0 <= beam < len(ranges) and valid[beam]
+        if seen and ranges[beam] >= distance - THROUGH_M:
+            continue
         out[count] = old[k]
         count += 1
     return out[:count].copy()

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Success and precision against dynamism, and the paths of some runs over the floor plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+import scenes
+from scenes.scene import Scene
+from scripts.closed_loop.plan import Driven
+from scripts.figures import COLORS, color_of, save
+from sim.floorplan import FloorPlan
+from sim.mapview import MapView
+from sim.world import World
+
+Row = dict[str, Any]
+PX_PER_M = 40
+MARKS = {"reached": "#168c5a", "wrong": "#ce2c3c", "given up": "#8a8f98", "failed": "#20242c"}
+_STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False,
+          "figure.constrained_layout.use": True}  # fmt: skip
+
+
+def curves(path: Path, levels: Sequence[Row]) -> None:
+    """``closed_loop.png``: a panel each for success and precision, with 95 % intervals."""
+    mpl.rcParams.update(_STYLE)
+    figure = Figure(figsize=(10.0, 4.2))
+    success, precision = figure.subplots(1, 2)
+    names = list(dict.fromkeys(row["slam"] for row in levels))
+    for k, name in enumerate(names):
+        rows = [row for row in levels if row["slam"] == name]
+        aside = 0.008 * (k - 0.5 * (len(names) - 1))  # so that intervals do not cover each other
+        look = {"color": color_of(name, names), "marker": "o", "ms": 4, "capsize": 3, "lw": 1.4}
+        _line(success, rows, aside, ("success", "success_low", "success_high"), 100.0, name, look)
+        arrived = [row for row in rows if row["precision_m"] is not None]
+        columns = ("precision_m", "precision_m_low", "precision_m_high")
+        _line(precision, arrived, aside, columns, 1.0, name, look)
+    scene = levels[0]["scene"]
+    success.set(ylim=(-3, 103), ylabel="goals reached, %", title=f"{scene}: success")
+    precision.set(
+        ylim=(0.0, None), ylabel="distance to the goal when believed reached, m",
+        title=f"{scene}: precision (median)",
+    )  # fmt: skip
+    for ax in (success, precision):
+        ax.set_xlabel("dynamism")
+        ax.grid(alpha=0.35)
+    success.legend(frameon=False, loc="lower left")
+    save(figure, path)
+
+
+def _line(
+    ax: Axes,
+    rows: Sequence[Row],
+    aside: float,
+    columns: tuple[str, str, str],
+    scale: float,
+    name: str,
+    look: dict[str, Any],
+) -> None:
+    at = np.array([row["dynamism"] for row in rows]) + aside
+    middle, low, high = (scale * np.array([row[c] for row in rows], float) for c in columns)
+    spread = np.maximum(np.array([middle - low, high - middle]), 0.0)
+    ax.errorbar(at, middle, yerr=spread, label=name, **look)
+
+
+def paths(path: Path, rows: Sequence[Sequence[Driven]]) -> None:
+    """``paths.png``: runs as panels, true path over the room as it was at the start."""
+    mpl.rcParams.update(_STYLE)
+    first = rows[0][0].identity
+    scene = scenes.build(first["scene"], 0)
+    xmin, ymin, xmax, ymax = scene.bounds
+    wide = min(7.0, 20.0 / len(rows[0]))
+    high = wide * (ymax - ymin) / (xmax - xmin) + 0.5
+    figure = Figure(figsize=(wide * len(rows[0]), high * len(rows) + 0.4))
+    axes = np.atleast_2d(figure.subplots(len(rows), len(rows[0]), squeeze=False))
+    for r, runs in enumerate(rows):
+        world = World(runs[0].identity["scene"], seed=runs[0].identity["seed"], dynamism=0.0)
+        size = (round((xmax - xmin + 0.6) * PX_PER_M), round((ymax - ymin + 0.6) * PX_PER_M))
+        room = MapView(world.scene, *size).draw(world.mover_poses())
+        plan = FloorPlan(world.scene, *size)
+        for c, run in enumerate(runs):
+            _panel(axes[r, c], run, room, plan, world.scene)
+    figure.legend(handles=_legend(), loc="outside lower center", ncols=6, frameon=False)
+    save(figure, path)
+
+
+def _panel(ax: Axes, run: Driven, room: Any, plan: FloorPlan, scene: Scene) -> None:
+    ax.imshow(room, interpolation="antialiased", alpha=0.75)
+    for name, style in (("believed", ":"), ("true", "-")):
+        if len(run.arrays[name]):
+            pixels = plan.to_pixels(run.arrays[name][:, :2].copy())
+            color = "#1f61be" if name == "believed" else COLORS["truth"]
+            ax.plot(pixels[:, 0], pixels[:, 1], style, color=color, lw=1.2)
+    for k, goal in enumerate(run.goals):
+        place = np.array([scene.goals[goal["goal"]]], dtype=np.float64)
+        x, y = plan.to_pixels(place)[0].tolist()
+        ax.plot(x, y, "o", color=MARKS[goal["outcome"]], ms=11, mec="white")
+        ax.text(x, y, str(k + 1), color="white", ha="center", va="center", fontsize=8)
+    who = run.identity
+    ax.set_title(f"{who['slam']}, dynamism {who['dynamism']:g}, seed {who['seed']}", fontsize=9)
+    ax.set(xlim=(0, room.shape[1]), ylim=(room.shape[0], 0))
+    ax.axis("off")
+
+
+def _legend() -> list[Line2D]:
+    lines = [
+        Line2D([], [], color=COLORS["truth"], label="true path"),
+        Line2D([], [], color="#1f61be", ls=":", label="believed path"),
+    ]
+    return lines + [
+        Line2D([], [], color=color, marker="o", ls="", label=outcome)
+        for outcome, color in MARKS.items()
+    ]

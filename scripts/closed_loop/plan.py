@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is to be driven, and the job that one run is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import scenes
+import sim
+import slam
+from scripts.compare.plan import source_of, sources
+from scripts.jobs import Job
+from scripts.session import file_name
+from sim.loop import LoopConfig, LoopRun, closed_loop
+from sim.simulation import Simulation
+from slam.errors import InvalidValueError
+from slam.guests.pipe import Limits, limited
+
+RUNS = "runs"  # folder of the jobs' files
+MAX_RUNS = 100_000
+IDENTITY = ("scene", "dynamism", "seed", "slam")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Every SLAM in the same worlds: at every level, with every seed.
+
+    goals  names, or how many of the seed's order; () is all
+    """
+
+    scene: str
+    slams: tuple[str, ...]
+    levels: tuple[float, ...]
+    seeds: tuple[int, ...]
+    goals: tuple[str, ...] | int = ()
+    loop: LoopConfig = field(default_factory=LoopConfig)
+
+    def __post_init__(self) -> None:
+        for name in ("slams", "levels", "seeds"):
+            values = getattr(self, name)
+            if not values or len(set(values)) != len(values):
+                raise InvalidValueError(f"Plan.{name} must be one or more, each once, got {values}")
+        if any(not 0.0 <= level <= 1.0 for level in self.levels):
+            raise InvalidValueError(f"--dynamism must lie in [0, 1], got {self.levels}")
+        if min(self.seeds) < 0:
+            raise InvalidValueError(f"--seeds must be >= 0, got {self.seeds}")
+        if isinstance(self.goals, int) and self.goals < 1:
+            raise InvalidValueError(f"--goals must be names or a number >= 1, got {self.goals}")
+        if len(self.slams) * len(self.levels) * len(self.seeds) > MAX_RUNS:
+            raise InvalidValueError(f"at most {MAX_RUNS} runs can be driven at once")
+
+    def jobs(self) -> Iterator[tuple[dict[str, Any], Job]]:
+        """Identity and job of each run, SLAM by SLAM within a seed, seeds within a level."""
+        for level in self.levels:
+            for seed in self.seeds:
+                for name in self.slams:
+                    identity = (self.scene, level, seed, name)
+                    yield dict(zip(IDENTITY, identity, strict=True)), self._job(level, seed, name)
+
+    def _job(self, level: float, seed: int, name: str) -> Job:
+        goals = list(self.goals) if isinstance(self.goals, tuple) else self.goals
+        return Job(
+            name=f"{file_name(self.scene)}_d{level:g}_s{seed}_{file_name(name)}",
+            call=run_one,
+            arguments={
+                "scene": self.scene, "dynamism": level, "seed": seed, "slam": name,
+                "goals": goals or None, "loop": asdict(self.loop),
+            },
+            code=(*sources(sim, scenes, slam), Path(__file__), *source_of(name)),
+        )  # fmt: skip
+
+
+def run_one(
+    path: Path,
+    *,
+    scene: str,
+    dynamism: float,
+    seed: int,
+    slam: str,
+    goals: list[str] | int | None,
+    loop: Mapping[str, Any],
+) -> None:
+    """A job: one run, into ``path``."""
+    simulation = Simulation(scene, seed=seed, dynamism=dynamism)
+    system = limited(slam, Limits())
+    run = closed_loop(simulation, system, config=LoopConfig(**loop), goals=goals, name=slam)
+    save(path, run)
+
+
+_ARRAYS = ("stamps_ns", "believed", "true", "commands", "trusted", "goal_of")
+
+
+def save(path: Path, run: LoopRun) -> None:
+    """Arrays as they are, goals and the rest as JSON."""
+    arrays = {name: getattr(run, name) for name in _ARRAYS}
+    rest = {f.name: getattr(run, f.name) for f in fields(run) if f.name not in _ARRAYS}
+    rest["goals"] = [asdict(goal) for goal in run.goals]
+    np.savez_compressed(path, **arrays, rest=np.array(json.dumps(rest)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Driven:
+    """A run read back: who and where, goals and the rest as ``LoopRun`` has them, arrays."""
+
+    identity: Mapping[str, Any]
+    goals: list[dict[str, Any]]
+    rest: Mapping[str, Any]
+    arrays: Mapping[str, Any]
+
+
+def load(path: Path, identity: Mapping[str, Any]) -> Driven:
+    """What ``save`` wrote."""
+    with np.load(path) as file:
+        rest = json.loads(file["rest"].item())
+        arrays = {name: file[name] for name in _ARRAYS}
+    return Driven(identity=identity, goals=rest.pop("goals"), rest=rest, arrays=arrays)
