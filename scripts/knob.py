@@ -20,10 +20,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import spearmanr
 
-from scripts.compare.columns import LOST_RULE
 from scripts.compare.folder import Compared, read
 from scripts.figures import color_of, save
 from slam.errors import InvalidValueError, MobiliaError
+from slam.lost import LOST_RULE
 
 PICTURE = Path("docs/pictures/dynamism.png")
 ATE, LOST, MOVING = "ate_unaligned_m", "lost", "moving_share_of_returns"

@@ -20,7 +20,7 @@ from scripts.session import file_name
 from sim.loop import LoopConfig, LoopRun, closed_loop
 from sim.simulation import Simulation
 from slam.errors import InvalidValueError
-from slam.guests.pipe import Limits, limited
+from slam.guests import Limits, limited
 
 RUNS = "runs"  # folder of the jobs' files
 MAX_RUNS = 100_000

@@ -25,8 +25,8 @@ from scripts.output import locked_folder, machine, write_recipe
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.files import write_text
+from slam.guests import Limits, limited
 from slam.lost import FOUND_RULE, LOST_RULE
-from slam.system import create
 
 SCHEMA = 1
 
@@ -111,7 +111,7 @@ def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
             known = ", ".join(sorted(built.goals))
             raise UnknownNameError(f"scene '{plan.scene}' has no goal '{name}'. Known: {known}.")
     for name in plan.slams:
-        create(name)
+        limited(name, Limits())
     out = out.absolute()
     with locked_folder(out):
         settings = {"drive_schema": SCHEMA, **asdict(plan)}

@@ -19,12 +19,13 @@ from typer.testing import CliRunner
 
 from scripts import knob
 from scripts.compare import folder, tables, verb
-from scripts.compare.columns import COLUMNS, LOST_M, lost_at
+from scripts.compare.columns import COLUMNS, lost_at
 from scripts.compare.plan import Plan
 from scripts.compare.recording import load
 from scripts.many import ManyValues, repeated
 from slam import Estimate, Trajectory, metrics, se2, system
 from slam.errors import InvalidValueError, LogFormatError, OutputError, UnknownNameError
+from slam.lost import LOST_M
 
 REPO = Path(__file__).resolve().parents[3]
 SECONDS = 1.6
@@ -244,7 +245,7 @@ def test_what_cannot_be_compared_is_said_in_a_line(tmp_path):
         Plan(slams=("odometry",), **{**PLAN, "levels": (2.0,)})
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
-    with pytest.raises(OutputError, match="no comparison"):
+    with pytest.raises(OutputError, match="choose another"):
         verb.carry_out(Plan(slams=("odometry",), **PLAN), tmp_path / "mine")
     with pytest.raises(LogFormatError):
         folder.read(tmp_path)
