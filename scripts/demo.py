@@ -10,7 +10,7 @@ import typer
 
 from scripts.session import Outputs
 
-FILM_FPS = 10  # each picture is a fresh 3D rendering on the CPU
+FILM_FPS = 15.0  # the whole demo is to last a minute on two cores
 
 
 def demo(
