@@ -29,6 +29,7 @@ PICTURE = Path("docs/pictures/dynamism.png")
 ATE, LOST, MOVING = "ate_unaligned_m", "lost", "moving_share_of_returns"
 LEAST_LEVELS = 3
 _BAND = 0.15
+_ASIDE = 0.015
 
 
 class Curve:
@@ -81,24 +82,23 @@ def picture(compared: Compared, path: Path) -> None:
     )  # fmt: skip
     figure = Figure(figsize=(4.2 * len(scenes), 5.2))
     grid: Any = figure.subplots(
-        2, len(scenes), sharex=True, sharey="row", squeeze=False, height_ratios=(1.5, 1.0)
+        2, len(scenes), sharex="col", sharey="row", squeeze=False, height_ratios=(1.5, 1.0)
     )
     for column, scene in enumerate(scenes):
         errors, losses = grid[0][column], grid[1][column]
         for k, slam in enumerate(slams):
             color = color_of(slam, slams)
-            _draw(errors, Curve(compared, scene, slam, ATE), 100.0, color, slam)
-            shifted = 0.008 * (k - 0.5 * (len(slams) - 1))
-            _draw(losses, Curve(compared, scene, slam, LOST), 100.0, color, slam, shifted)
+            _draw_errors(errors, Curve(compared, scene, slam, ATE), color, slam)
+            aside = _ASIDE * (k - 0.5 * (len(slams) - 1))
+            _draw_shares(losses, Curve(compared, scene, slam, LOST), aside, color)
         errors.set(title=scene, yscale="log")
         _name_levels(losses, Curve(compared, scene, slams[0], MOVING))
     runs = len(settings["seeds"])
     grid[0][0].set_ylabel("ATE in cm, unaligned\n(median, 95 % interval)")
     grid[1][0].set_ylabel("runs lost in %\n(95 % interval)")
     grid[1][0].set_ylim(-4.0, 104.0)
-    grid[0][0].legend(
-        *grid[0][-1].get_legend_handles_labels(), frameon=False, loc="best", fontsize=8
-    )
+    handles, labels = grid[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(slams), frameon=False)
     figure.supxlabel(
         f"dynamism (below: share of returns from things that move); {runs} runs of "
         f"{settings['seconds']:g} s a point",
@@ -107,14 +107,19 @@ def picture(compared: Compared, path: Path) -> None:
     save(figure, path)
 
 
-def _draw(ax: Axes, curve: Curve, scale: float, color: str, label: str, shift: float = 0.0) -> None:
+def _draw_errors(ax: Axes, curve: Curve, color: str, label: str) -> None:
     top = np.where(np.isfinite(curve.high), curve.high, np.nan)
-    ax.fill_between(
-        curve.levels + shift, curve.low * scale, top * scale, color=color, alpha=_BAND, lw=0.0
-    )
-    ax.plot(
-        curve.levels + shift, curve.values * scale, "o-", color=color, lw=1.6, ms=4, label=label
-    )
+    ax.fill_between(curve.levels, 100.0 * curve.low, 100.0 * top, color=color, alpha=_BAND, lw=0.0)
+    ax.plot(curve.levels, 100.0 * curve.values, "o-", color=color, lw=1.6, ms=4, label=label)
+
+
+def _draw_shares(ax: Axes, curve: Curve, aside: float, color: str) -> None:
+    """Side by side, so that curves at zero are all seen."""
+    below, above = curve.values - curve.low, curve.high - curve.values
+    ax.errorbar(
+        curve.levels + aside, 100.0 * curve.values, yerr=100.0 * np.stack([below, above]),
+        fmt="o-", color=color, lw=1.2, ms=4, elinewidth=0.8, capsize=2.0,
+    )  # fmt: skip
 
 
 def _name_levels(ax: Axes, moving: Curve) -> None:
