@@ -29,6 +29,7 @@ from slam.frames import NS_PER_S, Float, Frame
 from slam.replay import Replay, Track
 from slam.seen import SeenSpace
 from slam.shunting import ShuntingSlam
+from slam.shunting.occupancy import OccupancySlam
 
 SEEN_EVERY_NS = 200_000_000  # the areas of neighbouring scans overlap
 FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn anew
@@ -148,7 +149,11 @@ class Show:
 
     def holds(self) -> str:
         """What the map of the primary track is made of, where that is known."""
-        kinds = ((ShuntingSlam, "activities, "), (EkfSlam, f"landmarks ({SIGMAS:g} σ), "))
+        kinds = (
+            (OccupancySlam, "probabilities, "),
+            (ShuntingSlam, "activities, "),
+            (EkfSlam, f"landmarks ({SIGMAS:g} σ), "),
+        )
         system = self.track().system
         return next((words for kind, words in kinds if isinstance(system, kind)), "")
 
