@@ -12,12 +12,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import njit
 from slam.frames import Float
 from slam.shunting.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.network import Network
 from slam.shunting.slam import ShuntingSlam
+from slam.shunting.sweep import in_reach
 from slam.shunting.visibility import View, block_is_hidden, seen_empty
 from slam.system import Raster, register
 
@@ -26,27 +27,13 @@ HIT, MISS, MOST = 0.85, -0.4, 3.5
 STRUCK = 0.6  # impression of a cell that holds the end of a beam; fainter is only beside it
 
 
-@inner
-def _in_reach(
-    cells: Cells, view: View, ox: float, oy: float, size: float
-) -> tuple[int, int, int, int]:
-    """Directory rows and columns (first, past the last, each) that the view may reach."""
-    rows, columns = cells.directory.shape
-    return (
-        max(0, math.floor((oy - view.farthest) / size) - cells.corner[1] - 1),
-        min(rows, math.floor((oy + view.farthest) / size) - cells.corner[1] + 2),
-        max(0, math.floor((ox - view.farthest) / size) - cells.corner[0] - 1),
-        min(columns, math.floor((ox + view.farthest) / size) - cells.corner[0] + 2),
-    )
-
-
 @njit
 def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float) -> bool:
     """Let every block in view live: a grid also remembers where it saw nothing. False: no room."""
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
-    first_row, last_row, first_column, last_column = _in_reach(cells, view, ox, oy, size)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, ox, oy, size)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
             if cells.directory[row, column] >= 0:
@@ -81,7 +68,7 @@ def integrate(
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
     half = 0.71 * size
-    first_row, last_row, first_column, last_column = _in_reach(cells, view, ox, oy, size)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, ox, oy, size)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
             slot = cells.directory[row, column]

@@ -70,6 +70,20 @@ def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
     return total
 
 
+@inner
+def in_reach(
+    cells: Cells, view: View, ox: float, oy: float, size: float
+) -> tuple[int, int, int, int]:
+    """Directory rows and columns (first, past the last, each) that the view may reach."""
+    rows, columns = cells.directory.shape
+    return (
+        max(0, math.floor((oy - view.farthest) / size) - cells.corner[1] - 1),
+        min(rows, math.floor((oy + view.farthest) / size) - cells.corner[1] + 2),
+        max(0, math.floor((ox - view.farthest) / size) - cells.corner[0] - 1),
+        min(columns, math.floor((ox + view.farthest) / size) - cells.corner[0] + 2),
+    )
+
+
 @njit
 def integrate(
     cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, law: Law, write: bool
@@ -85,11 +99,7 @@ def integrate(
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
     half = 0.71 * size
-    rows, columns = cells.directory.shape
-    first_row = max(0, math.floor((oy - view.farthest) / size) - cells.corner[1] - 1)
-    last_row = min(rows, math.floor((oy + view.farthest) / size) - cells.corner[1] + 2)
-    first_column = max(0, math.floor((ox - view.farthest) / size) - cells.corner[0] - 1)
-    last_column = min(columns, math.floor((ox + view.farthest) / size) - cells.corner[0] + 2)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, ox, oy, size)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
             slot = cells.directory[row, column]
