@@ -127,9 +127,21 @@ def propagate(
     theta = float(np.asarray(T_a_b, dtype=np.float64)[2])
     bx, by, _ = np.asarray(T_b_c, dtype=np.float64).tolist()
     c, s = math.cos(theta), math.sin(theta)
-    F = np.array([[1.0, 0.0, -s * bx - c * by], [0.0, 1.0, c * bx - s * by], [0.0, 0.0, 1.0]])
-    G = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    P = np.asarray(covariance_a_b, dtype=np.float64)
-    Q = np.asarray(covariance_b_c, dtype=np.float64)
-    out: Array = F @ P @ F.T + G @ Q @ G.T
-    return 0.5 * (out + out.T)
+    f, g = -s * bx - c * by, c * bx - s * by  # last column of F
+    P0, P1, P2 = np.asarray(covariance_a_b, dtype=np.float64).tolist()
+    Q0, Q1, Q2 = np.asarray(covariance_b_c, dtype=np.float64).tolist()
+    FP = [[a + f * e for a, e in zip(P0, P2, strict=True)]]
+    FP += [[b + g * e for b, e in zip(P1, P2, strict=True)], P2]
+    GQ = [[c * a - s * b for a, b in zip(Q0, Q1, strict=True)]]
+    GQ += [[s * a + c * b for a, b in zip(Q0, Q1, strict=True)], Q2]
+    out = np.array(
+        [
+            [
+                p[0] + f * p[2] + c * q[0] - s * q[1],
+                p[1] + g * p[2] + s * q[0] + c * q[1],
+                p[2] + q[2],
+            ]
+            for p, q in zip(FP, GQ, strict=True)
+        ]
+    )
+    return np.asarray(0.5 * (out + out.T), dtype=np.float64)
