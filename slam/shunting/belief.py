@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from slam.frames import Float
-from slam.shunting.covariances import advance, observable
+from slam.shunting.covariances import advance, carried, observable
 from slam.shunting.matching import Match
 from slam.shunting.motion import Prediction
 from slam.shunting.residuals import Evidence
@@ -70,6 +70,19 @@ class Belief:
         """Going on in a map of before, which is off by ``covariance`` (3, 3) as a whole."""
         self._drift = covariance.copy()
         self.covariance = covariance.copy()
+
+    def odometry_part(self, motion: Float) -> Float:
+        """Covariance (3, 3), after ``motion`` in the map, of what odometry alone has told lately.
+
+        By so much the robot may be off the map in view; the map's own error is not in it. Nor is
+        what adds up along a corridor: there a match given leave to correct it would follow noise.
+        """
+        x, y = 0.0, 0.0
+        if self.along_rad is not None:
+            x, y = math.cos(self.along_rad), math.sin(self.along_rad)
+        out = np.empty((3, 3))
+        carried(self._blind, motion, x, y, out)
+        return out
 
     def update(
         self, T_map_before: Float, prediction: Prediction, match: Match, evidence: Evidence | None

@@ -105,19 +105,21 @@ def advance(
     F[0, 0] = F[1, 1] = F[2, 2] = 1.0
     F[0, 2], F[1, 2] = -motion[1], motion[0]
     precision, M, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    _inverse(prior, precision)
     _sandwich(F, drift, moved)
     for i in range(3):
         for j in range(3):
             drift[i, j] = moved[i, j]
     # odometry's: what the data leave of it
     _sandwich(F, blind, moved)
+    whole = _sum(moved, 1.0, prior)
+    _inverse(whole, precision)
     _inverse(_sum(data, 1.0, precision), M)
     for i in range(3):
         for j in range(3):
             N[i, j] = M[i, 0] * precision[0, j] + M[i, 1] * precision[1, j]
             N[i, j] += M[i, 2] * precision[2, j]
-    _sandwich(N, _sum(moved, 1.0, prior), blind)
+    _sandwich(N, whole, blind)
+    _inverse(prior, precision)
     # the shared error, as far as the data decide over the time that it stays the same
     _inverse(_sum(data, 1.0 / variances[2], precision), M)
     _sandwich(M, data, moved)
@@ -127,6 +129,25 @@ def advance(
             shared[i, j] = turns * variances[0] * moved[i, j]
             newest[i, j] = turns * variances[1] * moved[i, j]
             drift[i, j] += newest[i, j]
+
+
+@njit
+def carried(
+    covariance: NDArray[np.float64],
+    motion: NDArray[np.float64],
+    x: float,
+    y: float,
+    out: NDArray[np.float64],
+) -> None:
+    """``out``: a pose's covariance (3, 3) after a known ``motion`` (3,), both in the map frame.
+
+    Without the part along the unit vector (x, y); (0, 0): all of it.
+    """
+    T = np.zeros((3, 3))
+    T[0, 0], T[0, 1], T[1, 0], T[1, 1], T[2, 2] = 1.0 - x * x, -x * y, -x * y, 1.0 - y * y, 1.0
+    for i in range(2):
+        T[i, 2] = T[i, 1] * motion[0] - T[i, 0] * motion[1]
+    _sandwich(T, covariance, out)
 
 
 @njit

@@ -68,13 +68,16 @@ class Increments:
             found_out = match.matched, float(off[2]), data
             self.bias.learn(prediction.increment, prediction.elapsed, variances, found_out)
         share = min(match.tau * self._noise_share, 1.0)
-        self.nis, *found = innovation(prediction.covariance, prediction.prior, data, off, share)
+        self.nis, *found = innovation(
+            prediction.covariance + prediction.carried, prediction.prior, data, off, share
+        )
         (a, _, _), (_, b, _), (_, _, c) = prediction.unscaled.tolist()
+        (x, _, _), (_, y, _), (_, _, t) = prediction.carried.tolist()
         floor_m2, floor_rad2 = prediction.floor
         keep = math.exp(-1.0 / max(MEMORY, MEMORY_S / max(prediction.elapsed, 1e-3)))
         for k, unit, rest in (
-            (0, a + b, 2.0 * floor_m2 + found[2]),
-            (1, c, floor_rad2 + found[3]),
+            (0, a + b, 2.0 * floor_m2 + x + y + found[2]),
+            (1, c, floor_rad2 + t + found[3]),
         ):
             expected = float(self.scales[k]) * unit + rest
             square = min(found[k], WILD * expected)

@@ -53,7 +53,9 @@ class Prediction:
     elapsed      s since the previous frame
     unscaled     (3, 3) as stated or assumed, in the previous robot frame; zero: nothing to learn
     floor        m^2 and rad^2 that were added
-    loosened     (3, 3) that the matcher's prior has more than the covariance
+    loosened     (3, 3) that the matcher's prior of the increment has more than the covariance
+    carried      (3, 3) of the pose before, from odometry that no match has confirmed yet; zero
+                 where too little is in view: things that move would lead astray
     """
 
     T_map_robot: Float
@@ -64,11 +66,17 @@ class Prediction:
     unscaled: Float = field(default_factory=lambda: np.zeros((3, 3)))
     floor: tuple[float, float] = (0.0, 0.0)
     loosened: Float = field(default_factory=lambda: np.zeros((3, 3)))
+    carried: Float = field(default_factory=lambda: np.zeros((3, 3)))
+
+    @property
+    def step(self) -> Float:
+        """(3, 3) of the increment, as the matcher takes it."""
+        return self.covariance + self.loosened
 
     @property
     def prior(self) -> Float:
-        """(3, 3) as the matcher takes it."""
-        return self.covariance + self.loosened
+        """(3, 3) of the pose, as the matcher takes it."""
+        return self.covariance + self.loosened + self.carried
 
 
 def assumed_covariance(increment: Float) -> Float:

@@ -129,7 +129,7 @@ class Recovery:
         increment = prediction.increment
         T_map_robot = se2.compose(old.match.T_map_robot, increment)
         tracked = float(prediction.T_map_robot[2]) - float(increment[2])
-        covariance = turned(prediction.prior, float(old.match.T_map_robot[2]) - tracked)
+        covariance = turned(prediction.step, float(old.match.T_map_robot[2]) - tracked)
         match = self._climb(observations, T_map_robot, covariance)
         support = self._support(observations, match)
         scans = old.scans + 1

@@ -107,6 +107,9 @@ class ShuntingSlam:
             )
         prediction = self._predict(frame.odometry)
         observations = self._observe(frame, prediction.twist)
+        if float(observations.weights.sum()) >= TELLING:
+            motion = prediction.T_map_robot - self._T_map_robot
+            prediction = replace(prediction, carried=self._belief.odometry_part(motion))
         evidence = None
         if self._recovery is None:
             match = self._match(observations, prediction)

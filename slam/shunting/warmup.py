@@ -16,7 +16,7 @@ import numpy as np
 from slam.compiling import announced
 from slam.frames import LaserSpec, Scan
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.covariances import advance, innovation, observable
+from slam.shunting.covariances import advance, carried, innovation, observable
 from slam.shunting.impressions import from_scan, stamp
 from slam.shunting.matching import Matcher
 from slam.shunting.network import Network
@@ -42,6 +42,7 @@ def _run_all() -> None:
     advance(
         whole[0], whole[1], whole[2], whole[3], origin, covariance, covariance, (1.0, 1.0, 1.0, 1.0)
     )
+    carried(covariance, origin, 0.0, 0.0, np.eye(3))
     observable(covariance, 0.0, np.eye(3))
     innovation(covariance, covariance, covariance, origin, 1.0)
     for write in (False, True):

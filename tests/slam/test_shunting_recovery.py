@@ -40,6 +40,13 @@ def still(world: World2D, pose: tuple[float, float, float], seconds: float) -> l
     return frames(world, Drive(pose, ((0.0, 0.0, seconds),)), rate_hz=5.0, seed=3)
 
 
+def posts(dx: float = 0.0, dy: float = 0.0) -> World2D:
+    """Six posts with nothing behind them, moved by so much."""
+    corners = [(2.0, 0.0), (0.5, 1.8), (1.0, -1.5), (-2.0, 0.3), (-1.0, 1.6), (-0.6, -2.0)]
+    boxes = [rectangle(x + dx, y + dy, x + dx + 0.2, y + dy + 0.2) for x, y in corners]
+    return World2D(np.vstack(boxes))
+
+
 def states_of(system: ShuntingSlam, stream: list[Frame]) -> list[str]:
     return [system.update(frame.without_truth()).diagnostics["state"] for frame in stream]
 
@@ -77,18 +84,46 @@ def test_in_a_symmetric_room_dead_reckoning_says_which_of_two_places() -> None:
 
 def test_a_few_things_that_all_moved_do_not_make_a_robot_lost() -> None:
     """They may have moved as well as the robot: that is no evidence against the odometry."""
-    posts = [(2.0, 0.0), (0.5, 1.8), (1.0, -1.5), (-2.0, 0.3), (-1.0, 1.6), (-0.6, -2.0)]
-
-    def world(dx: float, dy: float) -> World2D:
-        boxes = [rectangle(x + dx, y + dy, x + dx + 0.2, y + dy + 0.2) for x, y in posts]
-        return World2D(np.vstack(boxes))
-
-    before = frames(world(0.0, 0.0), TURN, rate_hz=5.0, seed=3)
+    before = frames(posts(), TURN, rate_hz=5.0, seed=3)
     system = ShuntingSlam(FAST)
     states_of(system, before)
     truth = before[-1].truth
     assert truth is not None
     pose = tuple(float(v) for v in truth)
-    after = going_on(still(world(0.5, -0.4), pose, 6.0), before[-1])  # type: ignore[arg-type]
+    after = going_on(still(posts(0.5, -0.4), pose, 6.0), before[-1])  # type: ignore[arg-type]
     assert set(states_of(system, after)) == {"tracking"}
     np.testing.assert_allclose(system.trajectory().poses[-1], pose, atol=0.1)
+
+
+def test_after_a_blind_stretch_all_its_odometry_is_in_doubt_not_only_the_last_step() -> None:
+    world, system = World2D(arena()), ShuntingSlam(FAST)
+    before = frames(world, TURN, rate_hz=5.0, seed=3)
+    states_of(system, before)
+    x, y, heading = (float(v) for v in system.trajectory().poses[-1])
+    dark = blind_turn(before[-1], steps=400, said_rad=0.02, sd_rad=0.005)
+    assert set(states_of(system, dark)) == {"blind"}
+    there = (x, y, heading + 400 * 0.02 + 0.25)  # 2.5 standard deviations of all steps, 50 of one
+    for frame in going_on(still(world, there, 1.0), dark[-1], 0.03):
+        estimate = system.update(frame.without_truth())
+        assert estimate.diagnostics["state"] == "tracking"
+        error = estimate.T_map_robot - np.array(there)
+        assert math.hypot(float(error[0]), float(error[1])) < 0.02
+        assert abs(se2.wrap(float(error[2]))) < math.radians(1.2)
+
+
+def blind_turn(last: Frame, *, steps: int, said_rad: float, sd_rad: float) -> list[Frame]:
+    """Frames without a return, whose odometry turns on the spot, by so much a step."""
+    assert last.scan is not None
+    out = []
+    for step in range(1, steps + 1):
+        stamp = last.stamp_ns + step * 200_000_000
+        turn = np.array([0.0, 0.0, step * said_rad])
+        odometry = Odometry(
+            stamp_ns=stamp,
+            T_odom_robot=se2.compose(last.odometry.T_odom_robot, turn),
+            increment_covariance=np.diag([1e-6, 1e-6, sd_rad**2]),
+        )
+        ranges = np.full_like(last.scan.ranges, np.nan)
+        scan = Scan(stamp_ns=stamp, ranges=ranges, spec=last.scan.spec)
+        out.append(Frame(stamp_ns=stamp, odometry=odometry, scan=scan))
+    return out
