@@ -12,6 +12,7 @@ from rich.logging import RichHandler
 
 from scripts import interrupt
 from scripts.bench import bench
+from scripts.blame.verb import blame
 from scripts.closed_loop.verb import drive
 from scripts.compare.verb import compare
 from scripts.console import console, fail, note
@@ -52,6 +53,7 @@ app.command("sensor-card")(sensor_card)
 app.command("reproduce")(reproduce)
 app.command("compare", cls=ManyValues)(compare)
 app.command("drive", cls=ManyValues)(drive)
+app.command("blame")(blame)
 
 
 @app.callback()

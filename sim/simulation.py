@@ -149,6 +149,10 @@ class Simulation:
         """Geometry and timing of the scanner, as in every frame's scan."""
         return self.laser.spec
 
+    def use_laser(self, laser: Lms221) -> None:
+        """Go on with another scanner of the same timing on the same robot."""
+        self.laser, self._watch = laser, None
+
     @property
     def scan_period_s(self) -> float:
         """Seconds of simulated time that one ``observe`` takes."""

@@ -60,13 +60,26 @@ class Robot(NamedTuple):
     limits: Float
 
 
+class Pinned(NamedTuple):
+    """What is held where it is whatever acts on it (``sim.absence``); nothing in a plain run.
+
+    at, places  qpos addresses and what stands there; dofs; servos  actuators
+    """
+
+    at: NDArray[np.int64]
+    places: Float
+    dofs: NDArray[np.int64]
+    servos: NDArray[np.int64]
+
+
 class Actors(NamedTuple):
-    """Everybody who moves anything."""
+    """Everybody who moves anything, and what may not."""
 
     people: People
     doors: Leaves
     shoved: tuple[Shoved, Shoved, Shoved]
     rolled: tuple[Rolled, Rolled, Rolled]
+    pinned: Pinned
 
 
 class Watch(NamedTuple):
@@ -100,6 +113,18 @@ def control(time: float, robot: Robot, physics: Physics, actors: Actors) -> None
         roll_chairs(time, tick, rolled, qvel, qfrc)
 
 
+@njit
+def pin(physics: Physics, pinned: Pinned) -> None:
+    """Undo what moved the pinned things, or would."""
+    for k in range(len(pinned.at)):
+        physics.qpos[pinned.at[k]] = pinned.places[k]
+    for dof in pinned.dofs:
+        physics.qvel[dof] = 0.0
+        physics.qfrc[dof] = 0.0
+    for servo in pinned.servos:
+        physics.ctrl[servo] = 0.0
+
+
 def plain(table: Any) -> Any:
     """The same tables in plain tuples, which Numba takes over from Python three times faster."""
     return tuple(map(plain, table)) if isinstance(table, tuple) else table
@@ -108,7 +133,7 @@ def plain(table: Any) -> Any:
 @njit
 def _actors(parts: Any) -> Actors:
     """Inverse of ``plain``."""
-    folk, doors, shoved, rolled = parts
+    folk, doors, shoved, rolled, pinned = parts
     alive, rates, at, field, ways, crowd, servos, torsos, limbs, feet, sitting, hulls = folk
     people = People(
         alive, rates, Addresses(*at), Field(*field), Doors(*ways), Crowd(*crowd),
@@ -119,6 +144,7 @@ def _actors(parts: Any) -> Actors:
         Leaves(*doors),
         (Shoved(*shoved[0]), Shoved(*shoved[1]), Shoved(*shoved[2])),
         (Rolled(*rolled[0]), Rolled(*rolled[1]), Rolled(*rolled[2])),
+        Pinned(*pinned),
     )
 
 
@@ -175,6 +201,7 @@ def _advance(
             call(engine.step2, engine.model, engine.data)
             clock[0] += 1
             roll(robot.drive, step)
+            pin(physics, actors.pinned)
             if people.alive:
                 walk(
                     step, (physics.qpos, physics.qvel), people.torsos, people.limbs, people.feet,
@@ -182,6 +209,7 @@ def _advance(
                 )  # fmt: skip
             if clock[0] % SUBSTEPS_PER_TICK == 0:
                 control(clock[0] / SUBSTEPS_PER_S, robot, physics, actors)
+                pin(physics, actors.pinned)
         dof = robot.at[1]
         if robot.push[dof] != 0.0 or robot.push[dof + 1] != 0.0 or robot.push[dof + 2] != 0.0:
             if len(robot.touches.geoms) == 0 and not resumed:
@@ -194,6 +222,12 @@ def _advance(
         if watch.marks[row + 1]:
             note(watch.scanner)
     return last
+
+
+def loose() -> Pinned:
+    """Nothing is pinned."""
+    none = np.zeros(0, dtype=np.int64)
+    return Pinned(none, np.zeros(0), none, none)
 
 
 def unseen(rows: int) -> Any:

@@ -100,6 +100,7 @@ class World:
             self.bodies.place_robot(self.data, start)
         self.people.start(self.data)
         mujoco.mj_forward(self.model, self.data)
+        self._pinned = substeps.loose()
         self._room = self._tables()
         self._unseen = substeps.unseen(2)
         substeps.decide_first(self._room)
@@ -131,8 +132,18 @@ class World:
         mocap = (data.mocap_pos, data.mocap_quat)
         physics = substeps.Physics(data.qpos, data.qvel, data.ctrl, data.qfrc_applied, mocap)
         shoved, rolled = tables(self.model, self._shoves)
-        actors = substeps.Actors(self.people.table, self._doors.leaves, shoved, rolled)
+        actors = substeps.Actors(
+            self.people.table, self._doors.leaves, shoved, rolled, self._pinned
+        )
         return substeps.plain((self._clock, engine(self.model, data), robot, physics, actors))
+
+    def pin(self, pinned: substeps.Pinned) -> None:
+        """Hold things at a place from now on, and bring all poses up to date (``sim.absence``)."""
+        self._pinned = pinned
+        self.data.qpos[pinned.at] = pinned.places
+        self.data.qvel[pinned.dofs] = 0.0
+        self.bodies.restore_physics(self.data, self.bodies.physics_state(self.data))
+        self._room = self._tables()
 
     def _counters(self, stream: str) -> NDArray[np.uint64]:
         return self.seeds.counters(stream, len(self.scene.movers))

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which run is looked at: from its folder, or from what would make it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sim.recording.recipe import MAX_BYTES, Made, read_recipe
+from slam.errors import InvalidValueError, LogFormatError
+
+RECIPE = "recipe.json"
+COMMANDS = ("run", "demo")
+OF_THE_RUN = ("slams", "seconds", "simulation")  # in the recipe of a run; the rest is the world's
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A simulated tour and the SLAM on it.
+
+    settings  arguments of ``Simulation``
+    seconds   of the tour
+    slam      name or ``module:Class``
+    every     the SLAM gets one scan in so many
+    title     for people
+    folder    of the recorded run, if there is one
+    made      who recorded it, if that is known
+    """
+
+    settings: Mapping[str, Any]
+    seconds: float
+    slam: str = "shunting"
+    every: int = 1
+    folder: Path | None = None
+    made: Made | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.every, bool) or not isinstance(self.every, int) or self.every < 1:
+            raise InvalidValueError(f"--every must be a whole number >= 1, got {self.every!r}")
+
+    @property
+    def title(self) -> str:
+        """The world in a line."""
+        options = {k: v for k, v in self.settings.items() if isinstance(v, str | int | float)}
+        scene = options.pop("scene", "?")
+        return " · ".join([str(scene), *(f"{k} {v}" for k, v in sorted(options.items()))])
+
+
+def case_of(folder: Path, slam: str | None, every: int) -> Case:
+    """The case of a folder of ``mobilia run`` or ``demo``, or of an episode of a dataset.
+
+    Raises ``LogFormatError`` that names the file for what cannot be simulated again.
+    """
+    if not folder.exists():
+        raise LogFormatError(folder, "no such folder")
+    path = folder / RECIPE if folder.is_dir() else folder
+    words = _read(path)
+    if "recipe" in words:
+        return _episode(path, slam or "shunting", every)
+    command, settings = words.get("command"), words.get("settings")
+    if command not in COMMANDS:
+        raise LogFormatError(
+            path, f"no recipe of a run or an episode but of {command!r}: name one of its runs by "
+            "--scene, --dynamism, --seed, --every"
+        )  # fmt: skip
+    if not isinstance(settings, dict):
+        raise LogFormatError(path, "no recipe of a run: it has no settings")
+    if "scene" not in settings:
+        raise LogFormatError(path, "this run was on a log: only a simulated one can be run again")
+    slams = settings.get("slams")
+    if slam is None:
+        slam = next((s for s in slams if s != "odometry"), "odometry") if slams else "shunting"
+    seconds = settings.get("seconds")
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float):
+        raise LogFormatError(path, f"settings.seconds must be a number, got {seconds!r}")
+    world = {k: v for k, v in settings.items() if k not in OF_THE_RUN}
+    return Case(settings=world, seconds=seconds, slam=slam, every=every, folder=path.parent)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        raw = path.read_bytes()[: MAX_BYTES + 1]
+        words = json.loads(raw.decode("utf-8"))
+    except OSError as error:
+        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:
+        raise LogFormatError(path, f"no recipe: {error}") from error
+    if not isinstance(words, dict):
+        raise LogFormatError(path, "no recipe: expected an object")
+    return words
+
+
+def _episode(path: Path, slam: str, every: int) -> Case:
+    made = read_recipe(path)
+    recipe = made.recipe
+    if recipe.twin:
+        raise LogFormatError(
+            path, f"a {recipe.twin} twin cannot be changed: take an episode made without --twins"
+        )
+    settings = {k: v for k, v in recipe.simulation().items() if k != "labels"}
+    return Case(settings=settings, seconds=recipe.seconds, slam=slam, every=every, made=made)
+
+
+def options_of(words: list[str]) -> dict[str, Any]:
+    """``["walls=none", "n_chairs=6"]`` as arguments; ``InvalidValueError`` for anything else."""
+    found: dict[str, Any] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not (name.isidentifier() and equals and value):
+            raise InvalidValueError(f"--option must be NAME=VALUE, got {word!r}")
+        try:
+            found[name] = json.loads(value)
+        except ValueError:
+            found[name] = value
+    return found
