@@ -22,6 +22,7 @@ from scripts.generate import generate
 from scripts.listing import listing
 from scripts.many import ManyValues
 from scripts.render import render
+from scripts.report.verb import report
 from scripts.reproduce.verb import reproduce
 from scripts.run import run
 from scripts.sensor_card import sensor_card
@@ -54,6 +55,7 @@ app.command("reproduce")(reproduce)
 app.command("compare", cls=ManyValues)(compare)
 app.command("drive", cls=ManyValues)(drive)
 app.command("blame")(blame)
+app.command("report")(report)
 
 
 @app.callback()

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +81,8 @@ def merge(path: Path, recording: Path, entries: Mapping[str, Path]) -> list[Row]
 
 _OF_RECORDING = (
     "stamps_ns", "truth", "ranges", "hit", "mover_poses", "moving", "names", "kinds", "radii_m",
-    "closed", "static_map", "static_map_resolution_m", "T_world_origin",
+    "closed", "static_map", "static_map_resolution_m", "T_world_origin", "laser_angle_min",
+    "laser_angle_increment", "laser_range_max", "laser_T_robot_laser",
 )  # fmt: skip
 
 
@@ -109,20 +111,30 @@ class RunFile:
     mover_poses (n, m, 3), ``moving`` (n, m), ``names``, ``kinds``, ``radii_m`` of the movers
     hit        (n, beams) the mover that each beam met, -1 static, -2 nothing
     static_map what never moves, in the world frame
+    laser_angles (beams,) rad, ``laser_range_max`` m, ``T_robot_laser`` of the scanner
     """
 
     def __init__(self, path: Path) -> None:
         try:
-            with np.load(path) as file:
+            with path.open("rb") as opened, np.load(opened) as file:
                 self._arrays = dict(file)
-        except (OSError, ValueError) as error:
+            self._take()
+        except (OSError, ValueError, BadZipFile, EOFError) as error:
             raise LogFormatError(path, f"no run of a comparison: {error}") from error
+        except KeyError as error:
+            raise LogFormatError(path, f"no run of this schema: it lacks {error}") from error
+
+    def _take(self) -> None:
         a = self._arrays
         self.slams: list[str] = a["slams"].tolist()
         self.stamps_ns, self.truth, self.ranges = a["stamps_ns"], a["truth"], a["ranges"]
         self.mover_poses, self.moving, self.hit = a["mover_poses"], a["moving"], a["hit"]
         self.names, self.kinds = a["names"].tolist(), a["kinds"].tolist()
         self.radii_m = a["radii_m"]
+        beams = np.arange(self.ranges.shape[1])
+        self.laser_angles: Float = a["laser_angle_min"] + beams * a["laser_angle_increment"]
+        self.laser_range_max = float(a["laser_range_max"])
+        self.T_robot_laser: Float = a["laser_T_robot_laser"]
         self.static_map = Raster(
             values=a["static_map"].astype(np.float32),
             resolution_m=float(a["static_map_resolution_m"]),
@@ -187,7 +199,8 @@ class Compared:
 def read(folder: Path) -> Compared:
     """A comparison on file; ``LogFormatError`` for a folder that holds none."""
     compared = Compared(folder)
-    if compared.recipe.get("settings", {}).get("compare_schema") != SCHEMA:
+    settings = compared.recipe.get("settings")
+    if not isinstance(settings, dict) or settings.get("compare_schema") != SCHEMA:
         raise LogFormatError(folder, f"no comparison of schema {SCHEMA}")
     return compared
 
@@ -201,8 +214,8 @@ def _table(path: Path) -> list[Row]:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             return [{k: _value(k, v) for k, v in row.items()} for row in csv.DictReader(file)]
-    except (OSError, ValueError) as error:
-        raise LogFormatError(path, f"no table of a comparison: {error}") from error
+    except (OSError, ValueError, TypeError) as error:  # the last: a line of another length
+        raise LogFormatError(path, f"no table of a comparison: {_why(error)}") from error
 
 
 def _value(column: str, cell: str) -> Any:
@@ -215,5 +228,11 @@ def _json(path: Path) -> Row:
     try:
         data: Row = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise LogFormatError(path, f"no comparison: {error}") from error
+        raise LogFormatError(path, f"no comparison: {_why(error)}") from error
+    if not isinstance(data, dict):
+        raise LogFormatError(path, "no comparison: no JSON object")
     return data
+
+
+def _why(error: Exception) -> str:
+    return str(getattr(error, "strerror", None) or error)

@@ -33,7 +33,9 @@ def _between(low: float, high: float, share: float) -> float:
         return low
     if share == 1.0:
         return high
-    return 0.0 if low == -math.inf and high == math.inf else low + share * (high - low)
+    if math.isinf(low) or math.isinf(high):
+        return 0.0 if math.isinf(low) and math.isinf(high) else low + high
+    return low + share * (high - low)
 
 
 def median_interval(values: Sequence[float]) -> tuple[float, float]:
@@ -45,8 +47,8 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
     ranked = np.sort(np.array(values, dtype=np.float64)[draws], axis=1)
     low, high = ranked[:, (n - 1) // 2], ranked[:, n // 2]
     with np.errstate(invalid="ignore"):
-        medians = np.where(low == high, low, low + 0.5 * (high - low))
-    medians[np.isnan(medians)] = 0.0  # as in _between
+        medians = np.where(np.isinf(low + high), low + high, low + 0.5 * (high - low))
+    medians[np.isnan(low + high)] = 0.0  # as in _between
     tail = 0.5 * (1.0 - CONFIDENCE)
     listed = medians.tolist()
     return quantile(listed, tail), quantile(listed, 1.0 - tail)

@@ -26,6 +26,15 @@ def test_quantiles_bear_infinities():
     assert quantile([1.0, INF, INF], 0.5) == INF
     assert quantile([1.0, INF], 0.25) == INF
     assert quantile([-INF, INF], 0.5) == 0.0
+    assert quantile([-INF, 3.0], 0.5) == -INF
+
+
+def test_intervals_bear_infinities_as_quantiles_do():
+    always_better = [-INF, -INF, -INF, -3.0, -2.0, -1.0]
+    low, high = median_interval(always_better)
+    assert low == -INF
+    assert high < 0.0
+    assert median_interval([-v for v in always_better]) == (-high, INF)
 
 
 @pytest.mark.parametrize("n", [9, 10])

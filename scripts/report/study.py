@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison's tables, looked up by scene, level and SLAM, and what may be said of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from scripts.compare import tables
+from scripts.compare.columns import COLUMNS
+from scripts.compare.folder import LEVELS, PAIRED, RUNS, Compared, RunFile, read
+from slam.errors import LogFormatError
+
+Row = dict[str, Any]
+OURS = "shunting"
+SETTINGS = (
+    "slams", "scenes", "levels", "seeds", "seconds", "every", "scanner", "scan_limit_s",
+    "lost_rule",
+)  # fmt: skip
+LEAST_RUNS = 6  # with fewer not even all wins are unlikely enough by chance (sign test, 5 %)
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Rows by what they are about. ``ours`` is "shunting", or the first SLAM where it is absent."""
+
+    compared: Compared
+
+    @cached_property
+    def slams(self) -> list[str]:
+        """In the order in which they were named."""
+        return list(dict.fromkeys(str(row["slam"]) for row in self.compared.runs))
+
+    @cached_property
+    def scenes(self) -> list[str]:
+        """In the order in which they were named."""
+        return list(dict.fromkeys(str(row["scene"]) for row in self.compared.runs))
+
+    @cached_property
+    def levels(self) -> list[float]:
+        """Of dynamism, ascending."""
+        return sorted({float(row["dynamism"]) for row in self.compared.runs})
+
+    @property
+    def ours(self) -> str:
+        """The SLAM that the page asks about."""
+        return OURS if OURS in self.slams else self.slams[0]
+
+    @property
+    def rivals(self) -> list[str]:
+        """All others."""
+        return [slam for slam in self.slams if slam != self.ours]
+
+    @cached_property
+    def _by_level(self) -> dict[tuple[str, float, str, str], Row]:
+        return {
+            (row["scene"], row["dynamism"], row["slam"], row["metric"]): row
+            for row in self.compared.levels
+        }
+
+    def level(self, scene: str, dynamism: float, slam: str, metric: str) -> Row | None:
+        """The row of ``levels.csv``."""
+        return self._by_level.get((scene, dynamism, slam, metric))
+
+    def has(self, metric: str) -> bool:
+        """Whether any SLAM has that number."""
+        return any(row["metric"] == metric for row in self.compared.levels)
+
+    @cached_property
+    def _by_pair(self) -> dict[tuple[str, float, str, str, str], Row]:
+        found = {}
+        for row in self.compared.paired:
+            head = (row["scene"], row["dynamism"], row["metric"])
+            found[(*head, row["slam_a"], row["slam_b"])] = row
+            found[(*head, row["slam_b"], row["slam_a"])] = _turned(row)
+        return found
+
+    def pair(self, scene: str, dynamism: float, metric: str, a: str, b: str) -> Row | None:
+        """``a`` against ``b``: the row of ``paired.csv``, turned where it is the other way."""
+        return self._by_pair.get((scene, dynamism, metric, a, b))
+
+    def runs(self, scene: str, dynamism: float, slam: str) -> list[Row]:
+        """Rows of ``runs.csv``."""
+        return [
+            row
+            for row in self.compared.runs
+            if (row["scene"], row["dynamism"], row["slam"]) == (scene, dynamism, slam)
+        ]
+
+    def outcomes(self, scene: str, slam: str) -> Counter[str]:
+        """How its runs ended."""
+        return Counter(
+            row["outcome"]
+            for row in self.compared.runs
+            if (row["scene"], row["slam"]) == (scene, slam)
+        )
+
+    @cached_property
+    def least_runs(self) -> int:
+        """Runs of a SLAM at a level, at the fewest."""
+        return min(
+            len(self.runs(scene, level, slam))
+            for scene in self.scenes
+            for level in self.levels
+            for slam in self.slams
+        )
+
+    def run(self, row: Row) -> RunFile:
+        """The file of a row's run; ``LogFormatError`` where it does not hold that SLAM."""
+        file = self.compared.run(row["scene"], row["dynamism"], int(row["seed"]))
+        if row["slam"] not in file.slams:
+            raise LogFormatError(self.compared.folder, f"a run without {row['slam']}")
+        return file
+
+    def worst(self, scene: str, slam: str) -> Row:
+        """Its worst run: one that failed, or else the one of the largest error."""
+        rows = [row for row in self.compared.runs if (row["scene"], row["slam"]) == (scene, slam)]
+        return max(rows, key=_badness)
+
+    def typical(self, scene: str, dynamism: float, slam: str) -> Row:
+        """Its run in the middle."""
+        rows = sorted(self.runs(scene, dynamism, slam), key=_badness)
+        return rows[(len(rows) - 1) // 2]
+
+
+def _badness(row: Row) -> float:
+    value = tables.number(row, "ate_unaligned_m")
+    return -1.0 if value is None else value
+
+
+def _turned(row: Row) -> Row:
+    """The same pair the other way round."""
+    low, high = row["low"], row["high"]
+    return {
+        **row,
+        "slam_a": row["slam_b"],
+        "slam_b": row["slam_a"],
+        "median_difference": _minus(row["median_difference"]),
+        "low": _minus(high),
+        "high": _minus(low),
+        "wins": row["losses"],
+        "losses": row["wins"],
+    }
+
+
+def _minus(value: float | None) -> float | None:
+    return None if value is None else -value
+
+
+def verdict(row: Row, less_is_better: bool) -> int:
+    """1 where a of the pair is better, -1 where it is beaten, 0 where nobody can say.
+
+    The 95 % interval of the paired difference excludes zero, and there are ``LEAST_RUNS``.
+    """
+    if row["n"] < LEAST_RUNS or row["low"] is None or row["high"] is None:
+        return 0
+    if row["low"] > 0.0:
+        return -1 if less_is_better else 1
+    if row["high"] < 0.0:
+        return 1 if less_is_better else -1
+    return 0
+
+
+def study(folder: Path) -> Study:
+    """The comparison in ``folder``; ``LogFormatError`` for one that is missing, old or damaged."""
+    compared = read(folder)
+    absent = [key for key in SETTINGS if key not in compared.recipe["settings"]]
+    if absent:
+        raise LogFormatError(folder / "recipe.json", f"its settings lack '{absent[0]}'")
+    for name, rows, wanted in (
+        (RUNS, compared.runs, COLUMNS),
+        (LEVELS, compared.levels, tables.LEVEL_COLUMNS),
+        (PAIRED, compared.paired, tables.PAIRED_COLUMNS if compared.paired else ()),
+    ):
+        if not rows:
+            if name == PAIRED:  # one SLAM alone
+                continue
+            raise LogFormatError(folder / name, "a table without rows")
+        missing = [column for column in wanted if column not in rows[0]]
+        if missing:
+            raise LogFormatError(folder / name, f"a table without the column '{missing[0]}'")
+    return Study(compared)

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How every figure of the report looks, and a figure as SVG that sits in the page."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from scripts import figures
+
+INK, MUTED, RULE = "#20242c", "#6b7280", "#d9dce1"
+TRUTH = figures.COLORS["truth"]
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_GLYPHS = ("●", "■", "▲", "◆", "▼", "✚", "✖")
+_TICKS = (  # up to which ratio of the ends which multiples of a power of ten are labelled
+    (3.0, (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)),
+    (1000.0, (1.0, 2.0, 5.0)),
+    (math.inf, (1.0,)),
+)
+_RC: dict[str, Any] = {
+    "font.family": "sans-serif", "font.size": 9.0, "axes.labelsize": 9.0, "axes.titlesize": 9.5,
+    "axes.titleweight": "bold", "axes.titlelocation": "left", "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK, "text.color": INK, "xtick.color": MUTED, "ytick.color": MUTED,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.7,
+    "axes.grid": True, "axes.grid.axis": "y", "grid.color": RULE, "grid.linewidth": 0.6,
+    "axes.axisbelow": True, "legend.frameon": False,
+    "svg.fonttype": "none", "svg.hashsalt": "mobilia", "axes.unicode_minus": True,
+}  # fmt: skip
+
+
+def color(slam: str, slams: Sequence[str]) -> str:
+    """One colour per SLAM, the same as in every figure of a run."""
+    return figures.color_of(slam, slams)
+
+
+def marker(slam: str, slams: Sequence[str]) -> str:
+    """One marker per SLAM, for those who print in black or see colours otherwise."""
+    return _MARKERS[list(slams).index(slam) % len(_MARKERS)]
+
+
+def glyph(slam: str, slams: Sequence[str]) -> str:
+    """That marker as a letter."""
+    return _GLYPHS[list(slams).index(slam) % len(_GLYPHS)]
+
+
+def new_figure(width: float, height: float, *, margins: bool = True) -> Figure:
+    """Inches of 96 pixels; save it with ``svg``, under the same style."""
+    with mpl.rc_context(_RC):
+        figure = Figure(figsize=(width, height), layout="constrained" if margins else None)
+        figure.patch.set_alpha(0.0)
+        return figure
+
+
+def styled() -> Any:
+    """The context in which axes are made and drawn."""
+    return mpl.rc_context(_RC)
+
+
+def log_axis(ax: Axes) -> None:
+    """Decades in plain numbers, with 2 and 5 between them where there are few."""
+    lines = [np.asarray(line.get_ydata(orig=False), dtype=np.float64) for line in ax.lines]
+    values = np.concatenate(lines) if lines else np.zeros(0)
+    if not (values > 0.0).any():
+        return
+    ax.set_yscale("log", nonpositive="clip")
+    low, high = (_step(end, up) for end, up in zip(ax.get_ylim(), (False, True), strict=True))
+    ax.set_ylim(low, high)
+    subs = next(subs for most, subs in _TICKS if high / low <= most)
+    ax.yaxis.set_major_locator(LogLocator(subs=subs))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _at: f"{value:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _step(value: float, up: bool) -> float:
+    """The next 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(value))
+    steps = [power * k for k in (1.0, 2.0, 5.0, 10.0)]
+    return next(s for s in steps if s >= value) if up else max(s for s in steps if s <= value)
+
+
+def remark(ax: Axes, y: float, words: str, tint: str) -> None:
+    """Small words at the right end of a horizontal line, outside."""
+    ax.annotate(words, (1.0, y), xycoords=("axes fraction", "data"), xytext=(3, 0),
+                textcoords="offset points", va="center", color=tint, fontsize=8)  # fmt: skip
+
+
+def svg(figure: Figure, title: str) -> str:
+    """The figure as an ``<svg>`` element: scales with the page, its text is text."""
+    written = io.StringIO()
+    with styled():
+        figure.savefig(written, format="svg", metadata={"Date": None, "Creator": None})
+    text = written.getvalue()
+    text = text[text.index("<svg") :].rstrip()
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r' (?:width|height)="[\d.]+pt"', "", text, count=2)
+    escaped = title.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
+    return text.replace("<svg ", f'<svg role="img" aria-label="{escaped}" ', 1)

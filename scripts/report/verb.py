@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia report``: a comparison as one page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from scripts.console import console
+
+
+def report(
+    folder: Annotated[
+        Path, typer.Argument(help="Folder that mobilia compare wrote.", metavar="DIR")
+    ],
+) -> None:
+    """Write DIR/report.html: one page with everything in it, that opens from disk and prints.
+
+    [bold]mobilia report out/compare[/bold]
+    """
+    from scripts.report import page
+    from scripts.report.study import study
+
+    path = page.write(study(folder))
+    console.print(
+        f"Open [bold]{escape(str(path))}[/bold] ({path.stat().st_size / 1e6:.1f} MB).",
+        soft_wrap=True,
+    )

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The summary in words: who wins where, by how much, and where ours is beaten."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+
+from scripts.compare.columns import LESS_IS_BETTER, MORE_IS_BETTER
+from scripts.compare.tables import FAILED
+from scripts.report.metrics import METRICS, Metric
+from scripts.report.study import LEAST_RUNS, Study, verdict
+
+ATE = METRICS["ate_unaligned_m"]
+_FAILURES = {
+    "raised": "raised or ended", "hung": "hung", "nan": "gave a pose that is not finite",
+    "bad": "gave no answer to the frame",
+}  # fmt: skip
+_JUDGED = tuple(METRICS[key] for key in METRICS if key in (*LESS_IS_BETTER, *MORE_IS_BETTER))
+
+
+def listed(words: list[str]) -> str:
+    """a, b and c."""
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
+
+
+def levels_text(levels: list[float], of: list[float]) -> str:
+    """ "at dynamism 0 and 0.5", "at every level"."""
+    if len(levels) == len(of):
+        return "at every level" if len(of) > 1 else f"at dynamism {levels[0]:g}"
+    return "at dynamism " + listed([f"{level:g}" for level in levels])
+
+
+def leaders(study: Study, scene: str) -> list[str]:
+    """Who has the lowest median position error at which levels."""
+    led: dict[str, list[float]] = {}
+    for dynamism in study.levels:
+        found = []
+        for slam in study.slams:
+            row = study.level(scene, dynamism, slam, ATE.key)
+            if row is not None and math.isfinite(row["value"]):
+                found.append((row["value"], slam))
+        if found:
+            led.setdefault(min(found)[1], []).append(dynamism)
+    return [
+        f"{slam} has the lowest median position error {levels_text(at, study.levels)}"
+        + _clearly(study, scene, slam, at)
+        for slam, at in led.items()
+    ]
+
+
+def _clearly(study: Study, scene: str, slam: str, levels: list[float]) -> str:
+    """Whether its lead is more than chance, against everybody and at all these levels."""
+    others = [other for other in study.slams if other != slam]
+    if not others or study.least_runs < LEAST_RUNS:
+        return "."
+    unclear = [
+        other
+        for other in others
+        if not all(
+            (row := study.pair(scene, level, ATE.key, slam, other)) and verdict(row, True) == 1
+            for level in levels
+        )
+    ]
+    if not unclear:
+        return ", clearly before every other."
+    return f"; its lead over {listed(unclear)} is not clear everywhere there."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Against:
+    """Where one SLAM is better or worse than a rival, and in which measures (by how much)."""
+
+    rival: str
+    where: str
+    measures: list[str]
+
+
+def against_ours(study: Study, side: int) -> list[Against]:
+    """Where ours is beaten (``side`` -1) or better (1), by rival and place."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for rival in study.rivals:
+        for metric in _JUDGED:
+            where, most = _places(study, rival, metric, side)
+            if where:
+                words = f"{metric.name} ({metric.show(most)} {metric.unit})"
+                found.setdefault((rival, where), []).append(words)
+    return [
+        Against(rival=rival, where=where, measures=measures)
+        for (rival, where), measures in found.items()
+    ]
+
+
+def _places(study: Study, rival: str, metric: Metric, side: int) -> tuple[str, float]:
+    """Scenes and levels with that verdict, in words, and the largest median difference there."""
+    places: dict[str, list[float]] = {}
+    most = 0.0
+    for scene in study.scenes:
+        for level in study.levels:
+            row = study.pair(scene, level, metric.key, study.ours, rival)
+            if row is None or verdict(row, bool(metric.less_is_better)) != side:
+                continue
+            places.setdefault(scene, []).append(level)
+            most = max(most, abs(row["median_difference"] or 0.0))
+    if len(study.scenes) > 1 and all(places.get(s) == study.levels for s in study.scenes):
+        return "everywhere", most
+    said = [f"{scene} {levels_text(at, study.levels)}" for scene, at in places.items()]
+    return "; ".join(said), most
+
+
+def failures(study: Study) -> list[str]:
+    """Who failed, how and how often; nobody is a sentence too."""
+    said = []
+    for slam in study.slams:
+        counts = sum((study.outcomes(scene, slam) for scene in study.scenes), start=Counter())
+        failed = [f"{_FAILURES[word]} in {counts[word]}" for word in FAILED if counts[word]]
+        if failed:
+            said.append(f"{slam} {listed(failed)} of {counts.total()} runs.")
+    return said or ["No SLAM raised, hung or answered with what is no pose."]

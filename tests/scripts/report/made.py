@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison of three SLAMs made by hand: who wins where is known, nothing is simulated."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scripts.compare import folder as files
+from scripts.compare import tables
+from scripts.compare.columns import COLUMNS
+from scripts.output import write_recipe
+from slam.lost import LOST_RULE
+
+OURS, EKF, OWN = "shunting", "ekf", "own:Hanging"
+SCENE, LEVELS, SEEDS = "room", (0.0, 1.0), tuple(range(100, 106))
+SCANS, BEAMS = 20, 61
+# median position error, m: the EKF beats ours where nothing moves and is beaten where much does
+ERROR_M = {(OURS, 0.0): 0.02, (OURS, 1.0): 0.03, (EKF, 0.0): 0.01, (EKF, 1.0): 0.3,
+           (OWN, 0.0): 0.05, (OWN, 1.0): 0.05}  # fmt: skip
+
+
+def make(folder: Path, seeds: tuple[int, ...] = SEEDS) -> Path:
+    """Write what ``mobilia compare`` writes: tables, recipe and the files of the runs."""
+    rows = [
+        row_of(slam, level, seed) for level in LEVELS for seed in seeds for slam in (OURS, EKF, OWN)
+    ]
+    settings = {
+        "compare_schema": files.SCHEMA, "slams": [OURS, EKF, OWN], "scenes": [SCENE],
+        "levels": LEVELS, "seeds": seeds, "seconds": 4.0, "every": 8, "scanner": "full",
+        "scan_limit_s": 10.0, "lost_rule": LOST_RULE, "machine": {"processor": "an abacus"},
+    }  # fmt: skip
+    folder.mkdir(parents=True)
+    write_recipe(folder, "compare", settings)
+    files.write_csv(folder / files.RUNS, rows, COLUMNS)
+    files.write_csv(folder / files.LEVELS, tables.levels(rows), tables.LEVEL_COLUMNS)
+    files.write_csv(folder / files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS)
+    (folder / "runs").mkdir()
+    for level in LEVELS:
+        for seed in seeds:
+            np.savez_compressed(folder / "runs" / f"{SCENE}_d{level:g}_s{seed}.npz", **run_of())
+    return folder
+
+
+def row_of(slam: str, level: float, seed: int) -> dict[str, Any]:
+    """A row of ``runs.csv``; the guest hangs at dynamism 1."""
+    error_m = ERROR_M[slam, level] * (1.0 + 0.02 * (seed - 100))
+    row = {"scene": SCENE, "dynamism": level, "seed": seed, "slam": slam, "scans": SCANS,
+           "ms_per_scan_p50": 2.0, "peak_memory_mb": 5.0}  # fmt: skip
+    if slam == OWN and level == 1.0:
+        words = "SLAM 'own:Hanging', scan 9, hung: no answer within <10> s"
+        return row | {"outcome": "hung", "failure": words, "lost": 1, "lost_at_s": 1.8}
+    return row | {
+        "outcome": "finished", "lost": 0, "ate_unaligned_m": error_m, "rpe_m_per_m": 0.01,
+        "heading_rmse_rad": 0.002, "nees_over_3": 1.5, "ghost_rate": 0.1,
+    }  # fmt: skip
+
+
+def run_of() -> dict[str, Any]:
+    """The arrays of a run: a robot that drives along x in a room of 8 x 6 m, a chair, a door."""
+    stamps = np.arange(SCANS, dtype=np.int64) * 200_000_000
+    truth = np.tile([1.0, 3.0, 0.0], (SCANS, 1))
+    truth[:, 0] += 0.1 * np.arange(SCANS)
+    room = np.zeros((60, 80), np.uint8)
+    room[[0, -1]] = room[:, 0] = room[:, -1] = 1
+    movers = np.tile([[4.0, 2.0, 0.0], [6.0, 0.1, 1.0]], (SCANS, 1, 1))
+    arrays = {
+        "schema": files.SCHEMA, "slams": np.array([OURS, EKF, OWN]), "stamps_ns": stamps,
+        "truth": truth, "ranges": np.full((SCANS, BEAMS), 2.0, np.float32),
+        "hit": np.zeros((SCANS, BEAMS), np.int16), "mover_poses": movers,
+        "moving": np.arange(SCANS)[:, None] % 2 == [0, 0], "names": np.array(["chair1", "door1"]),
+        "kinds": np.array(["chair_visitor", "door"]), "radii_m": np.array([0.3, 0.9]),
+        "closed": np.zeros((2, 3)), "static_map": room, "static_map_resolution_m": 0.1,
+        "T_world_origin": np.zeros(3), "laser_angle_min": -math.pi / 2,
+        "laser_angle_increment": math.pi / (BEAMS - 1), "laser_range_max": 80.0,
+        "laser_T_robot_laser": np.zeros(3),
+    }  # fmt: skip
+    for k, answered in enumerate((SCANS, SCANS, 9)):
+        poses = truth[:answered] - truth[0] + [0.0, 0.02 * (k + 1), 0.0]
+        arrays |= {
+            f"slam{k}_stamps_ns": stamps[:answered], f"slam{k}_poses": poses,
+            f"slam{k}_covariances": np.tile(np.eye(3) * 1e-4, (answered, 1, 1)),
+            f"slam{k}_converged": np.ones(answered, np.bool_),
+            f"slam{k}_milliseconds": np.ones(answered),
+        }  # fmt: skip
+    arrays |= {
+        "slam0_map": np.where(room, 254, 255).astype(np.uint8), "slam0_map_resolution_m": 0.1,
+        "slam0_T_map_origin": np.array([-1.0, -3.0, 0.0]),
+    }  # fmt: skip
+    return arrays

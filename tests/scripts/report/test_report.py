@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report says who wins where, opens from disk alone, and refuses what is no comparison."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from scripts import cli
+from scripts.compare import folder as files
+from scripts.report import page, pictures, tables, words
+from scripts.report.metrics import METRICS, digits
+from scripts.report.study import study, verdict
+from slam.errors import LogFormatError
+from tests.scripts.report import made
+from tests.scripts.report.browser import CHROMIUM, Browser
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made.make(tmp_path_factory.mktemp("report") / "compare")
+
+
+@pytest.fixture(scope="module")
+def written(folder: Path) -> Path:
+    done = CliRunner().invoke(cli.app, ["report", str(folder)], catch_exceptions=False)
+    assert done.exit_code == 0
+    assert "report.html" in done.output
+    return folder / page.REPORT
+
+
+def test_ours_is_said_to_be_beaten_where_it_is(folder: Path):
+    one = study(folder)
+    assert words.against_ours(one, -1) == [
+        words.Against(
+            rival="ekf", where="room at dynamism 0", measures=["position error (ATE) (1.05 cm)"]
+        )
+    ]
+    better = {(item.rival, item.where): item.measures for item in words.against_ours(one, 1)}
+    assert better["ekf", "room at dynamism 1"] == ["position error (ATE) (28.3 cm)"]
+    assert better[made.OWN, "room at every level"] == ["position error (ATE) (∞ cm)"]
+    assert "runs lost (100 %)" in better[made.OWN, "room at dynamism 1"]
+
+
+def test_the_leaders_are_named_level_by_level(folder: Path):
+    assert words.leaders(study(folder), "room") == [
+        "ekf has the lowest median position error at dynamism 0, clearly before every other.",
+        "shunting has the lowest median position error at dynamism 1, clearly before every other.",
+    ]
+    assert words.failures(study(folder)) == ["own:Hanging hung in 6 of 12 runs."]
+
+
+def test_with_few_runs_nobody_wins(tmp_path: Path):
+    few = study(made.make(tmp_path / "few", seeds=(100, 101, 102, 103, 104)))
+    assert words.against_ours(few, -1) == words.against_ours(few, 1) == []
+    assert (
+        words.leaders(few, "room")[0] == "ekf has the lowest median position error at dynamism 0."
+    )
+
+
+def test_a_pair_reads_the_same_from_both_sides(folder: Path):
+    one = study(folder)
+    ours = one.pair("room", 0.0, "ate_unaligned_m", "shunting", "ekf")
+    theirs = one.pair("room", 0.0, "ate_unaligned_m", "ekf", "shunting")
+    assert ours is not None
+    assert theirs is not None
+    assert ours["median_difference"] == -theirs["median_difference"] > 0.0
+    assert (ours["low"], ours["high"]) == (-theirs["high"], -theirs["low"])
+    assert (ours["wins"], ours["losses"]) == (theirs["losses"], theirs["wins"]) == (0, 6)
+    for less_is_better in (True, False):
+        assert verdict(ours, less_is_better) == -verdict(theirs, less_is_better) != 0
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "n", "said"),
+    [(0.1, 0.2, 6, -1), (-0.2, -0.1, 6, 1), (-0.1, 0.1, 6, 0), (0.0, 0.1, 6, 0), (0.1, 0.2, 5, 0),
+     (None, 0.2, 9, 0), (math.inf, math.inf, 6, -1)],
+)  # fmt: skip
+def test_a_win_is_an_interval_beside_zero_of_enough_runs(low, high, n, said):
+    assert verdict({"low": low, "high": high, "n": n}, less_is_better=True) == said
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(0.0, "0"), (1.0, "1.00"), (-0.01234, "−0.0123"), (99.96, "100"), (1234.5, "1234"),
+     (9.996, "10.0"), (math.inf, "∞"), (1e-7, "1.0e-07")],
+)  # fmt: skip
+def test_numbers_are_shown_with_three_digits(value, shown):
+    assert digits(value) == shown
+
+
+def test_tables_show_units_intervals_and_failures(folder: Path):
+    one = study(folder)
+    table = tables.of_levels(one, "room", METRICS["ate_unaligned_m"])
+    assert table.caption == "position error (ATE), cm"
+    assert [cell.text for cell in table.rows[1]] == ["1", "3.15", "31.5", "∞"]
+    assert [cell.mark for cell in table.rows[1]] == ["", "best", "", ""]
+    difference = tables.of_pairs(one, "room", METRICS["ate_unaligned_m"]).rows[0][1]
+    assert (difference.text, difference.mark) == ("+1.05", "worse")
+    assert difference.small.endswith("0–0–6")
+    outcomes = tables.of_outcomes(one, "room").rows[2]
+    assert [(cell.text, cell.small) for cell in outcomes[1:]] == [
+        ("6 of 6", ""),
+        ("0 of 6", "6 hung"),
+    ]
+
+
+def test_the_moving_share_counts_beams_on_what_moves(folder: Path):
+    run = study(folder).compared.run("room", 1.0, 100)
+    np.testing.assert_array_equal(pictures.moving_share(run), np.arange(made.SCANS) % 2 == 0)
+
+
+class Addresses(HTMLParser):
+    """Everything that a page would fetch; and tags left open."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        self.found += [f"{tag} {value}" for name, value in attrs
+                       if name in ("src", "href", "xlink:href", "srcset", "data", "action")
+                       and value and not value.startswith(("#", "data:"))]  # fmt: skip
+        assert tag not in ("script", "link", "iframe", "object") or ("href", "data:,") in attrs
+
+
+def test_the_page_is_one_file_and_the_same_each_time(folder: Path, written: Path):
+    text = written.read_text(encoding="utf-8")
+    parser = Addresses()
+    parser.feed(text)
+    assert parser.found == []
+    assert not re.search(r"url\((?!#)|@import", text)
+    assert "within &lt;10&gt; s" in text  # what a guest says is no HTML
+    assert text.count("<svg") == 5 + 2 + 1 + 8  # curves, truth and a map, errors, moments
+    assert page.render(study(folder)) == text
+
+
+def damage(name: str):
+    def cut(folder: Path) -> None:
+        path = folder / name
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+    return cut
+
+
+def without_a_column(folder: Path) -> None:
+    rows = files.read(folder).runs
+    files.write_csv(folder / files.RUNS, rows, [name for name in rows[0] if name != "outcome"])
+
+
+def of_another_schema(folder: Path) -> None:
+    recipe = json.loads((folder / "recipe.json").read_text())
+    recipe["settings"]["compare_schema"] = 0
+    (folder / "recipe.json").write_text(json.dumps(recipe))
+
+
+def run_of_another_schema(folder: Path) -> None:
+    for path in (folder / "runs").glob("*.npz"):
+        np.savez(path, slams=np.array([made.OURS]))
+
+
+@pytest.mark.parametrize(
+    ("harm", "says"),
+    [
+        (lambda folder: (folder / "recipe.json").unlink(), "no comparison: No such file"),
+        (lambda folder: (folder / "recipe.json").write_text("[1]"), "no JSON object"),
+        (damage("recipe.json"), "recipe.json: no comparison"),
+        (of_another_schema, "no comparison of schema 1"),
+        (lambda folder: (folder / "runs.csv").unlink(), "runs.csv: no table of a comparison"),
+        (damage("levels.csv"), "levels.csv: no table of a comparison"),
+        (lambda folder: (folder / "paired.csv").write_bytes(b"\xff"), "paired.csv: no table"),
+        (lambda folder: (folder / "runs.csv").write_text("scene\n"), "a table without rows"),
+        (without_a_column, "a table without the column 'outcome'"),
+        (damage("runs/room_d1_s102.npz"), "room_d1_s102.npz: no run of a comparison"),
+        (run_of_another_schema, "it lacks 'stamps_ns'"),
+    ],
+)
+def test_what_is_no_comparison_is_told_in_a_line(tmp_path: Path, harm, says, monkeypatch, capsys):
+    folder = made.make(tmp_path / "compare")
+    harm(folder)
+    monkeypatch.setattr(sys, "argv", ["mobilia", "report", str(folder)])
+    with pytest.raises(SystemExit) as done:
+        cli.main()
+    assert done.value.code == 1
+    told = capsys.readouterr().err
+    assert says in told
+    assert told.count("\n") == 1
+    assert not (folder / page.REPORT).exists()
+    with pytest.raises(LogFormatError):
+        page.write(study(folder))
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here (apt-get install chromium)")
+def test_a_browser_shows_it_on_a_phone_and_on_a_desk(written: Path, tmp_path: Path):
+    with Browser(tmp_path) as browser:
+        for width in (375, 1280):
+            browser.open(written, width)
+            assert browser.evaluate("document.documentElement.scrollWidth") == width
+            boxes = "[...document.querySelectorAll('.scroll, figure, p, h1, h2, h3, pre, dl')]"
+            edge = f"Math.max(...{boxes}.map(box => box.getBoundingClientRect().right))"
+            assert browser.evaluate(edge) <= width
+            assert browser.evaluate("document.querySelectorAll('svg text').length") > 50
+        assert browser.console == []
+        asked = {address for address in browser.requests if not address.startswith("data:")}
+        assert asked == {written.as_uri()}
+        assert browser.printed().startswith(b"%PDF")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here (apt-get install chromium)")
+def test_the_browser_would_notice(tmp_path: Path):
+    """Two-sided: a page that asks, complains and overflows is caught."""
+    bad = tmp_path / "bad.html"
+    bad.write_text('<p style="width: 900px">x</p><img src="none.png"><script>undefined.x</script>')
+    with Browser(tmp_path / "profile") as browser:
+        browser.open(bad, 375)
+        assert browser.evaluate("document.documentElement.scrollWidth") > 375
+        assert any(address.endswith("none.png") for address in browser.requests)
+        assert browser.console
