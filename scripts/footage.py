@@ -100,7 +100,9 @@ def open_run(path: Path, *, view: str | None = "follow") -> Footage:
         )  # fmt: skip
     if "scene" not in settings or "seconds" not in settings:
         command = str(words.get("command", "?"))[:40]
-        raise LogFormatError(path, f"a run of 'mobilia {command}', which is no drive to be filmed")
+        raise LogFormatError(
+            path, f"made by 'mobilia {command}': runs, demos, episodes and logs can be filmed"
+        )
     known = {key: settings[key] for key in SIMULATED if key in settings}
     try:
         return replace(of_scene(known, view=view), slam=slam)

@@ -79,10 +79,10 @@ def render(
         require_ffmpeg()
     if rerun is not None:
         RerunLog.require()
-    with open_run(run, view=None if no_3d else view) as footage:
+    with open_run(run, view=view if out is not None and not no_3d else None) as footage:
         pace = _pace(footage, fps, from_s, to_s, speed)
         show = footage.show([slam or footage.slam or "shunting"], pace=pace, size=pixels)
-        if footage.no_camera and (out or strip_to):
+        if footage.no_camera:
             note(f"the film has no 3D panel: {footage.no_camera}")
         if strip_to is not None and not moments:
             moments = evenly(STRIP_PICTURES, pace.from_s, min(pace.to_s, footage.duration_s))

@@ -119,6 +119,17 @@ def test_an_episode_is_filmed_with_its_world_and_truth(tmp_path: Path):
     assert (picture == GREEN).all(axis=2).any()
 
 
+def test_a_twin_is_filmed_from_above(tmp_path: Path):
+    record(Recipe(scene="arena", seed=1, dynamism=1.0, seconds=0.5, twin="dynamic"), tmp_path)
+    last = []
+    for name in ("static", "dynamic"):
+        with open_run(tmp_path / f"arena-d1-s0001-{name}") as footage:
+            assert footage.title.endswith(f"{name} twin")
+            assert "twins" in footage.no_camera
+            last.append(pictures_at(footage.stream, footage.show(["odometry"]), [0.4])[0])
+    assert (last[0] != last[1]).any()
+
+
 def test_a_log_without_truth_is_filmed_without_it(tmp_path: Path):
     log = tmp_path / "bare.log"
     write_carmen(log, stream("arena", seed=1, seconds=1.0))
@@ -223,7 +234,7 @@ def test_what_is_no_run_is_told_in_one_line(run: Path, tmp_path: Path):
     (run / "recipe.json").write_text('{"settings": {"scene": "arena", "seconds": "long"}}')
     assert "no recipe of a run: seconds must be" in told(run)
     (run / "recipe.json").write_text('{"command": "bench", "settings": {}}')
-    assert "a run of 'mobilia bench'" in told(run)
+    assert "made by 'mobilia bench'" in told(run)
     (run / "recipe.json").write_text('{"settings": {"log": "intel.log", "slams": ["ekf"]}}')
     assert "render 'intel.log' itself with --slam ekf" in told(run)
 
