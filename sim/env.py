@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from scenes.scene import SCAN_HEIGHT
 from sim.env_options import episode
 from sim.lidar import Lms221Config, ScanResult
+from sim.pose_source import PoseSource
 from sim.seeds import Seeds
 from sim.simulation import Simulation
 from slam._jit import njit
 from slam.errors import InvalidValueError
 from slam.frames import LaserSpec
+from slam.system import SlamSystem
 
 V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
 GOAL_RADIUS_M = 0.4
@@ -27,14 +29,16 @@ _MAX_TICKS = 2**40
 Observation = dict[str, Any]  # arrays by name; Gymnasium types Dict spaces so
 
 
-def _observation_space(spec: LaserSpec) -> spaces.Dict:
+def _observation_space(spec: LaserSpec, *, believing: bool) -> spaces.Dict:
     n = spec.n_beams
+    believed = PoseSource.space() if believing else {}
     return spaces.Dict(
         {
             "ranges": spaces.Box(0.0, np.float32(spec.range_max), (n,), np.float32),
             "valid": spaces.Box(0, 1, (n,), np.uint8),
             "encoders": spaces.Box(-_MAX_TICKS, _MAX_TICKS, (2,), np.int64),
             "time": spaces.Box(0.0, 1e9, (), np.float64),
+            **believed,
         }
     )
 
@@ -69,11 +73,20 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     | `encoders` | (2,)  | int64   | ticks of the left and the right wheel since the reset       |
     | `time`     | ()    | float64 | s since the reset                                           |
 
+    With ``pose_source`` also what it believes:
+
+    | key        | shape | type    | meaning                                                     |
+    |------------|-------|---------|-------------------------------------------------------------|
+    | `pose`     | (3,)  | float64 | x m, y m, heading rad, in the frame of the start            |
+    | `trusted`  | ()    | uint8   | 0 while the SLAM does not trust its own estimate            |
+    | `goal`     | (2,)  | float64 | m, the goal as seen from `pose` (x ahead, y left); 0 if none |
+
     ### Info
-    Truth, only here: `pose` (3,) m, m, rad of the robot in the world; `frame`, the ``slam`` frame
-    of the scan (with truth; give a SLAM ``frame.without_truth()``); `contacts`, names of what the
-    robot touched during the step; `hard_collision`; `beam_time` (n,) s of each beam since the
-    reset; `movers` name -> (x, y, heading) of everything that can move; `goal_distance` m or None.
+    Truth, only here (but for ``pose_source="truth"``): `pose` (3,) m, m, rad of the robot in the
+    world; `frame`, the ``slam`` frame of the scan (with truth; give a SLAM
+    ``frame.without_truth()``); `contacts`, names of what the robot touched during the step;
+    `hard_collision`; `beam_time` (n,) s of each beam since the reset; `movers` name -> (x, y,
+    heading) of everything that can move; `goal_distance` m or None.
 
     ### Reward
     Metres of progress towards the goal during the step when ``options["goal"]`` gave one, else 0.
@@ -85,6 +98,9 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     ### Arguments
     ``scene``, ``dynamism``, ``laser``, ``scan_height_m``, ``odometry``, ``labels`` as in
     ``sim.Simulation``;
+    ``pose_source``: None, "odometry", "shunting", any other SLAM's name, "module:Class", a
+    ``SlamSystem``, or "truth"; it takes every scan and is reset with the environment, a failure of
+    it is a ``SlamFailedError``. Reward and the end of an episode go by the truth in any case;
     ``render_mode`` "rgb_array" (3D, needs OpenGL), "map" (2D, needs nothing) or None; ``view``
     "top", "follow" or "persp" for the former; ``render_size`` (width, height) px.
 
@@ -127,6 +143,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         time_limit_s: float = 60.0,
         terminate_on_collision: bool = False,
         labels: bool = False,
+        pose_source: str | SlamSystem | None = None,
         render_mode: str | None = None,
         view: str = "top",
         render_size: tuple[int, int] = (640, 480),
@@ -148,15 +165,18 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "odometry": odometry,
             "labels": labels,
         }
+        self._pose_source = None if pose_source is None else PoseSource(pose_source)
         self._view, self._size = view, render_size
         self._renderer: Any = None
         self._simulation: Simulation | None = None
         self._goal: tuple[float, float] | None = None
         self.goal_distance: float | None = None  # m, if this episode has a goal
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        spec = self._settings["laser"].spec()
+        self._set_space(self._settings["laser"].spec())
+
+    def _set_space(self, spec: LaserSpec) -> None:
         self._n_beams = spec.n_beams
-        self.observation_space = _observation_space(spec)
+        self.observation_space = _observation_space(spec, believing=self._pose_source is not None)
 
     @property
     def simulation(self) -> Simulation:
@@ -176,8 +196,9 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._close_renderer()
         self._simulation = Simulation(seed=own, **plan.settings)
         if self._simulation.spec.n_beams != self._n_beams:
-            self._n_beams = self._simulation.spec.n_beams
-            self.observation_space = _observation_space(self._simulation.spec)
+            self._set_space(self._simulation.spec)
+        if self._pose_source is not None:
+            self._pose_source.reset(self._simulation.world.robot_pose())
         scan = self._simulation.sense()
         self.goal_distance = self._goal_distance()
         return self._observation(scan), self._info()
@@ -216,14 +237,21 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _observation(self, scan: ScanResult) -> Observation:
         """What the robot knows by the scan that was just taken."""
-        spec = self.simulation.spec
+        simulation = self.simulation
+        spec = simulation.spec
         ranges, valid = _told(scan.ranges, spec.range_min, spec.range_max)
-        return {
+        observation = {
             "ranges": ranges,
             "valid": valid,
-            "encoders": self.simulation.encoders.ticks,
-            "time": np.array(self.simulation.world.time_ns * 1e-9),
+            "encoders": simulation.encoders.ticks,
+            "time": np.array(simulation.world.time_ns * 1e-9),
         }
+        if self._pose_source is not None:
+            frame = simulation.frame
+            assert frame is not None  # a scan was just taken
+            self._pose_source.take(frame)
+            observation |= self._pose_source.observation(self._goal)
+        return observation
 
     def _info(self) -> dict[str, Any]:
         world, frame = self.simulation.world, self.simulation.frame

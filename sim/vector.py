@@ -48,7 +48,8 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
     ``frames`` also ``frame`` (n,) objects; all with a mask of the same name and a leading "_", here
     always true.
 
-    ``settings`` are those of ``MobiliaEnv``; rendering is left to the single environment.
+    ``settings`` are those of ``MobiliaEnv``, ``pose_source`` by name only, so that each room has a
+    SLAM of its own; rendering is left to the single environment.
     """
 
     def __init__(
@@ -63,6 +64,12 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         for name, value in (("num_envs", num_envs), ("n_threads", n_threads)):
             if isinstance(value, bool) or not isinstance(value, int) or value < 1:
                 raise InvalidValueError(f"{name} must be a whole number >= 1, got {value!r}")
+        source = settings.get("pose_source")
+        if num_envs > 1 and source is not None and not isinstance(source, str):
+            raise InvalidValueError(
+                f"pose_source must be a name for {num_envs} environments, so that each has its "
+                f"own SLAM, got {source!r:.80}"
+            )
         self.num_envs = num_envs
         self.mode = _mode(autoreset_mode)
         self._frames = frames
