@@ -26,7 +26,9 @@ from slam.errors import InvalidValueError, MobiliaError
 from slam.lost import LOST_RULE
 
 PICTURE = Path("docs/pictures/dynamism.png")
-ATE, LOST, MOVING = "ate_unaligned_m", "lost", "moving_share_of_returns"
+ATE, ALIGNED, LOST = "ate_unaligned_m", "ate_se2_m", "lost"
+MOVING = "moving_share_of_returns"
+CORRELATED = {"ATE": ATE, "aligned": ALIGNED, "lost": LOST, "moving": MOVING}
 LEAST_LEVELS = 3
 _BAND = 0.15
 _ASIDE = 0.015
@@ -52,7 +54,7 @@ class Curve:
 
 
 def correlations(compared: Compared) -> list[dict[str, Any]]:
-    """A row for each scene and SLAM: rho of dynamism with the median ATE and the share lost."""
+    """A row for each scene and SLAM: rho of dynamism with what ``CORRELATED`` names."""
     settings = compared.recipe["settings"]
     if len(settings["levels"]) < LEAST_LEVELS:
         raise InvalidValueError(
@@ -63,9 +65,10 @@ def correlations(compared: Compared) -> list[dict[str, Any]]:
         {
             "scene": scene,
             "slam": slam,
-            "ate": Curve(compared, scene, slam, ATE).correlation(),
-            "lost": Curve(compared, scene, slam, LOST).correlation(),
-            "moving": Curve(compared, scene, slam, MOVING).correlation(),
+            **{
+                name: Curve(compared, scene, slam, metric).correlation()
+                for name, metric in CORRELATED.items()
+            },
         }
         for scene in settings["scenes"]
         for slam in settings["slams"]
@@ -144,13 +147,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 1
     print("Spearman's rho with dynamism, over the medians of the levels (nan: all the same)")
-    print(f"{'scene':12s}{'SLAM':16s}{'ATE':>8s}{'lost':>8s}{'moving share':>14s}")
+    heads = "".join(f"{name:>9s}" for name in CORRELATED)
+    print(f"{'scene':12s}{'SLAM':16s}{heads}")
     for row in rows:
-        print(
-            f"{row['scene']:12s}{row['slam']:16s}{row['ate']:8.2f}{row['lost']:8.2f}"
-            f"{row['moving']:14.2f}"
-        )
-    print(f"lost: {LOST_RULE}\n{wanted.out}")
+        numbers = "".join(f"{row[name]:9.2f}" for name in CORRELATED)
+        print(f"{row['scene']:12s}{row['slam']:16s}{numbers}")
+    print(
+        f"ATE: unaligned; aligned: the same after a rigid motion, without the error of the first "
+        f"scan, on which a map is built\nlost: {LOST_RULE}\nmoving: share of returns\n{wanted.out}"
+    )
     return 0
 
 

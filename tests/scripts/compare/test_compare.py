@@ -271,8 +271,8 @@ def test_the_knob(tmp_path, capsys):
     write_recipe(tmp_path, "compare", settings)
     folder.write_csv(tmp_path / "levels.csv", tables.levels(rows), tables.LEVEL_COLUMNS)
     found = {row["slam"]: row for row in knob.correlations(folder.read(tmp_path))}
-    assert found["ekf"]["ate"] == pytest.approx(1.0)
-    assert found["odometry"]["ate"] == pytest.approx(-0.5)
+    assert found["ekf"]["ATE"] == pytest.approx(1.0)
+    assert found["odometry"]["ATE"] == pytest.approx(-0.5)
     assert np.isnan(found["ekf"]["lost"])
     assert knob.main([str(tmp_path), "--out", str(tmp_path / "knob.png")]) == 0
     assert "ekf" in capsys.readouterr().out
