@@ -60,4 +60,4 @@ def landmarks_of(system: object) -> Float:
     if isinstance(system, EkfSlam):
         return system.landmarks().points_map
     assert isinstance(system, FeaturedShuntingSlam)
-    return peaks(system.network, PEAK)[0]
+    return peaks(system.network, PEAK).points_map

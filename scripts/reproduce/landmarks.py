@@ -49,7 +49,7 @@ SHARES = (0.0, 0.10, 0.25, 0.50, 0.75, 0.90)
 PAPER_SHARE = 0.25
 TARGET = (0.10, 0.50)  # shares of moving points at which the EKF is to be beaten
 EVERY = 10  # steps between two looks at which landmarks there are
-SHUNTING: dict[str, Any] = {"cell_m": 0.03, "range_m": 12.5, "freeze_below": 0.0}
+SHUNTING: dict[str, Any] = {"cell_m": 0.01, "range_m": 12.5, "freeze_below": 0.0}
 NAMES = ("odometry", "EKF", "shunting", "known associations")
 
 

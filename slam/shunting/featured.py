@@ -3,8 +3,10 @@
 
 "We use a general-purpose feature extractor to achieve positions and uncertainties of features, and
 use IPJC to perform data association" (section 4.3). Features are associated with the peaks of the
-map's activity; the pose that the accepted pairs agree on is where climbing starts, and only they
-pull. What was not accepted still writes to the map: nothing is classified.
+map's activity. For pairs of Gaussians the logarithms of Eq. (13) are squares, so the best pose is
+that of least squares: each feature and each peak with a covariance of its own, which is read off
+the shape of the peak's bell and the number of looks that made it. What was not accepted still
+writes to the map: nothing is classified.
 """
 
 from __future__ import annotations
@@ -22,16 +24,18 @@ from slam.ekf.hypotheses import Gates
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import Observations
-from slam.shunting.matching import Match
-from slam.shunting.motion import Prediction, inverted, turned
-from slam.shunting.peaks import peaks
+from slam.shunting.impressions import SIGMA_CELLS, Observations
+from slam.shunting.matching import Match, seen_by
+from slam.shunting.motion import Prediction, turned
+from slam.shunting.overlap import evaluate
+from slam.shunting.peaks import Peaks, peaks
 from slam.shunting.slam import ShuntingSlam
 from slam.system import Estimate, register
 
 LEAST_PEAK = 0.1  # lower activities are no landmark to associate with
-PEAK_CELLS = 0.25  # standard deviation of a peak's place beside its observations' own
+PEAK_CELLS = 0.15  # standard deviation of a peak's place beside its observations' own
 ENOUGH_PAIRS = 2  # fewer do not say where the robot is: then the whole map is matched
+LEAST_M2 = 1e-6  # variance of a feature, at least
 GATES = Gates()
 
 
@@ -62,14 +66,23 @@ class FeaturedShuntingSlam(ShuntingSlam):
         return super().update(frame)
 
     def _match(self, observations: Observations, prediction: Prediction) -> Match:
-        start, accepted = self._agreed(observations, prediction)
+        pose, accepted = self._agreed(observations, prediction)
         if int(accepted.sum()) < ENOUGH_PAIRS:
             return super()._match(observations, prediction)
         pulling = dataclasses.replace(observations, weights=accepted.astype(np.float64))
-        precision = inverted(prediction.covariance)
-        match = self._matcher.climb(self.network, pulling, start, prediction.T_map_robot, precision)
-        share = float(accepted.mean())
-        return dataclasses.replace(match, matched=match.matched * share, searched=True)
+        information = np.zeros((3, 3))
+        score, _ = evaluate(
+            self.network.cells, self._matcher.reward, seen_by(pulling), pose,
+            np.zeros(3), np.zeros(3), information,
+        )  # fmt: skip
+        return Match(
+            T_map_robot=pose,
+            information=information,
+            matched=float(accepted.mean()),
+            score=self.config.reward * score,
+            tau=self.config.reward,
+            searched=True,
+        )
 
     def _agreed(self, observations: Observations, prediction: Prediction) -> tuple[Float, Any]:
         """The pose (3,) after IPJC between features and peaks, and which features (n,) it took."""
@@ -77,28 +90,35 @@ class FeaturedShuntingSlam(ShuntingSlam):
         accepted = np.zeros(len(points), dtype=np.bool_)
         before = self._T_map_robot
         reach = self.config.range_m + 1.0
-        marks, _ = peaks(self.network, LEAST_PEAK, centre=before[:2], reach_m=reach)
-        if len(points) == 0 or len(marks) == 0:
+        marks = peaks(self.network, LEAST_PEAK, centre=before[:2], reach_m=reach)
+        n = len(marks.heights)
+        if len(points) == 0 or n == 0:
             return prediction.T_map_robot, accepted
-        lattice = (PEAK_CELLS * self.config.cell_m) ** 2 * np.eye(2)
         state = EkfFilter()
         state.pose = before.copy()
         state.add(
-            se2.transform(se2.inverse(before), marks), np.repeat(lattice[None], len(marks), axis=0)
+            se2.transform(se2.inverse(before), marks.points_map),
+            self._places(marks, prediction.elapsed),
         )
         in_robot = turned(prediction.covariance, -float(before[2]))
         state.predict(prediction.increment, in_robot)
-        (xx, xy, yy) = self._sensed(observations).T
-        covariances = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -1)
-        found = ipjc(state, np.arange(len(marks)), points, covariances, GATES)
+        covariances = self._sensed(observations)
+        found = ipjc(state, np.arange(n), points, covariances, GATES)
         accepted = found.landmarks >= 0
         state.update(found.landmarks[accepted], points[accepted], covariances[accepted])
         return state.pose.copy(), accepted
 
+    def _places(self, marks: Peaks, elapsed: float) -> Float:
+        """(n, 2, 2) how sure the peaks' places are, robot frame: one look's, over their number."""
+        looks = np.maximum(marks.ages_s / max(elapsed, 1e-3), 1.0)
+        R = se2.rotation(-float(self._T_map_robot[2]))
+        out: Float = np.einsum("ij,njk,lk->nil", R, marks.spreads / looks[:, None, None], R)
+        lattice = (PEAK_CELLS * self.config.cell_m) ** 2 * np.eye(2)
+        return 0.5 * (out + out.transpose(0, 2, 1)) + lattice
+
     def _sensed(self, observations: Observations) -> Float:
-        """(n, 3) the features' own covariances: without the width that the lattice needs, and twice
-        the sensor's share, because peaks were seen with the same sensor."""
-        floor = (0.8 * self.config.cell_m) ** 2
+        """(n, 2, 2) the features' own covariances: without the width that the lattice needs."""
+        floor = (SIGMA_CELLS * self.config.cell_m) ** 2 - LEAST_M2
         own = observations.covariances - np.array([floor, 0.0, floor])
-        out: Float = 2.0 * own + np.array([1e-6, 0.0, 1e-6])
+        out: Float = own[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
         return out

@@ -35,9 +35,10 @@ def test_peaks_lie_between_neurons_where_the_points_were(trace_s):
     rng = np.random.default_rng(0)
     points = np.stack([np.arange(-4.0, 4.0), rng.uniform(-5.0, 5.0, 8)], axis=1)
     points += rng.uniform(-0.05, 0.05, points.shape)
-    found, heights = peaks(network_of(points, trace_s=trace_s), 0.05)
+    there = peaks(network_of(points, trace_s=trace_s), 0.05)
+    found = there.points_map
     assert len(found) == len(points)
-    assert (heights > 0.05).all()
+    assert (there.heights > 0.05).all()
     order = np.argsort(found[:, 0])
     # the short-term activity I / (A + I) is flatter on top than I, so a little off a Gaussian
     np.testing.assert_allclose(found[order], points, atol=0.005)
@@ -46,9 +47,26 @@ def test_peaks_lie_between_neurons_where_the_points_were(trace_s):
 def test_peaks_beyond_reach_and_below_the_least_are_left_out():
     points = np.array([[1.0, 0.0], [30.0, 0.0]])
     network = network_of(points)
-    near, _ = peaks(network, 0.05, centre=np.zeros(2), reach_m=5.0)
-    np.testing.assert_allclose(near, points[:1], atol=0.01)
-    assert len(peaks(network, 1.0)[0]) == 0
+    near = peaks(network, 0.05, centre=np.zeros(2), reach_m=5.0)
+    np.testing.assert_allclose(near.points_map, points[:1], atol=0.01)
+    assert len(peaks(network, 1.0).heights) == 0
+
+
+def test_a_peak_is_as_wide_as_what_was_seen_and_as_old_as_it_was_looked_at():
+    c, s = np.cos(0.5), np.sin(0.5)
+    turn = np.array([[c, -s], [s, c]])
+    told = turn @ np.diag([0.12**2, 0.02**2]) @ turn.T
+    config = ShuntingConfig(cell_m=0.05, short_term_weight=0.0)  # its bell is flatter on top
+    network, at = Network(config), np.array([[3.01, 1.02]])
+    features = Features(stamp_ns=0, points_robot=at, covariances=told[None])
+    for _ in range(4):
+        stamp(network, from_features(features, config), np.zeros(3))
+        seen = from_features(features, config)
+        network.integrate(seen.view, np.zeros(3), 0.5, write=True)
+    there = peaks(network, 0.05)
+    np.testing.assert_allclose(there.spreads[0], told, atol=3e-4)
+    assert np.linalg.eigvalsh(there.spreads[0])[0] >= 0.0
+    np.testing.assert_allclose(there.ages_s, 2.0, atol=1e-5)
 
 
 @pytest.mark.parametrize("moving", [0.0, 0.5])
