@@ -195,7 +195,7 @@ def _sweep(report: Report, by_share: dict[float, list[Run]]) -> None:
         values = {name: [run.numbers[name]["rmse_m"] for run in runs] for name in NAMES}
         rows.append(
             [f"{share:.0%}"]
-            + [spread(values[name]).text("{:.3f}") for name in NAMES]
+            + [spread(values[name]).text("{:.4f}") for name in NAMES]
             + [sign_test(values[name], values["EKF"]).text() for name in NAMES[2:]]
         )
     report.say(
@@ -256,8 +256,7 @@ def fig8(run: Run) -> Any:
     figure.colorbar(image, ax=axes[1], shrink=0.6, label="activity")
     axes[0].set(title="(a) EKF with IPJC and landmark lifecycle")
     axes[1].set(title="(b) shunting map on features")
-    for ax in axes:
-        ax.legend(loc="lower left", fontsize=7, frameon=True)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
