@@ -173,22 +173,22 @@ class Compared:
     @cached_property
     def recipe(self) -> Row:
         """``recipe.json``."""
-        return _json(self.folder / "recipe.json")
+        return read_json(self.folder / "recipe.json")
 
     @cached_property
     def runs(self) -> list[Row]:
         """Rows of ``runs.csv``: numbers as floats (seed and counts too), empty as None."""
-        return _table(self.folder / RUNS)
+        return read_csv(self.folder / RUNS)
 
     @cached_property
     def levels(self) -> list[Row]:
         """Rows of ``levels.csv``."""
-        return _table(self.folder / LEVELS)
+        return read_csv(self.folder / LEVELS)
 
     @cached_property
     def paired(self) -> list[Row]:
         """Rows of ``paired.csv``."""
-        return _table(self.folder / PAIRED)
+        return read_csv(self.folder / PAIRED)
 
     def run(self, scene: str, dynamism: float, seed: int) -> RunFile:
         """One simulated run with all SLAMs."""
@@ -210,12 +210,13 @@ _WORDS = frozenset(
 )
 
 
-def _table(path: Path) -> list[Row]:
+def read_csv(path: Path) -> list[Row]:
+    """The rows of a table: numbers as floats, empty cells as None."""
     try:
         with path.open(newline="", encoding="utf-8") as file:
             return [{k: _value(k, v) for k, v in row.items()} for row in csv.DictReader(file)]
     except (OSError, ValueError, TypeError) as error:  # the last: a line of another length
-        raise LogFormatError(path, f"no table of a comparison: {_why(error)}") from error
+        raise LogFormatError(path, f"no table: {_why(error)}") from error
 
 
 def _value(column: str, cell: str) -> Any:
@@ -224,13 +225,14 @@ def _value(column: str, cell: str) -> Any:
     return cell if column in _WORDS else float(cell)
 
 
-def _json(path: Path) -> Row:
+def read_json(path: Path) -> Row:
+    """The object of a JSON file."""
     try:
         data: Row = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise LogFormatError(path, f"no comparison: {_why(error)}") from error
+        raise LogFormatError(path, f"cannot be read: {_why(error)}") from error
     if not isinstance(data, dict):
-        raise LogFormatError(path, "no comparison: no JSON object")
+        raise LogFormatError(path, "holds no JSON object")
     return data
 
 

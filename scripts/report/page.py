@@ -6,14 +6,15 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import jinja2
 
-from scripts.report import curves, metrics, pictures, style, tables, words
+from scripts.report import closed, curves, metrics, pictures, style, tables, words
+from scripts.report.closed import Driven
 from scripts.report.metrics import METRICS
 from scripts.report.study import LEAST_RUNS, Study
 from slam.files import write_text
@@ -22,22 +23,21 @@ REPORT = "report.html"
 TEMPLATE = Path(__file__).with_name("page.html")
 
 
-def write(study: Study) -> Path:
+def write(study: Study, drives: Sequence[Driven] = ()) -> Path:
     """Write ``report.html`` into the comparison's folder; its path."""
     path = study.compared.folder / REPORT
-    write_text(path, render(study))
+    write_text(path, render(study, drives))
     return path
 
 
-def render(study: Study) -> str:
+def render(study: Study, drives: Sequence[Driven] = ()) -> str:
     """The page as text: everything is in it, it asks for nothing."""
+    slams = list(dict.fromkeys([*study.slams, *(s for drive in drives for s in drive.slams)]))
     scenes = [_scene(study, scene) for scene in study.scenes]  # first: these read the runs
     return _template().render(
         study=study,
-        marks={
-            slam: (style.glyph(slam, study.slams), style.color(slam, study.slams))
-            for slam in study.slams
-        },
+        marks={slam: (style.glyph(slam, slams), style.color(slam, slams)) for slam in slams},
+        drives=[(drive, closed.curves(drive, slams), closed.table(drive)) for drive in drives],
         css=TEMPLATE.with_name("page.css").read_text(encoding="utf-8"),
         settings=study.compared.recipe["settings"],
         summary=_summary(study),

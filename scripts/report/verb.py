@@ -16,15 +16,21 @@ def report(
     folder: Annotated[
         Path, typer.Argument(help="Folder that mobilia compare wrote.", metavar="DIR")
     ],
+    drive: Annotated[
+        list[Path] | None,
+        typer.Option(help="Folders that mobilia drive wrote; DIR/drive* are found without."),
+    ] = None,
 ) -> None:
     """Write DIR/report.html: one page with everything in it, that opens from disk and prints.
 
     [bold]mobilia report out/compare[/bold]
     """
     from scripts.report import page
+    from scripts.report.closed import driven
     from scripts.report.study import study
 
-    path = page.write(study(folder))
+    found = [*(drive or []), *sorted(path for path in folder.glob("drive*") if path.is_dir())]
+    path = page.write(study(folder), [driven(one) for one in found])
     console.print(
         f"Open [bold]{escape(str(path))}[/bold] ({path.stat().st_size / 1e6:.1f} MB).",
         soft_wrap=True,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from scripts.closed_loop import tables as closed_loop
 from scripts.compare import folder as files
 from scripts.compare import tables
 from scripts.compare.columns import COLUMNS
@@ -91,3 +92,23 @@ def run_of() -> dict[str, Any]:
         "slam0_T_map_origin": np.array([-1.0, -3.0, 0.0]),
     }  # fmt: skip
     return arrays
+
+
+def make_drive(folder: Path) -> Path:
+    """What ``mobilia drive`` writes, as far as a report reads it; "own" never arrives."""
+    rows = []
+    for slam, reached in ((OURS, 3), ("own", 0)):
+        for level in LEVELS:
+            arrived = {"precision_m": 0.12, "precision_m_low": 0.1, "precision_m_high": 0.2}
+            rows.append({
+                "scene": SCENE, "dynamism": level, "slam": slam, "runs": 2, "goals": 4,
+                "reached": reached, "success": reached / 4, "success_low": 0.1 * reached,
+                "success_high": 0.95, "wrong": 1, "given_up": 0, "failed": 0, "time_s": 20.0,
+                "collisions_per_km": 1.5, "near_misses_per_km": 0.0, "runs_lost": 1,
+                "runs_recovered": 1, **(arrived if reached else {}),
+            })  # fmt: skip
+    folder.mkdir(parents=True)
+    loop = {"tolerance_m": 0.5, "plan_on": "layout"}
+    write_recipe(folder, "drive", {"drive_schema": 1, "loop": loop})
+    files.write_csv(folder / "levels.csv", rows, closed_loop.LEVEL_COLUMNS)
+    return folder

@@ -16,7 +16,8 @@ from typer.testing import CliRunner
 
 from scripts import cli
 from scripts.compare import folder as files
-from scripts.report import page, pictures, tables, words
+from scripts.report import closed, page, pictures, tables, words
+from scripts.report.closed import driven
 from scripts.report.metrics import METRICS, digits
 from scripts.report.study import study, verdict
 from slam.errors import LogFormatError
@@ -118,6 +119,31 @@ def test_the_moving_share_counts_beams_on_what_moves(folder: Path):
     np.testing.assert_array_equal(pictures.moving_share(run), np.arange(made.SCANS) % 2 == 0)
 
 
+def test_a_drive_beside_the_comparison_is_told_too(folder: Path, tmp_path: Path):
+    drive = driven(made.make_drive(tmp_path / "drive"))
+    assert drive.levels == [0.0, 1.0]
+    shown = [[(cell.text, cell.small) for cell in row] for row in closed.table(drive).rows]
+    assert shown[1][:4] == [("shunting", ""), ("1", ""), ("3 of 4", "30 to 95 %"), ("1", "")]
+    assert shown[1][6] == ("12.0", "10.0 to 20.0")
+    assert shown[3][6] == ("–", "")  # another SLAM, which believed itself nowhere
+    text = page.render(study(folder), [drive])
+    assert text.count("<svg") == page.render(study(folder)).count("<svg") + 2
+    assert "ways planned on the layout" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [("recipe.json", "{}", "no closed-loop drive of schema"),
+     ("levels.csv", "scene,dynamism\n", "a table without 'scene'"),
+     ("levels.csv", "scene,dynamism\na,0\n", "a table without 'slam'")],
+)  # fmt: skip
+def test_what_is_no_drive_is_told(tmp_path: Path, name: str, content: str, says: str):
+    folder = made.make_drive(tmp_path / "drive")
+    (folder / name).write_text(content)
+    with pytest.raises(LogFormatError, match=says):
+        driven(folder)
+
+
 class Addresses(HTMLParser):
     """Everything that a page would fetch; and tags left open."""
 
@@ -170,12 +196,15 @@ def run_of_another_schema(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("harm", "says"),
     [
-        (lambda folder: (folder / "recipe.json").unlink(), "no comparison: No such file"),
-        (lambda folder: (folder / "recipe.json").write_text("[1]"), "no JSON object"),
-        (damage("recipe.json"), "recipe.json: no comparison"),
+        (
+            lambda folder: (folder / "recipe.json").unlink(),
+            "recipe.json: cannot be read: No such file",
+        ),
+        (lambda folder: (folder / "recipe.json").write_text("[1]"), "holds no JSON object"),
+        (damage("recipe.json"), "recipe.json: cannot be read"),
         (of_another_schema, "no comparison of schema 1"),
-        (lambda folder: (folder / "runs.csv").unlink(), "runs.csv: no table of a comparison"),
-        (damage("levels.csv"), "levels.csv: no table of a comparison"),
+        (lambda folder: (folder / "runs.csv").unlink(), "runs.csv: no table"),
+        (damage("levels.csv"), "levels.csv: no table"),
         (lambda folder: (folder / "paired.csv").write_bytes(b"\xff"), "paired.csv: no table"),
         (lambda folder: (folder / "runs.csv").write_text("scene\n"), "a table without rows"),
         (without_a_column, "a table without the column 'outcome'"),

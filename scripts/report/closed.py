@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Closed-loop results (``mobilia drive``) as a part of the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from matplotlib.ticker import MaxNLocator
+
+from scripts.closed_loop.tables import LEVEL_COLUMNS
+from scripts.closed_loop.verb import SCHEMA
+from scripts.compare.folder import Row, read_csv, read_json
+from scripts.report import style
+from scripts.report.curves import HEIGHT, WIDTH
+from scripts.report.metrics import digits
+from scripts.report.tables import Cell, Table
+from slam.errors import LogFormatError
+
+SUCCESS = ("success", "success_low", "success_high")
+PRECISION = ("precision_m", "precision_m_low", "precision_m_high")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Driven:
+    """The folder of a drive: its recipe's settings and the rows of its ``levels.csv``."""
+
+    settings: dict[str, Any]
+    rows: list[Row]
+
+    @property
+    def scene(self) -> str:
+        """A drive has one."""
+        return str(self.rows[0]["scene"])
+
+    @property
+    def slams(self) -> list[str]:
+        """In the order in which they were named."""
+        return list(dict.fromkeys(str(row["slam"]) for row in self.rows))
+
+    @property
+    def levels(self) -> list[float]:
+        """Of dynamism, ascending."""
+        return sorted({float(row["dynamism"]) for row in self.rows})
+
+    def of(self, slam: str) -> list[Row]:
+        """A SLAM's rows."""
+        return [row for row in self.rows if row["slam"] == slam]
+
+
+def driven(folder: Path) -> Driven:
+    """A drive on file; ``LogFormatError`` for a folder that holds none."""
+    settings = read_json(folder / "recipe.json").get("settings")
+    if not isinstance(settings, dict) or settings.get("drive_schema") != SCHEMA:
+        raise LogFormatError(folder, f"no closed-loop drive of schema {SCHEMA}")
+    loop = settings.get("loop")
+    if not isinstance(loop, dict) or not {"tolerance_m", "plan_on"} <= loop.keys():
+        raise LogFormatError(folder / "recipe.json", "its settings lack 'loop'")
+    rows = read_csv(folder / "levels.csv")
+    missing = [column for column in LEVEL_COLUMNS if not rows or column not in rows[0]]
+    if missing:
+        raise LogFormatError(folder / "levels.csv", f"a table without '{missing[0]}'")
+    return Driven(settings=settings, rows=rows)
+
+
+def curves(drive: Driven, slams: Sequence[str]) -> list[tuple[str, str]]:
+    """(name, SVG) of goals reached and of precision against dynamism; ``slams`` give colours."""
+    return [
+        ("goals reached", _curve(drive, slams, SUCCESS, "goals truly reached, %")),
+        ("precision", _curve(drive, slams, PRECISION, "distance from the goal, cm")),
+    ]
+
+
+def _curve(drive: Driven, slams: Sequence[str], keys: tuple[str, str, str], label: str) -> str:
+    figure = style.new_figure(WIDTH, HEIGHT)
+    with style.styled():
+        ax = figure.subplots()
+        for slam in drive.slams:
+            at = style.apart(slam, slams, drive.levels)
+            points = []
+            for row in drive.of(slam):
+                value, low, high = (_percent(row[key]) for key in keys)
+                points.append((row["dynamism"] + at, value, low, high))
+            style.line(ax, points, style.color(slam, slams), style.marker(slam, slams))
+        ax.set_ylabel(label)
+        ax.set_ylim(0.0, 103.0 if keys == SUCCESS else None)
+        ax.yaxis.set_major_locator(MaxNLocator(5))
+        style.level_axis(ax, drive.levels)
+    return style.svg(figure, f"{label} against dynamism in {drive.scene}")
+
+
+def _percent(value: float | None) -> float:
+    """Shares in percent as metres in centimetres."""
+    return math.nan if value is None else 100.0 * value
+
+
+def table(drive: Driven) -> Table:
+    """A row for each SLAM and level."""
+    rows = [
+        [
+            Cell(text=str(row["slam"])),
+            Cell(text=f"{row['dynamism']:g}"),
+            Cell(
+                text=f"{row['reached']:g} of {row['goals']:g}",
+                small=f"{100.0 * row['success_low']:.0f} to {100.0 * row['success_high']:.0f} %",
+            ),
+            *(Cell(text=f"{row[key]:g}") for key in ("wrong", "given_up", "failed")),
+            _precision(row),
+            *(_number(row[key]) for key in ("time_s", "collisions_per_km", "near_misses_per_km")),
+            Cell(text=f"{row['runs_lost']:g} of {row['runs']:g}",
+                 small=f"{row['runs_recovered']:g} recovered"),
+        ]
+        for slam in drive.slams
+        for row in drive.of(slam)
+    ]  # fmt: skip
+    head = ["SLAM", "dynamism", "reached", "wrong", "given up", "failed", "precision, cm",
+            "time, s", "collisions per km", "near misses per km", "runs lost"]  # fmt: skip
+    return Table(caption=drive.scene, head=head, rows=rows)
+
+
+def _precision(row: Row) -> Cell:
+    low, high = (row[key] for key in PRECISION[1:])
+    small = "" if low is None or high is None else f"{digits(100 * low)} to {digits(100 * high)}"
+    return Cell(text=_number(row["precision_m"], 100.0).text, small=small)
+
+
+def _number(value: float | None, factor: float = 1.0) -> Cell:
+    return Cell(text="–" if value is None else digits(value * factor))
