@@ -4,7 +4,7 @@
 A mover that is **out** is parked beside the floor, held there, touches nothing and is met by no
 ray; a door, which cannot leave its hinge, stands wide open instead, unseen and untouchable (people
 still keep a hand's breadth off the open leaf). One that is **frozen** stays where it is, whatever
-pushes it: nobody shoves it, it does not walk, its closer does not pull.
+pushes it: nobody shoves it, it does not walk (a foot in the air comes down), no closer pulls it.
 
 The model keeps its size, so a state saved without either fits a simulation with it and the other
 way round. Nobody else draws other numbers: every actor has a generator of its own. What the others

@@ -14,6 +14,7 @@ from slam.errors import InvalidValueError, LogFormatError
 
 RECIPE = "recipe.json"
 COMMANDS = ("run", "demo")
+NO_OPTIONS = ("scene", "seed", "dynamism", "laser", "labels", "tags")
 OF_THE_RUN = ("slams", "seconds", "simulation")  # in the recipe of a run; the rest is the world's
 
 
@@ -111,6 +112,8 @@ def options_of(words: list[str]) -> dict[str, Any]:
         name, equals, value = word.partition("=")
         if not (name.isidentifier() and equals and value):
             raise InvalidValueError(f"--option must be NAME=VALUE, got {word!r}")
+        if name in NO_OPTIONS:
+            raise InvalidValueError(f"--option {name}: that has an option of its own or none")
         try:
             found[name] = json.loads(value)
         except ValueError:

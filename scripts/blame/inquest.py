@@ -61,7 +61,7 @@ class Question:
                 raise InvalidValueError(f"--{name} must be a whole number >= 0, got {value!r}")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(kw_only=True, eq=False)
 class Trial:
     """One re-run.
 
@@ -265,7 +265,7 @@ def _repeat(found: Inquest, checkpoint: Checkpoint, trial: Trial, note: Note) ->
         note(f"{trial.change}, other noise {noise}", 1, 1)
         strip = checkpoint.rerun(trial.change, found.last, noise=noise)
         again += _rise_m(found, strip) < CURED * found.rise_m
-    object.__setattr__(trial, "again", again)
+    trial.again = again
 
 
 def _rise_m(found: Inquest, strip: Strip) -> float:

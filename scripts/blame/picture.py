@@ -22,7 +22,7 @@ from PIL import Image
 from scripts import draw
 from scripts.blame.inquest import CURED, Inquest, Trial
 from scripts.blame.tape import Strip, simulate
-from scripts.blame.words import headline
+from scripts.blame.words import headline, who
 from scripts.draw import Picture
 from scripts.strips import strips
 from sim.absence import Change
@@ -48,8 +48,7 @@ def blame_picture(path: Path, found: Inquest) -> None:
     shown = _shown(found)
     parts = {"as it was": camera.row(found.tape.strip, rows, None)}
     if shown is not None:
-        name = f"{shown.change}".partition(",")[0] if len(str(shown.change)) < 60 else "all changed"
-        parts[name] = camera.row(shown.strip, [row - found.first for row in rows], shown)
+        parts[who(shown)] = camera.row(shown.strip, [row - found.first for row in rows], shown)
     cells = strips(parts, seconds, cell_width=CELL_PX)
     picture = np.vstack([_title(found, cells.shape[1]), cells, _chart(found, cells.shape[1])])
     with replacing(path) as temporary:

@@ -165,12 +165,12 @@ class Checkpoint:
 
         Raises ``SlamFailedError`` for a SLAM that does not repeat itself.
         """
-        if not self._repeats(last) and self.how == "copy":
+        if self._repeats(last):
+            return
+        if self.how == "copy":
             self.how = "replay"
             if self._repeats(last):
                 return
-        elif self._repeats(last):
-            return
         raise SlamFailedError(
             f"SLAM '{self.tape.case.slam}' does not repeat itself on the same frames: "
             "no counterfactual can be told from chance"

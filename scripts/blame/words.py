@@ -52,7 +52,7 @@ def headline(found: Inquest) -> tuple[str, str]:
     if verdict == "joint":
         together = found.named[0]
         return (
-            f"Joint: nobody alone, but {_who(found, together)} cures it",
+            f"Joint: nobody alone, but {who(together)} cures it",
             f"{sure} Cured in {together.again} of {question.repeats}.",
         )
     why = "sensor, geometry or odometry"
@@ -73,10 +73,11 @@ def _named(found: Inquest) -> str:
 def _tries(found: Inquest) -> str:
     tries = (found.cures or found.together)[:3]
     of = found.question.repeats
-    return "".join(f" Cured by {_who(found, t)}: {t.again} of {of}." for t in tries)
+    return "".join(f" Cured by {who(t)}: {t.again} of {of}." for t in tries)
 
 
-def _who(found: Inquest, trial: Trial) -> str:
+def who(trial: Trial) -> str:
+    """What was changed."""
     if trial.kind == "all":
         return f"all movers {'out' if trial.change.out else 'frozen'}"
     return str(trial.change)

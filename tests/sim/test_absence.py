@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from sim import manners
 from sim.absence import Change, apply
 from sim.simulation import Simulation
 from slam.errors import InvalidValueError, UnknownNameError
@@ -169,6 +170,24 @@ def test_a_door_that_is_out_stands_open_and_is_not_seen():
     turned = abs(simulation.world.mover_poses()[row, 2] - hinge[2])
     assert turned == pytest.approx(1.5, abs=0.4)
     assert not np.isin(frame.labels.body, bodies_of(simulation, name)).any()
+
+
+def test_who_sat_on_a_chair_that_is_out_stands_there(before):
+    settings, block, _, _ = before
+    simulation = Simulation(**settings)
+    simulation.load_state(block)
+    people = simulation.world.people
+    at, _ = simulation.world.bodies.addresses(["chair1"])
+    seat = int(np.flatnonzero(people.table.at.discs[:, 0] == at[0])[0])
+    people.crowd.task[0, [manners.WALKING, manners.SEAT]] = manners.SEATED, seat
+    people.crowd.state[0, manners.SIT] = 1.0
+    people.crowd.state[0, manners.STAY_UNTIL] = 1e9
+    apply(simulation, Change(out=("chair1",)))
+    row = simulation.world.mover_names.index("person0")
+    there = simulation.world.mover_poses()[row, :2]
+    drive(simulation, 30)
+    assert people.crowd.task[0].tolist()[manners.SEAT] == -1
+    assert np.abs(simulation.world.mover_poses()[row, :2] - there).max() < 0.5
 
 
 def test_names_are_checked(before):

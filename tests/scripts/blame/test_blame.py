@@ -211,6 +211,7 @@ def test_the_verb_leaves_picture_table_and_numbers(tmp_path: Path):
         (("--scene", "arena", "--horizon", "-1"), "--horizon must be > 0 s"),
         (("--scene", "arena", "--top", "-1"), "--top must be a whole number >= 0"),
         (("--scene", "arena", "--option", "walls"), "--option must be NAME=VALUE"),
+        (("--scene", "arena", "--option", "seed=4"), "--option seed: that has an option"),
         (("--scene", "arena", "--option", "wall=no"), "cannot take these options"),
         (("--scene", "arena", "--scanner", "best"), "--scanner must be one of full"),
         (("--scene", "arena", "--slam", "shuntin"), "Did you mean 'shunting'"),
