@@ -4,12 +4,15 @@
 The error at a frame is the distance of the estimate from the truth plus ``LEVER_M`` times the
 heading error, in the frame of the first pose, unaligned: one number in m. A **divergence** is a
 rise by ``threshold_m`` within ``within_s`` that is still there over the ``stays_s`` that follow (by
-the median). Slow drift never rises that fast, a glitch does not stay, and a correction is a fall.
+the median), and that the motion since tells too: who drives on with a heading that has long been
+wrong gets further off, but gathers no error. Slow drift never rises that fast, a glitch does not
+stay, and a correction is a fall.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,42 +56,77 @@ class Divergence:
 
 
 def error_m(truth: Float, estimate: Float) -> float:
-    """Error of one pose (3,) against the truth (3,), both in the frame of the first pose."""
+    """Error of one pose (3,) against the truth (3,), both in the same frame."""
     dx, dy = float(estimate[0] - truth[0]), float(estimate[1] - truth[1])
     return math.hypot(dx, dy) + LEVER_M * abs(se2.wrap(float(estimate[2] - truth[2])))
 
 
+def errors_since_m(
+    then: tuple[Float, Float], truth: Sequence[Float], estimate: Sequence[Float]
+) -> Float:
+    """(n,) errors gathered since a moment whose true and estimated pose are ``then``.
+
+    Each motion since is compared in the frame of its own pose then, so what was wrong by then does
+    not count. With (the first true pose, zeros) these are the errors in the map frame.
+    """
+    pairs = zip(truth, estimate, strict=True)
+    return np.array([error_m(se2.between(then[0], t), se2.between(then[1], e)) for t, e in pairs])
+
+
 def first_divergence(
-    stamps_ns: NDArray[np.int64], errors_m: Float, rule: Rule | None = None
+    stamps_ns: NDArray[np.int64],
+    truth: Sequence[Float],
+    estimate: Sequence[Float],
+    rule: Rule | None = None,
 ) -> Divergence | None:
-    """The first one in a series of errors (n,) at stamps (n,); None where there is none."""
+    """The first one of a run of n frames; None where there is none.
+
+    truth     n poses (3,) in the world       estimate  n in the map, the frame of the first
+    """
     rule = Rule() if rule is None else rule
-    times = (np.asarray(stamps_ns) - stamps_ns[0]) / NS_PER_S if len(stamps_ns) else np.zeros(0)
-    befores = np.searchsorted(times, times - rule.within_s)
-    for k in range(1, len(times)):
-        window = errors_m[befores[k] : k + 1]
-        low = int(befores[k]) + int(np.argmin(window))
-        if errors_m[k] - errors_m[low] < rule.threshold_m:
-            continue
-        last = int(np.searchsorted(times, times[k] + rule.stays_s, side="right"))
+    errors_m, lows, rises = _rises(stamps_ns, truth, estimate, rule)
+    for k in np.flatnonzero(rises >= rule.threshold_m).tolist():
+        low, stays_ns = int(lows[k]), round(rule.stays_s * NS_PER_S)
+        last = int(np.searchsorted(stamps_ns, stamps_ns[k] + stays_ns, side="right"))
         rise = float(np.median(errors_m[k:last])) - float(errors_m[low])
         if rise >= rule.threshold_m:
             return Divergence(begins=_beginning(errors_m, low, k, rule), found=k, rise_m=rise)
     return None
 
 
+def largest_rise_m(
+    stamps_ns: NDArray[np.int64],
+    truth: Sequence[Float],
+    estimate: Sequence[Float],
+    rule: Rule | None = None,
+) -> float:
+    """m, the most that the error rises within ``rule.within_s``, whether it stays or not."""
+    rises = _rises(stamps_ns, truth, estimate, Rule() if rule is None else rule)[2]
+    return float(rises.max()) if len(rises) else 0.0
+
+
+def _rises(
+    stamps_ns: NDArray[np.int64], truth: Sequence[Float], estimate: Sequence[Float], rule: Rule
+) -> tuple[Float, NDArray[np.int64], Float]:
+    """(n,) errors, row of the least in the time before each, and the rise since that.
+
+    The rise is the lesser of two: of the error itself, and of what was gathered since that row.
+    """
+    n = len(stamps_ns)
+    lows, rises = np.zeros(n, dtype=np.int64), np.zeros(n)
+    if n == 0:
+        return np.zeros(0), lows, rises
+    errors_m = errors_since_m((truth[0], np.zeros(3)), truth, estimate)
+    befores = np.searchsorted(stamps_ns, stamps_ns - round(rule.within_s * NS_PER_S))
+    for k in range(n):
+        low = lows[k] = befores[k] + np.argmin(errors_m[befores[k] : k + 1])
+        then = (truth[low], estimate[low])
+        gathered = errors_since_m(then, truth[k : k + 1], estimate[k : k + 1])[0]
+        rises[k] = min(errors_m[k] - errors_m[low], gathered)
+    return errors_m, lows, rises
+
+
 def _beginning(errors_m: Float, low: int, found: int, rule: Rule) -> int:
     """The last row before ``found`` at which the error had hardly risen."""
     calm = errors_m[low:found] <= errors_m[low] + BEGUN * rule.threshold_m
     return low + int(np.flatnonzero(calm)[-1])
-
-
-def largest_rise_m(
-    stamps_ns: NDArray[np.int64], errors_m: Float, rule: Rule | None = None
-) -> float:
-    """m, the most that the error rises within ``rule.within_s``, whether it stays or not."""
-    rule = Rule() if rule is None else rule
-    times = (np.asarray(stamps_ns) - stamps_ns[0]) / NS_PER_S if len(stamps_ns) else np.zeros(0)
-    befores = np.searchsorted(times, times - rule.within_s)
-    rises = [float(errors_m[k] - errors_m[befores[k] : k + 1].min()) for k in range(len(times))]
-    return max(rises, default=0.0)

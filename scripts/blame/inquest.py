@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who did it: re-runs from the checkpoint with one thing changed each, and the verdict.
 
-A change **cures** a divergence when at the end of the horizon (median over its last second) the
-error has risen less than ``CURED`` of what it rose in the original, both since the checkpoint.
+A change **cures** a divergence when by the end of the horizon (median over its last second) less
+error than ``CURED`` of the original's has been gathered since the checkpoint.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scripts.blame.tape import Checkpoint, Sighting, Strip, Tape, row_at, sightings
+from scripts.blame.tape import Checkpoint, Pair, Sighting, Strip, Tape, row_at, sightings
 from sim.absence import Change
 from slam.divergence import Divergence, Rule, first_divergence, largest_rise_m
 from slam.errors import InvalidValueError, SlamFailedError
@@ -66,7 +66,7 @@ class Trial:
     """One re-run.
 
     kind      "single", "pair" or "all"
-    rise_m    of the error from the checkpoint to the horizon; NaN: the SLAM failed
+    rise_m    error gathered from the checkpoint to the horizon; NaN: the SLAM failed
     share     of the original's rise that is gone
     path_m    most that the robot's path differs from the original
     others_m  most that another mover's place differs at the end
@@ -108,6 +108,11 @@ class Inquest:
     recurs: int = 0
     suspects: list[Sighting] = field(default_factory=list)
     trials: list[Trial] = field(default_factory=list)
+
+    @property
+    def then(self) -> Pair:
+        """The true and the believed pose at the checkpoint, since which errors are gathered."""
+        return self.tape.then(self.first)
 
     @property
     def cures(self) -> list[Trial]:
@@ -167,15 +172,15 @@ class Inquest:
 def hold(tape: Tape, question: Question, note: Note = lambda what, done, of: None) -> Inquest:
     """Find the divergence of a tape and who is to blame for it."""
     strip, rule = tape.strip, question.rule
-    stamps, errors = strip.stamps_ns(), strip.errors_m(tape.T_world_map)
+    run = (strip.stamps_ns(), strip.truth, strip.believed)
     found = Inquest(
         tape=tape,
         question=question,
-        largest_rise_m=largest_rise_m(stamps, errors, rule),
-        end_error_m=float(errors[-1]),
+        largest_rise_m=largest_rise_m(*run, rule),
+        end_error_m=float(strip.errors_m(tape.then(0))[-1]),
     )
     if question.at_s is None:
-        found.moment = first_divergence(stamps, errors, rule)
+        found.moment = first_divergence(*run, rule)
     else:
         row = row_at(tape, question.at_s)
         found.moment = Divergence(begins=row, found=row, rise_m=0.0)
@@ -185,7 +190,7 @@ def hold(tape: Tape, question: Question, note: Note = lambda what, done, of: Non
     checkpoint = Checkpoint(tape, found.first)
     checkpoint.verify(found.last)
     found.how = checkpoint.how
-    found.rise_m = _rise_m(found, _cut(strip, found.first, found.last))
+    found.rise_m = _rise_m(found, strip.cut(found.first, found.last))
     if found.verdict != "weak":
         _try_all(found, checkpoint, note)
     return found
@@ -269,16 +274,16 @@ def _repeat(found: Inquest, checkpoint: Checkpoint, trial: Trial, note: Note) ->
 
 
 def _rise_m(found: Inquest, strip: Strip) -> float:
-    """m that the error of a strip rises from its first row to its end."""
-    errors, stamps = strip.errors_m(found.tape.T_world_map), strip.stamps_ns()
+    """m that a strip has gathered since the checkpoint by its end."""
+    errors, stamps = strip.errors_m(found.then), strip.stamps_ns()
     late = stamps >= stamps[-1] - round(LAST_S * 1e9)
-    return float(np.median(errors[late]) - errors[0])
+    return float(np.median(errors[late]))
 
 
 def _aside(found: Inquest, change: Change, strip: Strip) -> tuple[float, float]:
     """What else is different: the robot's path and the others' places, m."""
     tape = found.tape
-    path = np.array(strip.truth) - np.array(_cut(tape.strip, found.first, found.last).truth)
+    path = np.array(strip.truth) - np.array(tape.strip.cut(found.first, found.last).truth)
     changed = (*change.out, *change.frozen)
     others = [m for m, name in enumerate(tape.names) if name not in changed]
     gap: Float = strip.poses[-1][others] - tape.strip.poses[found.last][others]
@@ -289,12 +294,3 @@ def _longest(ways: Float) -> float:
     if not len(ways):
         return 0.0
     return float(np.sqrt(ways[:, 0] * ways[:, 0] + ways[:, 1] * ways[:, 1]).max())
-
-
-def _cut(strip: Strip, first: int, last: int) -> Strip:
-    """Rows ``first`` to ``last``."""
-    rows = slice(first, last + 1)
-    return Strip(
-        frames=strip.frames[rows], truth=strip.truth[rows], believed=strip.believed[rows],
-        poses=strip.poses[rows], beams=strip.beams[rows],
-    )  # fmt: skip

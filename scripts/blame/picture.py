@@ -203,7 +203,7 @@ def _chart(found: Inquest, width: int) -> Picture:
     figure.set_facecolor([c / 255.0 for c in draw.PAPER])
     ax = figure.subplots()
     stamps = found.tape.strip.stamps_ns()
-    errors = found.tape.strip.errors_m(found.tape.T_world_map)
+    errors = found.tape.strip.errors_m(found.then)
     times = (stamps - stamps[0]) / NS_PER_S
     best = {id(trial): trial for trial in found.named or found.cures[:1]}
     for trial in sorted(found.trials, key=lambda t: id(t) in best):
@@ -218,11 +218,13 @@ def _chart(found: Inquest, width: int) -> Picture:
         for row, word in ((found.moment.begins, "begins "), (found.moment.found, "found ")):
             ax.text(times[row], 1.0, word, transform=ax.get_xaxis_transform(), va="top",
                     ha="right", color="#787e8a")  # fmt: skip
-        cure = errors[found.first] + CURED * found.rise_m
         if found.trials:
-            ax.axhline(cure, color="#168c5a", lw=0.9, ls=(0, (2, 3)), label="below: cured")
+            ax.axhline(
+                CURED * found.rise_m, color="#168c5a", lw=0.9, ls=(0, (2, 3)), label="below: cured"
+            )
+    what = "error" if found.moment is None else "error since the checkpoint"
     ax.set(
-        xlabel="time, s", ylabel="error, m (position + 1 m × heading)",
+        xlabel="time, s", ylabel=f"{what}, m\n(position + 1 m × heading)",
         xlim=(times[found.first], times[last - 1]),
     )  # fmt: skip
     ax.set_ylim(0.0, ROOM * float(errors[found.first : last].max()))  # a worse one leaves the chart
@@ -234,7 +236,7 @@ def _chart(found: Inquest, width: int) -> Picture:
 
 def _curve(ax: mpl.axes.Axes, found: Inquest, trial: Trial, times: Float, named: bool) -> None:
     rows = slice(found.first, found.first + len(trial.strip.frames))
-    errors = trial.strip.errors_m(found.tape.T_world_map)
+    errors = trial.strip.errors_m(found.then)
     if trial.kind == "all":
         style: dict[str, Any] = {
             "color": "#1f61be",

@@ -22,12 +22,13 @@ from sim.absence import Change
 from sim.pilot import Pilot
 from sim.simulation import Simulation, n_frames
 from slam import se2
-from slam.divergence import error_m
+from slam.divergence import errors_since_m
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 from slam.frames import Float, Frame
 from slam.replay import Track
 from slam.system import create
 
+Pair = tuple[Float, Float]
 KEPT_S = 0.5  # the world's state is kept this often
 
 
@@ -56,14 +57,21 @@ class Strip:
         self.poses.append(poses)
         self.beams.append(beams)
 
+    def cut(self, first: int, last: int) -> Strip:
+        """Rows ``first`` to ``last``."""
+        rows = slice(first, last + 1)
+        return Strip(
+            frames=self.frames[rows], truth=self.truth[rows], believed=self.believed[rows],
+            poses=self.poses[rows], beams=self.beams[rows],
+        )  # fmt: skip
+
     def stamps_ns(self) -> NDArray[np.int64]:
         """(n,) of the rows."""
         return np.array([frame.stamp_ns for frame in self.frames], dtype=np.int64)
 
-    def errors_m(self, T_world_map: Float) -> Float:
-        """(n,) as ``slam.divergence``; ``T_world_map``: truth of the run's first frame."""
-        pairs = zip(self.truth, self.believed, strict=True)
-        return np.array([error_m(se2.between(T_world_map, t), b) for t, b in pairs])
+    def errors_m(self, then: Pair) -> Float:
+        """(n,) gathered since a moment whose true and believed pose are ``then``."""
+        return errors_since_m(then, self.truth, self.believed)
 
 
 @dataclass(eq=False)
@@ -85,6 +93,12 @@ class Tape:
     def T_world_map(self) -> Float:
         """(3,) of the frame in which the SLAM began."""
         return self.strip.truth[0]
+
+    def then(self, row: int) -> Pair:
+        """The true and the believed pose before a row: that of the row before."""
+        if row == 0:
+            return self.T_world_map, np.zeros(3)
+        return self.strip.truth[row - 1], self.strip.believed[row - 1]
 
     def row_before(self, row: int) -> int:
         """The last row at or before ``row`` at which a state was kept."""

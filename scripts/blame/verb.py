@@ -172,7 +172,12 @@ def _tell(found: Inquest, folder: Path) -> None:
     console.print(escape(says[1]), highlight=False, soft_wrap=True)
     if found.trials:
         console.print(
-            f"Held fixed: {FIXED}. Others may move otherwise once one is out: 'others moved'.",
+            f"Held fixed: {FIXED}. The robot's path differs by at most {_path_m(found):.3f} m; "
+            "'others' is how far other movers ended from where they did.",
             highlight=False, soft_wrap=True,
         )  # fmt: skip
     console.print(f"Open [bold]{escape(str(folder / 'blame.png'))}[/bold].", soft_wrap=True)
+
+
+def _path_m(found: Inquest) -> float:
+    return max((trial.path_m for trial in found.trials if not trial.failed), default=0.0)

@@ -33,7 +33,8 @@ def headline(found: Inquest) -> tuple[str, str]:
             "No divergence",
             f"The error never rises by {rule.threshold_m:g} m within {rule.within_s:g} s and "
             f"stays; the largest rise is {found.largest_rise_m:.2f} m, the last error "
-            f"{found.end_error_m:.2f} m.",
+            f"{found.end_error_m:.2f} m"
+            + (", gathered slowly." if found.end_error_m > rule.threshold_m else "."),
         )
     at = f"at {time_s(found, found.moment.found):.1f} s"
     up = f"The error rises by {found.rise_m:.2f} m {at}"
@@ -92,25 +93,22 @@ def table(found: Inquest) -> Table:
     """One row for each re-run, the best first."""
     shown = Table(title=escape(headline(found)[0]), title_justify="left")
     shown.add_column("changed")
-    shown.add_column("mode")
-    for heading in ("beams", "moved, m", "error rises, m", "removed", "others moved, m", "path, m"):
+    for heading in ("beams", "moved, m", "error, m", "removed", "others, m"):
         shown.add_column(heading, justify="right")
     shown.add_column("verdict")
     seen = {s.name: s for s in found.suspects}
-    shown.add_row("nothing", "", "", "", f"{found.rise_m:.2f}", "", "", "", "as it was")
+    shown.add_row("nothing", "", "", f"{found.rise_m:.2f}", "", "", "as it was")
     order = {"all": 0, "single": 1, "pair": 2}
     for trial in sorted(found.trials, key=lambda t: (order[t.kind], -_or_last(t.share))):
         names = trial.change.out or trial.change.frozen
         sighting = seen.get(names[0]) if len(names) == 1 else None
         shown.add_row(
-            "all movers" if trial.kind == "all" else escape(" + ".join(names)),
-            "out" if trial.change.out else "frozen",
+            escape(who(trial)),
             str(sighting.beams) if sighting else "",
             f"{sighting.moved_m:.2f}" if sighting else "",
             "failed" if trial.failed else f"{trial.rise_m:.2f}",
             "" if trial.failed else f"{100.0 * trial.share:.0f} %",
             "" if trial.failed else f"{trial.others_m:.2f}",
-            "" if trial.failed else f"{trial.path_m:.3f}",
             _word(found, trial),
         )
     return shown
@@ -125,7 +123,7 @@ def _word(found: Inquest, trial: Trial) -> str:
         return "control: cured" if trial.cured else "control"
     if not trial.cured:
         return ""
-    return f"cured; again {trial.again} of {found.question.repeats}" if trial.again else "cured"
+    return f"cured, again {trial.again} of {found.question.repeats}"
 
 
 def as_json(found: Inquest) -> dict[str, Any]:
@@ -173,5 +171,5 @@ def _trial(found: Inquest, trial: Trial) -> dict[str, Any]:
     if trial.failed:
         words["failed"] = trial.failed
     else:
-        words["errors_m"] = [round(e, 5) for e in trial.strip.errors_m(found.tape.T_world_map)]
+        words["errors_m"] = [round(e, 5) for e in trial.strip.errors_m(found.then)]
     return words

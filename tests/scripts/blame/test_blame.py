@@ -251,7 +251,7 @@ def test_an_episode_of_a_dataset_is_a_case(tmp_path: Path):
     assert made.exit_code == 0
     case = case_of(tmp_path / "data" / "arena-d0.5-s0005", None, 1)
     assert (case.slam, case.seconds, case.settings["seed"]) == ("shunting", 1.0, 5)
-    assert np.isfinite(record(case).strip.errors_m(np.zeros(3))).all()
+    assert np.isfinite(record(case).strip.errors_m((np.zeros(3), np.zeros(3)))).all()
 
 
 def test_options_are_read():
