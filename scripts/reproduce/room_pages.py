@@ -18,7 +18,8 @@ from slam.frames import Float
 NAMES = tuple(SYSTEMS)
 RULE = (
     f"Failed: RMSE above {FAILED_M} m or {FAILED_RAD} rad, or the SLAM itself says at the end that "
-    "it is lost."
+    "it is lost. “Shunting” sees the beams; “shunting, paper preset” point features (corners) with "
+    "IPJC, as the paper ran it."
 )
 
 
