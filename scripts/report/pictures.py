@@ -24,6 +24,7 @@ from slam.system import Raster
 from slam.trajectory import Trajectory
 
 MOMENTS = 8
+AROUND_M = 3.0  # of the paths, in the strip
 MOVING, RESTING, SCAN = "#e0902c", "#c3c7ce", "#1f61be"
 _PANEL = 2.9  # inches
 _INK = np.array([22.0, 33.0, 58.0]) / 255.0
@@ -58,11 +59,12 @@ def strip(run: RunFile, slam: str, slams: Sequence[str]) -> list[tuple[float, st
     believed = run.believed(slam)
     poses = _in_world(run, believed.poses)
     last = max(len(poses) - 1, 0)
+    paths = np.vstack([run.truth[:, :2], poses[:, :2]])
     moments = sorted({round(last * k / (MOMENTS - 1)) for k in range(MOMENTS)})
     panels = []
     for k in moments:
         second = float(run.stamps_ns[k] - run.stamps_ns[0]) / 1e9
-        figure, ax = _panel(run)
+        figure, ax = _panel(run, paths)
         with style.styled():
             _image(ax, run.static_map)
             _movers(ax, run, k)
@@ -116,12 +118,17 @@ def moving_share(run: RunFile) -> Float:
     return share
 
 
-def _panel(run: RunFile) -> tuple[Figure, Axes]:
-    """Axes in the world, as large as the room."""
+def _panel(run: RunFile, paths: Float | None = None) -> tuple[Figure, Axes]:
+    """Axes in the world: the room, or the part of it around ``paths`` (n, 2)."""
     room = run.static_map
-    height, width = (n * room.resolution_m for n in room.values.shape)
-    x, y, _ = room.T_map_origin.tolist()
-    figure = style.new_figure(_PANEL, _PANEL * min(max(height / width, 0.4), 1.6), margins=False)
+    low = room.T_map_origin[:2]
+    high = low + np.array(room.values.shape[::-1]) * room.resolution_m
+    if paths is not None:
+        low = np.maximum(low, paths.min(axis=0) - AROUND_M)
+        high = np.minimum(high, paths.max(axis=0) + AROUND_M)
+    (x, y), (width, height) = low.tolist(), (high - low).tolist()
+    shape = min(max(height / width, 0.4), 1.6)
+    figure = style.new_figure(_PANEL, _PANEL * shape, margins=False)
     with style.styled():
         ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         ax.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal", xticks=[], yticks=[])

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The messages between mobilia and a SLAM in a process of its own: one JSON object per line.
 
-docs/bring_your_own.md is the specification. Strict JSON, UTF-8, no NaN: a range of -1 stands for no
-return (+inf) and -2 for an error code (NaN), a cell of -1 for unknown, null for an intensity that
-is no number. Doubles are written with the digits that give back the same double, ranges and cells
+docs/bring_your_own.md is the specification. Strict JSON: a range of -1 stands for no return (+inf),
+-2 for an error code (NaN), a cell of -1 for unknown, null for no intensity. Doubles are written with the digits that give back the same double, ranges and cells
 with those that give back the same float32. Matrices are flat, row by row.
 
 ``…_message`` makes a message, ``…_of`` reads it. What is read of a guest's words raises
@@ -83,9 +82,6 @@ def failure_of(message: Message) -> SlamFailedError:
     words = " ".join(str(message.get("message", "")).split())[:400] or "an error without words"
     outcome = message.get("outcome")
     return SlamFailedError(words, outcome if outcome in FAILURES else "raised")
-
-
-# ---- to the guest -------------------------------------------------------------------------------
 
 
 def frame_line(frame: Frame, known: LaserSpec | None) -> bytes:
@@ -174,9 +170,6 @@ def _features_of(stamp_ns: int, message: Message) -> Features:
         points_robot=np.reshape(message["points_robot"], (-1, 2)),
         covariances=np.reshape(message["covariances"], (-1, 2, 2)),
     )
-
-
-# ---- from the guest -----------------------------------------------------------------------------
 
 
 def estimate_message(estimate: Estimate) -> dict[str, Any]:

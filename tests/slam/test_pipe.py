@@ -22,48 +22,7 @@ from slam.guests.serve import Server
 from slam.replay import Track
 from tests.world2d import World2D, arena, frames, laser, wander
 
-CLIENT = """
-import json, os, signal, subprocess, sys, time
-fault, count = sys.argv[1], 0
-def say(**words):
-    sys.stdout.write(json.dumps(words) + "\\n"); sys.stdout.flush()
-for line in sys.stdin:
-    message = json.loads(line)
-    kind = message["type"]
-    if kind == "hello":
-        if fault == "mute": time.sleep(60)
-        if fault == "future": say(type="hello", protocol="mobilia-slam", version=2); continue
-        say(type="hello", protocol="mobilia-slam", version=1, map=fault == "map", trajectory=False)
-    elif kind == "frame":
-        count += 1
-        if count == 1 and fault == "slow start": time.sleep(0.5)
-        if count == 3:
-            if fault == "crash": os.kill(os.getpid(), signal.SIGSEGV)
-            if fault == "exit": sys.stderr.write("out of\\nideas\\n"); sys.exit(3)
-            if fault == "close": os.close(1); time.sleep(60)
-            if fault == "hang": time.sleep(60)
-            if fault == "spin": signal.signal(signal.SIGTERM, signal.SIG_IGN); exec("while 1: pass")
-            if fault == "family":
-                subprocess.Popen(["sleep", "600"]); sys.stderr.write("kin\\n"); time.sleep(60)
-            if fault == "garbage": print("Segmentation fault (just kidding)", flush=True); continue
-            if fault == "half": sys.stdout.write('{"type":'); sys.stdout.flush(); time.sleep(60)
-            if fault == "chatter": sys.stderr.write("x" * 1000000 + "\\n")
-            if fault == "twice": say(type="estimate", stamp_ns=message["stamp_ns"], T_map_robot=[0]*3)
-            if fault == "error": say(type="error", message="no idea\\nat all"); continue
-            if fault == "other": say(type="map"); continue
-            if fault == "nan":
-                print('{"type":"estimate","stamp_ns":%d,"T_map_robot":[nan,0,0]}' % message["stamp_ns"],
-                      flush=True); continue
-            if fault == "short": say(type="estimate", stamp_ns=message["stamp_ns"], T_map_robot=[1]); continue
-            if fault == "stamp": say(type="estimate", stamp_ns=1, T_map_robot=[0]*3); continue
-        say(type="estimate", stamp_ns=message["stamp_ns"], T_map_robot=[count, 0, 0])
-    elif kind == "reset":
-        count = 0; say(type="reset")
-    elif kind == "map":
-        say(type="error", message="lost it")
-    else:
-        break
-"""  # noqa: E501
+CLIENT = Path(__file__).with_name("misbehaving.py")
 
 
 @pytest.fixture(scope="module")
@@ -71,15 +30,8 @@ def stream() -> list[Frame]:
     return frames(World2D(arena()), wander(4.0), rate_hz=5.0, spec=laser(181), seed=4)[:8]
 
 
-@pytest.fixture(scope="module")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("client") / "client.py"
-    path.write_text(CLIENT)
-    return path
-
-
-def piped(client: Path, fault: str, scan_s: float = 5.0) -> PipeSlam:
-    command = [sys.executable, "-S", "-E", str(client), fault]
+def piped(fault: str, scan_s: float = 5.0) -> PipeSlam:
+    command = [sys.executable, "-S", "-E", str(CLIENT), fault]
     return PipeSlam(command, scan_limit_s=scan_s, first_limit_s=10.0)
 
 
@@ -97,8 +49,8 @@ def gone(pid: int, within_s: float = 5.0) -> bool:
     return False
 
 
-def test_a_good_guest_comes_through_and_starts_anew(client, stream):
-    slam = piped(client, "none")
+def test_a_good_guest_comes_through_and_starts_anew(stream):
+    slam = piped("none")
     track = Track("good", slam)
     assert track.survive(stream) is None
     np.testing.assert_array_equal(track.online().poses[:, 0], np.arange(1, 9))
@@ -128,8 +80,8 @@ def test_a_good_guest_comes_through_and_starts_anew(client, stream):
         ("stamp", "bad", "answered for 1 ns instead of"),
     ],
 )
-def test_each_fault_ends_the_guest_and_nothing_else(client, stream, fault, outcome, says):
-    slam = piped(client, fault, scan_s=0.3 if outcome == "hung" else 5.0)
+def test_each_fault_ends_the_guest_and_nothing_else(stream, fault, outcome, says):
+    slam = piped(fault, scan_s=0.3 if outcome == "hung" else 5.0)
     track = Track(fault, slam)
     failure = track.survive(stream)
     assert isinstance(failure, SlamFailedError)
@@ -145,19 +97,19 @@ def test_each_fault_ends_the_guest_and_nothing_else(client, stream, fault, outco
     assert slam.update(stream[4]).T_map_robot[0] == 1.0
 
 
-def test_an_answer_too_many_puts_it_out_of_step(client, stream):
-    failure = Track("twice", piped(client, "twice")).survive(stream)
+def test_an_answer_too_many_puts_it_out_of_step(stream):
+    failure = Track("twice", piped("twice")).survive(stream)
     assert failure is not None
     assert failure.outcome == "bad"
     assert "scan 3" in str(failure)
 
 
-def test_much_said_on_standard_error_blocks_nothing(client, stream):
-    assert Track("chatter", piped(client, "chatter")).survive(stream) is None
+def test_much_said_on_standard_error_blocks_nothing(stream):
+    assert Track("chatter", piped("chatter")).survive(stream) is None
 
 
-def test_its_children_end_with_it(client, stream):
-    slam = piped(client, "family", scan_s=0.5)
+def test_its_children_end_with_it(stream):
+    slam = piped("family", scan_s=0.5)
     group = slam._wire.pid
     failure = Track("family", slam).survive(stream)
     assert failure is not None
@@ -173,8 +125,8 @@ def _group(process: Path) -> int | None:
         return None
 
 
-def test_the_first_scan_may_take_longer(client, stream):
-    assert Track("slow", piped(client, "slow start", scan_s=0.25)).survive(stream[:2]) is None
+def test_the_first_scan_may_take_longer(stream):
+    assert Track("slow", piped("slow start", scan_s=0.25)).survive(stream[:2]) is None
 
 
 def test_a_guest_that_takes_no_more_input_hangs(stream):
@@ -185,8 +137,8 @@ def test_a_guest_that_takes_no_more_input_hangs(stream):
     assert failure.outcome == "hung"
 
 
-def test_a_map_that_fails_leaves_the_poses(client, stream):
-    track = Track("map", piped(client, "map"))
+def test_a_map_that_fails_leaves_the_poses(stream):
+    track = Track("map", piped("map"))
     assert track.survive(stream) is None
     with pytest.raises(SlamFailedError, match=r"SLAM 'map', map\(\) lost it"):
         track.map()
@@ -194,8 +146,8 @@ def test_a_map_that_fails_leaves_the_poses(client, stream):
     assert track.final() is None
 
 
-def test_it_ends_when_nobody_holds_it_any_more(client, stream):
-    slam = piped(client, "none")
+def test_it_ends_when_nobody_holds_it_any_more(stream):
+    slam = piped("none")
     pid = slam._wire.pid
     slam.update(stream[0])
     assert not gone(pid, 0.05)
@@ -217,11 +169,11 @@ def test_a_command_that_cannot_be_is_said_at_once(name, says):
         create(name)
 
 
-def test_a_guest_of_another_version_or_without_a_word_is_not_made(client):
+def test_a_guest_of_another_version_or_without_a_word_is_not_made():
     with pytest.raises(SlamFailedError, match=r"cannot be made: speaks 'mobilia-slam' version 2"):
-        create(f"pipe:{sys.executable} {client} future")
+        create(f"pipe:{sys.executable} {CLIENT} future")
     with pytest.raises(SlamFailedError, match=r"no answer within 0\.3 s") as got:
-        create(f"pipe:{sys.executable} {client} mute", first_limit_s=0.3)
+        create(f"pipe:{sys.executable} {CLIENT} mute", first_limit_s=0.3)
     assert got.value.outcome == "hung"
     with pytest.raises(SlamFailedError, match="cannot be made: its process ended with status 0"):
         create("pipe:true")
