@@ -54,7 +54,7 @@ app.command("sensor-card")(sensor_card)
 app.command("reproduce")(reproduce)
 app.command("compare", cls=ManyValues)(compare)
 app.command("drive", cls=ManyValues)(drive)
-app.command("blame")(blame)
+app.command("blame", cls=ManyValues)(blame)
 app.command("report")(report)
 
 

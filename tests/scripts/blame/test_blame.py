@@ -183,7 +183,7 @@ def test_a_run_without_divergence_says_so_and_is_a_result(tmp_path: Path):
 def test_the_verb_leaves_picture_table_and_numbers(tmp_path: Path):
     out = tmp_path / "out"
     done = mobilia(
-        "blame", "--scene", "arena", "--option", "walls=none", "--option", "n_chairs=3",
+        "blame", "--scene", "arena", "--option", "walls=none", "n_chairs=3",
         "--option", "odometry=ideal", "--dynamism", "1", "--seed", "6", "--seconds", "4",
         "--slam", "skittish_slams:Skittish", "--every", "4", "--horizon", "1", "--repeats", "1",
         "--out", out,
