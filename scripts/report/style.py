@@ -103,8 +103,8 @@ def level_axis(ax: Axes, levels: Sequence[float]) -> None:
 
 def log_axis(ax: Axes) -> None:
     """Decades in plain numbers, with 2 and 5 between them where there are few."""
-    lines = [np.asarray(line.get_ydata(orig=False), dtype=np.float64) for line in ax.lines]
-    values = np.concatenate(lines) if lines else np.zeros(0)
+    drawn = [one for one in ax.lines if one.get_transform() == ax.transData]  # no crosses, no rules
+    values = np.concatenate([np.zeros(0), *(np.asarray(one.get_ydata(), float) for one in drawn)])
     if not (values > 0.0).any():
         return
     ax.set_yscale("log", nonpositive="clip")

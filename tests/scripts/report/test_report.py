@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from scripts import cli
 from scripts.compare import folder as files
+from scripts.compare.columns import COLUMNS
 from scripts.report import closed, page, pictures, tables, words
 from scripts.report.closed import driven
 from scripts.report.metrics import METRICS, digits
@@ -142,6 +143,22 @@ def test_what_is_no_drive_is_told(tmp_path: Path, name: str, content: str, says:
     (folder / name).write_text(content)
     with pytest.raises(LogFormatError, match=says):
         driven(folder)
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        lambda row: row["slam"] == "ekf",
+        lambda row: row["dynamism"] == 1.0 and row["slam"] == made.OWN,  # every run failed
+    ],
+)
+def test_little_is_enough_for_a_page(tmp_path: Path, kept):
+    folder = made.make(tmp_path / "compare", seeds=(100,))
+    rows = [row for row in files.read(folder).runs if kept(row)]
+    files.write_csv(folder / files.RUNS, rows, COLUMNS)
+    files.write_csv(folder / files.LEVELS, made.tables.levels(rows), made.tables.LEVEL_COLUMNS)
+    files.write_csv(folder / files.PAIRED, [], made.tables.PAIRED_COLUMNS)
+    assert "Where" not in page.render(study(folder))
 
 
 class Addresses(HTMLParser):
