@@ -25,6 +25,8 @@ from slam.frames import Features, Float, Scan
 GRAZING = math.radians(10.0)  # flattest view of a surface that is still taken as one
 FLAT = math.radians(12.0)  # flattest view at which the end of a surface is believed
 FAR_M = 1e6  # stands for no return
+FAILED = 2  # beams in a row that may have failed; a scanner that has no word for "nothing there"
+# says the same code for both, and where more are without an answer nothing is there
 MARGIN_CELLS = 12
 BLOCK = 5  # pixels over which Kanade and Tomasi sum gradients
 IDEAL = 0.14  # their response to one dot of a standard deviation of 1.2 cells (measured)
@@ -73,7 +75,7 @@ def corners(
     """Corners of ``scan`` in the robot frame at its stamp, de-skewed with the body ``twist``."""
     config = config or CornerConfig()
     points = _points(scan, twist)
-    ranges = np.where(np.isnan(scan.ranges), -1.0, np.minimum(scan.ranges, FAR_M, dtype=np.float64))
+    ranges = answered(scan)
     step = scan.spec.angle_increment
     joined = raster.joined_beams(ranges, scan.valid, points, step, GRAZING, config.noise_m)
     valid, false_ends = _judge_ends(ranges, scan.valid, joined)
@@ -95,6 +97,17 @@ def corners(
         gap = _gap(beam, points, joined, ranges[beam] * step)
         covariances.append(_covariance(cells, gap, config))
     return _features(scan, found, covariances)
+
+
+def answered(scan: Scan) -> Float:
+    """(n,) m: ranges; ``FAR_M`` where nothing is, -1 where a beam failed."""
+    failed = np.isnan(scan.ranges)
+    ranges = np.where(failed, -1.0, np.minimum(scan.ranges, FAR_M, dtype=np.float64))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], failed, [False]])))
+    for first, past in edges.reshape(-1, 2).tolist():
+        if past - first > FAILED:
+            ranges[first:past] = FAR_M
+    return ranges
 
 
 def _points(scan: Scan, twist: Float | None) -> Float:

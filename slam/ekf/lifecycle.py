@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.ekf.config import EkfConfig
+from slam.ekf.corners import answered
 from slam.frames import Float, Scan
 
 CHANCE = 0.05  # probability that something else is seen where the landmark was
@@ -126,7 +127,7 @@ def unhidden_by_beams(landmarks_laser: Float, scan: Scan) -> NDArray[np.bool_]:
     beam = np.round((bearing - spec.angle_min) / spec.angle_increment).astype(np.int64)
     inside = (beam >= 1) & (beam < spec.n_beams - 1)
     beam = np.clip(beam, 1, max(spec.n_beams - 2, 1))
-    ranges = np.where(np.isnan(scan.ranges), 0.0, scan.ranges.astype(np.float64))
+    ranges = answered(scan)
     if spec.n_beams < 3:
         return np.zeros(len(landmarks_laser), dtype=np.bool_)
     shortest = np.minimum(np.minimum(ranges[beam - 1], ranges[beam]), ranges[beam + 1])

@@ -14,7 +14,7 @@ import pytest
 
 from slam import se2
 from slam.ekf import raster
-from slam.ekf.corners import IDEAL, CornerConfig, corners
+from slam.ekf.corners import IDEAL, CornerConfig, answered, corners
 from slam.errors import InvalidValueError
 from slam.frames import Features, LaserSpec, Scan
 
@@ -181,3 +181,20 @@ def test_impossible_configurations_are_refused():
     for changes in ({"cell_m": 0.0}, {"range_m": 1e3}, {"response": -1.0}, {"floor_m": math.nan}):
         with pytest.raises(InvalidValueError, match=next(iter(changes))):
             CornerConfig(**changes)
+
+
+def test_many_beams_without_an_answer_see_nothing_and_few_have_failed():
+    ranges = np.full(12, 2.0, dtype=np.float32)
+    ranges[2:4] = ranges[6:] = np.nan
+    spec = LaserSpec(n_beams=12, angle_min=-0.05, angle_increment=0.01)
+    told = answered(Scan(stamp_ns=0, ranges=ranges, spec=spec))
+    np.testing.assert_array_equal(told[:6], [2.0, 2.0, -1.0, -1.0, 2.0, 2.0])
+    assert (told[6:] > 1e3).all()
+
+
+def test_a_post_before_nothing_is_a_feature():
+    ranges = np.full(361, np.nan, dtype=np.float32)
+    ranges[178:183] = 2.0
+    spec = LaserSpec(n_beams=361, angle_min=-np.pi / 2, angle_increment=np.pi / 360)
+    found = corners(Scan(stamp_ns=0, ranges=ranges, spec=spec))
+    np.testing.assert_allclose(found.points_robot, [[2.0, 0.0]], atol=0.03)

@@ -92,10 +92,15 @@ def test_a_thing_in_front_hides_and_one_behind_does_not():
 def test_only_beams_that_pass_beyond_prove_absence():
     spec = LaserSpec(n_beams=181, angle_min=-math.pi / 2.0, angle_increment=math.pi / 180.0)
     landmark = np.array([[4.0, 0.0]])
-    for value, gone in ((7.0, True), (np.inf, True), (4.0, False), (2.0, False), (np.nan, False)):
+    for value, gone in ((7.0, True), (np.inf, True), (4.0, False), (2.0, False), (np.nan, True)):
         ranges = np.full(181, value, dtype=np.float32)
         scan = Scan(stamp_ns=0, ranges=ranges, spec=spec)
         assert unhidden_by_beams(landmark, scan).tolist() == [gone], value
+    ranges = np.full(181, 7.0, dtype=np.float32)
+    ranges[90] = np.nan  # one beam failed: it proves nothing
+    assert unhidden_by_beams(landmark, Scan(stamp_ns=0, ranges=ranges, spec=spec)).tolist() == [
+        False
+    ]
     behind = np.array([[-4.0, 0.0]])
     far = Scan(stamp_ns=0, ranges=np.full(181, 9.0, dtype=np.float32), spec=spec)
     assert unhidden_by_beams(behind, far).tolist() == [False]
