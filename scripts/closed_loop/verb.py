@@ -18,7 +18,7 @@ from scripts import workers
 from scripts.closed_loop import pictures, tables
 from scripts.closed_loop.plan import RUNS, Driven, Plan, load
 from scripts.compare.folder import write_csv
-from scripts.compare.verb import levels
+from scripts.compare.verb import levels, named
 from scripts.console import console
 from scripts.jobs import run_jobs
 from scripts.output import locked_folder, machine, write_recipe
@@ -61,10 +61,10 @@ def drive(
     workers.check_jobs(jobs)
     plan = Plan(
         scene=scene,
-        slams=_words(slam),
+        slams=named(slam),
         levels=levels(dynamism or ["0:1:0.25"]),
-        seeds=_seeds(_words(seeds or ["5"])),
-        goals=_goals(_words(goals or [])),
+        seeds=_seeds(named(seeds or ["5"])),
+        goals=_goals(named(goals or [])),
         loop=LoopConfig(plan_on=plan_on, limit_s=seconds, scans=every),
     )
     started = time.perf_counter()
@@ -75,10 +75,6 @@ def drive(
         f"({time.perf_counter() - started:.0f} s)",
         soft_wrap=True,
     )
-
-
-def _words(values: list[str]) -> tuple[str, ...]:
-    return tuple(word for value in values for word in value.split(",") if word)
 
 
 def _seeds(words: tuple[str, ...]) -> tuple[int, ...]:

@@ -64,8 +64,8 @@ def compare(
     if isinstance(seeds, bool) or not 1 <= seeds <= 10_000:
         raise InvalidValueError(f"--seeds must be 1 to 10000, got {seeds}")
     plan = Plan(
-        slams=_words(slam),
-        scenes=_words(scene or ["arena", "office"]),
+        slams=named(slam),
+        scenes=named(scene or ["arena", "office"]),
         levels=levels(dynamism or ["0:1:0.25"]),
         seeds=tuple(range(first_seed, first_seed + seeds)),
         seconds=seconds,
@@ -84,7 +84,7 @@ def compare(
     )
 
 
-def _words(values: list[str]) -> tuple[str, ...]:
+def named(values: list[str]) -> tuple[str, ...]:
     """Words may also be joined by commas, but for the command of a pipe, which may hold some."""
     parts = ([value] if value.startswith("pipe:") else value.split(",") for value in values)
     return tuple(word for words in parts for word in words if word)
@@ -93,7 +93,7 @@ def _words(values: list[str]) -> tuple[str, ...]:
 def levels(values: list[str]) -> tuple[float, ...]:
     """``["0:1:0.5"]`` or ``["0", "0.5,1"]`` -> (0, 0.5, 1)."""
     found: list[float] = []
-    for word in _words(values):
+    for word in named(values):
         if ":" in word:
             found += sweep(word, "--dynamism")
             continue
