@@ -26,9 +26,9 @@ RUN_COLUMNS = (
 )  # fmt: skip
 LEVEL_COLUMNS = (
     "scene", "dynamism", "slam", "runs", "goals", "reached", "success", "success_low",
-    "success_high", "wrong", "given_up", "failed", "precision_m", "precision_m_low",
-    "precision_m_high", "precision_rad", "time_s", "collisions_per_km", "near_misses_per_km",
-    "runs_lost", "runs_recovered",
+    "success_high", "wrong", "given_up", "failed", "given_up_taken", "precision_m",
+    "precision_m_low", "precision_m_high", "precision_rad", "time_s", "collisions_per_km",
+    "near_misses_per_km", "runs_lost", "runs_recovered",
 )  # fmt: skip
 
 
@@ -99,6 +99,7 @@ def _level(key: tuple[Any, ...], goals: list[Row], runs: list[Row]) -> Row:
         **dict(zip(("scene", "dynamism", "slam"), key, strict=True)),
         "runs": len(runs), "goals": len(goals), **counts,
         "success": counts["reached"] / len(goals), "success_low": low, "success_high": high,
+        "given_up_taken": sum(g["outcome"] == "given up" and g["taken_by"] != "" for g in goals),
         **_precisions(goals), "precision_m_low": near, "precision_m_high": far,
         "time_s": quantile([g["time_s"] for g in goals if g["outcome"] == "reached"], 0.5),
         "collisions_per_km": sum(g["collisions"] for g in goals) / km if km else None,
