@@ -29,7 +29,7 @@ CLOSE_M, CLOSE_S = 0.4, 4.0  # this near without progress for this long: as near
 SLOWEST_MPS, CREEP_M = 0.15, 0.1  # towards a goal: speed, and how far it looks ahead
 DOUBT_SPEED = 0.5  # share of the usual speed while the SLAM does not trust itself
 DOUBT_S, LOOK_S, LOOK_RADPS = 1.5, 12.0, 0.6  # then it stops and looks about, at most so long
-THIN_HALF_M = 0.25  # half the box that a thin thing is planned around
+TIGHT_M = 0.2  # thin things are planned round this closely where there is no way otherwise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,19 +117,23 @@ class Navigator:
         if left > self._left + PROGRESS_M:  # the map has grown: the way is longer than thought
             self._best = left
         self._layout = layout
-        grid = layout.with_boxes(self._boxes(here))
-        blocked = grid.cost_near(grid.cost_to(self._goal), here[0], here[1]) >= _FAR
+        grid = self._round(layout, here)
         if self._driver is None:
             self._driver = Driver(walls, self._goal[None], self._tour)
-        self._driver.use(layout if blocked else grid, walls=walls, afresh=False)
+        self._driver.use(grid, walls=walls, afresh=False)
 
-    def _boxes(self, here: Float) -> Float:
-        """(n, 5) what is seen, as obstacles in the world."""
+    def _round(self, layout: NavGrid, here: Float) -> NavGrid:
+        """The layout with what is seen on it: at its full size, tighter, or not at all, whichever
+        first leaves a way."""
         points, radii = self._sight.points_robot, self._sight.radii
         boxes = np.zeros((len(points), 5))
         boxes[:, :2] = se2.transform(here, points)
-        boxes[:, 2] = boxes[:, 3] = np.minimum(radii, THIN_HALF_M)
-        return boxes
+        for largest in (math.inf, TIGHT_M):
+            boxes[:, 2] = boxes[:, 3] = np.minimum(radii, largest)
+            grid = layout.with_boxes(boxes)
+            if grid.cost_near(grid.cost_to(self._goal), here[0], here[1]) < _FAR:
+                return grid
+        return layout
 
     def _progress(self, here: Float, distance: float, dt: float, *, trusted: bool) -> str:
         """Why the goal is over now, or ""."""
