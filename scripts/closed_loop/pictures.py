@@ -49,9 +49,12 @@ def curves(path: Path, levels: Sequence[Row]) -> None:
         title=f"{scene}: precision (median)",
     )  # fmt: skip
     for ax in (success, precision):
-        ax.set_xlabel("dynamism")
+        ax.set(xlabel="dynamism", xticks=sorted({row["dynamism"] for row in levels}))
         ax.grid(alpha=0.35)
-    success.legend(frameon=False, loc="lower left")
+    handles, labels = success.get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=len(names), frameon=False, fontsize=9
+    )
     save(figure, path)
 
 
