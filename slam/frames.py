@@ -16,9 +16,10 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from slam.errors import InvalidValueError, NotFiniteError
+from slam.checked import ByContent, check_stamp, covariance, finite, frozen, pose, possible
+from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
 NS_PER_S = 1_000_000_000
@@ -32,108 +33,6 @@ def to_ns(seconds: float) -> int:
 def to_s(nanoseconds: int) -> float:
     """Nanoseconds as seconds; exact only to about 1e-7 s for Unix times."""
     return nanoseconds / NS_PER_S
-
-
-def frozen(
-    owner: str, name: str, value: ArrayLike, shape: tuple[int | None, ...], dtype: Any = np.float64
-) -> NDArray[Any]:
-    """A read-only copy of ``value`` with the given shape (None: any length) and type.
-
-    Raises ``InvalidValueError`` that names owner and field when it cannot be one.
-    """
-    try:
-        array = np.array(value, dtype=dtype) if dtype is np.float64 else _cast(value, dtype)
-    except (TypeError, ValueError, ArithmeticError) as error:
-        raise InvalidValueError(f"{owner}.{name} must be numeric: {error}") from error
-    if array.shape != shape and (
-        array.ndim != len(shape)
-        or any(
-            want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
-        )
-    ):
-        wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
-        raise InvalidValueError(f"{owner}.{name} must have shape {wanted}, got {array.shape}")
-    array.setflags(write=False)
-    return array
-
-
-def _cast(value: ArrayLike, dtype: Any) -> NDArray[Any]:
-    """A copy in a type that may not hold every number: losing more than digits is an error."""
-    raw = np.asarray(value)
-    if raw.dtype == dtype:
-        return raw.copy()
-    if np.issubdtype(dtype, np.integer) and raw.size and raw.dtype.kind not in "iub":
-        raise ValueError(f"expected whole numbers, got {raw.dtype}")
-    with np.errstate(over="raise", invalid="raise"):
-        array: NDArray[Any] = np.array(raw, dtype=dtype)
-    if array.dtype.kind in "iu" and not np.array_equal(array, raw):
-        raise ValueError(f"some numbers do not fit {array.dtype}")
-    return array
-
-
-def finite(owner: str, name: str, array: NDArray[Any]) -> None:
-    """Raise ``NotFiniteError`` when any entry is NaN or infinite."""
-    # For the few numbers of a pose NumPy costs more than scalars.
-    few = array.size <= 9
-    fine = all(map(math.isfinite, array.ravel().tolist())) if few else np.isfinite(array).all()
-    if not fine:
-        raise NotFiniteError(f"{owner}.{name} must be finite, got {array.tolist()!r:.200}")
-
-
-def pose(owner: str, name: str, value: ArrayLike) -> Float:
-    """A frozen, finite ``(x, y, theta)``."""
-    array = frozen(owner, name, value, (3,))
-    finite(owner, name, array)
-    return array
-
-
-def _close(a: float, b: float) -> bool:
-    """Equal but for rounding."""
-    return abs(a - b) <= 1e-9 + 1e-6 * min(abs(a), abs(b))
-
-
-def covariance(owner: str, name: str, value: ArrayLike) -> Float:
-    """A frozen, finite, symmetric (3, 3) covariance without a negative variance."""
-    array = frozen(owner, name, value, (3, 3))
-    finite(owner, name, array)
-    rows = array.tolist()  # scalars: np.allclose on nine numbers costs more than a whole motion
-    if min(rows[0][0], rows[1][1], rows[2][2]) < 0.0 or not (
-        _close(rows[0][1], rows[1][0])
-        and _close(rows[0][2], rows[2][0])
-        and _close(rows[1][2], rows[2][1])
-    ):
-        raise InvalidValueError(
-            f"{owner}.{name} must be symmetric with variances >= 0, got {array.tolist()}"
-        )
-    return array
-
-
-def _stamp(owner: str, value: object) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise InvalidValueError(
-            f"{owner}.stamp_ns must be an integer number of nanoseconds, got {value!r}"
-        )
-
-
-class ByContent:
-    """Equality of dataclasses that hold arrays: same type, equal fields, NaN equal to NaN."""
-
-    def __eq__(self, other: object) -> bool:
-        if self is other:
-            return True
-        if type(self) is not type(other):
-            return NotImplemented
-        mine, theirs = vars(self), vars(other)
-        return all(_same(mine[name], theirs[name]) for name in mine)
-
-    __hash__ = None  # type: ignore[assignment]  # arrays have no hash
-
-
-def _same(a: object, b: object) -> bool:
-    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        floats = a.dtype.kind == "f"
-        return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=floats)
-    return bool(a == b)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,6 +67,11 @@ class LaserSpec(ByContent):
         if self.angle_increment <= 0.0:
             raise InvalidValueError(
                 f"LaserSpec.angle_increment must be > 0 rad, got {self.angle_increment}"
+            )
+        if (self.n_beams - 1) * self.angle_increment > 1.05 * math.tau:
+            raise InvalidValueError(
+                f"LaserSpec.angle_increment must keep {self.n_beams} beams within one turn (in "
+                f"radians, not degrees?), got {self.angle_increment} rad"
             )
         if not 0.0 <= self.range_min < self.range_max < math.inf:
             raise InvalidValueError(
@@ -212,7 +116,8 @@ class Scan(ByContent):
     """One laser scan.
 
     stamp_ns     time of the earliest beam, ns
-    ranges       (n_beams,) float32 m; REP 117: +inf no return, NaN an error code, never -inf
+    ranges       (n_beams,) float32 m; REP 117: +inf no return, NaN an error code, never -inf. 0
+                 is no measurement, whatever range_min: drivers write it for one that failed
     intensities  optional (n_beams,) float32
     """
 
@@ -222,7 +127,7 @@ class Scan(ByContent):
     intensities: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
-        _stamp("Scan", self.stamp_ns)
+        check_stamp("Scan", self.stamp_ns)
         n = self.spec.n_beams
         ranges = frozen("Scan", "ranges", self.ranges, (n,), np.float32)
         if (ranges < 0.0).any():
@@ -241,9 +146,9 @@ class Scan(ByContent):
 
     @property
     def valid(self) -> NDArray[np.bool_]:
-        """(n_beams,) True where the range is finite and within the scanner's limits."""
+        """(n_beams,) True where the range is finite, not 0, and within the scanner's limits."""
         r = self.ranges
-        return np.isfinite(r) & (r >= self.spec.range_min) & (r <= self.spec.range_max)
+        return np.isfinite(r) & (r > 0.0) & (r >= self.spec.range_min) & (r <= self.spec.range_max)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -262,7 +167,7 @@ class Features(ByContent):
     ids: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
-        _stamp("Features", self.stamp_ns)
+        check_stamp("Features", self.stamp_ns)
         points = frozen("Features", "points_robot", self.points_robot, (None, 2))
         finite("Features", "points_robot", points)
         k = len(points)
@@ -273,6 +178,12 @@ class Features(ByContent):
             covariances, transposed, rtol=1e-6, atol=1e-9
         ):
             raise InvalidValueError("Features.covariances must be symmetric with variances >= 0")
+        for index, ((xx, xy), (_, yy)) in enumerate(covariances.tolist()):
+            if not possible(xx, xy, yy):
+                raise InvalidValueError(
+                    f"Features.covariances[{index}] must be positive semidefinite (no correlation "
+                    f"beyond 1), got {covariances[index].tolist()}"
+                )
         object.__setattr__(self, "points_robot", points)
         object.__setattr__(self, "covariances", covariances)
         if self.ids is not None:
@@ -297,7 +208,7 @@ class Odometry(ByContent):
     twist: Float | None = None
 
     def __post_init__(self) -> None:
-        _stamp("Odometry", self.stamp_ns)
+        check_stamp("Odometry", self.stamp_ns)
         object.__setattr__(
             self, "T_odom_robot", pose("Odometry", "T_odom_robot", self.T_odom_robot)
         )
@@ -370,7 +281,7 @@ class Frame(ByContent):
     labels: BeamLabels | None = None
 
     def __post_init__(self) -> None:
-        _stamp("Frame", self.stamp_ns)
+        check_stamp("Frame", self.stamp_ns)
         sensed = self.scan if self.scan is not None else self.features
         if self.odometry.stamp_ns != self.stamp_ns or (
             sensed is not None and sensed.stamp_ns != self.stamp_ns

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slam import se2
+from slam.checked import frozen
 from slam.errors import InvalidValueError
-from slam.frames import NS_PER_S, Float, frozen
+from slam.frames import NS_PER_S, Float
 from slam.trajectory import Trajectory
 
 Alignment = Literal["none", "se2"]

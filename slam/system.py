@@ -26,8 +26,9 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.checked import covariance, frozen, pose
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError
-from slam.frames import Float, Frame, covariance, frozen, pose
+from slam.frames import Float, Frame
 from slam.trajectory import Trajectory
 
 

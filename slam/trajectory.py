@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.checked import finite, frozen
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import write_text
-from slam.frames import NS_PER_S, Float, finite, frozen
+from slam.frames import NS_PER_S, Float
 
 MAX_STAMP_S = 9e9  # what 64-bit nanoseconds hold: year 2255
 

@@ -17,8 +17,9 @@ from slam.frames import Float, Frame
 from slam.points import PointWorld, PointWorldConfig
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.featured import FeaturedShuntingSlam
-from slam.shunting.impressions import from_features, from_scan, stamp
+from slam.shunting.impressions import from_features, from_scan
 from slam.shunting.slam import ShuntingSlam
+from slam.shunting.stamping import stamp
 
 RED, BLUE, GREEN, GREY = "#ce2c3c", "#1f61be", "#168c5a", "#5b6472"
 STRIDE = 5

@@ -16,11 +16,12 @@ from slam import se2
 from slam.frames import Features, Float, Frame
 from slam.shunting.cells import SIDE
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import Observations, from_features, from_scan, stamp
+from slam.shunting.impressions import Observations, from_features, from_scan
 from slam.shunting.lyapunov import energy
 from slam.shunting.matching import Matcher
 from slam.shunting.network import Network
 from slam.shunting.slam import ShuntingSlam
+from slam.shunting.stamping import stamp
 from slam.shunting.sweep import lateral_mu
 
 

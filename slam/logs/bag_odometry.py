@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slam import se2
+from slam.checked import possible
 from slam.frames import Float
 
 _ZERO = np.zeros((3, 3))
@@ -79,7 +80,7 @@ def increment_covariance(before: Stamped | None, now: Stamped) -> Float | None:
     covariance of the motion in the frame of the robot before it. Many drivers publish one constant
     instead of an accumulated covariance: where P does not change, nothing is known (None).
     Rounding can leave variances below zero: they are set to zero, and so are covariances that are
-    then too large.
+    then too large, and those with the heading where not all three can be.
     """
     if before is None or before.covariance is None or now.covariance is None:
         return None
@@ -110,4 +111,7 @@ def _possible(Q: Float) -> Float:
         for j in range(i):
             limit = math.sqrt(float(out[i, i])) * math.sqrt(float(out[j, j]))
             out[i, j] = out[j, i] = min(max(out[i, j], -limit), limit)
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = out.tolist()
+    if not possible(xx, xy, yy, xt, yt, tt):  # three correlations that cannot be at once
+        out[:2, 2] = out[2, :2] = 0.0
     return out

@@ -21,11 +21,12 @@ from slam.frames import Float
 from slam.posegraph import Edge, carried, optimise
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.everywhere import coarse_field, places
-from slam.shunting.impressions import Observations, stamp
+from slam.shunting.impressions import Observations
 from slam.shunting.matching import Match, Matcher
 from slam.shunting.motion import inverted
 from slam.shunting.network import Network
 from slam.shunting.recovery import COARSE, support
+from slam.shunting.stamping import stamp
 
 _log = logging.getLogger(__name__)
 KEY_M, KEY_RAD = 1.0, 0.6  # between key frames

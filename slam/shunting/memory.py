@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.checked import covariance, pose
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing
-from slam.frames import Float, covariance, pose
+from slam.frames import Float
 from slam.shunting.cells import FREE_COUNT, SIDE, living
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.network import Network

@@ -15,11 +15,12 @@ import numpy as np
 from slam import se2
 from slam.frames import Float
 from slam.shunting.everywhere import places
-from slam.shunting.impressions import Observations, stamp
+from slam.shunting.impressions import Observations
 from slam.shunting.matching import Match, Matcher
 from slam.shunting.motion import Prediction, inverted, turned
 from slam.shunting.network import Network
 from slam.shunting.search import SearchWindow
+from slam.shunting.stamping import stamp
 
 MOST = 6  # hypotheses from one search of the map
 AGAIN_S = 1.0  # between two searches of the map

@@ -19,13 +19,7 @@ from slam.frames import Float, Frame, Odometry
 from slam.shunting import layers, memory
 from slam.shunting.belief import Belief
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import (
-    Observations,
-    from_features,
-    from_scan,
-    joined,
-    stamp,
-)
+from slam.shunting.impressions import Observations, from_features, from_scan, joined
 from slam.shunting.increments import Increments
 from slam.shunting.loops import Loops
 from slam.shunting.matching import Match, Matcher
@@ -34,6 +28,7 @@ from slam.shunting.network import Network
 from slam.shunting.recovery import COARSE, SLIPPED, TELLING, Recovery, slipped
 from slam.shunting.residuals import Evidence, look
 from slam.shunting.search import SearchWindow
+from slam.shunting.stamping import stamp
 from slam.shunting.warmup import warm_up
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory

@@ -17,10 +17,11 @@ from slam.compiling import announced
 from slam.frames import LaserSpec, Scan
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.covariances import advance, carried, innovation, observable
-from slam.shunting.impressions import from_scan, stamp
+from slam.shunting.impressions import from_scan
 from slam.shunting.matching import Matcher
 from slam.shunting.network import Network
 from slam.shunting.residuals import look
+from slam.shunting.stamping import stamp
 
 
 @functools.cache

@@ -53,6 +53,7 @@ LASER = {"n_beams": 3, "angle_min": 0.0, "angle_increment": 0.1}
         ({"beam_time_offsets": [0.0, 0.1]}, r"beam_time_offsets must have shape \(3\)"),
         ({"beam_time_offsets": [0.0, -0.1, 0.0]}, "beam_time_offsets must be >= 0"),
         ({"beam_time_offsets": [0.0, math.nan, 0.0]}, "beam_time_offsets must be finite"),
+        ({"angle_increment": 180.0}, "3 beams within one turn"),
         ({"T_robot_laser": [0.0, 0.0]}, "T_robot_laser"),
         ({"T_robot_laser": "left"}, "T_robot_laser must be numeric"),
     ],
@@ -81,10 +82,22 @@ def test_a_scanner_that_cannot_be(changes, message):
             lambda: odometry(increment_covariance=np.triu(np.ones((3, 3)))),
             "symmetric with variances >= 0",
         ),
+        (
+            lambda: odometry(increment_covariance=[[1e-4, 1e-2, 0], [1e-2, 1e-4, 0], [0, 0, 1e-4]]),
+            "increment_covariance must be positive semidefinite",
+        ),
+        (
+            lambda: odometry(increment_covariance=2.0 * np.eye(3) - 1.5 * (1.0 - np.eye(3))),
+            "increment_covariance must be positive semidefinite",
+        ),
         (lambda: features(points_robot=[[1.0, 2.0, 3.0]]), "points_robot"),
         (lambda: features(covariances=[np.eye(2)] * 2), "covariances"),
         (lambda: features(covariances=[[[1.0, 0.5], [0.0, 1.0]]]), "symmetric"),
         (lambda: features(covariances=[[[-1.0, 0.0], [0.0, 1.0]]]), "variances >= 0"),
+        (
+            lambda: features(covariances=[[[1e-3, 5e-2], [5e-2, 1e-3]]]),
+            r"Features.covariances\[0\] must be positive semidefinite",
+        ),
         (lambda: features(ids=[1.5]), "ids must be numeric: expected whole numbers"),
         (lambda: features(ids=[2**70]), "ids must be numeric"),
         (
@@ -133,7 +146,19 @@ def test_arrays_are_copies_that_nobody_can_write():
 def test_rep_117_values_pass_and_are_not_valid_ranges():
     made = scan(ranges=[math.inf, math.nan, 31.0])
     assert not made.valid.any()
-    assert scan(ranges=[0.0, 1.0, 30.0]).valid.all()
+    assert scan(ranges=[0.001, 1.0, 30.0]).valid.all()
+    assert scan(ranges=[0.0, 1.0, 30.0]).valid.tolist() == [False, True, True]
+
+
+def test_covariances_may_be_singular_and_rounded():
+    for singular in (
+        np.zeros((3, 3)),
+        np.ones((3, 3)),
+        np.outer([1.0, -2.0, 3.0], [1.0, -2.0, 3.0]),
+    ):
+        for scale in (1e-12, 1e-4, 1e4):
+            rounded = (scale * singular).astype(np.float32)
+            odometry(increment_covariance=rounded)
 
 
 def test_beam_times_are_whole_nanoseconds_and_angles_count_up():

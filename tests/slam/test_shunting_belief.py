@@ -14,12 +14,13 @@ from slam.frames import Float, Frame, Odometry, Scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.belief import Belief
 from slam.shunting.covariances import innovation, observable
-from slam.shunting.impressions import SENSOR_SIGMA_M, SIGMA_CELLS, from_scan, stamp
+from slam.shunting.impressions import SENSOR_SIGMA_M, SIGMA_CELLS, from_scan
 from slam.shunting.increments import Increments
 from slam.shunting.matching import Match, Matcher
 from slam.shunting.motion import Prediction
 from slam.shunting.network import Network
 from slam.shunting.residuals import Evidence, look
+from slam.shunting.stamping import stamp
 from slam.system import Estimate
 from tests.world2d import Drive, World2D, arena, frames, laser, rectangle, wander
 

@@ -12,9 +12,10 @@ from slam.frames import Features
 from slam.points import PointWorld, PointWorldConfig
 from slam.replay import Track
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import from_features, stamp
+from slam.shunting.impressions import from_features
 from slam.shunting.network import Network
 from slam.shunting.peaks import peaks
+from slam.shunting.stamping import stamp
 from slam.trajectory import Trajectory
 
 

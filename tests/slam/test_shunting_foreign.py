@@ -46,6 +46,14 @@ def with_gaps(frame: Frame) -> Frame:
     return replace(frame, scan=scan)
 
 
+def with_zeros(frame: Frame) -> Frame:
+    """A third of the beams says 0, as drivers do that know no other word for nothing."""
+    assert frame.scan is not None
+    lost = np.arange(frame.scan.spec.n_beams) % 3 == 0
+    ranges = np.where(lost, 0.0, frame.scan.ranges).astype(np.float32)
+    return replace(frame, scan=replace(frame.scan, ranges=ranges))
+
+
 def without_twist(frame: Frame) -> Frame:
     """Nothing but the pose of the wheels."""
     odometry = Odometry(stamp_ns=frame.stamp_ns, T_odom_robot=frame.odometry.T_odom_robot)
@@ -85,6 +93,10 @@ STREAMS = {
         segments=arena, drive=curve(12.0), rate_hz=10.0, spec=scanner(1.0, 180.0, 80.0),
         limit_m=0.01, change=with_gaps,
     ),
+    "a third of the beams 0": Foreign(
+        segments=arena, drive=curve(6.0), rate_hz=10.0, spec=scanner(1.0, 180.0, 8.0),
+        limit_m=0.01, change=with_zeros,
+    ),
     "a scan each metre, round the office": Foreign(
         segments=office, drive=LOOP, rate_hz=0.8, spec=scanner(1.0, 180.0, 80.0), limit_m=0.10
     ),
@@ -110,7 +122,7 @@ def test_foreign_streams_are_followed(name: str) -> None:
     assert error <= case.limit_m
 
 
-@pytest.mark.parametrize("silence", [math.nan, math.inf])
+@pytest.mark.parametrize("silence", [math.nan, math.inf, 0.0])
 def test_a_scanner_that_falls_silent_is_told_from_one_that_stands_still(silence: float) -> None:
     """Two seconds in the middle: odometry goes on and nobody pretends to know; then it is back."""
     spec = scanner(1.0, 180.0, 30.0)

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.frames import Features, Odometry, Scan
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import Observations, from_features, from_scan, stamp
+from slam.shunting.impressions import Observations, from_features, from_scan
 from slam.shunting.matching import Matcher, seen_by
 from slam.shunting.motion import inverted, predict, turned
 from slam.shunting.network import Network
 from slam.shunting.overlap import evaluate
 from slam.shunting.search import SearchWindow
+from slam.shunting.stamping import stamp
 from slam.shunting.surfaces import join
 from tests.world2d import World2D, arena, laser, rectangle
 

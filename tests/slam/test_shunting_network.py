@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import Observations, stamp
+from slam.shunting.impressions import Observations
 from slam.shunting.lyapunov import energy, shunting_terms
 from slam.shunting.network import SIDE, Network, lateral_mu
+from slam.shunting.stamping import stamp
 from slam.shunting.visibility import View, view_of_beams, view_of_features
 
 Array = NDArray[np.float64]

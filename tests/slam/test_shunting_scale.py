@@ -13,10 +13,11 @@ from slam import se2
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.bounds import Search
 from slam.shunting.cells import FREE_COUNT, TOUCHED_COUNT, living
-from slam.shunting.impressions import from_scan, stamp
+from slam.shunting.impressions import from_scan
 from slam.shunting.matching import Matcher
 from slam.shunting.network import Network
 from slam.shunting.search import SearchWindow
+from slam.shunting.stamping import stamp
 from tests.world2d import World2D, arena, frames, laser, wander
 
 CONFIG = ShuntingConfig(cell_m=0.05)

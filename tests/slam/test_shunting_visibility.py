@@ -13,8 +13,9 @@ from slam import se2
 from slam.frames import Features, Scan
 from slam.seen import FREE_WITHOUT_RETURN_M
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import Observations, from_features, from_scan, stamp
+from slam.shunting.impressions import Observations, from_features, from_scan
 from slam.shunting.network import Network
+from slam.shunting.stamping import stamp
 from slam.shunting.visibility import View
 from tests.world2d import World2D, laser, rectangle
 

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a number must be before it enters a type: shape, finite, a possible covariance."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from slam.errors import InvalidValueError, NotFiniteError
+
+Float = NDArray[np.float64]
+
+
+def frozen(
+    owner: str, name: str, value: ArrayLike, shape: tuple[int | None, ...], dtype: Any = np.float64
+) -> NDArray[Any]:
+    """A read-only copy of ``value`` with the given shape (None: any length) and type.
+
+    Raises ``InvalidValueError`` that names owner and field when it cannot be one.
+    """
+    try:
+        array = np.array(value, dtype=dtype) if dtype is np.float64 else _cast(value, dtype)
+    except (TypeError, ValueError, ArithmeticError) as error:
+        raise InvalidValueError(f"{owner}.{name} must be numeric: {error}") from error
+    if array.shape != shape and (
+        array.ndim != len(shape)
+        or any(
+            want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
+        )
+    ):
+        wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
+        raise InvalidValueError(f"{owner}.{name} must have shape {wanted}, got {array.shape}")
+    array.setflags(write=False)
+    return array
+
+
+def _cast(value: ArrayLike, dtype: Any) -> NDArray[Any]:
+    """A copy in a type that may not hold every number: losing more than digits is an error."""
+    raw = np.asarray(value)
+    if raw.dtype == dtype:
+        return raw.copy()
+    if np.issubdtype(dtype, np.integer) and raw.size and raw.dtype.kind not in "iub":
+        raise ValueError(f"expected whole numbers, got {raw.dtype}")
+    with np.errstate(over="raise", invalid="raise"):
+        array: NDArray[Any] = np.array(raw, dtype=dtype)
+    if array.dtype.kind in "iu" and not np.array_equal(array, raw):
+        raise ValueError(f"some numbers do not fit {array.dtype}")
+    return array
+
+
+def finite(owner: str, name: str, array: NDArray[Any]) -> None:
+    """Raise ``NotFiniteError`` when any entry is NaN or infinite."""
+    # For the few numbers of a pose NumPy costs more than scalars.
+    few = array.size <= 9
+    fine = all(map(math.isfinite, array.ravel().tolist())) if few else np.isfinite(array).all()
+    if not fine:
+        raise NotFiniteError(f"{owner}.{name} must be finite, got {array.tolist()!r:.200}")
+
+
+def pose(owner: str, name: str, value: ArrayLike) -> Float:
+    """A frozen, finite ``(x, y, theta)``."""
+    array = frozen(owner, name, value, (3,))
+    finite(owner, name, array)
+    return array
+
+
+def _close(a: float, b: float) -> bool:
+    """Equal but for rounding."""
+    return abs(a - b) <= 1e-9 + 1e-6 * min(abs(a), abs(b))
+
+
+def possible(
+    xx: float, xy: float, yy: float, xt: float = 0.0, yt: float = 0.0, tt: float = 0.0
+) -> bool:
+    """Whether these are of a covariance: positive semidefinite but for rounding.
+
+    By its correlations; variances of (30 micrometres or microradians)^2 count as rounding.
+    """
+    x, y, t = (math.sqrt(variance + 1e-9) for variance in (xx, yy, tt))
+    a, b, c = xy / x / y, xt / x / t, yt / y / t
+    within = max(abs(a), abs(b), abs(c)) <= 1.0 + 1e-6
+    return within and 1.0 + 2.0 * a * b * c - a * a - b * b - c * c >= -1e-6
+
+
+def covariance(owner: str, name: str, value: ArrayLike) -> Float:
+    """A frozen, finite, symmetric, positive semidefinite (3, 3) covariance."""
+    array = frozen(owner, name, value, (3, 3))
+    finite(owner, name, array)
+    rows = array.tolist()  # scalars: np.allclose on nine numbers costs more than a whole motion
+    if min(rows[0][0], rows[1][1], rows[2][2]) < 0.0 or not (
+        _close(rows[0][1], rows[1][0])
+        and _close(rows[0][2], rows[2][0])
+        and _close(rows[1][2], rows[2][1])
+    ):
+        raise InvalidValueError(
+            f"{owner}.{name} must be symmetric with variances >= 0, got {array.tolist()}"
+        )
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = rows
+    if not possible(xx, xy, yy, xt, yt, tt):
+        raise InvalidValueError(
+            f"{owner}.{name} must be positive semidefinite (no correlations beyond 1), "
+            f"got {array.tolist()}"
+        )
+    return array
+
+
+def check_stamp(owner: str, value: object) -> None:
+    """Raise ``InvalidValueError`` unless it is a whole number, of nanoseconds."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise InvalidValueError(
+            f"{owner}.stamp_ns must be an integer number of nanoseconds, got {value!r}"
+        )
+
+
+class ByContent:
+    """Equality of dataclasses that hold arrays: same type, equal fields, NaN equal to NaN."""
+
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        if type(self) is not type(other):
+            return NotImplemented
+        mine, theirs = vars(self), vars(other)
+        return all(_same(mine[name], theirs[name]) for name in mine)
+
+    __hash__ = None  # type: ignore[assignment]  # arrays have no hash
+
+
+def _same(a: object, b: object) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        floats = a.dtype.kind == "f"
+        return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=floats)
+    return bool(a == b)
