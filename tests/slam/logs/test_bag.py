@@ -208,6 +208,10 @@ def test_a_covariance_that_does_not_accumulate_says_nothing():
     assert increment_covariance(None, Stamped(1, there, None, P)) is None
     shrunk = increment_covariance(Stamped(0, here, None, P), Stamped(1, there, None, 0.5 * P))
     assert np.diagonal(shrunk).min() >= 0.0  # a filter's, not an odometry's: still a covariance
+    odd = 0.01 * np.array([[1.0, 0.9, 0.9], [0.9, 1.0, -0.9], [0.9, -0.9, 1.0]])
+    mended = increment_covariance(Stamped(0, here, None, P), Stamped(1, here, None, P + odd))
+    assert np.linalg.eigvalsh(mended).min() >= 0.0
+    np.testing.assert_allclose(np.diagonal(mended), 0.01)
 
 
 @pytest.mark.parametrize("kind", ["sqlite3", "mcap", "ros1"])
