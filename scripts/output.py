@@ -57,9 +57,13 @@ def whole_folder(path: Path, *, overwrite: bool) -> Iterator[Path]:
 def locked_folder(out: Path) -> Iterator[None]:
     """A folder of ours that grows, and nobody else's at the moment.
 
-    Raises ``OutputError`` for one that holds files without a recipe, or is being written now.
+    Raises ``OutputError`` for one that holds files without a recipe, is being written now, or
+    cannot be made.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot write {out}: {error.strerror or error}") from error
     others = [file.name for file in out.iterdir() if file.name != LOCK]
     if others and not (out / RECIPE).exists():
         raise OutputError(f"{out} holds files that mobilia did not write: choose another --out")

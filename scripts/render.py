@@ -74,12 +74,19 @@ def render(
         raise InvalidValueError(f"--view must be one of {', '.join(VIEWS)}, got '{view}'")
     if out is None and strip_to is None and rerun is None:
         out = Path("out") / f"{run.resolve().name.split('.')[0]}.mp4"
-    moments = _moments(at) if strip_to is not None else []
+    _check_suffixes(out, strip_to, rerun)
+    if at and strip_to is None:
+        raise InvalidValueError("--at names the moments of --strip, which is missing")
+    moments = _moments(at)
     if out is not None:
         require_ffmpeg()
     if rerun is not None:
         RerunLog.require()
     with open_run(run, view=view if out is not None and not no_3d else None) as footage:
+        if moments and moments[-1] > footage.duration_s:
+            raise InvalidValueError(
+                f"--at must lie within the run's {footage.duration_s:.1f} s, got {moments[-1]:g}"
+            )
         pace = _pace(footage, fps, from_s, to_s, speed)
         show = footage.show([slam or footage.slam or "shunting"], pace=pace, size=pixels)
         if footage.no_camera:
@@ -141,6 +148,17 @@ def _pace(
         from_s=from_s,
         to_s=math.inf if to_s is None else to_s,
     )
+
+
+def _check_suffixes(out: Path | None, strip_to: Path | None, rerun: Path | None) -> None:
+    """Writers choose formats by the suffix, and so do those who open the file."""
+    for option, path, suffix in (
+        ("--out", out, ".mp4"),
+        ("--strip", strip_to, ".png"),
+        ("--rerun", rerun, ".rrd"),
+    ):
+        if path is not None and path.suffix.lower() != suffix:
+            raise InvalidValueError(f"{option} must be a file that ends in {suffix}, got '{path}'")
 
 
 def _moments(words: str) -> list[float]:

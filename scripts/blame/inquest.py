@@ -220,7 +220,7 @@ def _try_all(found: Inquest, checkpoint: Checkpoint, note: Note) -> None:
             found.trials.append(_trial(found, checkpoint, "pair", change))
     for noise in range(1, found.question.repeats + 1):
         note(f"other noise {noise}", len(plan), len(plan))
-        again = _rise_m(found, checkpoint.rerun(Change(), found.last, noise=noise))
+        again = _rise_again_m(found, checkpoint, Change(), noise)
         found.recurs += again >= CURED * found.rise_m
     singles = [t for t in found.trials if t.kind == "single" and t.cured]
     for trial in sorted(singles, key=lambda t: -t.share) or found.together[:REPEATED]:
@@ -268,9 +268,16 @@ def _repeat(found: Inquest, checkpoint: Checkpoint, trial: Trial, note: Note) ->
     again = 0
     for noise in range(1, found.question.repeats + 1):
         note(f"{trial.change}, other noise {noise}", 1, 1)
-        strip = checkpoint.rerun(trial.change, found.last, noise=noise)
-        again += _rise_m(found, strip) < CURED * found.rise_m
+        again += _rise_again_m(found, checkpoint, trial.change, noise) < CURED * found.rise_m
     trial.again = again
+
+
+def _rise_again_m(found: Inquest, checkpoint: Checkpoint, change: Change, noise: int) -> float:
+    """The same with other noise; NaN where the SLAM fails then, which is neither."""
+    try:
+        return _rise_m(found, checkpoint.rerun(change, found.last, noise=noise))
+    except SlamFailedError:
+        return math.nan
 
 
 def _rise_m(found: Inquest, strip: Strip) -> float:

@@ -98,6 +98,8 @@ def blame(
         if scanner != "full":
             settings["laser"] = SCANNERS[scanner]()
         case = Case(settings=settings, seconds=seconds, slam=slam or "shunting", every=every)
+    if at is not None and not 0.0 <= at <= case.seconds:
+        raise InvalidValueError(f"--at must lie in 0..{case.seconds:g} s, got {at:g}")
     name = run.name if run is not None else f"{scene}-{seed}"
     folder = out or Path("out") / f"blame-{file_name(name)}-{file_name(case.slam)}"
     with whole_folder(folder, overwrite=overwrite) as part:

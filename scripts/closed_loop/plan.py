@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,11 @@ import slam
 from scripts.compare.plan import source_of, sources
 from scripts.jobs import Job
 from scripts.session import file_name
-from sim.loop import LoopConfig, LoopRun, closed_loop
+from sim.loop import GoalResult, LoopConfig, LoopRun, closed_loop
+from sim.loop.referee import Tally
+from sim.loop.run import goal_order
 from sim.simulation import Simulation
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, SlamFailedError
 from slam.guests import Limits, limited
 
 RUNS = "runs"  # folder of the jobs' files
@@ -86,11 +88,34 @@ def run_one(
     goals: list[str] | int | None,
     loop: Mapping[str, Any],
 ) -> None:
-    """A job: one run, into ``path``."""
+    """A job: one run, into ``path``. A SLAM that cannot be made has failed at every goal."""
     simulation = Simulation(scene, seed=seed, dynamism=dynamism)
-    system = limited(slam, Limits())
+    try:
+        system = limited(slam, Limits())
+    except SlamFailedError as error:
+        save(path, _failed(goal_order(simulation.world, goals), error))
+        return
     run = closed_loop(simulation, system, config=LoopConfig(**loop), goals=goals, name=slam)
     save(path, run)
+
+
+def _failed(goals: Sequence[str], error: SlamFailedError) -> LoopRun:
+    """The run of a SLAM that never was."""
+    return LoopRun(
+        goals=tuple(
+            GoalResult(goal=goal, outcome="failed", reason=error.outcome, tally=Tally())
+            for goal in goals
+        ),
+        stamps_ns=np.zeros(0, dtype=np.int64),
+        believed=np.zeros((0, 3)),
+        true=np.zeros((0, 3)),
+        commands=np.zeros((0, 2)),
+        trusted=np.zeros(0, dtype=np.bool_),
+        goal_of=np.zeros(0, dtype=np.int64),
+        lost_s=None,
+        found_s=None,
+        failure=(error.outcome, str(error)),
+    )
 
 
 _ARRAYS = ("stamps_ns", "believed", "true", "commands", "trusted", "goal_of")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib.util
+import shlex
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from scripts.session import file_name
 from sim.recording.recipe import Recipe
 from slam.errors import InvalidValueError
 from slam.guests import Limits
+from slam.guests.pipe import PREFIX
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
@@ -125,8 +127,12 @@ def sources(*packages: Any) -> tuple[Path, ...]:
 
 
 def source_of(slam: str) -> tuple[Path, ...]:
-    """The file of a SLAM's own module: with it changed, its runs are made again."""
-    if ":" not in slam:
+    """The file of a SLAM's own module, or those that a command names: with them changed, its runs
+    are made again."""
+    kind, _, command = slam.partition(":")
+    if not command:
         return ()
-    spec = importlib.util.find_spec(slam.partition(":")[0])
+    if slam.startswith(PREFIX):
+        return tuple(path for path in map(Path, shlex.split(command)) if path.is_file())
+    spec = importlib.util.find_spec(kind)
     return (Path(spec.origin),) if spec and spec.origin and spec.has_location else ()

@@ -158,7 +158,7 @@ def _table(plan: Plan, scene: str, rows: list[dict[str, Any]]) -> Table:
     )
     table.add_column("dynamism", justify="right")
     for name in plan.slams:
-        table.add_column(escape(name), justify="right")
+        table.add_column(escape(name), justify="right", overflow="fold")
     summary = {
         (row["dynamism"], row["slam"], row["metric"]): row["value"]
         for row in tables.levels([row for row in rows if row["scene"] == scene])

@@ -191,7 +191,10 @@ def guarded(name: str, limits: Limits | None = None, **config: Any) -> PipeSlam:
             environment={**os.environ, "PYTHONPATH": path},
         )
     except SlamFailedError as error:
-        raise error.at(f"SLAM '{name}' cannot be made:") from error
+        where = f"SLAM '{name}' cannot be made:"
+        if error.message.startswith(where):  # the child has said so
+            raise
+        raise error.at(where) from error
 
 
 def limited(name: str, limits: Limits | None) -> SlamSystem:

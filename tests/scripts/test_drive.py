@@ -9,7 +9,7 @@ import json
 import pytest
 
 from scripts.closed_loop import tables
-from scripts.closed_loop.plan import Driven, Plan
+from scripts.closed_loop.plan import Driven, Plan, load, run_one
 from scripts.closed_loop.verb import _goals, _seeds, carry_out
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError, OutputError, UnknownNameError
@@ -82,6 +82,22 @@ def test_seeds_and_goals_are_a_number_or_a_list():
         _seeds(("many",))
     assert _goals(("2",)) == 2
     assert _goals(("lounge", "copy")) == ("lounge", "copy")
+
+
+def test_a_slam_that_cannot_be_made_has_failed_at_every_goal(tmp_path, monkeypatch):
+    (tmp_path / "stillborn.py").write_text("class Slam:\n    def __init__(self): 1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    who = {"scene": "arena", "dynamism": 0.0, "seed": 100, "slam": "stillborn:Slam"}
+    run_one(tmp_path / "run.npz", **who, goals=2, loop={})
+    run = load(tmp_path / "run.npz", who)
+    rows = tables.goal_rows(run)
+    assert [(row["outcome"], row["reason"]) for row in rows] == [("failed", "raised")] * 2
+    row = tables.run_row(run)
+    assert (row["failed"], row["success"], row["failure"]) == (2, 0.0, "raised")
+    assert row["failure_words"].count("cannot be made") == 1
+    assert "ZeroDivisionError" in row["failure_words"]
+    (level,) = tables.levels(rows, [row])
+    assert (level["failed"], level["collisions_per_km"]) == (2, None)
 
 
 def goal(outcome, precision=None):

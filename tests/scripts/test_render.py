@@ -209,6 +209,10 @@ def test_a_size_is_two_even_numbers(words: str):
         (("--view", "side"), "--view must be one of follow, top, persp, got 'side'"),
         (("--at", "3,x", "--strip", "x.png"), "--at must be seconds"),
         (("--at", "3,1", "--strip", "x.png"), "rising order"),
+        (("--at", "3,99", "--strip", "x.png"), "--at must lie within the run's"),
+        (("--at", "1"), "--at names the moments of --strip"),
+        (("--strip", "x.txt"), "--strip must be a file that ends in .png, got 'x.txt'"),
+        (("--rerun", "x.mp4"), "--rerun must be a file that ends in .rrd"),
         (("--slam", "shuntin"), "Did you mean 'shunting'"),
     ],
 )
@@ -217,6 +221,11 @@ def test_a_wrong_option_is_named_and_nothing_is_written(run: Path, tmp_path: Pat
         render(run, "--out", tmp_path / "film.mp4", *words)
     assert says in str(caught.value)
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_film_is_an_mp4(run: Path, tmp_path: Path):
+    with pytest.raises(MobiliaError, match=r"--out must be a file that ends in \.mp4"):
+        render(run, "--out", tmp_path / "film.xyz")
 
 
 def test_what_is_no_run_is_told_in_one_line(run: Path, tmp_path: Path):

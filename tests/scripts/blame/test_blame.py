@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from scripts.blame.case import Case, case_of, options_of
 from scripts.blame.inquest import Inquest, Question, Trial, hold
-from scripts.blame.tape import Strip, Tape, record, row_at
+from scripts.blame.tape import Checkpoint, Strip, Tape, record, row_at
 from scripts.blame.words import headline
 from scripts.cli import app
 from sim.absence import Change
@@ -118,6 +118,23 @@ def test_a_slam_that_does_not_repeat_itself_is_refused():
     tape = record(case("Moody", 3.0))
     with pytest.raises(SlamFailedError, match="does not repeat itself"):
         hold(tape, Question(at_s=2.0, horizon_s=0.5))
+
+
+def test_a_slam_that_fails_with_other_noise_neither_strays_again_nor_is_cured(
+    startled, monkeypatch
+):
+    def rerun(self, change, last, *, noise=0):
+        if noise:
+            raise SlamFailedError("too noisy")
+        return again(self, change, last)
+
+    again = Checkpoint.rerun
+    monkeypatch.setattr(Checkpoint, "rerun", rerun)
+    found = hold(startled[0], Question(horizon_s=1.0, repeats=1, top=1))
+    assert found.recurs == 0
+    assert found.together
+    assert not found.named
+    assert found.verdict == "undecided"
 
 
 def test_a_chosen_time_at_which_nothing_happens_is_said_to_be_that():

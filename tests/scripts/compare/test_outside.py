@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from scripts.compare.entry import Entry
+from scripts.compare.plan import source_of
 from slam.guests import Limits
 from tests.scripts.compare.hand_made import recording
+from tests.slam import misbehaving
 
 CLIENT = Path(__file__).parents[2] / "slam" / "misbehaving.py"
 
@@ -39,6 +41,13 @@ def test_each_fault_is_an_outcome(fault: str, outcome: str):
 def test_one_that_cannot_start_has_lost_at_once():
     row = scored("mute", first_s=0.3)
     assert (row["outcome"], row["scans"], row["lost_at_s"]) == ("hung", 0, 0.0)
+
+
+def test_a_program_that_changed_is_run_again(tmp_path: Path):
+    (program := tmp_path / "mine.py").write_text("")
+    assert source_of(f"pipe:python3 {program} --fast") == (program,)
+    assert source_of("tests.slam.misbehaving:Any") == (Path(misbehaving.__file__),)
+    assert source_of("shunting") == ()
 
 
 def test_a_good_one_is_charged_its_own_time_and_memory():
