@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 
 import numpy as np
 import pytest
@@ -13,12 +14,19 @@ from scripts.compare.memory import PeakMemory
 MB = 1_000_000
 
 
+def hold_for_a_moment(mb: int) -> None:
+    """Straight from the system: what ``malloc`` gets, it may keep."""
+    if mb:
+        with mmap.mmap(-1, mb * MB) as pages:
+            np.frombuffer(pages, dtype=np.uint8)[:] = 1
+
+
 def grown(before_mb: int, within_mb: int) -> float:
     """MB grown where so much is held for a moment before, and so much within."""
     memory = PeakMemory()
-    np.ones(before_mb * MB // 8).sum()
+    hold_for_a_moment(before_mb)
     memory.begin()
-    np.ones(within_mb * MB // 8).sum()  # freed at once
+    hold_for_a_moment(within_mb)
     memory.end()
     if math.isnan(memory.growth_mb):
         pytest.skip("the kernel does not say")
