@@ -9,7 +9,8 @@ Three errors, kept apart because they grow differently:
   lattice's. Does not grow; its size is read off the residuals (``residuals``);
 - odometry, where the scan says nothing: the map's share of the pose ends, and this one grows.
 
-Every constant is in units of what is observed, so one set serves any scanner and rate.
+Every constant is in units of what is observed, so that one set serves many scanners and rates.
+They were set on 361 beams; sparser and shorter ones make it too sure (docs/uncertainty.md).
 """
 
 from __future__ import annotations

@@ -20,26 +20,33 @@ Objective = Literal["sum", "log"]
 class ShuntingConfig:
     """Everything a user may turn; the defaults are the preset ``robust()``.
 
+    What a value does to the error was measured on training seeds of office, arena and arena without
+    walls at 4.7 Hz; where no source is named, the default was chosen there.
+
     cell_m              edge of a neuron's square, m. Sets accuracy and cost: 0.05 is twice as
                         fast, 0.10 three times less accurate
     decay_per_s         A of Eq. (8), 1/s (paper: 0.8). Flat between 0.2 and 2
     lateral_sum         W, sum of a neuron's lateral weights (paper: < 0.2). Must stay below
                         ``decay_per_s``, else the empty map is unstable. 0 turns diffusion off: it
                         doubles the cost and gains nothing measurable
-    lateral_reach_cells r0 of w = mu / d for 0 < d < r0, in cells
-    threshold           sigma of Eq. (8): activities below it are dropped and do not spread
+    lateral_reach_cells r0 of w = mu / d for 0 < d < r0 (paper), in cells. Flat
+    threshold           sigma of Eq. (8): activities below it are dropped and do not spread. Flat
+                        between 0.001 and 0.05; lower values keep more neurons alive
     trace_s             pace of the long-term trace, s of looking at a neuron (never less than
                         five looks); 0 turns the trace off (paper). Below 1 s things that move
                         together carry the robot along
-    short_term_weight   share of the short-term activity in a neuron that has no long-term trace
-    reward              weight of one fully overlapped observation against the odometry prior
+    short_term_weight   share of the short-term activity in a neuron that has no long-term trace.
+                        Flat between 0.1 and 0.3; 1 errs by 15 % more in rooms, 24 % without walls
+    reward              weight of one fully overlapped observation against the odometry prior. Flat
+                        between 2 and 12 in rooms; without walls 2 errs by 90 % more, 12 by 20 less
     reward_exponent     the weight falls with the matched fraction q as ``reward * q**exponent``.
                         0: never; above, half of the chairs moving without a wall in sight lead
                         astray (14 cm at 0, 18 at 1, 28 at 2), below 2 nothing gained
     objective           "sum": overlapped volumes, as the paper words it; "log": as Eq. (13) prints
-    range_m             returns beyond are ignored, m
+    range_m             returns beyond are ignored, m. 8 errs by 70 % more in rooms
     freeze_below        nothing is written to the map while the matched fraction is below this
-                        share of its usual value and the map in view is contradicted; 0: never
+                        share of its usual value and the map in view is contradicted; 0: never.
+                        Flat between 0 and 0.8 where nobody carries the robot off
     """
 
     cell_m: float = 0.03
