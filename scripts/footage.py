@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scripts.film import SIZE, Pace, Size
-from scripts.output import RECIPE
+from scripts.output import RECIPE, read_recipe_words, slams_of
 from scripts.session import primary_of, systems_named
 from scripts.show import Show
 from scripts.stage import LogStage, Stage
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from sim.moments import Moment
     from sim.simulation import Simulation
 
-MAX_RECIPE = 1 << 20  # bytes
 SIMULATED = ("scene", "seconds", "seed", "dynamism", "scan_height_m")  # of a run's settings
 
 
@@ -85,13 +83,13 @@ def open_run(path: Path, *, view: str | None = "follow") -> Footage:
     recipe = path / RECIPE
     if not recipe.exists():
         return of_log(path)
-    words = _recipe(recipe)
+    words = read_recipe_words(recipe)
     if "recipe" in words:
         return of_episode(path, view=view)
     settings = words.get("settings")
     if not isinstance(settings, dict):
         raise LogFormatError(recipe, "no recipe of a run: it has no settings")
-    slams = [s for s in settings.get("slams", ()) if isinstance(s, str) and s != "odometry"]
+    slams = [name for name in slams_of(recipe, settings) if name != "odometry"]
     slam = slams[0] if slams else ""
     if "log" in settings:
         raise LogFormatError(
@@ -211,19 +209,3 @@ def title_of(settings: Mapping[str, Any]) -> str:
         f"{settings['scene']} · dynamism {settings.get('dynamism', 0.5)} · "
         f"seed {settings.get('seed', 0)}{twin}"
     )
-
-
-def _recipe(path: Path) -> dict[str, Any]:
-    try:
-        with path.open("rb") as file:
-            raw = file.read(MAX_RECIPE + 1)
-        if len(raw) > MAX_RECIPE:
-            raise LogFormatError(path, f"more than {MAX_RECIPE} bytes: no recipe")
-        words = json.loads(raw.decode("utf-8"))
-    except OSError as error:
-        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
-    except (ValueError, RecursionError) as error:
-        raise LogFormatError(path, f"no recipe: {error}") from error
-    if not isinstance(words, dict):
-        raise LogFormatError(path, "no recipe: not a JSON object")
-    return words

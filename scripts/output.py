@@ -16,11 +16,12 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from slam.errors import OutputError
+from slam.errors import LogFormatError, OutputError
 from slam.files import write_text
 
 RECIPE = "recipe.json"
 LOCK = ".lock"
+MAX_RECIPE_BYTES = 1 << 20
 
 
 @contextmanager
@@ -155,3 +156,28 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value
+
+
+def read_recipe_words(path: Path) -> dict[str, Any]:
+    """The object in a ``recipe.json`` of whatever command; ``LogFormatError`` for anything else."""
+    try:
+        with path.open("rb") as file:
+            raw = file.read(MAX_RECIPE_BYTES + 1)
+        if len(raw) > MAX_RECIPE_BYTES:
+            raise LogFormatError(path, f"more than {MAX_RECIPE_BYTES} bytes: no recipe")
+        words = json.loads(raw.decode("utf-8"))
+    except OSError as error:
+        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:
+        raise LogFormatError(path, f"no recipe: {error}") from error
+    if not isinstance(words, dict):
+        raise LogFormatError(path, "no recipe: not a JSON object")
+    return words
+
+
+def slams_of(path: Path, settings: Mapping[str, Any]) -> list[str]:
+    """The SLAMs that the settings of a recipe name; ``LogFormatError`` for what are no names."""
+    slams = settings.get("slams", [])
+    if not isinstance(slams, list) or not all(isinstance(name, str) for name in slams):
+        raise LogFormatError(path, f"settings.slams must be a list of names, got {slams!r:.80}")
+    return slams

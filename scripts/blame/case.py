@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sim.recording.recipe import MAX_BYTES, Made, read_recipe
+from scripts.output import RECIPE, read_recipe_words, slams_of
+from sim.recording.recipe import Made, read_recipe
 from slam.errors import InvalidValueError, LogFormatError
 
-RECIPE = "recipe.json"
 COMMANDS = ("run", "demo")
 NO_OPTIONS = ("scene", "seed", "dynamism", "laser", "labels", "tags")
 OF_THE_RUN = ("slams", "seconds", "simulation")  # in the recipe of a run; the rest is the world's
@@ -58,7 +58,7 @@ def case_of(folder: Path, slam: str | None, every: int) -> Case:
     if not folder.exists():
         raise LogFormatError(folder, "no such folder")
     path = folder / RECIPE if folder.is_dir() else folder
-    words = _read(path)
+    words = read_recipe_words(path)
     if "recipe" in words:
         return _episode(path, slam or "shunting", every)
     command, settings = words.get("command"), words.get("settings")
@@ -71,7 +71,7 @@ def case_of(folder: Path, slam: str | None, every: int) -> Case:
         raise LogFormatError(path, "no recipe of a run: it has no settings")
     if "scene" not in settings:
         raise LogFormatError(path, "this run was on a log: only a simulated one can be run again")
-    slams = settings.get("slams")
+    slams = slams_of(path, settings)
     if slam is None:
         slam = next((s for s in slams if s != "odometry"), "odometry") if slams else "shunting"
     seconds = settings.get("seconds")
@@ -79,19 +79,6 @@ def case_of(folder: Path, slam: str | None, every: int) -> Case:
         raise LogFormatError(path, f"settings.seconds must be a number, got {seconds!r}")
     world = {k: v for k, v in settings.items() if k not in OF_THE_RUN}
     return Case(settings=world, seconds=seconds, slam=slam, every=every, folder=path.parent)
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        raw = path.read_bytes()[: MAX_BYTES + 1]
-        words = json.loads(raw.decode("utf-8"))
-    except OSError as error:
-        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
-    except (ValueError, RecursionError) as error:
-        raise LogFormatError(path, f"no recipe: {error}") from error
-    if not isinstance(words, dict):
-        raise LogFormatError(path, "no recipe: expected an object")
-    return words
 
 
 def _episode(path: Path, slam: str, every: int) -> Case:

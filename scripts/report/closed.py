@@ -79,7 +79,7 @@ def _curve(drive: Driven, slams: Sequence[str], keys: tuple[str, str, str], labe
     with style.styled():
         ax = figure.subplots()
         for slam in drive.slams:
-            at = style.apart(slam, slams, drive.levels)
+            at = style.apart(slam, drive.slams, drive.levels)
             points = []
             for row in drive.of(slam):
                 value, low, high = (_percent(row[key]) for key in keys)

@@ -2,9 +2,8 @@
 """The messages between mobilia and a SLAM in a process of its own: one JSON object per line.
 
 docs/bring_your_own.md is the specification. Strict JSON: a range of -1 stands for no return (+inf),
--2 for an error code (NaN), a cell of -1 for unknown, null for no intensity. Doubles are written
-with the digits that give back the same double, ranges and cells with those that give back the same
-float32. Matrices are flat, row by row.
+-2 for an error code (NaN), a cell of -1 for unknown, null for no intensity. Doubles have the digits
+that give back the same double, ranges and cells the same float32. Matrices are flat, row by row.
 
 ``…_message`` makes a message, ``…_of`` reads it. What is read of a guest's words raises
 ``SlamFailedError`` with outcome "nan" or "bad".

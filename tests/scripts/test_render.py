@@ -242,6 +242,8 @@ def test_what_is_no_run_is_told_in_one_line(run: Path, tmp_path: Path):
     assert "not a JSON object" in told(run)
     (run / "recipe.json").write_text('{"settings": {"scene": "arena", "seconds": "long"}}')
     assert "no recipe of a run: seconds must be" in told(run)
+    (run / "recipe.json").write_text('{"settings": {"scene": "arena", "slams": [7]}}')
+    assert "slams must be a list of names, got [7]" in told(run)
     (run / "recipe.json").write_text('{"command": "bench", "settings": {}}')
     assert "made by 'mobilia bench'" in told(run)
     (run / "recipe.json").write_text('{"settings": {"log": "intel.log", "slams": ["ekf"]}}')

@@ -246,13 +246,17 @@ def test_wrong_words_are_told_by_name(tmp_path: Path, words, says):
     ("text", "says"),
     [
         ("{", "no recipe"),
-        ("[]", "expected an object"),
+        ("[]", "not a JSON object"),
         ('{"command": "run"}', "no settings"),
         ('{"command": "compare", "settings": {}}', "but of 'compare'"),
         ('{"command": "run", "settings": {"log": "a.log"}}', "this run was on a log"),
         (
             '{"command": "run", "settings": {"scene": "arena", "seconds": "long"}}',
             "seconds must be a number",
+        ),
+        (
+            '{"command": "run", "settings": {"scene": "arena", "seconds": 5, "slams": 7}}',
+            "slams must be a list of names, got 7",
         ),
         ('{"recipe": {}}', "no recipe"),
     ],
