@@ -13,7 +13,6 @@ import math
 import numpy as np
 
 from slam import se2
-from slam.frames import NS_PER_S
 
 _NEARBY = [(i, j) for r in range(5) for i in range(-r, r + 1) for j in range(-r, r + 1)
            if max(abs(i), abs(j)) == r]  # fmt: skip
@@ -41,11 +40,6 @@ def quaternion_of(theta: float) -> tuple[float, float]:
         if 2.0 * math.atan2(near_z, near_w) == theta:
             return near_z, near_w
     return z, w
-
-
-def stamp_of(stamp_ns: int) -> tuple[int, int]:
-    """(sec, nanosec) of a builtin_interfaces/Time."""
-    return divmod(stamp_ns, NS_PER_S)
 
 
 def round_number(value: float) -> float:

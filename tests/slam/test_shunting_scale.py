@@ -18,7 +18,7 @@ from slam.shunting.matching import Matcher
 from slam.shunting.network import Network
 from slam.shunting.search import SearchWindow
 from slam.shunting.stamping import stamp
-from tests.world2d import World2D, arena, frames, laser, wander
+from tests.world2d import World2D, arena, frames, laser, office, office_loop, wander
 
 CONFIG = ShuntingConfig(cell_m=0.05)
 STREAM = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(181), seed=3)[:60]
@@ -67,6 +67,14 @@ def test_neurons_touched_and_candidates_scored_stay_while_the_map_grows_100_fold
     assert costs[0][0] > 10_000
     for small, large in zip(costs[0], costs[1], strict=True):
         assert large == pytest.approx(small, rel=0.2)
+
+
+def test_a_live_neuron_costs_few_bytes() -> None:
+    """All arrays counted. 39 in the furnished office of ``mobilia bench``; here walls are bare."""
+    slam = ShuntingSlam()
+    for frame in frames(World2D(office()), office_loop(), rate_hz=1.0, spec=laser(), seed=3):
+        slam.update(frame.without_truth())
+    assert slam.network.bytes_per_neuron() <= 46.0
 
 
 def test_blocks_of_impressions_that_are_forgotten_die() -> None:
