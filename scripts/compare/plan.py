@@ -17,12 +17,14 @@ from scripts.compare import columns, entry, maps, places, recording, sight
 from scripts.jobs import Job
 from scripts.session import file_name
 from sim.recording.recipe import Recipe
+from sim.simulation import n_frames
 from slam.errors import InvalidValueError
 from slam.guests import Limits
 from slam.guests.pipe import PREFIX
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
+SCAN_PERIOD_S = 1.0 / 37.5
 _SCORING = (columns, entry, maps, places, sight)
 
 
@@ -74,6 +76,11 @@ class Plan:
             raise InvalidValueError(f"a comparison has at most {MAX_RUNS} runs")
         for run in self.runs():
             self.recipe(run)  # complains of values that cannot be
+        if n_frames(self.seconds, SCAN_PERIOD_S) <= self.every:
+            raise InvalidValueError(
+                f"a comparison needs 2 scans a run: {self.seconds:g} s with one scan in "
+                f"{self.every} of 37.5 a second has 1"
+            )
 
     def runs(self) -> list[Run]:
         """Every simulated run, scene by scene, level by level."""

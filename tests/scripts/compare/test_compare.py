@@ -243,6 +243,8 @@ def test_what_cannot_be_compared_is_said_in_a_line(tmp_path):
         verb.levels(["much"])
     with pytest.raises(InvalidValueError, match=r"\[0, 1\]"):
         Plan(slams=("odometry",), **{**PLAN, "levels": (2.0,)})
+    with pytest.raises(InvalidValueError, match="needs 2 scans a run"):
+        Plan(slams=("odometry",), **{**PLAN, "seconds": 0.1})
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
     with pytest.raises(OutputError, match="choose another"):
