@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """One number in [0, 1] for how much a room moves, and the table of what it means.
 
-| rate                                   | at knob d        | d = 0 | 0.25  | 0.5   | 1     |
-|----------------------------------------|------------------|-------|-------|-------|-------|
-| shoves of each chair, 1/s              | 0.05 d           | 0     | 0.013 | 0.025 | 0.05  |
-| kicks of each bin, 1/s                 | 0.02 d           | 0     | 0.005 | 0.010 | 0.02  |
-| moves of each trolley or pallet, 1/s   | 0.02 d           | 0     | 0.005 | 0.010 | 0.02  |
-| each door moved without a person, 1/s  | 0.02 d           | 0     | 0.005 | 0.010 | 0.02  |
-| mean stay of a person at a goal, s     | 4 / d - 2        | never | 14    | 6     | 2     |
-| walking pace, share of a person's own  | 0.7 + 0.3 d      | -     | 0.775 | 0.85  | 1     |
+| rate                                | at knob d        | d = 0 | 0.25  | 0.5   | 0.75  | 1     |
+|-------------------------------------|------------------|-------|-------|-------|-------|-------|
+| shoves of each chair, 1/s           | 0.15 d           | 0     | 0.038 | 0.075 | 0.113 | 0.15  |
+| kicks of each bin, 1/s              | 0.06 d           | 0     | 0.015 | 0.03  | 0.045 | 0.06  |
+| moves of each trolley, pallet, 1/s  | 0.06 d           | 0     | 0.015 | 0.03  | 0.045 | 0.06  |
+| each door moved by nobody, 1/s      | 0.04 d           | 0     | 0.01  | 0.02  | 0.03  | 0.04  |
+| mean stay of a person at a goal, s  | 12 / d - 10      | never | 38    | 14    | 6     | 2     |
+| walking pace, times a person's own  | 0.7 + 0.3 d      | -     | 0.775 | 0.85  | 0.925 | 1     |
+
+The rates are set so that what is on the move rises in proportion to the knob: a shove keeps a
+chair rolling for about a second, so at 1 one chair in six or seven moves at any time; a way
+between two goals takes a person about ten seconds, so at 1 five in six are walking, and a stay of
+12 / d - 10 seconds makes that (5 / 6) d. ``scripts.knob`` shows what the scanner sees of it.
 
 At 0 nothing moves by itself: people are present and stand perfectly still, chairs and bins are
 never pushed and doors stay at their angle of rest (a door still gives way to the robot). How hard
@@ -86,11 +91,11 @@ class Dynamism:
         if not 0.0 <= d <= 1.0:
             raise InvalidValueError(f"dynamism must lie in [0, 1], got {dynamism}")
         return cls(
-            chair_push_rate=0.05 * d,
-            bin_kick_rate=0.02 * d,
-            load_push_rate=0.02 * d,
-            door_rate=0.02 * d,
-            stay_mean=4.0 / d - 2.0 if d > 0.0 else math.inf,
+            chair_push_rate=0.15 * d,
+            bin_kick_rate=0.06 * d,
+            load_push_rate=0.06 * d,
+            door_rate=0.04 * d,
+            stay_mean=12.0 / d - 10.0 if d > 0.0 else math.inf,
             pace=0.7 + 0.3 * d,
         )
 

@@ -90,9 +90,15 @@ def test_every_rate_rises_with_the_knob():
 
 def test_the_documented_table_is_the_one_in_use():
     half = Dynamism.from_knob(0.5)
-    assert half.chair_push_rate == pytest.approx(0.025)
-    assert half.stay_mean == pytest.approx(6.0)
+    assert half.chair_push_rate == pytest.approx(0.075)
+    assert half.stay_mean == pytest.approx(14.0)
     assert half.pace == pytest.approx(0.85)
+
+
+def test_people_walk_in_proportion_to_the_knob():
+    way_s = 10.0  # between two goals
+    walking = [way_s / (way_s + Dynamism.from_knob(d).stay_mean) for d in (0.25, 0.5, 0.75, 1.0)]
+    assert walking == pytest.approx([d * 5.0 / 6.0 for d in (0.25, 0.5, 0.75, 1.0)])
 
 
 @pytest.mark.parametrize("knob", [-0.1, 1.1, 2, math.nan, "much", True])
