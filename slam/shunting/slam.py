@@ -45,6 +45,8 @@ GROWN_S, GROWN_SCANS = 10.0, 10  # once the map has been tracked on this long
 KNOWN = 0.5  # of that time: from then on the map may be frozen
 SUSPICIOUS, DENIED, STILL = 0.70, 0.30, 0.20  # of the usual match; share of the map in view
 # contradicted that raises doubt, and that keeps it up
+SUDDEN, NEAR_M, NEAR_RAD = 0.3, 0.5, 0.5  # of the usual match; so little all at once, within such
+# a step, is no new place but a robot carried to where what is in view hides the map
 GIVE_UP_S = 60.0  # of searching: then the map is written on from where odometry says
 
 
@@ -220,6 +222,9 @@ class ShuntingSlam:
             denied = STILL if self._doubts else DENIED
             # A corridor looked at the other way round still fits by two thirds.
             doubtful |= suspicious and contradicted > denied * (confirmed + contradicted)
+            x, y, turn = (match.T_map_robot - self._T_map_robot).tolist()
+            near = math.hypot(x, y) < NEAR_M and abs(se2.wrap(turn)) < NEAR_RAD
+            doubtful |= suspicious and share < SUDDEN and near
         self._doubts = self._doubts + 1 if doubtful else 0
         if doubtful and self._doubts <= PATIENCE:
             self.network.release()

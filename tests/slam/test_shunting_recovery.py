@@ -95,6 +95,16 @@ def test_a_few_things_that_all_moved_do_not_make_a_robot_lost() -> None:
     np.testing.assert_allclose(system.trajectory().poses[-1], pose, atol=0.1)
 
 
+def test_a_robot_carried_to_where_all_in_view_hides_the_map_knows_it() -> None:
+    """Nothing there contradicts the map: the near wall stands before everything it shows."""
+    world = World2D(np.vstack([arena(), rectangle(-2.0, 1.0, -1.2, 2.2)]))
+    before = frames(world, Drive(START, ((0.0, 0.8, 24.0),)), rate_hz=5.0, seed=3)
+    system = ShuntingSlam(FAST)
+    states_of(system, before)
+    after = going_on(still(world, (-2.6, 1.5, 2.2), 2.0), before[-1])
+    assert states_of(system, after)[:3] == ["frozen"] * 3
+
+
 def test_after_a_blind_stretch_all_its_odometry_is_in_doubt_not_only_the_last_step() -> None:
     world, system = World2D(arena()), ShuntingSlam(FAST)
     before = frames(world, TURN, rate_hz=5.0, seed=3)
