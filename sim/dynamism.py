@@ -11,7 +11,7 @@
 | walking pace, times a person's own  | 0.7 + 0.3 d      | -     | 0.775 | 0.85  | 0.925 | 1     |
 
 The rates are set so that what is on the move rises in proportion to the knob: a shove keeps a
-chair rolling for about a second, so at 1 one chair in six or seven moves at any time; a way
+chair rolling for about a second, so at 1 one office chair in seven moves at any time; a way
 between two goals takes a person about ten seconds, so at 1 five in six are walking, and a stay of
 12 / d - 10 seconds makes that (5 / 6) d. ``scripts.knob`` shows what the scanner sees of it.
 
