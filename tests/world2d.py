@@ -271,3 +271,20 @@ def wander(duration: float, speed: float = 0.4, turn: float = 0.4) -> Drive:
         pieces += [(speed, turn, half), (speed, -turn, half)]
         piece += 2.0 * half
     return Drive((0.0, 0.0, 0.0), tuple(pieces))
+
+
+def going_on(stream: list[Frame], last: Frame, seconds: float = 0.2) -> list[Frame]:
+    """The stream with stamps and odometry that go on from ``last`` as if nothing was."""
+    out = []
+    for frame in stream:
+        stamp = last.stamp_ns + round(seconds * 1e9) + frame.stamp_ns
+        assert frame.scan is not None
+        odometry = Odometry(
+            stamp_ns=stamp,
+            T_odom_robot=se2.compose(last.odometry.T_odom_robot, frame.odometry.T_odom_robot),
+            increment_covariance=frame.odometry.increment_covariance,
+            twist=frame.odometry.twist,
+        )
+        scan = Scan(stamp_ns=stamp, ranges=frame.scan.ranges, spec=frame.scan.spec)
+        out.append(Frame(stamp_ns=stamp, odometry=odometry, scan=scan, truth=frame.truth))
+    return out

@@ -11,29 +11,12 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.frames import Frame, Odometry, Scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from tests.world2d import Drive, World2D, arena, frames, rectangle
+from tests.world2d import Drive, World2D, arena, frames, going_on, rectangle
 
 Array = NDArray[np.float64]
 FAST = ShuntingConfig(cell_m=0.05)
 START = (0.0, 0.0, 0.0)
 TURN = Drive(START, ((0.0, 0.8, 12.0),))  # long enough for a map to be trusted
-
-
-def going_on(stream: list[Frame], last: Frame, seconds: float = 0.2) -> list[Frame]:
-    """The stream with stamps and odometry that go on from ``last`` as if nothing was."""
-    out = []
-    for frame in stream:
-        stamp = last.stamp_ns + round(seconds * 1e9) + frame.stamp_ns
-        assert frame.scan is not None
-        odometry = Odometry(
-            stamp_ns=stamp,
-            T_odom_robot=se2.compose(last.odometry.T_odom_robot, frame.odometry.T_odom_robot),
-            increment_covariance=frame.odometry.increment_covariance,
-            twist=frame.odometry.twist,
-        )
-        scan = Scan(stamp_ns=stamp, ranges=frame.scan.ranges, spec=frame.scan.spec)
-        out.append(Frame(stamp_ns=stamp, odometry=odometry, scan=scan, truth=frame.truth))
-    return out
 
 
 def still(world: World2D, pose: tuple[float, float, float], seconds: float) -> list[Frame]:

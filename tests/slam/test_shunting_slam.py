@@ -18,7 +18,7 @@ from slam.compiling import COMPILING
 from slam.errors import InvalidValueError
 from slam.frames import Features, Frame, Odometry, Scan
 from slam.shunting import ShuntingConfig, ShuntingSlam, search
-from tests.world2d import Chairs, Drive, World2D, arena, frames, laser, rectangle, wander
+from tests.world2d import Chairs, Drive, World2D, arena, frames, going_on, laser, rectangle, wander
 
 Array = NDArray[np.float64]
 FAST = ShuntingConfig(cell_m=0.05)
@@ -152,19 +152,7 @@ def kidnapped_to(
 ) -> list[Frame]:
     """Frames of 4 s from ``pose`` on, whose odometry goes on from ``last`` as if nothing was."""
     drive = Drive(pose, ((*twist, 4.0),))
-    out = []
-    for frame in frames(rooms, drive, rate_hz=5.0, seed=7):
-        stamp = last.stamp_ns + 200_000_000 + frame.stamp_ns
-        assert frame.scan is not None
-        odometry = Odometry(
-            stamp_ns=stamp,
-            T_odom_robot=se2.compose(last.odometry.T_odom_robot, frame.odometry.T_odom_robot),
-            increment_covariance=frame.odometry.increment_covariance,
-            twist=frame.odometry.twist,
-        )
-        scan = Scan(stamp_ns=stamp, ranges=frame.scan.ranges, spec=frame.scan.spec)
-        out.append(Frame(stamp_ns=stamp, odometry=odometry, scan=scan, truth=frame.truth))
-    return out
+    return going_on(frames(rooms, drive, rate_hz=5.0, seed=7), last)
 
 
 def test_a_kidnapped_robot_knows_it_and_finds_itself_without_touching_the_map() -> None:
