@@ -42,6 +42,7 @@ def bench(
         bench_rows.environments,
         bench_rows.pictures,
         bench_slam.updates,
+        bench_slam.ekf,
         bench_slam.area,
         partial(bench_dataset.rows, seed=bench_rows.SEED, dynamism=bench_rows.DYNAMISM),
     )

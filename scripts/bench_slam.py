@@ -14,6 +14,8 @@ import numpy as np
 
 from scripts.bench_rows import DYNAMISM, SEED, Row, row, timed
 from sim.simulation import stream
+from slam.ekf.slam import EkfSlam
+from slam.points import PointWorld, PointWorldConfig
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.cells import living
 from slam.shunting.memory import fill
@@ -55,6 +57,20 @@ def _halved(frames: list[Any]) -> list[Any]:
     )
     scans = [dataclasses.replace(f.scan, ranges=f.scan.ranges[::2], spec=half) for f in frames]
     return [dataclasses.replace(f, scan=s) for f, s in zip(frames, scans, strict=True)]
+
+
+def ekf(seconds: float) -> Iterator[Row]:
+    """A step of the EKF when it knows 300 landmarks and sees so many of them."""
+    for in_view, n_points, side_m, n_steps in ((20, 338, 60.0, 340), (45, 302, 36.0, 240)):
+        config = PointWorldConfig(n_points=n_points, side_m=side_m, n_steps=n_steps)
+        frames = [frame.without_truth() for frame in PointWorld(config, seed=SEED).stream()]
+        slam, last = EkfSlam(), min(max(20, round(2 * seconds)), n_steps // 3)
+        spent = [timed(lambda f=f, s=slam: s.update(f)) for f in frames][-last:]  # type: ignore[misc]
+        seen = np.mean([len(f.features.points_robot) for f in frames[-last:] if f.features])
+        how = f"{seen:.0f} points in view, {len(slam.filter)} landmarks in the end, IPJC"
+        for name, percent, target in (("p50", 50, "≤ 10"), ("p90", 90, "")):
+            figure = float(np.percentile(spent, percent)) * 1e3
+            yield row(f"EKF, 300 landmarks, {in_view} in view, {name}", figure, "ms", target, how)
 
 
 def area(seconds: float) -> Iterator[Row]:

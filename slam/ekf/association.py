@@ -19,14 +19,14 @@ their answers.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.ekf import kernels
+from slam.ekf import kernels, pairs
 from slam.ekf.filter import EkfFilter
 from slam.ekf.hypotheses import MOST_NODES, Association, Best, Effort, Gates, Ints
+from slam.ekf.ipjc import CUT_SHORT, NODES, TESTS, WORK, Search, visit
 from slam.ekf.jcbb import Jcbb
 from slam.frames import Float
 
@@ -67,21 +67,37 @@ def ipjc(
     """Incremental posterior joint compatibility."""
     costs = _prior_costs(state, chosen, points, covariances, gates)
     columns = np.flatnonzero(np.isfinite(costs).any(axis=0))
-    near = chosen[columns]
-    best = Best(landmarks=[-1] * len(points))
-    best.effort.tests += costs.size
-    best.effort.work += 50 * costs.size
-    root = _Posterior(
-        pose=state.pose.copy(),
-        landmarks=state.landmarks[near],
-        P=kernels.gather(state.error_covariance, near),
-        pairs=[],
-        cost=0.0,
+    near, order = chosen[columns], _order(costs)
+    k, counts = len(order), np.zeros(5, dtype=np.int64)
+    counts[TESTS], counts[WORK] = costs.size, 50 * costs.size
+    search = Search(
+        points=points[order],
+        covariances=covariances[order],
+        plausible=np.isfinite(costs[order][:, columns]),
+        together=np.array([0.0] + [gates.together(n) for n in range(1, k + 1)]),
+        added=gates.added(),
+        most_nodes=MOST_NODES,
+        chosen=np.full(k, -1),
+        taken=np.zeros(len(near), dtype=np.bool_),
+        best=np.full(k, -1),
+        best_cost=np.zeros(1),
+        counts=counts,
     )
-    prior = costs[:, columns]
-    search = _Ipjc((points, covariances), prior, gates, best, _order(prior))
-    search.visit(0, root)
-    return _answer(best, near, costs)
+    P = kernels.gather(state.error_covariance, near)
+    visit(search, state.pose, state.landmarks[near], P, 0, 0, 0.0)
+    found = np.full(len(points), -1)
+    found[order] = np.where(search.best >= 0, near[search.best], -1) if k else found[:0]
+    return Association(
+        landmarks=found,
+        cost=float(search.best_cost[0]),
+        plausible=_any(costs),
+        effort=Effort(
+            nodes=int(counts[NODES]),
+            tests=int(counts[TESTS]),
+            work=int(counts[WORK]),
+            complete=not counts[CUT_SHORT],
+        ),
+    )
 
 
 METHODS: dict[str, Associate] = {"individual": individual, "jcbb": jcbb, "ipjc": ipjc}
@@ -91,14 +107,16 @@ def _prior_costs(
     state: EkfFilter, chosen: Ints, points: Float, covariances: Float, gates: Gates
 ) -> Float:
     """(k, len(chosen)) cost of each pair alone, inf beyond its gate."""
-    return kernels.distances(
+    gate = gates.single()
+    return pairs.distances(
         state.pose,
         state.landmarks[chosen],
         kernels.gather(state.error_covariance, chosen),
-        len(chosen),
         points,
         covariances,
-        gates.single(),
+        np.ones((len(points), len(chosen)), dtype=np.bool_),
+        gate,
+        gate,
     )
 
 
@@ -122,95 +140,3 @@ def _answer(best: Best, names: Ints, costs: Float) -> Association:
         plausible=_any(costs),
         effort=best.effort,
     )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Posterior:
-    """The state given the accepted pairs: pose, candidate landmarks, their covariance."""
-
-    pose: Float
-    landmarks: Float
-    P: Float
-    pairs: list[tuple[int, int]]
-    cost: float
-
-
-class _Ipjc:
-    """The same tree, judged and bounded by the posterior of the pairs accepted so far."""
-
-    def __init__(
-        self,
-        seen: tuple[Float, Float],
-        prior: Float,
-        gates: Gates,
-        best: Best,
-        order: list[int],
-    ) -> None:
-        self.points, self.covariances = seen
-        self.prior, self.gates, self.best, self.order = prior, gates, best, order
-
-    def visit(self, depth: int, now: _Posterior) -> None:
-        """Judge all points that are left against all landmarks that are left, then branch."""
-        left = self.order[depth:]
-        if not left:
-            if self.best.beaten_by(len(now.pairs), now.cost):
-                self.best.keep(now.pairs, now.cost)
-            return
-        self._branch(depth, now, self._costs(left, now))
-
-    def _costs(self, left: list[int], now: _Posterior) -> Float:
-        costs = kernels.distances(
-            now.pose,
-            now.landmarks,
-            now.P,
-            len(now.landmarks),
-            self.points[left],
-            self.covariances[left],
-            self.gates.added(),
-        )
-        self.best.effort.tests += costs.size
-        self.best.effort.work += 50 * costs.size
-        # No joint cost ever falls: what is too dear now is too dear with any pairs to come.
-        limit = self.gates.together(len(now.pairs) + len(left)) - now.cost
-        costs[(costs > limit) | ~np.isfinite(self.prior[left])] = np.inf
-        costs[:, [j for _, j in now.pairs]] = np.inf
-        return costs
-
-    def _branch(self, depth: int, now: _Posterior, costs: Float) -> None:
-        """``costs`` of the points from ``depth`` on; skipping a point changes no posterior."""
-        best = self.best
-        best.effort.nodes += 1
-        if best.effort.nodes > MOST_NODES:
-            best.effort.complete = False
-            return
-        possible = _any(costs)
-        if not best.beaten_by(len(now.pairs) + int(possible.sum()), now.cost):
-            return
-        if not possible.any():
-            best.keep(now.pairs, now.cost)
-            return
-        skip = int(possible.argmax())
-        k, count = self.order[depth + skip], len(now.pairs) + 1
-        for j in np.argsort(costs[skip], kind="stable").tolist():
-            dearer = now.cost + float(costs[skip, j])
-            if dearer > self.gates.together(count):
-                break
-            if best.beaten_by(count + int(possible[skip + 1 :].sum()), dearer):
-                self.visit(depth + skip + 1, self._accept(now, k, j))
-        self._branch(depth + skip + 1, now, costs[skip + 1 :])
-
-    def _accept(self, now: _Posterior, k: int, j: int) -> _Posterior:
-        pose, landmarks, P = now.pose.copy(), now.landmarks.copy(), now.P.copy()
-        self.best.effort.work += 8 * len(P) ** 2
-        cost = kernels.absorb(
-            pose,
-            landmarks,
-            len(landmarks),
-            P,
-            np.array([j]),
-            self.points[k : k + 1],
-            self.covariances[k : k + 1],
-        )
-        return _Posterior(
-            pose=pose, landmarks=landmarks, P=P, pairs=[*now.pairs, (k, j)], cost=now.cost + cost
-        )

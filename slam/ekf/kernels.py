@@ -24,7 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import njit
-from slam.ekf.algebra import cholesky, mirror, solve, times, times_transposed
+from slam.ekf.algebra import (
+    cholesky,
+    solve,
+    subtract_products,
+    subtract_rows,
+    times,
+    times_transposed,
+)
 
 Float = NDArray[np.float64]
 
@@ -88,23 +95,16 @@ def disturb(P: Float, pose: Float, landmarks: Float, n: int, heading: float, Q: 
     """
     size = 3 + 2 * n
     cos, sin = math.cos(heading), math.sin(heading)
-    G = np.zeros((size, 3))
-    G[0, 0], G[0, 1], G[0, 2] = cos, -sin, pose[1]
-    G[1, 0], G[1, 1], G[1, 2] = sin, cos, -pose[0]
-    G[2, 2] = 1.0
+    Gt = np.zeros((4, size))  # the fourth row is empty: subtract_products takes four at a time
+    Gt[0, 0], Gt[1, 0], Gt[2, 0] = cos, -sin, pose[1]
+    Gt[0, 1], Gt[1, 1], Gt[2, 1] = sin, cos, -pose[0]
+    Gt[2, 2] = 1.0
     for i in range(n):
-        G[3 + 2 * i, 2], G[4 + 2 * i, 2] = landmarks[i, 1], -landmarks[i, 0]
-    GQ = np.zeros((size, 3))
-    for i in range(size):
-        for k in range(3):
-            for m in range(3):
-                GQ[i, k] += G[i, m] * Q[m, k]
-    for i in range(size):
-        for k in range(3):
-            if GQ[i, k] != 0.0:
-                for j in range(i + 1):
-                    P[i, j] += GQ[i, k] * G[j, k]
-    mirror(P, size)
+        Gt[2, 3 + 2 * i], Gt[2, 4 + 2 * i] = landmarks[i, 1], -landmarks[i, 0]
+    minus_QGt = np.zeros((4, size))
+    for k in range(3):
+        subtract_rows(minus_QGt[k], Q[k], Gt[:3])
+    subtract_products(P, size, minus_QGt, Gt)
 
 
 @njit
@@ -190,89 +190,33 @@ def absorb(
     H, innovation, S, cost = linearise(pose, landmarks, P, matched, z, R)
     if cost < 0.0:
         return cost
-    W = _times_sparse(P, size, matched, H)
     L = S.copy()
     cholesky(L)
-    Kt = np.ascontiguousarray(W.T)
+    # Rows of (A | B)': the gain K beside P H', and P H' - K S (rounding, where the gain is the best
+    # one) beside K. P - A B' is Joseph's (I - K H) P (I - K H)' + K R K' multiplied out.
+    At, Bt = np.empty((4 * m, size)), np.empty((4 * m, size))
+    PHt, Kt = Bt[: 2 * m], Bt[2 * m :]
+    _times_sparse(P, matched, H, PHt)
+    Kt[:] = PHt
     solve(L, Kt)
-    K = np.ascontiguousarray(Kt.T)
-    Wt = np.ascontiguousarray(W.T)
-    # Joseph: (I - K H) P (I - K H)' + K R K' = A - (A H' - K R) K' with A = P - K H P.
-    _subtract_outer(P, size, K, Wt)
-    U = _times_sparse(P, size, matched, H)
-    for i in range(size):
-        for k in range(m):
-            for r in range(2):
-                U[i, 2 * k + r] -= K[i, 2 * k] * R[k, 0, r] + K[i, 2 * k + 1] * R[k, 1, r]
-    _subtract_outer(P, size, U, Kt)
+    At[: 2 * m] = Kt
+    At[2 * m :] = PHt
     xi = np.zeros(size)
-    for i in range(size):
-        for k in range(2 * m):
-            xi[i] += K[i, k] * innovation[k, 0]
+    for k in range(2 * m):
+        subtract_rows(At[2 * m + k], S[k], Kt)
+    subtract_rows(xi, -innovation[:, 0], Kt)
+    subtract_products(P, size, At, Bt)
     retract(pose, landmarks, n, xi)
     return cost
 
 
 @njit
-def _subtract_outer(P: Float, size: int, A: Float, Bt: Float) -> None:
-    """P - A B' in place, from the lower half: the product is symmetric but for rounding."""
-    for i in range(size):
-        for k in range(A.shape[1]):
-            a = A[i, k]
-            for j in range(i + 1):
-                P[i, j] -= a * Bt[k, j]
-    mirror(P, size)
-
-
-@njit
-def _times_sparse(P: Float, size: int, matched: NDArray[np.int64], H: Float) -> Float:
-    """P H' (size, 2 m), H's columns being the pose and the matched landmarks."""
-    m = len(matched)
-    out = np.zeros((size, 2 * m))
-    for i in range(size):
-        for k in range(m):
-            a = 3 + 2 * matched[k]
-            for r in range(2):
-                row = 2 * k + r
-                total = P[i, 0] * H[row, 0] + P[i, 1] * H[row, 1] + P[i, 2] * H[row, 2]
-                total += P[i, a] * H[row, 3 + 2 * k] + P[i, a + 1] * H[row, 4 + 2 * k]
-                out[i, row] = total
-    return out
-
-
-@njit
-def distances(
-    pose: Float, landmarks: Float, P: Float, n: int, z: Float, R: Float, gate: float
-) -> Float:
-    """(k, n) posterior cost of each single pair (point k, landmark n); inf where beyond ``gate``.
-
-    Costs are those of ``linearise`` for one pair: O(1) each, whatever the size of the state. Pairs
-    far beyond the gate even with a bound on the curvature of h are not iterated.
-    """
-    out = np.full((len(z), n), np.inf)
-    h, H, xi, one = np.zeros(2), np.zeros((2, 5)), np.zeros(3 + 2 * n), np.zeros(1, dtype=np.int64)
-    S, place = np.zeros((2, 2)), np.zeros(5, dtype=np.int64)
-    place[1], place[2] = 1, 2
-    for j in range(n):
-        look(pose, landmarks[j], xi, 3 + 2 * j, h, H)
-        place[3], place[4] = 3 + 2 * j, 4 + 2 * j
-        S[:] = 0.0
-        for a in range(5):
-            for b in range(5):
-                value = P[place[a], place[b]]
-                S[0, 0] += H[0, a] * value * H[0, b]
-                S[0, 1] += H[0, a] * value * H[1, b]
-                S[1, 1] += H[1, a] * value * H[1, b]
-        one[0] = j
-        for k in range(len(z)):
-            u, v = z[k, 0] - h[0], z[k, 1] - h[1]
-            bend = 2.0 * P[2, 2] * (u * u + v * v)
-            s00, s11 = S[0, 0] + R[k, 0, 0] + bend, S[1, 1] + R[k, 1, 1] + bend
-            s01 = S[0, 1] + R[k, 0, 1]
-            rough = (s11 * u * u - 2.0 * s01 * u * v + s00 * v * v) / (s00 * s11 - s01 * s01)
-            if rough > 2.0 * gate:
-                continue
-            cost = linearise(pose, landmarks, P, one, z[k : k + 1], R[k : k + 1])[3]
-            if 0.0 <= cost <= gate:
-                out[k, j] = cost
-    return out
+def _times_sparse(P: Float, matched: NDArray[np.int64], H: Float, out: Float) -> None:
+    """(P H')' in ``out`` (2 m, size), H's columns being the pose and the matched landmarks."""
+    for row in range(len(out)):
+        k = row // 2
+        a = 3 + 2 * matched[k]
+        x, y, turn, u, v = H[row, 0], H[row, 1], H[row, 2], H[row, 3 + 2 * k], H[row, 4 + 2 * k]
+        for i in range(out.shape[1]):
+            total = P[0, i] * x + P[1, i] * y + P[2, i] * turn
+            out[row, i] = total + (P[a, i] * u + P[a + 1, i] * v)
