@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -22,6 +24,10 @@ from slam.trajectory import Trajectory
 
 COLORS = {"shunting": "#ce2c3c", "odometry": "#de6e18", "truth": "#168c5a"}
 CHANGED = 0.45  # fainter differences: looks too few to tell
+_LOOK: dict[str, Any] = {
+    "font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
+    "axes.spines.right": False, "figure.constrained_layout.use": True,
+}  # fmt: skip
 _SPARE = ("#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f")
 
 
@@ -33,6 +39,16 @@ def color_of(name: str, order: Sequence[str]) -> str:
     return _SPARE[others.index(name) % len(_SPARE)]
 
 
+@contextmanager
+def styled(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
+    """The look of our figures, for those that are made, drawn and saved in here; a decorator too.
+
+    ``changes``: what is different in these, as in ``matplotlib.rcParams``. Nothing is left behind.
+    """
+    with mpl.rc_context({**_LOOK, **(changes or {})}):
+        yield
+
+
 def save(figure: Figure, path: Path) -> None:
     """Write a figure whole or not at all; PNG by suffix, 150 dpi."""
     with replacing(path) as temporary:
@@ -40,15 +56,12 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def _axes(width: float, height: float, rows: int = 1) -> tuple[Figure, NDArray[np.object_]]:
-    mpl.rcParams.update(
-        {"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
-         "axes.spines.right": False, "figure.constrained_layout.use": True}
-    )  # fmt: skip
     figure = Figure(figsize=(width, height))
     axes = np.atleast_1d(figure.subplots(rows, 1, sharex=rows > 1))
     return figure, axes
 
 
+@styled()
 def trajectories(
     path: Path,
     tracks: Mapping[str, Trajectory],
@@ -83,6 +96,7 @@ def draw_raster(ax: Axes, raster: Raster) -> None:
               vmin=0.0, vmax=1.0, interpolation="antialiased")  # fmt: skip
 
 
+@styled()
 def errors(path: Path, tracks: Mapping[str, Trajectory], truth: Trajectory) -> None:
     """Position and heading error over time, unaligned: in the frame of the known first pose."""
     figure, axes = _axes(9.0, 5.0, rows=2)
@@ -121,6 +135,7 @@ def in_first_frame(truth: Trajectory) -> Trajectory:
     )
 
 
+@styled()
 def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float) -> None:
     """The map in the paper's style (Fig. 13): activities coloured, last scan blue, path black."""
     height, width = raster.values.shape
@@ -141,6 +156,7 @@ def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float
     save(figure, path)
 
 
+@styled()
 def changes_picture(path: Path, raster: Raster, changes: Changes, track: Trajectory) -> None:
     """What changed lately over what is there: appeared green, gone red, the rest grey."""
     height, width = raster.values.shape

@@ -14,14 +14,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import spearmanr
 
 from scripts.compare.folder import Compared, read
-from scripts.figures import color_of, save
+from scripts.figures import color_of, save, styled
 from slam.errors import InvalidValueError, MobiliaError
 from slam.lost import LOST_RULE
 
@@ -75,14 +74,11 @@ def correlations(compared: Compared) -> list[dict[str, Any]]:
     ]
 
 
+@styled({"grid.alpha": 0.3})
 def picture(compared: Compared, path: Path) -> None:
     """Error above, losses below, a column for each scene."""
     settings = compared.recipe["settings"]
     scenes, slams = settings["scenes"], settings["slams"]
-    mpl.rcParams.update(
-        {"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False,
-         "axes.spines.right": False, "figure.constrained_layout.use": True}
-    )  # fmt: skip
     figure = Figure(figsize=(4.2 * len(scenes), 5.2))
     grid: Any = figure.subplots(
         2, len(scenes), sharex="col", sharey="row", squeeze=False, height_ratios=(1.5, 1.0)

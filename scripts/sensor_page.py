@@ -7,14 +7,13 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
 from scripts import sensor_rows as measure
-from scripts.figures import save
+from scripts.figures import save, styled
 from scripts.sensor_ablation import ablation
 from sim.lidar_config import Lms221Config
 from sim.lidar_effects import NEEDED, NEEDED_RANGE_M, needed_reflectivity
@@ -23,6 +22,7 @@ from slam.files import write_text
 INK, RED, BLUE, GREY = "#222222", "#ce2c3c", "#1f61be", "#8a8a8a"
 
 
+@styled({"font.size": 8, "grid.alpha": 0.3})
 def write_card(out: Path, rows: Sequence[measure.Row]) -> None:
     """The page and its two pictures."""
     pictures = out / "pictures"
@@ -94,8 +94,6 @@ NOTES = (
 
 def card_figure() -> Figure:
     """Six panels: noise, systematic error, spot, needed reflectivity, timing, edges."""
-    mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3})
-    mpl.rcParams.update({"axes.spines.top": False, "axes.spines.right": False})
     figure = Figure(figsize=(10.0, 5.6), layout="constrained")
     panels = figure.subplots(2, 3).ravel()
     for draw, ax in zip((_noise, _bias, _spot, _needed, _times, _rate), panels, strict=True):

@@ -24,6 +24,7 @@ from scripts.blame.inquest import CURED, Inquest, Trial
 from scripts.blame.tape import Strip, simulate
 from scripts.blame.words import headline, who
 from scripts.draw import Picture
+from scripts.figures import styled
 from scripts.strips import strips
 from sim.absence import Change
 from sim.mapview import MapView
@@ -196,9 +197,9 @@ def _title(found: Inquest, width: int) -> Picture:
     return picture
 
 
+@styled({"axes.grid": False})
 def _chart(found: Inquest, width: int) -> Picture:
     """Error over time of the original and of every re-run."""
-    mpl.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
     figure = Figure(figsize=(width / 100.0, 3.6), dpi=100, layout="constrained")
     figure.set_facecolor([c / 255.0 for c in draw.PAPER])
     ax = figure.subplots()

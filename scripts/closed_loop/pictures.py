@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -16,7 +15,7 @@ from matplotlib.lines import Line2D
 import scenes
 from scenes.scene import Scene
 from scripts.closed_loop.plan import Driven
-from scripts.figures import COLORS, color_of, save
+from scripts.figures import COLORS, color_of, save, styled
 from sim.floorplan import FloorPlan
 from sim.mapview import MapView
 from sim.world import World
@@ -24,13 +23,11 @@ from sim.world import World
 Row = dict[str, Any]
 PX_PER_M = 40
 MARKS = {"reached": "#168c5a", "wrong": "#ce2c3c", "given up": "#8a8f98", "failed": "#20242c"}
-_STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False,
-          "figure.constrained_layout.use": True}  # fmt: skip
 
 
+@styled({"axes.grid": False})
 def curves(path: Path, levels: Sequence[Row]) -> None:
     """``closed_loop.png``: a panel each for success and precision, with 95 % intervals."""
-    mpl.rcParams.update(_STYLE)
     figure = Figure(figsize=(10.0, 4.2))
     success, precision = figure.subplots(1, 2)
     names = list(dict.fromkeys(row["slam"] for row in levels))
@@ -73,9 +70,9 @@ def _line(
     ax.errorbar(at, middle, yerr=spread, label=name, **look)
 
 
+@styled({"axes.grid": False})
 def paths(path: Path, rows: Sequence[Sequence[Driven]]) -> None:
     """``paths.png``: runs as panels, true path over the room as it was at the start."""
-    mpl.rcParams.update(_STYLE)
     first = rows[0][0].identity
     scene = scenes.build(first["scene"], 0)
     xmin, ymin, xmax, ymax = scene.bounds

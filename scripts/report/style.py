@@ -38,7 +38,6 @@ _RC: dict[str, Any] = {
     "axes.grid": True, "axes.grid.axis": "y", "grid.color": RULE, "grid.linewidth": 0.6,
     "axes.axisbelow": True, "legend.frameon": False,
     "svg.fonttype": "none", "svg.hashsalt": "mobilia", "axes.unicode_minus": True,
-    "figure.constrained_layout.use": False, "grid.alpha": 1.0,  # others leave theirs behind
 }  # fmt: skip
 
 

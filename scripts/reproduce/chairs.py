@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from scripts.figures import styled
 from scripts.reproduce.comparison import below_printed, paper_table
 from scripts.reproduce.paper_numbers import TABLE_3
 from scripts.reproduce.report import (
@@ -34,6 +35,7 @@ DYNAMISM = 1.0  # each chair is shoved once in 7 s on average
 LIMITS = {"x": (0.05, 0.01), "y": (0.05, 0.01), "θ": (0.03, 0.01)}
 
 
+@styled()
 def reproduce(plan: Plan) -> None:
     """With walls and without, every SLAM, every seed."""
     report = Report("chairs", plan)

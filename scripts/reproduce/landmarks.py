@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from scripts.figures import styled
 from scripts.reproduce.census import GATE_M, PEAK, Census, landmarks_of
 from scripts.reproduce.comparison import below_printed, paper_table
 from scripts.reproduce.paper_numbers import TABLE_2
@@ -138,6 +139,7 @@ def _maps(ekf: Track, ours: Track) -> dict[str, Any]:
     }
 
 
+@styled()
 def reproduce(plan: Plan) -> None:
     """The sweep, the two figures, the table."""
     report = Report("landmarks", plan)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from scripts.figures import styled
 from scripts.reproduce.report import Report, draw_activities, new_figure
 from scripts.reproduce.room_pages import (
     RULE,
@@ -20,6 +21,7 @@ from scripts.reproduce.runs import Plan, Run
 DYNAMISM = 0.5
 
 
+@styled()
 def reproduce(plan: Plan) -> None:
     """The office, every SLAM, every seed; the paper gives a picture and no numbers."""
     report = Report("office", plan)

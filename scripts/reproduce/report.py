@@ -114,11 +114,7 @@ class Report:
 
 
 def new_figure(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> Any:
-    """A figure and its axes (always an array, row by row)."""
-    mpl.rcParams.update(
-        {"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
-         "axes.spines.right": False, "figure.constrained_layout.use": True}
-    )  # fmt: skip
+    """A figure and its axes (always an array, row by row); for experiments that are ``styled``."""
     figure = Figure(figsize=(width, height))
     return figure, np.atleast_1d(figure.subplots(rows, columns, **options)).ravel()
 

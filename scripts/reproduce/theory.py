@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from scripts.accuracy import thinned
+from scripts.figures import styled
 from scripts.reproduce import theory_data
 from scripts.reproduce.report import Report, new_figure
 from scripts.reproduce.runs import Plan
@@ -25,6 +26,7 @@ RED, BLUE, GREEN, GREY = "#ce2c3c", "#1f61be", "#168c5a", "#5b6472"
 STRIDE = 5
 
 
+@styled()
 def reproduce(plan: Plan) -> None:
     """All figures of the theory, and their numbers."""
     report = Report("theory", plan)

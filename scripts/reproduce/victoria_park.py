@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from scripts.figures import styled
 from scripts.reproduce.census import landmarks_of
 from scripts.reproduce.comparison import paper_table
 from scripts.reproduce.paper_numbers import TABLE_1
@@ -112,6 +113,7 @@ def run_one(path: Path, *, name: str, data: str, scans: int) -> None:
     save_run(path, {"sizes": sizes, "not converged": lost, "ms": ms}, arrays)
 
 
+@styled()
 def reproduce(plan: Plan) -> None:
     """All SLAMs, the graph, the figures and the table."""
     if plan.data is None:
