@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import (
@@ -13,6 +15,7 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.table import Table
 
 console = Console()
 _errors = Console(stderr=True)
@@ -42,3 +45,20 @@ def progress() -> Progress:
         console=console,
         transient=False,
     )
+
+
+def level_table(
+    title: str,
+    caption: str,
+    levels: Sequence[float],
+    slams: Sequence[str],
+    cell: Callable[[float, str], str],
+) -> Table:
+    """A row for each level of dynamism, a column for each SLAM; ``cell`` gives the words."""
+    table = Table(title=escape(title), title_justify="left", caption=escape(caption))
+    table.add_column("dynamism", justify="right")
+    for slam in slams:
+        table.add_column(escape(slam), justify="right", overflow="fold")
+    for level in levels:
+        table.add_row(f"{level:g}", *(cell(level, slam) for slam in slams))
+    return table

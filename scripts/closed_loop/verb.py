@@ -19,7 +19,7 @@ from scripts.closed_loop import pictures, tables
 from scripts.closed_loop.plan import RUNS, Driven, Plan, load
 from scripts.compare.folder import write_csv
 from scripts.compare.verb import levels, named
-from scripts.console import console
+from scripts.console import console, level_table
 from scripts.jobs import run_jobs
 from scripts.output import locked_folder, machine, write_recipe
 from sim.loop import LoopConfig
@@ -140,19 +140,13 @@ def _write(out: Path, plan: Plan, runs: list[Driven]) -> list[dict[str, Any]]:
 
 
 def _table(plan: Plan, rows: list[dict[str, Any]]) -> Table:
-    """Success and precision, a row for each level, a column for each SLAM."""
-    table = Table(
-        title=escape(f"{plan.scene}: goals reached, %; median precision, cm; runs lost"),
-        title_justify="left",
-        caption=f"reached: within {plan.loop.tolerance_m:g} m in truth; lost: {LOST_RULE}",
+    """Success and precision."""
+    at = {(row["dynamism"], row["slam"]): row for row in rows}
+    title = f"{plan.scene}: goals reached, %; median precision, cm; runs lost"
+    caption = f"reached: within {plan.loop.tolerance_m:g} m in truth; lost: {LOST_RULE}"
+    return level_table(
+        title, caption, plan.levels, plan.slams, lambda level, slam: _cell(at[level, slam])
     )
-    table.add_column("dynamism", justify="right")
-    for name in plan.slams:
-        table.add_column(escape(name), justify="right")
-    for level in plan.levels:
-        at = {row["slam"]: row for row in rows if row["dynamism"] == level}
-        table.add_row(f"{level:g}", *(_cell(at[name]) for name in plan.slams))
-    return table
 
 
 def _cell(row: dict[str, Any]) -> str:

@@ -19,7 +19,7 @@ from scripts.compare import tables
 from scripts.compare.columns import COLUMNS, DRIVES
 from scripts.compare.plan import ENTRIES, RECORDINGS, Plan
 from scripts.compare.recording import load
-from scripts.console import console
+from scripts.console import console, level_table
 from scripts.generate import sweep
 from scripts.jobs import Job, run_jobs
 from scripts.output import locked_folder, machine, write_recipe
@@ -150,24 +150,16 @@ def _about(recording: Path) -> dict[str, float]:
 
 
 def _table(plan: Plan, scene: str, rows: list[dict[str, Any]]) -> Table:
-    """Median error and runs lost, a row for each level, a column for each SLAM."""
-    table = Table(
-        title=escape(f"{scene}: median unaligned ATE in cm (runs lost of {len(plan.seeds)})"),
-        title_justify="left",
-        caption=f"lost: {LOST_RULE}",
-    )
-    table.add_column("dynamism", justify="right")
-    for name in plan.slams:
-        table.add_column(escape(name), justify="right", overflow="fold")
+    """Median error and runs lost."""
     summary = {
         (row["dynamism"], row["slam"], row["metric"]): row["value"]
         for row in tables.levels([row for row in rows if row["scene"] == scene])
     }
-    for level in plan.levels:
-        cells = []
-        for name in plan.slams:
-            ate_cm = 100.0 * summary[level, name, "ate_unaligned_m"]
-            lost = round(summary[level, name, "lost"] * len(plan.seeds))
-            cells.append(f"{ate_cm:.2f} ({lost})")
-        table.add_row(f"{level:g}", *cells)
-    return table
+
+    def cell(level: float, slam: str) -> str:
+        ate_cm = 100.0 * summary[level, slam, "ate_unaligned_m"]
+        lost = round(summary[level, slam, "lost"] * len(plan.seeds))
+        return f"{ate_cm:.2f} ({lost})"
+
+    title = f"{scene}: median unaligned ATE in cm (runs lost of {len(plan.seeds)})"
+    return level_table(title, f"lost: {LOST_RULE}", plan.levels, plan.slams, cell)
