@@ -9,7 +9,7 @@ ghost_rate         share of occupied cells with nothing within ``NEAR_M``: neith
 new_object_recall  of what stands for 2 s at a new place, was seen in 5 scans and lately: the share
                    that the map holds (half its hits within ``REACH_M`` of an occupied cell)
 half_life          of the belief in the place of a moved chair, bin or load, from the scan that
-                   first sees it empty; infinite where it outlasts the run in half of the cases
+                   first sees it empty: ``censored_median``, as some outlast the run or the watch
 door_accuracy      of doors seen in the last 2 s and closed (< 15 degrees) or open (> 45): the share
                    of which the map says so (closed: half the closed leaf is occupied)
 """
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scripts.compare.places import BELIEVED, LATELY_S, OldPlace, Places
 from scripts.compare.recording import Recording
 from scripts.compare.sight import Sight, clearance
-from scripts.compare.statistics import quantile
+from scripts.compare.statistics import censored_median
 from slam import se2
 from slam.frames import NS_PER_S, Float
 from slam.system import Raster
@@ -151,17 +151,16 @@ class MapJudge:
         if self._believed is None:
             return {}
         old = [place for place in self.places.left if place.seen_empty_s is not None]
-        lives = [(p.half_life_s, p.observations) for p in old if p.half_life_s is not None]
-        censored = [math.inf] * (len(old) - len(lives))
+        ended = [place.forgotten for place in old]
         return {
             "ghost_rate": _mean([alone for alone, _ in self._ghosts]),
             "ghost_left_rate": _mean([left for _, left in self._ghosts]),
             "new_object_recall": _mean(self._found),
             "new_objects": len(self._found),
-            "half_life_s": _median([s for s, _ in lives] + censored),
-            "half_life_observations": _median([float(n) for _, n in lives] + censored),
+            "half_life_s": censored_median([p.lasted_s for p in old], ended),
+            "half_life_observations": censored_median([p.observations for p in old], ended),
             "half_life_events": len(old),
-            "half_life_censored": len(censored),
+            "half_life_censored": len(old) - sum(ended),
             "door_accuracy": _mean(self._right),
             "doors_judged": len(self._right),
         }
@@ -213,13 +212,9 @@ class MapJudge:
 def _forgets(old: OldPlace, believed: bool, seconds: float) -> None:
     """What the newest map thinks of an old place."""
     old.believed = believed
-    if old.seen_empty_s is not None and not believed:
-        old.half_life_s = seconds - old.seen_empty_s
+    if old.seen_empty_s is not None:
+        old.lasted_s, old.forgotten = seconds - old.seen_empty_s, not believed
 
 
 def _mean(values: Sequence[float]) -> float | None:
     return sum(values) / len(values) if values else None
-
-
-def _median(values: list[float]) -> float | None:
-    return quantile(values, 0.5) if values else None

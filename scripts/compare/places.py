@@ -39,11 +39,12 @@ class Place:
 
 @dataclass(eq=False)
 class OldPlace:
-    """A place that its mover has left; the half-life is that of a map's belief in it.
+    """A place that its mover has left, and for how long a map's belief in it lasts.
 
     believed      by the latest map, None before the first
     seen_empty_s  when it was first seen empty, and ``observations`` in how many scans since
-    half_life_s, half_life_observations  once the belief is gone; None while it lasts
+    lasted_s      from then to the latest map asked
+    forgotten     that map no longer believed it: its end was seen
     over          no longer watched: something stands there again, or it was not believed at first
     """
 
@@ -51,13 +52,14 @@ class OldPlace:
     believed: bool | None = None
     seen_empty_s: float | None = None
     observations: int = 0
-    half_life_s: float | None = None
+    lasted_s: float = 0.0
+    forgotten: bool = False
     over: bool = False
 
     @property
     def watched(self) -> bool:
         """Whether maps still matter."""
-        return not self.over and self.half_life_s is None
+        return not self.over and not self.forgotten
 
     @property
     def fading(self) -> bool:

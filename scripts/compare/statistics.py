@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
+from scipy.stats import CensoredData, binomtest, ecdf
 
 RESAMPLES = 2000
 SEED = 20070411  # of every bootstrap: the same table gives the same intervals
@@ -52,6 +52,21 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
     tail = 0.5 * (1.0 - CONFIDENCE)
     listed = medians.tolist()
     return quantile(listed, tail), quantile(listed, 1.0 - tail)
+
+
+def censored_median(lasted: Sequence[float], ended: Sequence[bool]) -> float | None:
+    """Kaplan-Meier median of durations, of which some were watched for so long without an end.
+
+    The least duration at which the estimated share that lasts longer, the product over all ends up
+    to then of 1 - ends / (those watched for so long), is at most one half. Infinite where the share
+    stays above; None of nothing.
+    """
+    if not lasted:
+        return None
+    watched = CensoredData.right_censored(np.asarray(lasted, float), ~np.asarray(ended, bool))
+    longer = ecdf(watched).sf
+    below = longer.quantiles[longer.probabilities <= 0.5 + 1e-9]  # products of fractions
+    return float(below[0]) if len(below) else math.inf
 
 
 def share_interval(hits: int, n: int) -> tuple[float, float]:

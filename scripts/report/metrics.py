@@ -102,8 +102,8 @@ _ALL = (
            about="of what stands at a new place for 2 s and was seen in 5 scans, the share that "
            "the map holds"),
     Metric(key="half_life_s", name="half-life of a moved chair", unit="s",
-           about="median over what was moved: how long the map shows it at its old place after the "
-           "scan that first sees that empty; ∞ where most outlast the watch"),
+           about="Kaplan-Meier median over what was moved: how long the map shows it at its old "
+           "place after the scan that first sees that empty; ∞ where most outlast the watch"),
     Metric(key="half_life_observations", name="half-life of a moved chair", unit="looks",
            about="the same, in scans that looked there"),
     Metric(key="door_accuracy", name="doors right", unit="%", factor=100.0,

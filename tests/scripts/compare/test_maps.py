@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from scripts.compare.maps import MapJudge, disc
+from scripts.compare.places import OldPlace
 from scripts.compare.sight import Sight
 from tests.scripts.compare.hand_made import HZ, WALL_M, raster, recording
 
@@ -80,6 +81,19 @@ def test_a_place_never_forgotten_is_infinite_and_one_never_known_no_event():
     scores = judged(drive, lambda k: raster(wall)).scores()
     assert scores["half_life_events"] == 0
     assert scores["half_life_s"] is None
+
+
+def test_a_place_watched_to_the_end_counts_for_as_long_as_it_was_watched():
+    """Three places: forgotten after 1 s and 3 s, and one taken again after 2 s, still believed."""
+    judge = judged(recording([HERE] * 11), lambda k: raster(wall))
+    for lasted_s, forgotten in ((1.0, True), (2.0, False), (3.0, True)):
+        old = OldPlace(np.zeros((1, 2)), seen_empty_s=1.0, lasted_s=lasted_s, forgotten=forgotten)
+        old.observations = round(HZ * lasted_s)
+        judge.places.left.append(old)
+    scores = judge.scores()
+    assert (scores["half_life_events"], scores["half_life_censored"]) == (3, 1)
+    assert scores["half_life_s"] == 3.0  # 2/3 last longer than 1 s, of whom the only one left ends
+    assert scores["half_life_observations"] == 3 * HZ
 
 
 def test_recall_of_a_chair_at_its_new_place():
