@@ -9,12 +9,17 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 
+from scripts.cli import main
+from sim.simulation import stream
+from slam.logs.carmen_writer import write_carmen
 from slam.maps import read_map
 from slam.trajectory import read_tum
 
@@ -22,6 +27,7 @@ REPO = Path(__file__).resolve().parents[2]
 
 
 def mobilia(*words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The command as a process of its own, which takes seconds to start."""
     return subprocess.run(
         [sys.executable, "-m", "scripts", *map(str, words)],
         capture_output=True,
@@ -31,6 +37,22 @@ def mobilia(*words: str | Path, **environment: str) -> subprocess.CompletedProce
         cwd=REPO,
         env={**os.environ, "COLUMNS": "200", **environment},
     )
+
+
+@pytest.fixture
+def called(capsys, monkeypatch) -> Callable[..., SimpleNamespace]:
+    """``mobilia`` without the process: what it printed, and its exit status."""
+
+    def call(*words: str | Path) -> SimpleNamespace:
+        monkeypatch.setattr(sys, "argv", ["mobilia", *map(str, words)])
+        monkeypatch.setattr(sys, "path", [*sys.path])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = capsys.readouterr()
+        return SimpleNamespace(returncode=ended.value.code, stdout=printed.out, stderr=printed.err)
+
+    return call
 
 
 @pytest.fixture(scope="module")
@@ -91,20 +113,17 @@ def test_the_film_has_the_frames_of_three_seconds(finished):
     assert frames[-1].std() > 20.0
 
 
-def test_a_log_runs_from_end_to_end(tmp_path: Path):
-    from sim.simulation import stream
-    from slam.logs.carmen_writer import write_carmen
-
+def test_a_log_runs_from_end_to_end(tmp_path: Path, called):
     log = tmp_path / "arena.log"
     write_carmen(log, stream("arena", seed=1, seconds=2.0))
-    done = mobilia("run", "shunting", "--log", log, "--out", tmp_path / "run", "--no-film")
+    done = called("run", "shunting", "--log", log, "--out", tmp_path / "run", "--no-film")
     assert done.returncode == 0, done.stderr
     results = json.loads((tmp_path / "run" / "results.json").read_text())
     assert results["slams"]["shunting"]["scans"] == 75
 
 
-def test_list_names_scenes_slams_and_environments():
-    done = mobilia("list")
+def test_list_names_scenes_slams_and_environments(called):
+    done = called("list")
     assert done.returncode == 0
     for word in ("arena", "office", "shunting", "odometry", "mobilia/Office-v0"):
         assert word in done.stdout
@@ -123,40 +142,40 @@ def test_list_names_scenes_slams_and_environments():
         (("run", "no_module:Slam", "--scene", "arena"), "cannot import 'no_module'"),
     ],
 )
-def test_a_wrong_word_is_one_line_and_a_status(tmp_path: Path, words, says):
-    done = mobilia(*words, "--out", tmp_path / "out")
+def test_a_wrong_word_is_one_line_and_a_status(tmp_path: Path, called, words, says):
+    done = called(*words, "--out", tmp_path / "out")
     assert done.returncode == 1
     assert says in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_damaged_log_is_named_and_nothing_is_written(tmp_path: Path):
+def test_a_damaged_log_is_named_and_nothing_is_written(tmp_path: Path, called):
     (tmp_path / "torn.log").write_text("FLASER 3 1.0 1.0 1.0 0 0 0 0 0 0 1.0 host 1.0\nFLASER 3 1.")
     (tmp_path / "noise.log").write_bytes(bytes(range(256)) * 20)
     before = sorted(p.name for p in tmp_path.iterdir())
     for name in ("torn.log", "noise.log"):
-        done = mobilia("run", "shunting", "--log", tmp_path / name, "--out", tmp_path / "out")
+        done = called("run", "shunting", "--log", tmp_path / name, "--out", tmp_path / "out")
         assert done.returncode == 1
         assert name in done.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == before
 
 
-def test_an_earlier_run_stays_unless_overwriting_is_asked_for(tmp_path: Path):
+def test_an_earlier_run_stays_unless_overwriting_is_asked_for(tmp_path: Path, called):
     words = ("run", "odometry", "--scene", "arena", "--seconds", "0.2", "--no-film",
              "--out", tmp_path / "out")  # fmt: skip
-    assert mobilia(*words).returncode == 0
+    assert called(*words).returncode == 0
     kept = (tmp_path / "out" / "recipe.json").stat().st_mtime_ns
-    again = mobilia(*words)
+    again = called(*words)
     assert again.returncode == 1
     assert "holds an earlier run: pass --overwrite" in again.stderr
     assert (tmp_path / "out" / "recipe.json").stat().st_mtime_ns == kept
-    assert mobilia(*words, "--overwrite").returncode == 0
+    assert called(*words, "--overwrite").returncode == 0
 
 
-def test_an_output_that_cannot_be_written_is_named(tmp_path: Path):
+def test_an_output_that_cannot_be_written_is_named(tmp_path: Path, called):
     (tmp_path / "file").write_text("in the way")
-    done = mobilia("demo", "--seconds", "1", "--out", tmp_path / "file" / "out")
+    done = called("demo", "--seconds", "1", "--out", tmp_path / "file" / "out")
     assert done.returncode == 1
     assert "cannot write" in done.stderr
 
@@ -194,24 +213,24 @@ def test_an_interrupted_run_leaves_nothing(tmp_path: Path, number):
 
 
 @pytest.mark.parametrize("name", ["nope [/x].log", "[red]gone[/red].log"])
-def test_brackets_in_a_name_are_just_brackets(tmp_path: Path, name: str):
-    done = mobilia("run", "shunting", "--log", tmp_path / name, "--out", tmp_path / "out")
+def test_brackets_in_a_name_are_just_brackets(tmp_path: Path, called, name: str):
+    done = called("run", "shunting", "--log", tmp_path / name, "--out", tmp_path / "out")
     assert done.returncode == 1
     assert f"{name}: no such file" in done.stderr
 
 
-def test_a_log_of_one_scan_is_a_run(tmp_path: Path):
+def test_a_log_of_one_scan_is_a_run(tmp_path: Path, called):
     beams = " ".join(["2.5"] * 180)
     log = tmp_path / "one.log"
     log.write_text(f"FLASER 180 {beams} 0 0 0 0 0 0 1.0 host 1.0\n")
-    done = mobilia("run", "shunting", "--log", log, "--out", tmp_path / "out")
+    done = called("run", "shunting", "--log", log, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert "film.mp4" in done.stdout
 
 
-def test_only_files_that_exist_are_recommended(tmp_path: Path):
+def test_only_files_that_exist_are_recommended(tmp_path: Path, called):
     out = tmp_path / "a [b] c" / "out"
-    done = mobilia(
+    done = called(
         "run", "odometry", "--scene", "arena", "--seconds", "0.2", "--no-film", "--out", out
     )
     assert done.returncode == 0, done.stderr
