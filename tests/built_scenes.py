@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 
 import cv2
 import mujoco
@@ -19,8 +19,9 @@ ROBOT_RADIUS = 0.3
 DEG = math.pi / 180.0
 
 
-@cache
+@lru_cache(maxsize=len(NAMES))  # a scene holds some 30 MB
 def built(name: str, seed: int) -> Scene:
+    """Of the other seeds few are asked for twice."""
     return scenes.build(name, seed)
 
 
