@@ -10,8 +10,6 @@ import argparse
 import json
 import os
 import sys
-import threading
-import time
 import traceback
 from typing import Any, BinaryIO
 
@@ -88,20 +86,12 @@ def serve(server: Server, requests: BinaryIO, answers: BinaryIO) -> None:
         answers.flush()
 
 
-def _end_with(parent: int) -> None:
-    """A guest in an endless loop must not outlive a mobilia that was killed."""
-    while os.getppid() == parent:
-        time.sleep(1.0)
-    os._exit(1)
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Take the process's two ends for the protocol; whatever else prints or reads gets none."""
     parser = argparse.ArgumentParser(prog="python -m slam.guests.serve", description=__doc__)
     parser.add_argument("name", help="module:Class, or the name of a registered SLAM")
     parser.add_argument("--options", default="{}", help="of its constructor, a JSON object")
     chosen = parser.parse_args(arguments)
-    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     with open(os.devnull, "rb") as nothing:
         os.dup2(nothing.fileno(), 0)

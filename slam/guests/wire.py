@@ -19,6 +19,7 @@ from slam.errors import InvalidValueError, SlamFailedError
 MAX_LINE_BYTES = 1 << 28  # a map of 5000 x 5000 cells
 KEPT_WORDS = 4000  # bytes of its standard error
 _CHUNK = 1 << 16
+_SHELL = "/bin/sh"
 _LEAVE_S = 1.0  # from the end of its input to the end of its life
 _STATUS_S = 0.2  # from the end of its output to the end of its life
 
@@ -29,7 +30,7 @@ class Wire:
     The child reads requests from its standard input and answers each with one line on its standard
     output; ``farewell`` and the end of its input mean that it is to end. When it is not needed any
     more, whether closed, garbage collected or at the end of this program, its whole group is
-    killed. POSIX only.
+    killed; a guard sees to it should this program be killed. POSIX only.
     """
 
     def __init__(
@@ -38,6 +39,10 @@ class Wire:
         environment: Mapping[str, str] | None = None,
         farewell: bytes = b"",
     ) -> None:
+        try:
+            self._guard = _guard()
+        except OSError as error:
+            raise InvalidValueError(f"cannot start {_SHELL!r}: {error.strerror}") from error
         try:
             self._process = subprocess.Popen(
                 command,
@@ -49,10 +54,12 @@ class Wire:
                 start_new_session=True,
             )
         except (OSError, ValueError) as error:
+            _dismiss(self._guard)
             why = getattr(error, "strerror", None) or error
             raise InvalidValueError(f"cannot start {command[0]!r}: {why}") from error
         self._stdin, self._stdout, self._stderr = _pipes(self._process)
-        self._finalizer = weakref.finalize(self, _end, self._process, farewell)
+        self._finalizer = weakref.finalize(self, _end, self._process, self._guard, farewell)
+        _tell(self._guard, self._process.pid)
         self._heard = bytearray()
         self._words = bytearray()
 
@@ -80,7 +87,7 @@ class Wire:
             return self._exchange(request, time.monotonic() + limit_s, limit_s)
         except BaseException:
             if self._finalizer.detach():
-                _end(self._process, leave_s=0.0)
+                _end(self._process, self._guard, leave_s=0.0)
             raise
 
     def _exchange(self, request: bytes, deadline: float, limit_s: float) -> bytes:
@@ -167,6 +174,32 @@ class Wire:
         return None
 
 
+def _guard() -> subprocess.Popen[bytes]:
+    """Reads the number of a process group; at the end of its input it kills that."""
+    return subprocess.Popen(
+        [_SHELL, "-c", 'read -r group && { read -r _; kill -s KILL -- "-$group"; }'],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        bufsize=0,
+        start_new_session=True,  # what interrupts us at a terminal does not end it
+    )
+
+
+def _tell(guard: subprocess.Popen[bytes], group: int) -> None:
+    assert guard.stdin is not None
+    with suppress(OSError):
+        guard.stdin.write(b"%d\n" % group)
+
+
+def _dismiss(guard: subprocess.Popen[bytes]) -> None:
+    """Before its group is reaped and the number another's."""
+    guard.kill()
+    assert guard.stdin is not None
+    guard.stdin.close()
+    guard.wait()
+
+
 def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes], IO[bytes]]:
     assert process.stdin is not None
     assert process.stdout is not None
@@ -190,7 +223,10 @@ def _exit_status(process: subprocess.Popen[bytes]) -> str:
 
 
 def _end(
-    process: subprocess.Popen[bytes], farewell: bytes = b"", leave_s: float = _LEAVE_S
+    process: subprocess.Popen[bytes],
+    guard: subprocess.Popen[bytes],
+    farewell: bytes = b"",
+    leave_s: float = _LEAVE_S,
 ) -> None:
     """Say farewell, close its input, wait a moment, kill its group, reap it."""
     if process.stdin is not None and farewell:
@@ -205,4 +241,5 @@ def _end(
         time.sleep(0.005)
     with suppress(OSError):  # not reaped yet: the number of its group is still its own
         os.killpg(process.pid, signal.SIGKILL)
+    _dismiss(guard)
     process.wait()

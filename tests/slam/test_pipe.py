@@ -256,6 +256,23 @@ def test_the_other_end_answers_whatever_it_is_told(stream):
     assert "unexpected keyword" in str(asked(Server("odometry", {"x": 1}), **hello)["message"])
 
 
+def test_a_program_that_ignores_the_end_of_its_input_does_not_outlive_a_killed_mobilia():
+    code = (
+        "import sys; from slam.guests.wire import Wire\n"
+        "wire = Wire(['sh', '-c', 'trap \"\" HUP TERM; sleep 600 & echo $!; wait'])\n"
+        "print(wire.pid, int(wire.ask(b'', 5.0)), flush=True); sys.stdin.read()"
+    )
+    parent = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stdin=subprocess.PIPE
+    )
+    with parent:
+        program, its_child = (int(word) for word in parent.stdout.readline().split())
+        assert not gone(program, within_s=0.2)
+        os.kill(parent.pid, signal.SIGKILL)
+    assert gone(program)
+    assert gone(its_child)
+
+
 def test_a_class_does_not_outlive_a_mobilia_that_was_killed(own):
     code = (
         f"import sys; sys.path.insert(0, {str(own)!r})\n"
