@@ -14,6 +14,7 @@ import scenes
 import sim
 import slam
 from scripts.compare import columns, entry, maps, places, recording, sight
+from scripts.compare.imports import with_imports
 from scripts.jobs import Job
 from scripts.session import file_name
 from sim.recording.recipe import Recipe
@@ -134,12 +135,17 @@ def sources(*packages: Any) -> tuple[Path, ...]:
 
 
 def source_of(slam: str) -> tuple[Path, ...]:
-    """The file of a SLAM's own module, or those that a command names: with them changed, its runs
-    are made again."""
+    """The file of a SLAM's own module, or those that a command names, and what Python files among
+    them import from beside them: with any of it changed, its runs are made again."""
     kind, _, command = slam.partition(":")
     if not command:
         return ()
     if slam.startswith(PREFIX):
-        return tuple(path for path in map(Path, shlex.split(command)) if path.is_file())
+        named = [path for path in map(Path, shlex.split(command)) if path.is_file()]
+        return tuple(file for path in named for file in _whole(path, path.stem))
     spec = importlib.util.find_spec(kind)
-    return (Path(spec.origin),) if spec and spec.origin and spec.has_location else ()
+    return _whole(Path(spec.origin), kind) if spec and spec.origin and spec.has_location else ()
+
+
+def _whole(file: Path, module: str) -> tuple[Path, ...]:
+    return with_imports(file, module) if file.suffix == ".py" else (file,)
