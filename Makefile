@@ -13,8 +13,8 @@ help:            ## list the targets
 demo: $(STAMP)   ## 60 s of a moving office, SLAM against odometry, a map and a film in out/demo/
 	@$(BIN)/mobilia demo --overwrite
 
-test: $(STAMP)   ## the whole test suite
-	@$(BIN)/python -m pytest
+test: $(STAMP)   ## the whole test suite, on up to four cores
+	@$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 check: $(STAMP)  ## lint, format and strict types
 	@$(BIN)/ruff check .

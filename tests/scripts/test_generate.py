@@ -78,13 +78,14 @@ def flip(path: Path, at: float = 0.5) -> None:
 
 def test_killed_in_mid_episode_and_started_again_ends_with_the_same_bytes(serial, tmp_path):
     out = tmp_path / "data"
-    child = os.fork()
-    if child == 0:
-        generate("arena", out, **SETTINGS)
-        os._exit(0)
+    code = (
+        "from pathlib import Path; from scripts.generate import generate\n"
+        f"generate('arena', Path({str(out)!r}), **{SETTINGS})"
+    )
+    child = subprocess.Popen([sys.executable, "-c", code], env=environment())
     wait_for(lambda: whole_episodes(out) and list(out.glob(".*.part/*/*.mcap")))
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
+    child.kill()
+    child.wait()
     assert not (out / SUMS).exists()
     first = whole_episodes(out)[0]
     kept = (first / RECIPE).stat()

@@ -10,6 +10,7 @@ import os
 import select
 import shutil
 import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,12 @@ OPTIONS = (
     "--disable-dev-shm-usage", "--disable-background-networking", "--remote-debugging-pipe",
 )  # fmt: skip
 LIMIT_S = 60.0
+CONNECT = """
+import os, sys
+os.dup2(int(sys.argv[1]), 3)
+os.dup2(int(sys.argv[2]), 4)
+os.execv(sys.argv[3], sys.argv[3:])
+"""  # Chromium reads 3 and writes 4
 
 
 class Browser:
@@ -33,21 +40,25 @@ class Browser:
         read_theirs, self._write = os.pipe()
         self._read, write_theirs = os.pipe()
 
-        def connect() -> None:  # Chromium reads 3 and writes 4
-            high = [fcntl.fcntl(end, fcntl.F_DUPFD, 10) for end in (read_theirs, write_theirs)]
-            os.dup2(high[0], 3)
-            os.dup2(high[1], 4)
-
+        high = [fcntl.fcntl(end, fcntl.F_DUPFD, 10) for end in (read_theirs, write_theirs)]
         self._process = subprocess.Popen(
-            [CHROMIUM, *OPTIONS, f"--user-data-dir={profile}", "about:blank"],
-            preexec_fn=connect,
-            close_fds=False,
+            [
+                sys.executable,
+                "-c",
+                CONNECT,
+                *map(str, high),
+                CHROMIUM,
+                *OPTIONS,
+                f"--user-data-dir={profile}",
+                "about:blank",
+            ],
+            pass_fds=high,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             env={**os.environ, "HOME": str(profile)},
         )
-        os.close(read_theirs)
-        os.close(write_theirs)
+        for end in (read_theirs, write_theirs, *high):
+            os.close(end)
         self._count, self._session = 0, None
         self._heard = bytearray()
         self.console: list[str] = []
