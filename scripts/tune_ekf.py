@@ -4,7 +4,9 @@
 One pass over the knobs, each in turn over a few values with the others as they are in the preset,
 on the training seeds 0 to 19 and nothing else; results are shown on seeds from 100 on. The score is
 the mean over the runs of log10(RMSE / 1 m): a factor counts the same wherever it happens, and a run
-that is lost counts, but not for everything. Prints each value's score and the best ones.
+that is lost counts, but not for everything. Seeds are paired: beside each value's change of the
+score stands in how many seeds (mean over their worlds) it was better and worse than the preset, and
+the two-sided probability of that by chance. Prints a Markdown table.
 """
 
 from __future__ import annotations
@@ -13,22 +15,25 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import slam
 from scripts.accuracy import thinned
 from scripts.jobs import Job, run_jobs
-from scripts.reproduce.runs import follow, truth_of
+from scripts.reproduce.runs import follow, sign_test, truth_of
 from sim.simulation import stream
 from slam import create, metrics
-from slam.frames import Frame
+from slam.ekf.slam import PRESETS
+from slam.frames import Float, Frame
 from slam.points import PointWorld, PointWorldConfig
 
 TRAINING = range(20)
 WORLDS: dict[str, tuple[dict[str, Any], ...]] = {
-    "points": ({"moving": 0.0}, {"moving": 0.25}, {"moving": 0.5}),
+    "points": ({"moving": 0.0}, {"moving": 0.25}, {"moving": 0.5}, {"moving": 0.75}),
     "corners": (
         {"scene": "arena", "dynamism": 1.0, "walls": "visible"},
         {"scene": "arena", "dynamism": 1.0, "walls": "none"},
@@ -39,10 +44,10 @@ VALUES: dict[str, tuple[Any, ...]] = {
     "individual_gate": (0.999, 0.9999, 0.999999),
     "joint_gate": (0.99, 0.999, 0.999999),
     "posterior_gate": (0.99, 0.9999, 0.99999),
-    "noise_scale": (1.0, 1.25, 2.0),
+    "noise_scale": (1.0, 1.25, 1.5, 2.0),
     "confirm_looks": (2, 4, 8, 12),
-    "detection": (0.7, 0.8, 0.9),
-    "memory_looks": (2.0, 4.0, 8.0),
+    "detection": (0.6, 0.7, 0.8, 0.9),
+    "memory_looks": (2.0, 4.0, 8.0, 16.0),
     "separation_m": (0.0, 0.15, 0.3),
 }
 SECONDS = 30.0
@@ -70,10 +75,13 @@ def run_one(
 
 def tune(
     preset: str, seeds: Sequence[int], folder: Path, processes: int, knobs: Sequence[str]
-) -> list[tuple[dict[str, Any], float]]:
-    """Mean score of each trial, the preset itself first."""
+) -> list[tuple[dict[str, Any], Float]]:
+    """Of each trial its scores (seeds, worlds), the preset itself first."""
+    frozen = PRESETS[preset]()
     trials: list[dict[str, Any]] = [{}]
-    trials += [{knob: value} for knob in knobs for value in VALUES[knob]]
+    for knob in knobs:
+        trials += [{knob: value} for value in VALUES[knob] if value != getattr(frozen, knob)]
+    worlds = range(len(WORLDS[preset]))
     jobs = [
         Job(
             name=f"{preset}-{world}-seed-{seed}",
@@ -82,14 +90,35 @@ def tune(
             suffix=".json",
             code=(Path(slam.__file__).parent, Path(__file__)),
         )
-        for world in range(len(WORLDS[preset]))
         for seed in seeds
+        for world in worlds
     ]
     files = run_jobs(jobs, folder, processes=processes, title=f"tuning the EKF for {preset}")
-    scores = [json.loads(file.read_text()) for file in files.values()]
-    return [
-        (changes, sum(run[k] for run in scores) / len(scores)) for k, changes in enumerate(trials)
-    ]
+    runs = np.array([json.loads(file.read_text()) for file in files.values()])
+    scores = runs.reshape(len(seeds), len(worlds), len(trials))
+    return [(changes, scores[:, :, k]) for k, changes in enumerate(trials)]
+
+
+def table(preset: str, results: Sequence[tuple[dict[str, Any], Float]]) -> Iterator[str]:
+    """Lines of Markdown: each value's change of the score, paired over the seeds and by world."""
+    frozen, base = PRESETS[preset](), results[0][1]
+    worlds = [" ".join(str(v) for v in world.values()) for world in WORLDS[preset]]
+    medians = ", ".join(
+        f"{1e3 * 10**score:.1f} mm ({world})"
+        for score, world in zip(np.median(base, axis=0).tolist(), worlds, strict=True)
+    )
+    yield f"Preset {preset}, {len(base)} seeds: score {base.mean():+.3f}; median RMSE {medians}."
+    yield ""
+    yield f"| knob | frozen | value | change | better : worse | p | {' | '.join(worlds)} |"
+    yield "|---|---:|---:|---:|---:|---:|" + "---:|" * len(worlds)
+    for changes, scores in results[1:]:
+        ((knob, value),) = changes.items()
+        by_seed, change = base.mean(axis=1).tolist(), scores - base
+        test = sign_test(scores.mean(axis=1).tolist(), by_seed)
+        cells = [knob, f"{getattr(frozen, knob):g}", f"{value:g}", f"{change.mean():+.3f}"]
+        cells += [f"{test.wins} : {test.losses}", f"{test.p:.2g}"]
+        cells += [f"{x:+.3f}" for x in change.mean(axis=0).tolist()]
+        yield f"| {' | '.join(cells)} |"
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -103,13 +132,8 @@ def main(arguments: list[str] | None = None) -> int:
     wanted = parser.parse_args(arguments)
     seeds = list(TRAINING)[: wanted.seeds]
     results = tune(wanted.preset, seeds, wanted.out, wanted.jobs, wanted.knobs)
-    preset = results[0][1]
-    print(f"preset '{wanted.preset}': {preset:+.3f} (log10 of RMSE in m)")
-    for knob in wanted.knobs:
-        of_knob = {c[knob]: score for c, score in results if knob in c}
-        best = min(of_knob, key=lambda value: of_knob[value])
-        told = "  ".join(f"{value}: {score - preset:+.3f}" for value, score in of_knob.items())
-        print(f"  {knob:16s} {told}   best {best}")
+    for line in table(wanted.preset, results):
+        print(line)
     return 0
 
 
