@@ -51,6 +51,24 @@ def test_only_what_stops_a_beam_is_a_chance():
     np.testing.assert_array_equal(corner_recall.visible(points, scan), points[:1])
 
 
+def test_a_corner_of_a_room_needs_its_walls():
+    spec = LaserSpec(n_beams=181, angle_min=-math.pi / 2, angle_increment=math.pi / 180)
+    ranges = np.full(181, 4.0, dtype=np.float32)
+    point = np.array([[4.0, 0.0]])
+    for beam, seen in ((92, False), (97, True)):  # 2 and 7 degrees beside it, 0.14 and 0.5 m
+        ranges[:] = 4.0
+        ranges[beam] = 2.0
+        scan = Scan(stamp_ns=0, ranges=ranges, spec=spec)
+        assert len(corner_recall.visible(point, scan, 0.2)) == seen
+        assert len(corner_recall.visible(point, scan)) == 1
+
+
+def test_in_the_arena_features_lie_at_known_things_and_are_found_again():
+    tallies = corner_recall.recall("arena", seed=0, seconds=4.0, laser=Lms221Config())
+    assert tallies[corner_recall.KNOWN].recall > 0.8
+    assert tallies[corner_recall.AGAIN].recall > 0.6
+
+
 @pytest.mark.parametrize("kind", ["door jambs"])
 def test_most_jambs_of_the_office_are_found(kind):
     tally = corner_recall.recall("office", seed=0, seconds=2.0, laser=Lms221Config())[kind]
