@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -163,7 +164,8 @@ def error_axes(seconds: Float, errors: Mapping[str, Float], title: str) -> Figur
         sizes = [float(np.nanmax(np.abs(e[:, k]))) for e in errors.values()]
         sizes = [size for size in sizes if size > 0.0]
         if sizes and max(sizes) > 15.0 * min(sizes):
-            ax.set_yscale("symlog", linthresh=min(sizes))
+            # a power of ten: else the first tick lies within the linear part, on that of zero
+            ax.set_yscale("symlog", linthresh=10.0 ** round(math.log10(min(sizes))))
     axes[0].set(title=title)
     axes[0].legend(frameon=False, ncols=4, fontsize=8)
     axes[2].set(xlabel="time in s")
