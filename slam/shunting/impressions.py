@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import njit
-from slam.frames import Features, Float, Scan
+from slam.errors import InvalidValueError
+from slam.frames import Features, Float, Frame, Scan
 from slam.seen import FREE_WITHOUT_RETURN_M
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.surfaces import face, join, unveiled
@@ -177,6 +178,21 @@ def from_features(features: Features, config: ShuntingConfig) -> Observations:
         view=view_of_features(points[near], config.cell_m),
         T_robot_laser=np.zeros(3),
     )
+
+
+def observe(frame: Frame, twist: Float, config: ShuntingConfig) -> Observations:
+    """What a frame shows to a robot that moves with ``twist``: beams, features or both.
+
+    Raises ``InvalidValueError`` for a frame with neither.
+    """
+    if frame.scan is None and frame.features is None:
+        raise InvalidValueError("the shunting SLAM needs a scan or features in every frame")
+    if frame.scan is None:
+        return from_features(frame.features, config)  # type: ignore[arg-type]
+    beams = from_scan(frame.scan, twist, config)
+    if frame.features is None:
+        return beams
+    return joined(beams, from_features(frame.features, config))
 
 
 def joined(first: Observations, second: Observations) -> Observations:

@@ -67,6 +67,17 @@ class Match:
     slipped: bool = False
 
 
+def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
+    """A pose that comes from elsewhere: the data say nothing of it."""
+    return Match(
+        T_map_robot=T_map_robot,
+        information=np.zeros((3, 3)),
+        matched=matched,
+        score=score,
+        tau=0.0,
+    )
+
+
 class Matcher:
     """Matches observations to a network."""
 

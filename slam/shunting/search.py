@@ -35,6 +35,19 @@ class SearchWindow:
     reach_m: float
     turn_rad: float
 
+    @classmethod
+    def about(cls, prior: Float) -> SearchWindow:
+        """Three standard deviations of a (3, 3) prior, within ``WIDEST``."""
+        reach_m = 3.0 * math.sqrt(max(prior[0, 0], prior[1, 1]))
+        turn_rad = 3.0 * math.sqrt(prior[2, 2])
+        return cls(
+            reach_m=min(max(reach_m, 0.1), WIDEST.reach_m),
+            turn_rad=min(max(turn_rad, 0.05), WIDEST.turn_rad),
+        )
+
+
+WIDEST = SearchWindow(reach_m=0.6, turn_rad=0.5)
+
 
 @njit
 def _field(

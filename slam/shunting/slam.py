@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import replace
 from pathlib import Path
-from statistics import median
 from typing import Self
 
 import numpy as np
@@ -19,15 +17,16 @@ from slam.frames import Float, Frame, Odometry
 from slam.shunting import layers, memory
 from slam.shunting.belief import Belief
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import Observations, from_features, from_scan, joined
+from slam.shunting.doubt import LOST_AFTER, PATIENCE, Doubt
+from slam.shunting.impressions import Observations, observe
 from slam.shunting.increments import Increments
 from slam.shunting.loops import Loops
-from slam.shunting.matching import Match, Matcher
+from slam.shunting.matching import Match, Matcher, unmatched
 from slam.shunting.motion import Prediction, inverted, turned
 from slam.shunting.network import Network
 from slam.shunting.recovery import COARSE, SLIPPED, TELLING, Recovery, slipped
 from slam.shunting.residuals import Evidence, look
-from slam.shunting.search import SearchWindow
+from slam.shunting.search import WIDEST, SearchWindow
 from slam.shunting.stamping import stamp
 from slam.shunting.warmup import warm_up
 from slam.system import Estimate, Raster, register
@@ -36,17 +35,8 @@ from slam.trajectory import Trajectory
 FIRST_LOOK_S = 1.0  # the first frame acts this long, so that the map is usable at once
 RESUMED_LOOK_S = 0.2  # of the first frame with a loaded map
 LONGEST_LOOK_S = 3.0  # however long ago the previous frame was
-WIDEST = SearchWindow(reach_m=0.6, turn_rad=0.5)
 GOOD_SHARE = 0.85  # of the usual matched fraction: below it the neighbourhood is searched
 VAGUE_CELLS = 1.0  # a prior wider than this may leave the basin of the right optimum
-LOST_AFTER, PATIENCE = 3, 30  # doubtful frames in a row: then lost; then the map is written anew
-WORTH_SEARCHING = 0.6  # usual support by the map from which on a lost robot searches it,
-GROWN_S, GROWN_SCANS = 10.0, 10  # once the map has been tracked on this long
-KNOWN = 0.5  # of that time: from then on the map may be frozen
-SUSPICIOUS, DENIED, STILL = 0.70, 0.30, 0.20  # of the usual match; share of the map in view
-# contradicted that raises doubt, and that keeps it up
-SUDDEN, NEAR_M, NEAR_RAD = 0.3, 0.5, 0.5  # of the usual match; so little all at once, within such
-# a step, is no new place but a robot carried to where what is in view hides the map
 GIVE_UP_S = 60.0  # of searching: then the map is written on from where odometry says
 
 
@@ -78,11 +68,8 @@ class ShuntingSlam:
         self._T_map_robot: Float = np.zeros(3)
         self._belief = Belief(self.config.cell_m)
         self._increments = Increments(self.config.cell_m)
-        self._usual: deque[float] = deque(maxlen=50)
-        self._supports: deque[float] = deque(maxlen=50)
-        self._doubts = 0
+        self._doubt = Doubt(self.config.freeze_below)
         self._recovery: Recovery | None = None
-        self._tracked_s, self._tracked = 0.0, 0
         self._loops = Loops(self.config, self._matcher)
         self._trusted = True  # the pose of the frame before
         self._stamps: list[int] = []
@@ -103,7 +90,7 @@ class ShuntingSlam:
                 f"frames must come in order: {frame.stamp_ns} ns after {self._stamps[-1]} ns"
             )
         prediction = self._predict(frame.odometry)
-        observations = self._observe(frame, prediction.twist)
+        observations = observe(frame, prediction.twist, self.config)
         if float(observations.weights.sum()) >= TELLING:
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = replace(prediction, carried=self._belief.odometry_part(motion))
@@ -128,13 +115,12 @@ class ShuntingSlam:
 
     def _first(self, frame: Frame) -> Estimate:
         twist = frame.odometry.twist
-        observations = self._observe(frame, np.zeros(3) if twist is None else np.asarray(twist))
+        moving = np.zeros(3) if twist is None else np.asarray(twist)
+        observations = observe(frame, moving, self.config)
         stamp(self.network, observations, self._T_map_robot)
         T_map_laser = se2.compose(self._T_map_robot, observations.T_robot_laser)
         self.network.integrate(observations.view, T_map_laser, FIRST_LOOK_S, write=True)
-        match = Match(
-            T_map_robot=np.zeros(3), information=np.zeros((3, 3)), matched=1.0, score=0.0, tau=0.0
-        )
+        match = unmatched(np.zeros(3), matched=1.0, score=0.0)
         self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
         return self._report(frame, match, "tracking" if len(observations.points_robot) else "blind")
 
@@ -151,16 +137,6 @@ class ShuntingSlam:
             elapsed=RESUMED_LOOK_S,
         )
 
-    def _observe(self, frame: Frame, twist: Float) -> Observations:
-        if frame.scan is None and frame.features is None:
-            raise InvalidValueError("the shunting SLAM needs a scan or features in every frame")
-        if frame.scan is None:
-            return from_features(frame.features, self.config)  # type: ignore[arg-type]
-        beams = from_scan(frame.scan, twist, self.config)
-        if frame.features is None:
-            return beams
-        return joined(beams, from_features(frame.features, self.config))
-
     def _match(self, observations: Observations, prediction: Prediction) -> Match:
         """Climb from the prediction; search around it when that is vague or finds too little."""
         predicted = prediction.T_map_robot
@@ -168,23 +144,18 @@ class ShuntingSlam:
         precision = inverted(prior)
         start = self._matcher.approach(self.network, observations, predicted, prior)
         match = self._matcher.climb(self.network, observations, start, predicted, precision)
-        sd = [math.sqrt(prior[k, k]) for k in range(3)]
-        spread = max(sd[0], sd[1])
-        near = SearchWindow(
-            reach_m=min(max(3.0 * spread, 0.1), WIDEST.reach_m),
-            turn_rad=min(max(3.0 * sd[2], 0.05), WIDEST.turn_rad),
-        )
-        good = GOOD_SHARE * self._usual_match()
-        vague = spread > VAGUE_CELLS * self.config.cell_m
+        near = SearchWindow.about(prior)
+        good = GOOD_SHARE * self._doubt.usual_match()
+        vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > VAGUE_CELLS * self.config.cell_m
         for window, wanted in ((near, vague or match.matched < good), (WIDEST, True)):
             if not wanted or (window is WIDEST and match.matched >= 0.7 * good):
                 break
             found = self._matcher.search(self.network, observations, predicted, precision, window)
             if found.score > match.score:
                 match = found
-        if match.matched >= 0.7 * good or not self._is_worth_searching():
+        if match.matched >= 0.7 * good or not self._doubt.is_worth_searching():
             return match
-        usual = self._usual_support()
+        usual = self._doubt.usual_support()
         shoved = slipped(self.network, self._matcher, observations, prediction, usual)
         return match if shoved is None else shoved
 
@@ -193,54 +164,29 @@ class ShuntingSlam:
         step, turn = min(elapsed, LONGEST_LOOK_S), len(self._poses)
         return look(self.network, short_term, observations, match.T_map_robot, step, turn)
 
-    def _usual_match(self) -> float:
-        return median(self._usual) if self._usual else 1.0
-
-    def _usual_support(self) -> float:
-        return median(self._supports) if self._supports else 1.0
-
-    def _is_worth_searching(self, share: float = 1.0) -> bool:
-        """Grown (or to that share), and explains what is seen: else it cannot deny it either."""
-        grown = self._tracked_s >= share * GROWN_S and self._tracked >= GROWN_SCANS
-        return grown and self._usual_support() >= WORTH_SEARCHING
-
     def _integrate(self, observations: Observations, match: Match, elapsed: float) -> str:
         """Let the network see the frame, unless the map in view contradicts it; the state."""
         stamp(self.network, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
         step = min(elapsed, LONGEST_LOOK_S)
-        doubtful = False
-        share = match.matched / max(self._usual_match(), 1e-9)
-        telling = float(observations.weights.sum()) >= TELLING
-        suspicious = telling and self.config.freeze_below > 0.0 and self._is_worth_searching()
-        if telling and share < max(self.config.freeze_below, SUSPICIOUS if suspicious else 0.0):
+        doubt, doubtful = self._doubt, False
+        if float(observations.weights.sum()) >= TELLING and doubt.arises(match.matched):
             confirmed, contradicted, _ = self.network.integrate(
                 observations.view, T_map_laser, step, write=False
             )
-            doubtful = self._is_worth_searching(KNOWN) and contradicted > confirmed
-            doubtful &= share < self.config.freeze_below
-            denied = STILL if self._doubts else DENIED
-            # A corridor looked at the other way round still fits by two thirds.
-            doubtful |= suspicious and contradicted > denied * (confirmed + contradicted)
-            x, y, turn = (match.T_map_robot - self._T_map_robot).tolist()
-            near = math.hypot(x, y) < NEAR_M and abs(se2.wrap(turn)) < NEAR_RAD
-            doubtful |= suspicious and share < SUDDEN and near
-        self._doubts = self._doubts + 1 if doubtful else 0
-        if doubtful and self._doubts <= PATIENCE:
+            motion = match.T_map_robot - self._T_map_robot
+            doubtful = doubt.denied(match.matched, confirmed, contradicted, motion)
+        doubt.count(doubtful)
+        if doubtful and doubt.scans <= PATIENCE:
             self.network.release()
-            # Only a map that for long explained what is seen can tell where the robot is.
-            if self._doubts >= LOST_AFTER and suspicious:
+            if doubt.scans >= LOST_AFTER and doubt.suspicious:
                 self._recovery = Recovery(self.network, self._matcher)
-            return "lost" if self._doubts > LOST_AFTER else "frozen"
+            return "lost" if doubt.scans > LOST_AFTER else "frozen"
         confirmed, contradicted, _ = self.network.integrate(
             observations.view, T_map_laser, step, write=True
         )
         if not doubtful and len(observations.points_robot) > 0:
-            self._usual.append(match.matched)
-            self._tracked_s, self._tracked = self._tracked_s + elapsed, self._tracked + 1
-            if confirmed + contradicted > 0.0:
-                support = match.matched * confirmed / (confirmed + contradicted)
-                self._supports.append(support)
+            doubt.learn(match.matched, confirmed, contradicted, elapsed)
         return "lost" if doubtful else "tracking"
 
     def _recover(
@@ -250,23 +196,16 @@ class ShuntingSlam:
         predicted = prediction.T_map_robot
         precision = inverted(prediction.prior)
         here = self._matcher.climb(self.network, observations, predicted, predicted, precision)
-        match = recovery.step(observations, prediction, here, self._usual_support())
+        match = recovery.step(observations, prediction, here, self._doubt.usual_support())
         if match is not None:
-            self._recovery, self._doubts = None, 0
+            self._recovery = None
+            self._doubt.count(False)
             self._belief.relocated(COARSE)
             return match, "relocated"
         if recovery.elapsed_s > GIVE_UP_S:  # elsewhere: go on from here, as on the first frame
             self._recovery = None
-            self._doubts = PATIENCE
-            self._tracked_s, self._tracked = 0.0, 0
-        blind = Match(
-            T_map_robot=predicted,
-            information=np.zeros((3, 3)),
-            matched=here.matched,
-            score=here.score,
-            tau=0.0,
-        )
-        return blind, "lost"
+            self._doubt.give_up()
+        return unmatched(predicted, matched=here.matched, score=here.score), "lost"
 
     def _keep(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
@@ -323,10 +262,10 @@ class ShuntingSlam:
             kind=type(self).__name__,
             T_map_robot=self._T_map_robot,
             covariance=self._belief.covariance,
-            usual=tuple(self._usual),
-            supports=tuple(self._supports),
-            tracked_s=self._tracked_s,
-            tracked=self._tracked,
+            usual=tuple(self._doubt.matches),
+            supports=tuple(self._doubt.supports),
+            tracked_s=self._doubt.tracked_s,
+            tracked=self._doubt.tracked,
         )
         memory.save(path, self.network, state)
 
@@ -348,9 +287,7 @@ class ShuntingSlam:
         slam._T_map_robot = state.T_map_robot
         slam._resumed = state.covariance + COARSE
         slam._belief.resumed(state.covariance)
-        slam._usual.extend(state.usual)
-        slam._supports.extend(state.supports)
-        slam._tracked_s, slam._tracked = state.tracked_s, state.tracked
+        slam._doubt.resume(state.usual, state.supports, state.tracked_s, state.tracked)
         return slam
 
     def trajectory(self) -> Trajectory:
