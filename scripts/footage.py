@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from scripts.compare.again import is_run, run_of, whole_one
 from scripts.film import SIZE, Pace, Size
 from scripts.output import RECIPE, read_recipe_words, slams_of
 from scripts.session import primary_of, systems_named
@@ -75,11 +76,14 @@ class Footage:
 
 
 def open_run(path: Path, *, view: str | None = "follow") -> Footage:
-    """What lies at ``path``: the folder of a run or an episode, or a log of any known format.
+    """What lies at ``path``: the folder of a run or an episode, a run of a comparison, or a log of
+    any known format.
 
     view  of the 3D camera, None for none
     Raises ``LogFormatError`` that says what is missing or wrong there.
     """
+    if is_run(path):
+        return of_compared(path, view=view)
     recipe = path / RECIPE
     if not recipe.exists():
         return of_log(path)
@@ -97,10 +101,7 @@ def open_run(path: Path, *, view: str | None = "follow") -> Footage:
             + (f" with --slam {slam}" if slam else "")
         )  # fmt: skip
     if "scene" not in settings or "seconds" not in settings:
-        command = str(words.get("command", "?"))[:40]
-        raise LogFormatError(
-            path, f"made by 'mobilia {command}': runs, demos, episodes and logs can be filmed"
-        )
+        raise LogFormatError(path, whole_one(path, words.get("command", "?")))
     known = {key: settings[key] for key in SIMULATED if key in settings}
     try:
         return replace(of_scene(known, view=view), slam=slam)
@@ -131,16 +132,19 @@ def of_simulation(
     seconds: float,
     title: str,
     view: str | None = "follow",
+    every: int = 1,
 ) -> Footage:
-    """A simulation at hand and the moments that it goes through."""
+    """A simulation at hand and the moments that it goes through, one in ``every`` of them shown."""
     from scripts.live_stage import LiveStage
+    from sim.moments import thinned
     from sim.simulation import n_frames
 
-    stage = LiveStage(simulation, moments, view=view)
+    shown = moments if every == 1 else lambda: thinned(moments(), every)
+    stage = LiveStage(simulation, shown, view=view)
     stream = Stream(
         metadata=simulation.metadata(),
         frames=stage.frames,
-        length=n_frames(seconds, simulation.scan_period_s),
+        length=-(-n_frames(seconds, simulation.scan_period_s) // every),
     )
     return Footage(
         stream=stream,
@@ -182,6 +186,26 @@ def of_episode(path: Path, *, view: str | None = "follow") -> Footage:
     return footage
 
 
+def of_compared(path: Path, *, view: str | None = "follow") -> Footage:
+    """A run of a comparison, made again with the scans that its SLAMs got."""
+    from sim.moments import toured
+    from sim.simulation import Simulation
+
+    again = run_of(path)
+    recipe = again.recipe
+    simulation = Simulation(**recipe.simulation())
+    footage = of_simulation(
+        simulation,
+        lambda: toured(simulation, recipe.seconds),
+        seconds=recipe.seconds,
+        title=title_of(asdict(recipe)),
+        view=view,
+        every=again.every,
+    )
+    footage.slam = next((name for name in again.slams if name != "odometry"), "")
+    return footage
+
+
 def of_log(path: Path) -> Footage:
     """A log: its scans are all that is known of the world."""
     stream = read_bag(path, labels=True) if is_bag(path) else open_log(path)
@@ -204,7 +228,7 @@ def of_log(path: Path) -> Footage:
 
 def title_of(settings: Mapping[str, Any]) -> str:
     """``office · dynamism 0.5 · seed 4``."""
-    twin = f" · {settings['twin']} twin" if "twin" in settings else ""
+    twin = f" · {settings['twin']} twin" if settings.get("twin") else ""
     return (
         f"{settings['scene']} · dynamism {settings.get('dynamism', 0.5)} · "
         f"seed {settings.get('seed', 0)}{twin}"

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from scripts.compare.again import is_run
 from scripts.console import console, note
 from scripts.film import FPS, Pace, film, require_ffmpeg, size_of
 from scripts.footage import Footage, open_run
@@ -29,7 +30,8 @@ def render(
     run: Annotated[
         Path,
         typer.Argument(
-            help="Folder of a run or of an episode (made again from its recipe), or a log.",
+            help="Folder of a run or of an episode, DIR/runs/NAME.npz of a comparison (each made "
+            "again from its recipe), or a log.",
             metavar="RUN",
         ),
     ],
@@ -73,7 +75,8 @@ def render(
     if view not in VIEWS:
         raise InvalidValueError(f"--view must be one of {', '.join(VIEWS)}, got '{view}'")
     if out is None and strip_to is None and rerun is None:
-        out = Path("out") / f"{run.resolve().name.split('.')[0]}.mp4"
+        name = run.stem if is_run(run) else run.resolve().name.split(".")[0]
+        out = Path("out") / f"{name}.mp4"
     _check_suffixes(out, strip_to, rerun)
     if at and strip_to is None:
         raise InvalidValueError("--at names the moments of --strip, which is missing")

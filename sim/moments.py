@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,3 +42,19 @@ def toured(
         world.set_command(*pilot.command(simulation.scan_period_s))
         poses, moving = world.mover_poses(), world.movers_moving()
         yield Moment(frame=simulation.observe(), poses=poses, moving=moving)
+
+
+def thinned(moments: Iterable[Moment], every: int) -> Iterator[Moment]:
+    """The first of each ``every``, its odometry with the covariance of all motion since the last.
+
+    Zero, where the odometry tells none.
+    """
+    spread: Float = np.zeros((3, 3))
+    for k, moment in enumerate(moments):
+        odometry = moment.frame.odometry
+        if odometry.increment_covariance is not None:
+            spread = spread + odometry.increment_covariance
+        if k % every == 0:
+            odometry = replace(odometry, increment_covariance=spread)
+            yield replace(moment, frame=replace(moment.frame, odometry=odometry))
+            spread = np.zeros((3, 3))

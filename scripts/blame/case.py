@@ -9,9 +9,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from scripts.compare.again import is_run, run_of, whole_one
+from scripts.compare.folder import RunFile
 from scripts.output import RECIPE, read_recipe_words, slams_of
+from scripts.session import file_name
 from sim.recording.recipe import Made, read_recipe
 from slam.errors import InvalidValueError, LogFormatError
+from slam.frames import Float
+from slam.trajectory import read_tum
 
 COMMANDS = ("run", "demo")
 NO_OPTIONS = ("scene", "seed", "dynamism", "laser", "labels", "tags")
@@ -27,7 +32,7 @@ class Case:
     slam      name or ``module:Class``
     every     the SLAM gets one scan in so many
     title     for people
-    folder    of the recorded run, if there is one
+    recorded  (n, 3) what it believed then, if that is on file
     made      who recorded it, if that is known
     """
 
@@ -35,7 +40,7 @@ class Case:
     seconds: float
     slam: str = "shunting"
     every: int = 1
-    folder: Path | None = None
+    recorded: Float | None = field(default=None, repr=False)
     made: Made | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -51,22 +56,22 @@ class Case:
 
 
 def case_of(folder: Path, slam: str | None, every: int) -> Case:
-    """The case of a folder of ``mobilia run`` or ``demo``, or of an episode of a dataset.
+    """The case of a folder of ``mobilia run`` or ``demo``, of an episode of a dataset, or of a run
+    of a comparison.
 
     Raises ``LogFormatError`` that names the file for what cannot be simulated again.
     """
     if not folder.exists():
         raise LogFormatError(folder, "no such folder")
+    if is_run(folder):
+        return _compared(folder, slam, every)
     path = folder / RECIPE if folder.is_dir() else folder
     words = read_recipe_words(path)
     if "recipe" in words:
         return _episode(path, slam or "shunting", every)
     command, settings = words.get("command"), words.get("settings")
     if command not in COMMANDS:
-        raise LogFormatError(
-            path, f"no recipe of a run or an episode but of {command!r}: name one of its runs by "
-            "--scene, --dynamism, --seed, --every"
-        )  # fmt: skip
+        raise LogFormatError(path.parent, whole_one(path.parent, command))
     if not isinstance(settings, dict):
         raise LogFormatError(path, "no recipe of a run: it has no settings")
     if "scene" not in settings:
@@ -78,7 +83,22 @@ def case_of(folder: Path, slam: str | None, every: int) -> Case:
     if isinstance(seconds, bool) or not isinstance(seconds, int | float):
         raise LogFormatError(path, f"settings.seconds must be a number, got {seconds!r}")
     world = {k: v for k, v in settings.items() if k not in OF_THE_RUN}
-    return Case(settings=world, seconds=seconds, slam=slam, every=every, folder=path.parent)
+    online = path.parent / f"trajectory_{file_name(slam)}.tum"
+    recorded = read_tum(online).poses if every == 1 and online.exists() else None
+    return Case(settings=world, seconds=seconds, slam=slam, every=every, recorded=recorded)
+
+
+def _compared(path: Path, slam: str | None, every: int) -> Case:
+    again = run_of(path)
+    if every not in (1, again.every):
+        raise InvalidValueError(f"--every: in this comparison SLAMs got one scan in {again.every}")
+    slam = slam or next((name for name in again.slams if name != "odometry"), "odometry")
+    settings = {k: v for k, v in again.recipe.simulation().items() if k != "labels"}
+    recorded = RunFile(path).believed(slam).poses if slam in again.slams else None
+    return Case(
+        settings=settings, seconds=again.recipe.seconds, slam=slam, every=again.every,
+        recorded=recorded,
+    )  # fmt: skip
 
 
 def _episode(path: Path, slam: str, every: int) -> Case:

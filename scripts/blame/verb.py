@@ -19,6 +19,7 @@ from scripts.blame.inquest import Inquest, Question, hold
 from scripts.blame.picture import blame_picture
 from scripts.blame.tape import Tape, record
 from scripts.blame.words import FIXED, as_json, headline, table
+from scripts.compare.again import is_run
 from scripts.console import console, note, progress
 from scripts.output import whole_folder, write_recipe
 from scripts.session import file_name
@@ -26,7 +27,6 @@ from sim.recording.recipe import SCANNERS
 from slam.divergence import Rule
 from slam.errors import InvalidValueError
 from slam.files import write_text
-from slam.trajectory import read_tum
 
 AGREES_M = 1e-5  # a trajectory on file is rounded
 
@@ -34,7 +34,10 @@ AGREES_M = 1e-5  # a trajectory on file is rounded
 def blame(
     run: Annotated[
         Path | None,
-        typer.Argument(help="Folder of a simulated run, or an episode.", metavar="[RUN]"),
+        typer.Argument(
+            help="Folder of a simulated run, an episode, or DIR/runs/NAME.npz of a comparison.",
+            metavar="[RUN]",
+        ),
     ] = None,
     slam: Annotated[
         str | None, typer.Option(help="Whose error; default the run's first, or shunting.")
@@ -100,7 +103,7 @@ def blame(
         case = Case(settings=settings, seconds=seconds, slam=slam or "shunting", every=every)
     if at is not None and not 0.0 <= at <= case.seconds:
         raise InvalidValueError(f"--at must lie in 0..{case.seconds:g} s, got {at:g}")
-    name = run.name if run is not None else f"{scene}-{seed}"
+    name = (run.stem if is_run(run) else run.name) if run is not None else f"{scene}-{seed}"
     folder = out or Path("out") / f"blame-{file_name(name)}-{file_name(case.slam)}"
     with whole_folder(folder, overwrite=overwrite) as part:
         found = _inquest(case, question)
@@ -143,13 +146,11 @@ def _compare(tape: Tape) -> None:
     case = tape.case
     if case.made is not None and case.made.elsewhere():
         note(f"the episode was made elsewhere: {case.made.elsewhere()}")
-    path = case.folder / f"trajectory_{file_name(case.slam)}.tum" if case.folder else None
-    if path is None or case.every > 1 or not path.exists():
+    recorded, again = case.recorded, np.array(tape.strip.believed)
+    if recorded is None:
         return
-    recorded = read_tum(path).poses
-    again = np.array(tape.strip.believed)
     if recorded.shape != again.shape:
-        note(f"{path.name} has {len(recorded)} poses, the run again {len(again)}")
+        note(f"of {case.slam} {len(recorded)} poses are on file, the run again has {len(again)}")
         return
     gap = float(np.abs(recorded[:, :2] - again[:, :2]).max())
     if gap > AGREES_M:

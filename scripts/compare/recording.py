@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.moments import Moment, toured
+from sim.moments import Moment, thinned, toured
 from sim.recording.recipe import Recipe
 from sim.simulation import Simulation
 from slam.frames import BeamClass, Float, Frame, LaserSpec, Odometry, Scan
@@ -66,17 +66,16 @@ def record(path: Path, *, every: int, **recipe: Any) -> None:
     simulation = Simulation(**wanted.simulation())
     scene = simulation.world.scene
     mover_of_body = simulation.world.bodies.mover_of_body
-    thinned, returns = _Thinned(), np.zeros(len(BeamClass), dtype=np.int64)
-    for k, moment in enumerate(toured(simulation, wanted.seconds)):
+    returns = np.zeros(len(BeamClass), dtype=np.int64)
+    rows: list[dict[str, Any]] = []
+    for moment in thinned(_counted(toured(simulation, wanted.seconds), returns), every):
         labels = moment.frame.labels
         assert labels is not None
-        returns += np.bincount(labels.kind, minlength=len(BeamClass))
-        thinned.pass_by(moment.frame)
-        if k % every == 0:
-            mover = np.where(labels.body >= 0, mover_of_body[labels.body], NOTHING)
-            thinned.keep(moment, mover)
+        mover = np.where(labels.body >= 0, mover_of_body[labels.body], NOTHING)
+        rows.append(_row(moment, mover))
     truth_map = scene.static_map
-    arrays: dict[str, Any] = thinned.arrays() | _spec_arrays(simulation.spec)
+    arrays: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    arrays |= _spec_arrays(simulation.spec)
     np.savez_compressed(
         path,
         **arrays,
@@ -91,41 +90,30 @@ def record(path: Path, *, every: int, **recipe: Any) -> None:
     )
 
 
-class _Thinned:
-    """The kept scans, each with the covariance of all the motion since the one before."""
+def _counted(moments: Iterator[Moment], returns: NDArray[np.int64]) -> Iterator[Moment]:
+    """The same moments, their beams added to ``returns`` by ``BeamClass``."""
+    for moment in moments:
+        assert moment.frame.labels is not None
+        returns += np.bincount(moment.frame.labels.kind, minlength=len(BeamClass))
+        yield moment
 
-    def __init__(self) -> None:
-        self._lists: dict[str, list[Any]] = {}
-        self._covariance = np.zeros((3, 3))
 
-    def pass_by(self, frame: Frame) -> None:
-        """Motion of a scan, kept or not."""
-        if frame.odometry.increment_covariance is not None:
-            self._covariance = self._covariance + frame.odometry.increment_covariance
-
-    def keep(self, moment: Moment, mover: NDArray[np.int64]) -> None:
-        """A scan that everybody gets."""
-        frame = moment.frame
-        assert frame.scan is not None
-        twist = frame.odometry.twist
-        row = {
-            "stamps_ns": frame.stamp_ns,
-            "truth": frame.truth,
-            "ranges": frame.scan.ranges,
-            "T_odom_robot": frame.odometry.T_odom_robot,
-            "increment_covariances": self._covariance,
-            "twists": np.zeros(3) if twist is None else twist,
-            "hit": mover.astype(np.int16),
-            "mover_poses": moment.poses,
-            "moving": moment.moving,
-        }
-        for name, value in row.items():
-            self._lists.setdefault(name, []).append(value)
-        self._covariance = np.zeros((3, 3))
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """One array for each name, a row a scan."""
-        return {name: np.array(values) for name, values in self._lists.items()}
+def _row(moment: Moment, mover: NDArray[np.int64]) -> dict[str, Any]:
+    """Of a scan that everybody gets, which met ``mover``."""
+    frame = moment.frame
+    assert frame.scan is not None
+    twist = frame.odometry.twist
+    return {
+        "stamps_ns": frame.stamp_ns,
+        "truth": frame.truth,
+        "ranges": frame.scan.ranges,
+        "T_odom_robot": frame.odometry.T_odom_robot,
+        "increment_covariances": frame.odometry.increment_covariance,
+        "twists": np.zeros(3) if twist is None else twist,
+        "hit": mover.astype(np.int16),
+        "mover_poses": moment.poses,
+        "moving": moment.moving,
+    }
 
 
 def _spec_arrays(spec: LaserSpec) -> dict[str, Any]:

@@ -246,6 +246,8 @@ def test_what_is_no_run_is_told_in_one_line(run: Path, tmp_path: Path):
     assert "slams must be a list of names, got [7]" in told(run)
     (run / "recipe.json").write_text('{"command": "bench", "settings": {}}')
     assert "made by 'mobilia bench'" in told(run)
+    (run / "recipe.json").write_text('{"command": "drive", "settings": {}}')
+    assert "made by 'mobilia drive', where each SLAM's robot went its own way" in told(run)
     (run / "recipe.json").write_text('{"settings": {"log": "intel.log", "slams": ["ekf"]}}')
     assert "render 'intel.log' itself with --slam ekf" in told(run)
 

@@ -248,7 +248,7 @@ def test_wrong_words_are_told_by_name(tmp_path: Path, words, says):
         ("{", "no recipe"),
         ("[]", "not a JSON object"),
         ('{"command": "run"}', "no settings"),
-        ('{"command": "compare", "settings": {}}', "but of 'compare'"),
+        ('{"command": "compare", "settings": {}}', "a comparison of many runs: name one"),
         ('{"command": "run", "settings": {"log": "a.log"}}', "this run was on a log"),
         (
             '{"command": "run", "settings": {"scene": "arena", "seconds": "long"}}',
