@@ -17,8 +17,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from slam import se2
 from slam.ekf import raster
+from slam.ekf.polar import end_points
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Scan
 
@@ -112,19 +112,10 @@ def answered(scan: Scan) -> Float:
 
 def _points(scan: Scan, twist: Float | None) -> Float:
     """(n, 2) end points in the robot frame at the stamp; what has no range lies at the laser."""
+    spec = scan.spec
     ranges = np.where(scan.valid, scan.ranges, 0.0).astype(np.float64)
-    angles = scan.spec.angles
-    points_laser = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
-    points = se2.transform(scan.spec.T_robot_laser, points_laser)
-    if twist is None:
-        return points
-    t = scan.spec.beam_time_offsets
-    turn = twist[2] * t
-    c, s = np.cos(turn), np.sin(turn)
-    # First order in the way driven during one sweep (27 ms: a micrometre off the arc at 1 m/s).
-    x = c * points[:, 0] - s * points[:, 1] + twist[0] * t
-    y = s * points[:, 0] + c * points[:, 1] + twist[1] * t
-    return np.stack([x, y], axis=1)
+    still = np.zeros(3) if twist is None else np.asarray(twist, dtype=np.float64)
+    return end_points(ranges, spec.angles, spec.beam_time_offsets, spec.T_robot_laser, still)
 
 
 def _judge_ends(
@@ -197,7 +188,11 @@ def _draw(
 
 
 def _peaks(image: Float, least: float) -> list[tuple[int, int]]:
-    """(column, row) of the local maxima of the smaller eigenvalue, the strongest first."""
+    """(column, row) of the local maxima of the smaller eigenvalue, the strongest first.
+
+    OpenCV's response changes its last bits with the CPU; what is made of it, which pixel is the
+    largest, does not but for ties.
+    """
     response = cv2.cornerMinEigenVal(image.astype(np.float32), BLOCK, ksize=3)
     around = cv2.dilate(response, np.ones((2 * PEAK_CELLS + 1, 2 * PEAK_CELLS + 1), np.uint8))
     rows, columns = np.nonzero((response >= around) & (response > least * IDEAL))

@@ -94,14 +94,14 @@ class EkfFilter:
         """
         first, m = self._n, len(points_robot)
         self._grow(first + m)
-        R = se2.rotation(float(self.pose[2]))
+        turned = _turned(float(self.pose[2]), covariances)
         self._landmarks[first : first + m] = se2.transform(self.pose, points_robot)
         P, size = self._P, 3 + 2 * first
         for k in range(m):
             a = size + 2 * k
             P[a : a + 2, :a] = P[0:2, :a]
             P[:a, a : a + 2] = P[:a, 0:2]
-            P[a : a + 2, a : a + 2] = P[0:2, 0:2] + _turned(R, covariances[k])
+            P[a : a + 2, a : a + 2] = P[0:2, 0:2] + turned[k]
         self._n = first + m
         return np.arange(first, first + m)
 
@@ -119,22 +119,27 @@ class EkfFilter:
 
     def pose_covariance(self) -> Float:
         """(3, 3) of (x, y, theta) in the map frame."""
-        return self._plain(self.pose[:2], [0, 1, 2])
+        out: Float = self._plain(self.pose[None, :2], np.zeros(1, dtype=np.int64))[0]
+        return out
 
     def landmark_covariances(self) -> Float:
         """(n, 2, 2) m^2 in the map frame."""
-        out = np.empty((self._n, 2, 2))
-        for k, point in enumerate(self.landmarks):
-            out[k] = self._plain(point, [3 + 2 * k, 4 + 2 * k, 2])[:2, :2]
-        return out
+        return self._plain(self.landmarks, 3 + 2 * np.arange(self._n))[:, :2, :2]
 
-    def _plain(self, point: Float, index: list[int]) -> Float:
-        """Covariance of (point, heading): dp = xi_p + J p dtheta."""
-        P = self._P[np.ix_(index, index)]
-        T = np.eye(3)
-        T[0, 2], T[1, 2] = -point[1], point[0]
-        out: Float = T @ P @ T.T
-        return 0.5 * (out + out.T)
+    def _plain(self, points: Float, places: NDArray[np.int64]) -> Float:
+        """(k, 3, 3) covariance of each (point, heading): dp = xi_p + J p dtheta, ``places`` (k,)
+        being those of the xi_p."""
+        P, x, y = self._P, points[:, 0], points[:, 1]
+        turn = P[2, 2]
+        a, b = P[places, 2], P[places + 1, 2]
+        out = np.empty((len(points), 3, 3))
+        out[:, 0, 0] = P[places, places] - 2.0 * y * a + y * y * turn
+        out[:, 1, 1] = P[places + 1, places + 1] + 2.0 * x * b + x * x * turn
+        out[:, 0, 1] = out[:, 1, 0] = P[places, places + 1] + x * a - y * b - x * y * turn
+        out[:, 0, 2] = out[:, 2, 0] = a - y * turn
+        out[:, 1, 2] = out[:, 2, 1] = b + x * turn
+        out[:, 2, 2] = turn
+        return out
 
     def _grow(self, n: int) -> None:
         if n <= len(self._landmarks):
@@ -147,9 +152,16 @@ class EkfFilter:
         self._P[: len(P), : len(P)] = P
 
 
-def _turned(R: Float, covariance: Float) -> Float:
-    out: Float = R @ covariance @ R.T
-    return 0.5 * (out + out.T)
+def _turned(heading: float, covariances: Float) -> Float:
+    """(k, 2, 2) from the robot frame into the map frame."""
+    c, s = math.cos(heading), math.sin(heading)
+    xx, yy = covariances[:, 0, 0], covariances[:, 1, 1]
+    xy = 0.5 * (covariances[:, 0, 1] + covariances[:, 1, 0])
+    out = np.empty(covariances.shape)
+    out[:, 0, 0] = c * c * xx - 2.0 * c * s * xy + s * s * yy
+    out[:, 1, 1] = s * s * xx + 2.0 * c * s * xy + c * c * yy
+    out[:, 0, 1] = out[:, 1, 0] = c * s * (xx - yy) + (c * c - s * s) * xy
+    return out
 
 
 def from_range_bearing(

@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from slam._jit import njit
 from slam.ekf import kernels
+from slam.ekf.algebra import times, times_transposed
 from slam.ekf.filter import EkfFilter
 from slam.ekf.hypotheses import MOST_NODES, Best, Gates, Ints
 from slam.frames import Float
@@ -35,7 +39,8 @@ class Jcbb:
             H[2 * j : 2 * j + 2, :3] = block[:, :3]
             H[2 * j : 2 * j + 2, 3 + 2 * j : 5 + 2 * j] = block[:, 3:]
             self.predicted[j] = h
-        self.S: Float = H @ kernels.gather(state.error_covariance, chosen) @ H.T
+        marginal = kernels.gather(state.error_covariance, chosen)
+        self.S: Float = times(H, times_transposed(marginal, H))
 
     def visit(
         self, depth: int, pairs: list[tuple[int, int]], L: Float, white: Float, cost: float
@@ -73,16 +78,33 @@ class Jcbb:
         size = len(L)
         self.best.effort.tests += 1
         self.best.effort.work += (size + 2) ** 2
-        grown = np.zeros((size + 2, size + 2))
-        grown[:size, :size] = L
         rows = slice(2 * j, 2 * j + 2)
-        if size:
-            columns = np.array([(2 * i, 2 * i + 1) for _, i in pairs]).ravel()
-            cross = self.S[rows][:, columns].T.copy()
-            for r in range(size):  # forward substitution
-                cross[r] = (cross[r] - L[r, :r] @ cross[:r]) / L[r, r]
-            grown[size:, :size] = cross.T
-        own = self.S[rows, rows] + self.covariances[k] - grown[size:, :size] @ grown[size:, :size].T
-        grown[size:, size:] = np.linalg.cholesky(own)
-        fresh = self.points[k] - self.predicted[j] - grown[size:, :size] @ white
-        return grown, np.concatenate([white, np.linalg.solve(grown[size:, size:], fresh)])
+        columns = np.array([(2 * i, 2 * i + 1) for _, i in pairs], dtype=np.int64).ravel()
+        cross, own = self.S[rows][:, columns], self.S[rows, rows] + self.covariances[k]
+        return grow(L, white, cross, own, self.points[k] - self.predicted[j])
+
+
+@njit
+def grow(L: Float, white: Float, cross: Float, own: Float, fresh: Float) -> tuple[Float, Float]:
+    """Cholesky factor and whitened innovation with two more rows.
+
+    cross (2, n) and own (2, 2) are their covariances, fresh (2,) their innovation.
+    """
+    n = len(L)
+    grown, whitened = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
+    grown[:n, :n], whitened[:n] = L, white
+    for i in range(2):
+        row = grown[n + i]
+        whitened[n + i] = fresh[i]
+        for j in range(n + i):
+            row[j] = cross[i, j] if j < n else own[i, j - n]
+            for k in range(j):
+                row[j] -= row[k] * grown[j, k]
+            row[j] /= grown[j, j]
+            whitened[n + i] -= row[j] * whitened[j]
+        left = own[i, i]
+        for j in range(n + i):
+            left -= row[j] * row[j]
+        row[n + i] = math.sqrt(left)
+        whitened[n + i] /= row[n + i]
+    return grown, whitened

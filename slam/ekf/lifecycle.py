@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from slam.ekf.config import EkfConfig
 from slam.ekf.corners import answered
+from slam.ekf.polar import hidden, polar
 from slam.frames import Float, Scan
 
 CHANCE = 0.05  # probability that something else is seen where the landmark was
@@ -87,10 +88,9 @@ class Lifecycle:
 
 def in_view(landmarks_robot: Float, config: EkfConfig, rim: float = WITHIN) -> NDArray[np.bool_]:
     """(n,) landmarks (n, 2), robot frame, within the share ``rim`` of range and field of view."""
-    distance = np.hypot(landmarks_robot[:, 0], landmarks_robot[:, 1])
-    bearing = np.abs(np.arctan2(landmarks_robot[:, 1], landmarks_robot[:, 0]))
+    distance, bearing = polar(landmarks_robot)
     half = math.radians(config.fov_deg) / 2.0
-    inside = (bearing < rim * half) | (config.fov_deg >= 360.0)
+    inside: NDArray[np.bool_] = (np.abs(bearing) < rim * half) | (config.fov_deg >= 360.0)
     return inside & (distance < rim * config.range_m)
 
 
@@ -99,21 +99,9 @@ def unhidden_by_features(
 ) -> NDArray[np.bool_]:
     """(n,) False where an observed thing stands before the landmark: within the angle that
     ``occluder_m`` fills at its distance, and nearer than the landmark by as much."""
-    free = np.ones(len(landmarks_robot), dtype=np.bool_)
-    width = config.occluder_m
-    if width == 0.0 or len(points_robot) == 0 or len(free) == 0:
-        return free
-    reach = np.hypot(points_robot[:, 0], points_robot[:, 1])
-    shadow = np.arcsin(np.minimum(width / np.maximum(reach, width), 1.0))
-    distance = np.hypot(landmarks_robot[:, 0], landmarks_robot[:, 1])
-    turn = (
-        np.arctan2(points_robot[:, 1], points_robot[:, 0])[None, :]
-        - np.arctan2(landmarks_robot[:, 1], landmarks_robot[:, 0])[:, None]
-    )
-    turn = np.abs(turn - math.tau * np.round(turn / math.tau))
-    hidden = (turn < shadow[None, :]) & (reach[None, :] + width < distance[:, None])
-    free &= ~hidden.any(axis=1)
-    return free
+    if config.occluder_m == 0.0:
+        return np.ones(len(landmarks_robot), dtype=np.bool_)
+    return ~hidden(landmarks_robot, points_robot, config.occluder_m)
 
 
 def unhidden_by_beams(landmarks_laser: Float, scan: Scan) -> NDArray[np.bool_]:
@@ -123,7 +111,7 @@ def unhidden_by_beams(landmarks_laser: Float, scan: Scan) -> NDArray[np.bool_]:
     although no feature was found. Neither is a miss. Takes the three beams nearest in direction.
     """
     spec = scan.spec
-    bearing = np.arctan2(landmarks_laser[:, 1], landmarks_laser[:, 0])
+    distance, bearing = polar(landmarks_laser)
     beam = np.round((bearing - spec.angle_min) / spec.angle_increment).astype(np.int64)
     inside = (beam >= 1) & (beam < spec.n_beams - 1)
     beam = np.clip(beam, 1, max(spec.n_beams - 2, 1))
@@ -131,5 +119,4 @@ def unhidden_by_beams(landmarks_laser: Float, scan: Scan) -> NDArray[np.bool_]:
     if spec.n_beams < 3:
         return np.zeros(len(landmarks_laser), dtype=np.bool_)
     shortest = np.minimum(np.minimum(ranges[beam - 1], ranges[beam]), ranges[beam + 1])
-    distance = np.hypot(landmarks_laser[:, 0], landmarks_laser[:, 1])
     return inside & (shortest > distance + BEHIND_M)

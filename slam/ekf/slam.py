@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -23,6 +24,7 @@ from slam.ekf.lifecycle import (
     unhidden_by_beams,
     unhidden_by_features,
 )
+from slam.ekf.polar import polar
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, Odometry
 from slam.shunting.motion import assumed_covariance
@@ -143,7 +145,7 @@ class EkfSlam:
 
     def _used(self, features: Features) -> tuple[Float, Float]:
         points = features.points_robot
-        used = np.hypot(points[:, 0], points[:, 1]) <= self.config.range_m
+        used = polar(points)[0] <= self.config.range_m
         return points[used], features.covariances[used] * self.config.noise_scale**2
 
     def _predict(self, odometry: Odometry) -> None:
@@ -178,10 +180,10 @@ class EkfSlam:
     def _within_reach(self, chosen: NDArray[np.int64]) -> NDArray[np.bool_]:
         """What could be seen if the pose is off by three standard deviations."""
         P = self.filter.pose_covariance()
-        reach = self.config.range_m * (1.0 + 3.0 * P[2, 2] ** 0.5)
-        reach += 3.0 * float(P[0, 0] + P[1, 1]) ** 0.5
+        reach = self.config.range_m * (1.0 + 3.0 * math.sqrt(max(P[2, 2], 0.0)))
+        reach += 3.0 * math.sqrt(max(P[0, 0] + P[1, 1], 0.0))
         away = self.filter.landmarks[chosen] - self.filter.pose[:2]
-        near: NDArray[np.bool_] = np.hypot(away[:, 0], away[:, 1]) < reach
+        near: NDArray[np.bool_] = polar(away)[0] < reach
         return near
 
     def _expected(self, frame: Frame, points: Float) -> NDArray[np.bool_]:
@@ -215,7 +217,7 @@ class EkfSlam:
         new: list[int] = []
         for k, point in enumerate(points):
             away = np.concatenate([taken, points[new]]) - point
-            if not len(away) or np.hypot(away[:, 0], away[:, 1]).min() >= least:
+            if not len(away) or (away * away).sum(axis=1).min() >= least * least:
                 new.append(k)
         self.filter.add(points[new], covariances[new])
         self.lifecycle.add(len(new))

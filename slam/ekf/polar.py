@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compiled sines and angles of many points, whose last bit NumPy's change with the CPU."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import njit
+
+Float = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@njit
+def end_points(
+    ranges: Float, angles: Float, offsets: Float, T_robot_laser: Float, twist: Float
+) -> Float:
+    """(n, 2) m ends of beams in the robot frame of the stamp, ``offsets`` s before each was sent.
+
+    First order in the way driven during one sweep (27 ms: a micrometre off the arc at 1 m/s).
+    """
+    out = np.empty((len(ranges), 2))
+    for k in range(len(ranges)):
+        angle = angles[k] + T_robot_laser[2]
+        x = T_robot_laser[0] + ranges[k] * math.cos(angle)
+        y = T_robot_laser[1] + ranges[k] * math.sin(angle)
+        c, s = math.cos(twist[2] * offsets[k]), math.sin(twist[2] * offsets[k])
+        out[k, 0] = c * x - s * y + twist[0] * offsets[k]
+        out[k, 1] = s * x + c * y + twist[1] * offsets[k]
+    return out
+
+
+@njit
+def polar(points: Float) -> tuple[Float, Float]:
+    """Distances (n,) m and bearings (n,) rad of points (n, 2)."""
+    distances, bearings = np.empty(len(points)), np.empty(len(points))
+    for k in range(len(points)):
+        x, y = points[k, 0], points[k, 1]
+        distances[k] = math.sqrt(x * x + y * y)
+        bearings[k] = math.atan2(y, x)
+    return distances, bearings
+
+
+@njit
+def hidden(landmarks: Float, points: Float, width: float) -> Bools:
+    """(n,) landmarks (n, 2) behind one of the points (k, 2): within the angle that ``width`` (m)
+    fills at the point's distance, and farther than it by as much."""
+    out = np.zeros(len(landmarks), dtype=np.bool_)
+    distances, bearings = polar(landmarks)
+    reach, towards = polar(points)
+    for k in range(len(points)):
+        shadow = math.asin(min(width / max(reach[k], width), 1.0))
+        for i in range(len(landmarks)):
+            turn = towards[k] - bearings[i]
+            turn = abs(turn - 2.0 * math.pi * round(turn / (2.0 * math.pi)))
+            if turn < shadow and reach[k] + width < distances[i]:
+                out[i] = True
+    return out
