@@ -23,6 +23,7 @@ from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
 NS_PER_S = 1_000_000_000
+MOST_TWIST = 1e3  # m/s and rad/s: faster, de-skewing would tear a scan apart
 
 
 def to_ns(seconds: float) -> int:
@@ -220,6 +221,11 @@ class Odometry(ByContent):
             )
         if self.twist is not None:
             object.__setattr__(self, "twist", pose("Odometry", "twist", self.twist))
+            fastest = max(map(abs, self.twist.tolist()))
+            if fastest > MOST_TWIST:
+                raise InvalidValueError(
+                    f"Odometry.twist must lie within {MOST_TWIST:g} m/s and rad/s, got {fastest:g}"
+                )
 
 
 class BeamClass(IntEnum):

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from slam import se2
-from slam.frames import Float, Frame
+from slam import se2, steps
+from slam.frames import Float, Frame, Odometry
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
 
@@ -24,19 +24,25 @@ class OdometrySlam:
 
     def reset(self) -> None:
         """Forget everything; the next frame is the origin."""
-        self._T_odom_first: Float | None = None
+        self._first: Odometry | None = None
+        self._before: Odometry | None = None
         self._T_map_robot: Float = np.zeros(3)
         self._covariance: Float = np.zeros((3, 3))
         self._stamps: list[int] = []
         self._poses: list[Float] = []
 
     def update(self, frame: Frame) -> Estimate:
-        """The odometry pose relative to the first frame."""
-        T_odom_robot = frame.odometry.T_odom_robot
-        if self._T_odom_first is None:
-            self._T_odom_first = T_odom_robot
-        T_map_robot = se2.between(self._T_odom_first, T_odom_robot)
-        increment_covariance = frame.odometry.increment_covariance
+        """The odometry pose relative to the first frame.
+
+        Raises ``InvalidValueError`` where a step is none (``slam.steps``), as all SLAMs here do.
+        """
+        now = frame.odometry
+        if self._first is None or self._before is None:
+            self._first = self._before = now
+        steps.increment(self._before, now)
+        self._before = now
+        T_map_robot = se2.between(self._first.T_odom_robot, now.T_odom_robot)
+        increment_covariance = now.increment_covariance
         if increment_covariance is not None and self._stamps:
             T_before_now = se2.between(self._T_map_robot, T_map_robot)
             self._covariance = se2.propagate(

@@ -14,6 +14,7 @@ from slam.errors import InvalidValueError
 from slam.frames import Float
 
 _FIRST_CAPACITY = 32
+MOST_STD_M = 1e3  # of an increment; with more, rounding would eat a millimetre sensor
 
 
 class EkfFilter:
@@ -53,11 +54,15 @@ class EkfFilter:
 
         A shift w and a turn t end at w, on the group's straight line at V(t) w = w + t J w / 2: the
         second term (1.5 mm for 0.1 m and 0.03 rad) is more than a good sensor's noise, so its
-        covariance is added.
+        covariance is added. Standard deviations beyond ``MOST_STD_M`` or half a turn mean "not
+        known": they are lowered to these, the correlations kept.
         """
         heading = float(self.pose[2])
         self.pose = se2.compose(self.pose, increment)
         Q = np.array(covariance, dtype=np.float64)
+        most = zip(np.diag(Q).tolist(), (MOST_STD_M, MOST_STD_M, math.pi), strict=True)
+        scale = np.array([min(1.0, limit / math.sqrt(v)) if v > 0.0 else 1.0 for v, limit in most])
+        Q *= scale[:, None] * scale[None, :]
         bend = 0.25 * Q[2, 2]
         Q[:2, :2] += bend * np.array([[Q[1, 1], -Q[0, 1]], [-Q[0, 1], Q[0, 0]]])
         kernels.disturb(self._P, self.pose, self._landmarks, self._n, heading, Q)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slam import se2
+from slam import se2, steps
 from slam.ekf.association import METHODS
 from slam.ekf.config import EkfConfig
 from slam.ekf.corners import CornerConfig, corners
@@ -150,7 +150,7 @@ class EkfSlam:
 
     def _predict(self, odometry: Odometry) -> None:
         if self._before is not None:
-            increment = se2.between(self._before.T_odom_robot, odometry.T_odom_robot)
+            increment = steps.increment(self._before, odometry)
             covariance = odometry.increment_covariance
             if covariance is None:
                 covariance = assumed_covariance(increment)

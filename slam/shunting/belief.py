@@ -61,6 +61,8 @@ class Belief:
     @property
     def shared_m2(self) -> float:
         """Variance, m^2, of the residual that neighbouring points of a surface share."""
+        if self._pairs == 0.0:  # years since anything was seen
+            return USUAL_M**2
         return max(self._products, 0.0) / self._pairs
 
     def relocated(self, covariance: Float) -> None:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from slam import se2
-from slam.frames import Float, Odometry
+from slam import se2, steps
+from slam.frames import MOST_TWIST, Float, Odometry
 from slam.shunting.turning import TurnBias
 
 FLOOR_M, FLOOR_RAD = 0.002, 0.0015  # standard deviation per sqrt(0.2 s): skew, a match's own
@@ -113,7 +113,7 @@ def predict(
     ``scales`` multiply its variance of translation and of rotation; ``bias`` is taken out of the
     increment.
     """
-    increment = se2.between(before.T_odom_robot, now.T_odom_robot)
+    increment = steps.increment(before, now)
     if bias is not None:
         increment = bias.corrected(increment)
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
@@ -134,7 +134,7 @@ def predict(
         loosened = _widened(unscaled, more, rest)
     if now.twist is not None:
         twist = np.asarray(now.twist)
-    elif 0.0 < elapsed < 0.5:
+    elif 0.0 < elapsed < 0.5 and float(np.abs(increment).max()) <= MOST_TWIST * elapsed:
         twist = se2.log(increment) / elapsed
     else:
         twist = np.zeros(3)

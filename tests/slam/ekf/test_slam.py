@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import math
+import os
+import pickle
+import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -180,3 +183,50 @@ def test_wrong_options_and_frames_are_refused():
     system.update(frame)
     with pytest.raises(InvalidValueError, match="in order"):
         system.update(frame)
+
+
+DIGEST = """
+import hashlib, pickle, sys
+from slam.ekf.slam import EkfSlam
+
+whole = hashlib.sha256()
+for options, frames in pickle.load(sys.stdin.buffer):
+    system = EkfSlam(**options)
+    for frame in frames:
+        estimate = system.update(frame)
+        whole.update(estimate.T_map_robot.tobytes() + estimate.covariance.tobytes())
+    whole.update(system.landmarks().covariances.tobytes())
+print(whole.hexdigest())
+"""
+
+
+def test_the_same_bytes_without_the_vector_units_of_the_cpu():
+    points = list(PointWorld(PointWorldConfig(n_steps=25, moving=0.2), seed=0).stream())
+    scans = world2d.frames(
+        world2d.World2D(world2d.arena(), world2d.Chairs.random(12, (-4, -3, 4, 3), 20.0, 0.0, 0)),
+        world2d.wander(4.0),
+        rate_hz=5.0,
+    )
+    runs = [
+        ({"occluder_m": 0.3}, points),
+        ({"association": "jcbb", "individual_gate": 0.99}, points[:8]),
+        ({"preset": "corners"}, scans),
+    ]
+    found = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    off = {
+        "NPY_DISABLE_CPU_FEATURES": " ".join(found),
+        "OPENCV_CPU_DISABLE": "AVX512_SKX,AVX2,AVX",
+        "OPENBLAS_CORETYPE": "Prescott",
+    }
+    digests = set()
+    for more in ({}, off):
+        done = subprocess.run(
+            [sys.executable, "-c", DIGEST],
+            input=pickle.dumps(runs),
+            capture_output=True,
+            check=False,
+            env=os.environ | {"PYTHONPATH": str(Path(slam.__file__).parents[1])} | more,
+        )
+        assert done.returncode == 0, done.stderr
+        digests.add(done.stdout)
+    assert len(digests) == 1
