@@ -15,6 +15,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slam import se2
 from slam.ekf.association import ipjc
@@ -25,8 +26,9 @@ from slam.errors import InvalidValueError
 from slam.frames import Float, Frame
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.impressions import SIGMA_CELLS, Observations
+from slam.shunting.increments import Increments
 from slam.shunting.matching import Match, seen_by
-from slam.shunting.motion import Prediction, turned
+from slam.shunting.motion import Prediction, inverted, turned
 from slam.shunting.overlap import evaluate
 from slam.shunting.peaks import Peaks, peaks
 from slam.shunting.slam import ShuntingSlam
@@ -37,6 +39,16 @@ PEAK_CELLS = 0.15  # standard deviation of a peak's place beside its observation
 ENOUGH_PAIRS = 2  # fewer do not say where the robot is: then the whole map is matched
 LEAST_M2 = 1e-6  # variance of a feature, at least
 GATES = Gates()
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class _Agreed:
+    """What features and peaks agree on: the pose (3,), which features (n,) were paired with a peak,
+    and the information (3, 3) on the pose that these pairs are."""
+
+    T_map_robot: Float
+    accepted: NDArray[np.bool_]
+    information: Float
 
 
 @register("shunting-features")
@@ -65,48 +77,60 @@ class FeaturedShuntingSlam(ShuntingSlam):
             frame = dataclasses.replace(frame, scan=None, features=features)
         return super().update(frame)
 
+    def reset(self) -> None:
+        """Forget everything; the next frame is the origin."""
+        super().reset()
+        self._increments = Increments.of_points()
+
     def _match(self, observations: Observations, prediction: Prediction) -> Match:
-        pose, accepted = self._agreed(observations, prediction)
-        if int(accepted.sum()) < ENOUGH_PAIRS:
+        agreed = self._agreed(observations, prediction)
+        if int(agreed.accepted.sum()) < ENOUGH_PAIRS:
             return super()._match(observations, prediction)
-        pulling = dataclasses.replace(observations, weights=accepted.astype(np.float64))
-        information = np.zeros((3, 3))
+        pulling = dataclasses.replace(observations, weights=agreed.accepted.astype(np.float64))
         score, _ = evaluate(
-            self.network.cells, self._matcher.reward, seen_by(pulling), pose,
-            np.zeros(3), np.zeros(3), information,
+            self.network.cells, self._matcher.reward, seen_by(pulling), agreed.T_map_robot,
+            np.zeros(3), np.zeros(3), np.zeros((3, 3)),
         )  # fmt: skip
         return Match(
-            T_map_robot=pose,
-            information=information,
-            matched=float(accepted.mean()),
+            T_map_robot=agreed.T_map_robot,
+            information=agreed.information,
+            matched=float(agreed.accepted.mean()),
             score=self.config.reward * score,
-            tau=self.config.reward,
+            tau=1.0,
             searched=True,
         )
 
-    def _agreed(self, observations: Observations, prediction: Prediction) -> tuple[Float, Any]:
-        """The pose (3,) after IPJC between features and peaks, and which features (n,) it took."""
-        points = observations.points_robot
+    def _agreed(self, observations: Observations, prediction: Prediction) -> _Agreed:
+        """IPJC between features and peaks, those looked at more than once first, as in a filter
+        that confirms landmarks: what moves leaves peaks behind that were looked at once.
+        """
+        points, covariances = observations.points_robot, self._sensed(observations)
         accepted = np.zeros(len(points), dtype=np.bool_)
         before = self._T_map_robot
         reach = self.config.range_m + 1.0
         marks = peaks(self.network, LEAST_PEAK, centre=before[:2], reach_m=reach)
-        n = len(marks.heights)
-        if len(points) == 0 or n == 0:
-            return prediction.T_map_robot, accepted
         state = EkfFilter()
         state.pose = before.copy()
         state.add(
             se2.transform(se2.inverse(before), marks.points_map),
             self._places(marks, prediction.elapsed),
         )
-        in_robot = turned(prediction.covariance, -float(before[2]))
-        state.predict(prediction.increment, in_robot)
-        covariances = self._sensed(observations)
-        found = ipjc(state, np.arange(n), points, covariances, GATES)
-        accepted = found.landmarks >= 0
-        state.update(found.landmarks[accepted], points[accepted], covariances[accepted])
-        return state.pose.copy(), accepted
+        state.predict(prediction.increment, turned(prediction.prior, -float(before[2])))
+        prior = state.pose_covariance()
+        again = marks.ages_s > 1.5 * prediction.elapsed
+        for chosen in (np.flatnonzero(again), np.flatnonzero(~again)):
+            free = np.flatnonzero(~accepted)
+            if len(chosen) == 0 or len(free) == 0:
+                continue
+            found = ipjc(state, chosen, points[free], covariances[free], GATES).landmarks
+            pairs = free[found >= 0]
+            state.update(found[found >= 0], points[pairs], covariances[pairs])
+            accepted[pairs] = True
+        return _Agreed(
+            T_map_robot=state.pose.copy(),
+            accepted=accepted,
+            information=inverted(state.pose_covariance()) - inverted(prior),
+        )
 
     def _places(self, marks: Peaks, elapsed: float) -> Float:
         """(n, 2, 2) how sure the peaks' places are, robot frame: one look's, over their number."""

@@ -9,6 +9,7 @@ first, apart for translation and for rotation, whether a log states it or it had
 from __future__ import annotations
 
 import math
+from typing import Self
 
 import numpy as np
 
@@ -32,24 +33,42 @@ class Increments:
 
     scales  (2,) of the variances of translation and rotation
     nis     of the latest frame; None where its match is not believed
-    bias    what odometry adds to the heading by itself; taken out of it
+    bias    what odometry adds to the heading by itself; taken out of it. None: not learnt
     """
 
-    def __init__(self, cell_m: float) -> None:
-        # Variance of a match by the noise of its beams over what the reward's curvature claims.
-        self._noise_share = (SENSOR_SIGMA_M / (SIGMA_CELLS * cell_m)) ** 2 / 2.0
+    def __init__(self, noise_share: float, *, least_stated: float, bias: TurnBias | None) -> None:
+        """``noise_share``: variance of a match by the noise of what was seen, over what the match's
+        information claims; ``least_stated``: least scale of a covariance that a log states.
+        """
+        self._noise_share, self._least_stated = noise_share, least_stated
         self.scales: Float = np.ones(2)
         self.nis: float | None = None
-        self.bias = TurnBias()
+        self.bias = bias
         self._stated = False
-        self._least = LEAST_STATED
+        self._least = least_stated
         self._squares: Float = np.zeros(2)
         self._expected: Float = np.zeros(2)
+
+    @classmethod
+    def of_beams(cls, cell_m: float) -> Self:
+        """Matches of scans, whose information is the curvature of overlaps between bells."""
+        noise_share = (SENSOR_SIGMA_M / (SIGMA_CELLS * cell_m)) ** 2 / 2.0
+        return cls(noise_share, least_stated=LEAST_STATED, bias=TurnBias())
+
+    @classmethod
+    def of_points(cls) -> Self:
+        """Matches by least squares, whose information is what the covariances of points say.
+
+        A point is off in the same way for many frames (which side of a trunk is seen): odometry
+        looks too good beside such matches, and a bias learnt from them is theirs. So a stated
+        covariance is never made smaller, and no bias is learnt.
+        """
+        return cls(1.0, least_stated=1.0, bias=None)
 
     def predict(self, T_map_before: Float, before: Odometry, now: Odometry) -> Prediction:
         """The prior of a frame."""
         stated = now.increment_covariance is not None
-        self._least = LEAST_STATED if stated else LEAST_ASSUMED
+        self._least = self._least_stated if stated else LEAST_ASSUMED
         if self._expected[0] == 0.0:
             self._expected[:] = AT_FIRST
             self._squares[:] = AT_FIRST * (STATED if stated else ASSUMED)
@@ -63,7 +82,9 @@ class Increments:
         off = match.T_map_robot - prediction.T_map_robot
         off[2] = se2.wrap(float(off[2]))
         data = match.tau * match.information
-        if self._stated:  # an assumed variance says nothing of what is bias and what is chance
+        if (
+            self.bias is not None and self._stated
+        ):  # an assumed variance says nothing of what is bias and what is chance
             variances = float(prediction.covariance[2, 2]), float(prediction.prior[2, 2])
             found_out = match.matched, float(off[2]), data
             self.bias.learn(prediction.increment, prediction.elapsed, variances, found_out)

@@ -67,7 +67,7 @@ class ShuntingSlam:
         self._resumed: Float | None = None
         self._T_map_robot: Float = np.zeros(3)
         self._belief = Belief(self.config.cell_m)
-        self._increments = Increments(self.config.cell_m)
+        self._increments = Increments.of_beams(self.config.cell_m)
         self._doubt = Doubt(self.config.freeze_below)
         self._recovery: Recovery | None = None
         self._loops = Loops(self.config, self._matcher)

@@ -194,7 +194,7 @@ def test_scales_of_odometry_are_found_whatever_is_stated(stated: float | None) -
     """``stated`` times the true standard deviations, or nothing: the NIS settles near 3."""
     true = np.array([0.01, 0.006, 0.012])
     given = None if stated is None else np.diag((stated * true) ** 2)
-    increments, rng = Increments(0.05), np.random.default_rng(6)
+    increments, rng = Increments.of_beams(0.05), np.random.default_rng(6)
     values = [corrected(increments, rng, given, true) for _ in range(1200)]
     settled = np.array([v for v in values[400:] if v is not None])
     assert 0.6 < settled.mean() / 3.0 < 1.6
