@@ -73,7 +73,7 @@ def ipjc(
     search = Search(
         points=points[order],
         covariances=covariances[order],
-        plausible=np.isfinite(costs[order][:, columns]),
+        plausible=np.ascontiguousarray(np.isfinite(costs[order][:, columns])),
         together=np.array([0.0] + [gates.together(n) for n in range(1, k + 1)]),
         added=gates.added(),
         most_nodes=MOST_NODES,

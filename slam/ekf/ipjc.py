@@ -56,13 +56,12 @@ def _judge(
     search: Search, pose: Float, landmarks: Float, P: Float, first: int, pairs: int, cost: float
 ) -> Float:
     """(k, n) what each pair of a point from ``first`` on with a landmark not taken would add."""
-    wanted = search.plausible.copy()
-    wanted[:first] = False
+    wanted = np.zeros_like(search.plausible)
     tests = 0
-    for j in range(wanted.shape[1]):
-        if search.taken[j]:
-            wanted[:, j] = False
-        tests += wanted[:, j].sum()
+    for i in range(first, wanted.shape[0]):
+        for j in range(wanted.shape[1]):
+            wanted[i, j] = search.plausible[i, j] and not search.taken[j]
+            tests += wanted[i, j]
     search.counts[TESTS] += tests
     search.counts[WORK] += 50 * tests
     # No joint cost ever falls: what is too dear now is too dear with any pairs to come.
@@ -96,12 +95,13 @@ def visit(
     costs = _judge(search, pose, landmarks, P, first, pairs, cost)
     possible = np.zeros(k + 1, dtype=np.int64)  # how many points from each on have a landmark
     for i in range(k - 1, first - 1, -1):
-        possible[i] = possible[i + 1] + (1 if costs[i].min() < np.inf else 0)
+        possible[i] = possible[i + 1] + (_next(costs[i], -1.0, -1) >= 0)
     i = first
     while _better(search, pairs + possible[i], cost):
         left = possible[i]
         if left == 0:
-            search.best[:] = search.chosen
+            for point in range(k):
+                search.best[point] = search.chosen[point]
             search.best_cost[0] = cost
             counts[PAIRS] = pairs
             return

@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.ekf.algebra import (
     cholesky,
     solve,
@@ -130,19 +130,23 @@ def linearise(
         for i in range(m):
             look(pose, landmarks[matched[i]], xi, 3 + 2 * i, h, block)
             for r in range(2):
-                H[2 * i + r, :3] = block[r, :3]
-                H[2 * i + r, 3 + 2 * i : 5 + 2 * i] = block[r, 3:]
+                for k in range(3):
+                    H[2 * i + r, k] = block[r, k]
+                H[2 * i + r, 3 + 2 * i], H[2 * i + r, 4 + 2 * i] = block[r, 3], block[r, 4]
                 innovation[2 * i + r, 0] = z[i, r] - h[r]
                 for k in range(size):
                     innovation[2 * i + r, 0] += H[2 * i + r, k] * xi[k]
         PHt = times_transposed(marginal, H)
         S = times(H, PHt)
         for i in range(m):
-            S[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += R[i]
+            for r in range(2):
+                for k in range(2):
+                    S[2 * i + r, 2 * i + k] += R[i, r, k]
         L = S.copy()
         if not cholesky(L):
             return H, innovation, S, -1.0
-        weights[:] = innovation
+        for i in range(2 * m):
+            weights[i, 0] = innovation[i, 0]
         solve(L, weights)
         cost = 0.0
         for i in range(2 * m):
@@ -197,10 +201,10 @@ def absorb(
     At, Bt = np.empty((4 * m, size)), np.empty((4 * m, size))
     PHt, Kt = Bt[: 2 * m], Bt[2 * m :]
     _times_sparse(P, matched, H, PHt)
-    Kt[:] = PHt
+    _copy(PHt, Kt)
     solve(L, Kt)
-    At[: 2 * m] = Kt
-    At[2 * m :] = PHt
+    _copy(Kt, At[: 2 * m])
+    _copy(PHt, At[2 * m :])
     xi = np.zeros(size)
     for k in range(2 * m):
         subtract_rows(At[2 * m + k], S[k], Kt)
@@ -210,7 +214,15 @@ def absorb(
     return cost
 
 
-@njit
+@inner
+def _copy(source: Float, target: Float) -> None:
+    """Into rows of the same shape; an assignment would compile its error messages, for seconds."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
+
+
+@inner
 def _times_sparse(P: Float, matched: NDArray[np.int64], H: Float, out: Float) -> None:
     """(P H')' in ``out`` (2 m, size), H's columns being the pose and the matched landmarks."""
     for row in range(len(out)):

@@ -34,7 +34,10 @@ def distances(
     M, place = np.zeros((5, 5)), np.zeros(5, dtype=np.int64)
     place[1], place[2] = 1, 2
     for j in range(wanted.shape[1]):
-        if not wanted[:, j].any():
+        any_wanted = False
+        for k in range(len(z)):
+            any_wanted |= wanted[k, j]
+        if not any_wanted:
             continue
         place[3], place[4] = 3 + 2 * j, 4 + 2 * j
         for a in range(5):
