@@ -10,7 +10,8 @@ Three errors, kept apart because they grow differently:
 - odometry, where the scan says nothing: the map's share of the pose ends, and this one grows.
 
 Every constant is in units of what is observed, so that one set serves many scanners and rates.
-They were set on 361 beams; sparser and shorter ones make it too sure (docs/uncertainty.md).
+Errors that surfaces share average out over the surfaces in view, so their variance is in inverse
+proportion to how much of them is seen.
 """
 
 from __future__ import annotations
@@ -32,6 +33,11 @@ TURN_TIMES = 0.7  # ... of which so much turns it: surfaces do not all err the s
 SHARED_S, VIEW_S = 20.0, 1.0  # over which shared residuals and directions of surfaces are averaged
 AT_FIRST = 200.0  # pairs of points that the scanner's usual residual counts as
 USUAL_M = 0.002  # that residual
+WHOLE, LEAST_SHARE = (
+    75.0,
+    0.005,
+)  # weight of the surfaces in view in a room, for which the constants
+# above hold: a beam counts for one where it stands for SPACING_M of surface; and the least of it
 CORRELATED_S = 1.0  # for so long the shared error of a scan stays the same
 
 
@@ -54,6 +60,7 @@ class Belief:
         self._products, self._pairs = AT_FIRST * USUAL_M**2, AT_FIRST
         self._geometry: Float = np.zeros((3, 3))
         self._feigned, self._weighed = 0.0, 0.0
+        self._in_view, self._looks = 0.0, 0.0
         self._drift: Float = np.zeros((3, 3))
         self._blind: Float = np.zeros((3, 3))
         self._shared: Float = np.zeros((3, 3))
@@ -109,7 +116,7 @@ class Belief:
         else:
             self.unobservable, self.along_rad = 2, None
             self._blind = self._blind + self._shared
-        variance = self._lattice + SHARED_TIMES**2 * self.shared_m2
+        variance = (self._lattice + SHARED_TIMES**2 * self.shared_m2) * self._fewer()
         frames = max(1.0, CORRELATED_S / max(prediction.elapsed, 1e-3))
         advance(
             self._drift,
@@ -123,6 +130,11 @@ class Belief:
         )
         self.covariance = self._drift + self._blind + self._shared
 
+    def _fewer(self) -> float:
+        """By how much the shared errors of surfaces average out less than in a whole room."""
+        seen = self._in_view / max(self._looks, 1e-9)
+        return max(WHOLE / max(seen, LEAST_SHARE * WHOLE), 1.0)
+
     def _learn(self, evidence: Evidence, elapsed: float) -> None:
         keep = math.exp(-elapsed / SHARED_S)
         self._products = keep * self._products + evidence.shared
@@ -131,3 +143,5 @@ class Belief:
         self._geometry = keep * self._geometry + evidence.geometry
         self._feigned = keep * self._feigned + evidence.feigned
         self._weighed = keep * self._weighed + evidence.weighed
+        self._in_view = keep * self._in_view + evidence.in_view
+        self._looks = keep * self._looks + 1.0

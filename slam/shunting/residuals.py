@@ -189,6 +189,7 @@ class Evidence:
               (x, y, theta) direction in the map frame, about the robot; both directions of a
               thing that stands free. Ends and corners of surfaces are left out
     weighed   weight of those points
+    in_view   weight of all points like them: the sample stands for so many
     shared    m^2, sum over pairs of the weighted product of their offsets from the map
     paired    weight of those pairs
     feigned   what the noise of beams adds to the geometry along surfaces
@@ -197,6 +198,7 @@ class Evidence:
 
     geometry: Float
     weighed: float
+    in_view: float
     shared: float
     paired: float
     feigned: float
@@ -225,5 +227,11 @@ def look(
     )  # fmt: skip
     shared, paired, feigned, new, weighed = sums.tolist()
     return Evidence(
-        geometry=geometry, weighed=weighed, shared=shared, paired=paired, feigned=feigned, new=new
+        geometry=geometry,
+        weighed=weighed,
+        in_view=weighed * step,
+        shared=shared,
+        paired=paired,
+        feigned=feigned,
+        new=new,
     )

@@ -234,34 +234,48 @@ def test_nees_is_right_when_the_errors_are_what_the_belief_was_told() -> None:
     assert np.mean(values) / 3.0 == pytest.approx(1.0, abs=0.15)
 
 
-def test_shared_residuals_widen_the_belief_and_standing_still_does_not() -> None:
+def standing(shared_m: float, in_view: float) -> tuple[Float, Float]:
+    """Covariances of a robot that stands and sees the same surfaces, after 300 and 600 scans."""
     geometry = np.diag([0.5, 0.5, 4.0])
+    belief = Belief(0.03)
+    evidence = Evidence(
+        geometry=20.0 * geometry,
+        weighed=20.0,
+        in_view=in_view,
+        shared=20.0 * shared_m**2,
+        paired=20.0,
+        feigned=0.0,
+        new=0.0,
+    )
+    still = Prediction(
+        T_map_robot=np.zeros(3),
+        increment=np.zeros(3),
+        covariance=np.diag([0.002**2, 0.002**2, 0.001**2]),
+        twist=np.zeros(3),
+        elapsed=0.2,
+    )
+    match = Match(
+        T_map_robot=np.zeros(3), information=1e5 * geometry, matched=1.0, score=0.0, tau=5.0
+    )
+    out = []
+    for _ in range(2):
+        for _ in range(300):
+            belief.update(np.zeros(3), still, match, evidence)
+        out.append(belief.covariance.copy())
+    return out[0], out[1]
+
+
+def test_shared_residuals_widen_the_belief_and_standing_still_does_not() -> None:
     sizes = {}
     for shared_m in (0.0, 0.005):
-        belief = Belief(0.03)
-        evidence = Evidence(
-            geometry=20.0 * geometry,
-            weighed=20.0,
-            shared=20.0 * shared_m**2,
-            paired=20.0,
-            feigned=0.0,
-            new=0.0,
-        )
-        still = Prediction(
-            T_map_robot=np.zeros(3),
-            increment=np.zeros(3),
-            covariance=np.diag([0.002**2, 0.002**2, 0.001**2]),
-            twist=np.zeros(3),
-            elapsed=0.2,
-        )
-        match = Match(
-            T_map_robot=np.zeros(3), information=1e5 * geometry, matched=1.0, score=0.0, tau=5.0
-        )
-        for _ in range(300):
-            belief.update(np.zeros(3), still, match, evidence)
-        settled = belief.covariance.copy()
-        for _ in range(300):
-            belief.update(np.zeros(3), still, match, evidence)
-        np.testing.assert_allclose(belief.covariance, settled, rtol=0.05, atol=1e-12)
+        settled, later = standing(shared_m, in_view=75.0)
+        np.testing.assert_allclose(later, settled, rtol=0.05, atol=1e-12)
         sizes[shared_m] = float(settled[0, 0])
     assert sizes[0.005] > 3.0 * sizes[0.0]
+
+
+def test_errors_of_surfaces_average_out_over_those_in_view() -> None:
+    """Five times fewer of them: five times the variance, but for what odometry leaves."""
+    room, little = (standing(0.005, in_view)[1] for in_view in (75.0, 15.0))
+    assert little[0, 0] / room[0, 0] == pytest.approx(5.0, rel=0.2)
+    assert little[2, 2] / room[2, 2] == pytest.approx(5.0, rel=0.2)
