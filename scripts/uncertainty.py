@@ -63,7 +63,7 @@ class Case:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """One seed: s since the start, NEES / 3 and NIS / 3 of each frame (NaN where there is none), RMS
+    """One seed: s since the start, NEES / 3 and NIS / 3 of frames (NaN where there is none), RMS
     error of the settled frames, m."""
 
     times: Float
