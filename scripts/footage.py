@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scripts.compare.again import is_run, run_of, whole_one
+from scripts.compare.again import is_run, run_of, why_no_run
 from scripts.film import SIZE, Pace, Size
 from scripts.output import RECIPE, read_recipe_words, slams_of
 from scripts.session import primary_of, systems_named
@@ -101,7 +101,7 @@ def open_run(path: Path, *, view: str | None = "follow") -> Footage:
             + (f" with --slam {slam}" if slam else "")
         )  # fmt: skip
     if "scene" not in settings or "seconds" not in settings:
-        raise LogFormatError(path, whole_one(path, words.get("command", "?")))
+        raise LogFormatError(path, why_no_run(path, words.get("command", "?")))
     known = {key: settings[key] for key in SIMULATED if key in settings}
     try:
         return replace(of_scene(known, view=view), slam=slam)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scripts.compare.again import is_run, run_of, whole_one
+from scripts.compare.again import is_run, run_of, why_no_run
 from scripts.compare.folder import RunFile
 from scripts.output import RECIPE, read_recipe_words, slams_of
 from scripts.session import file_name
@@ -71,7 +71,7 @@ def case_of(folder: Path, slam: str | None, every: int) -> Case:
         return _episode(path, slam or "shunting", every)
     command, settings = words.get("command"), words.get("settings")
     if command not in COMMANDS:
-        raise LogFormatError(path.parent, whole_one(path.parent, command))
+        raise LogFormatError(path.parent, why_no_run(path.parent, command))
     if not isinstance(settings, dict):
         raise LogFormatError(path, "no recipe of a run: it has no settings")
     if "scene" not in settings:

@@ -33,8 +33,10 @@ def run_of(path: Path) -> Again:
     """Of such a file; ``LogFormatError`` says what is wrong with it or its comparison's recipe."""
     recipe = path.parent.parent / RECIPE
     words = read_recipe_words(recipe)
-    settings = words.get("settings")
-    if words.get("command") != "compare" or not isinstance(settings, dict):
+    command, settings = words.get("command"), words.get("settings")
+    if command == "drive":
+        raise LogFormatError(path, why_no_run(path, command))
+    if command != "compare" or not isinstance(settings, dict):
         raise LogFormatError(recipe, "no recipe of a comparison")
     known = [field.name for field in fields(Plan)]
     try:
@@ -49,7 +51,7 @@ def run_of(path: Path) -> Again:
     raise LogFormatError(path, f"no run of that comparison, whose first is {plan.runs()[0].name}")
 
 
-def whole_one(folder: Path, command: object) -> str:
+def why_no_run(folder: Path, command: object) -> str:
     """Why the folder of many runs is no run, and what to name instead."""
     if command == "compare":
         one = min((folder / RUNS).glob("*.npz"), default=folder / RUNS / "*.npz")

@@ -20,13 +20,13 @@ def with_imports(file: Path, module: str) -> tuple[Path, ...]:
     top, *below = module.split(".")
     depth = len(below) + (file.name == "__init__.py")
     root = file.resolve().parents[depth]
-    found: dict[Path, str] = {}
+    found: set[Path] = set()
     waiting = [(file.resolve(), module)]
     while waiting:
         path, name = waiting.pop()
         if path in found:
             continue
-        found[path] = name
+        found.add(path)
         for imported in _imported(path, name):
             if root.name not in INSTALLED or imported.partition(".")[0] == top:
                 waiting += _files(root, imported)
