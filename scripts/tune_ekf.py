@@ -41,10 +41,10 @@ WORLDS: dict[str, tuple[dict[str, Any], ...]] = {
     ),
 }
 VALUES: dict[str, tuple[Any, ...]] = {
-    "individual_gate": (0.999, 0.9999, 0.999999),
-    "joint_gate": (0.99, 0.999, 0.999999),
-    "posterior_gate": (0.99, 0.9999, 0.99999),
-    "noise_scale": (1.0, 1.25, 1.5, 2.0),
+    "individual_gate": (0.99, 0.999, 0.9999, 0.999999),
+    "joint_gate": (0.95, 0.99, 0.999, 0.999999),
+    "posterior_gate": (0.9, 0.95, 0.99, 0.9999),
+    "noise_scale": (0.8, 1.0, 1.25, 1.5),
     "confirm_looks": (2, 4, 8, 12),
     "detection": (0.6, 0.7, 0.8, 0.9),
     "memory_looks": (2.0, 4.0, 8.0, 16.0),

@@ -16,13 +16,13 @@ from slam.frames import LaserSpec, Scan
 
 def test_trials_are_scored_on_the_training_seeds(tmp_path, monkeypatch):
     monkeypatch.setattr(tune_ekf, "WORLDS", {"points": ({"moving": 0.0, "n_steps": 15},)})
-    results = tune_ekf.tune("points", [0, 1], tmp_path, 1, ["joint_gate"])
-    assert [changes for changes, _ in results[:2]] == [{}, {"joint_gate": 0.99}]
+    results = tune_ekf.tune("points", [0, 1], tmp_path, 1, ["noise_scale"])
+    assert [changes for changes, _ in results[:2]] == [{}, {"noise_scale": 0.8}]
     assert all(scores.shape == (2, 1) for _, scores in results)
     assert all((scores < math.log10(0.05)).all() for _, scores in results)
     assert len(list(tmp_path.iterdir())) == 2
     lines = list(tune_ekf.table("points", results))
-    assert lines[4].startswith("| joint_gate | 0.999999 | 0.99 |")
+    assert lines[4].startswith("| noise_scale | 1.25 | 0.8 |")
     assert len(lines) == 4 + len(results) - 1
 
 
