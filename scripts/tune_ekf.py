@@ -2,7 +2,7 @@
 """How the EKF's knobs were set: ``python -m scripts.tune_ekf points`` (or ``corners``).
 
 One pass over the knobs, each in turn over a few values with the others as they are in the preset,
-on the training seeds 0 to 19 and nothing else; results are shown on seeds from 100 on. The score is
+on the training seeds 0 to 19 and nothing else; results are shown on seeds from 200 on. The score is
 the mean over the runs of log10(RMSE / 1 m): a factor counts the same wherever it happens, and a run
 that is lost counts, but not for everything. Seeds are paired: beside each value's change of the
 score stands in how many seeds (mean over their worlds) it was better and worse than the preset, and

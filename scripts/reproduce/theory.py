@@ -11,7 +11,7 @@ from scripts.accuracy import thinned
 from scripts.figures import styled
 from scripts.reproduce import theory_data
 from scripts.reproduce.report import Report, new_figure
-from scripts.reproduce.runs import Plan
+from scripts.reproduce.runs import FIRST_SEED, Plan
 from sim.simulation import stream
 from slam import se2
 from slam.frames import Float, Frame
@@ -32,9 +32,9 @@ def reproduce(plan: Plan) -> None:
     report = Report("theory", plan)
     scale = plan.scale if plan.quick else 1.0
     seconds = max(2.0, (6.0 if plan.quick else 60.0) * scale)
-    office = thinned(list(stream("office", seed=100, dynamism=0.5, seconds=seconds)), STRIDE)
+    office = thinned(list(stream("office", seed=FIRST_SEED, dynamism=0.5, seconds=seconds)), STRIDE)
     steps = max(15, int((60 if plan.quick else 220) * scale))
-    points = list(PointWorld(PointWorldConfig(n_steps=steps), seed=100).stream())
+    points = list(PointWorld(PointWorldConfig(n_steps=steps), seed=FIRST_SEED).stream())
     _lyapunov(report, office, points)
     _scaling(report, office[0], (1, 10, 100) if plan.quick else (1, 3, 10, 30, 100, 300, 1000))
     _growth(report, office, points)

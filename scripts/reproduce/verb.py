@@ -24,9 +24,11 @@ def reproduce(
         list[str], typer.Argument(help=f"Of {', '.join(EXPERIMENTS)}, or all.", metavar="WHAT...")
     ],
     quick: Annotated[
-        bool, typer.Option("--quick", help="Short runs of one seed: three minutes for all.")
+        bool, typer.Option("--quick", help="Short runs, of one seed: three minutes for all.")
     ] = False,
-    seeds: Annotated[int, typer.Option(help="Runs of each simulated experiment.")] = 20,
+    seeds: Annotated[
+        int | None, typer.Option(help="Runs of each simulated experiment.", show_default="20")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder; each experiment gets one in it.")] = Path(
         "out/reproduce"
     ),

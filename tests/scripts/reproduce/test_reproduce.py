@@ -205,10 +205,21 @@ def test_the_papers_printed_var_p_break_its_definition():
 def test_medians_and_sign_tests():
     assert spread([1.0, 2.0, 3.0, math.nan]).median == 2.0
     assert spread([]).text() == "–"
+    assert spread([1.0, math.nan, 2.0]).text() == "1.5 [1.25, 1.75] (2 of 3)"
     test = sign_test([1.0] * 17 + [3.0] * 3, [2.0] * 20)
     assert (test.wins, test.losses) == (17, 3)
     np.testing.assert_allclose(test.p, 0.00258, rtol=0.01)
     assert sign_test([1.0], [1.0]).p == 1.0
+    lost = sign_test([math.nan, 1.0, math.nan], [1.0, math.nan, math.nan])
+    assert (lost.wins, lost.losses) == (1, 1)
+
+
+def test_seeds_are_those_nobody_tuned_on(tmp_path):
+    assert Plan(out=tmp_path).seed_list() == list(range(200, 220))
+    assert Plan(out=tmp_path, quick=True).seed_list() == [200]
+    assert Plan(out=tmp_path, quick=True, seeds=3).seed_list() == [200, 201, 202]
+    with pytest.raises(InvalidValueError, match="--seeds must be >= 1, got 0"):
+        Plan(out=tmp_path, seeds=0)
 
 
 def test_short_falls_are_bold():
