@@ -33,11 +33,13 @@ TURN_TIMES = 0.7  # ... of which so much turns it: surfaces do not all err the s
 SHARED_S, VIEW_S = 20.0, 1.0  # over which shared residuals and directions of surfaces are averaged
 AT_FIRST = 200.0  # pairs of points that the scanner's usual residual counts as
 USUAL_M = 0.002  # that residual
-WHOLE, LEAST_SHARE = (
-    75.0,
-    0.005,
-)  # weight of the surfaces in view in a room, for which the constants
-# above hold: a beam counts for one where it stands for SPACING_M of surface; and the least of it
+# Weight of the surfaces in view of a room, for which the constants above hold (a beam counts for
+# one where it stands for 0.1 m of surface), and the least share of it.
+WHOLE, LEAST_SHARE = 75.0, 0.005
+WRITTEN = (
+    0.5  # of what a match takes off odometry's error the share that the map keeps, in units of
+)
+# the share of the map in view that was written within CORRELATED_S
 CORRELATED_S = 1.0  # for so long the shared error of a scan stays the same
 
 
@@ -127,6 +129,7 @@ class Belief:
             prediction.covariance,
             data,
             (variance * strength, NEW_TIMES**2 * new * variance * strength, frames, TURN_TIMES),
+            min(WRITTEN * new * frames, 1.0),
         )
         self.covariance = self._drift + self._blind + self._shared
 

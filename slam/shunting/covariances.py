@@ -94,12 +94,15 @@ def advance(
     prior: NDArray[np.float64],
     data: NDArray[np.float64],
     variances: tuple[float, float, float, float],
+    written: float,
 ) -> None:
     """One frame; all arrays (3, 3) in the map frame, changed in place but the last three.
 
     ``data``: information of the match, with the weight it was given. ``variances``: per unit of
     information, of the shared error and of what is newly written; frames in which the first stays;
-    by how much less (standard deviation) surfaces agree in their error of the heading.
+    by how much less (standard deviation) surfaces agree in their error of the heading. ``written``:
+    share of the map in view that was written lately, off by what odometry was off then: of what the
+    data take off odometry's error, so much is the map's from now on.
     """
     F, N = np.zeros((3, 3)), np.empty((3, 3))
     F[0, 0] = F[1, 1] = F[2, 2] = 1.0
@@ -119,6 +122,11 @@ def advance(
             N[i, j] = M[i, 0] * precision[0, j] + M[i, 1] * precision[1, j]
             N[i, j] += M[i, 2] * precision[2, j]
     _sandwich(N, whole, blind)
+    kept = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            N[i, j] = (1.0 if i == j else 0.0) - N[i, j]
+    _sandwich(N, moved, kept)
     _inverse(prior, precision)
     # the shared error, as far as the data decide over the time that it stays the same
     _inverse(_sum(data, 1.0 / variances[2], precision), M)
@@ -127,7 +135,7 @@ def advance(
         for j in range(3):
             turns = (variances[3] if i == 2 else 1.0) * (variances[3] if j == 2 else 1.0)
             shared[i, j] = turns * variances[0] * moved[i, j]
-            newest[i, j] = turns * variances[1] * moved[i, j]
+            newest[i, j] = turns * variances[1] * moved[i, j] + written * kept[i, j]
             drift[i, j] += newest[i, j]
 
 

@@ -41,7 +41,15 @@ def _run_all() -> None:
     look(network, 0.3, seen, origin, 1.0, 0)
     whole = [np.eye(3) for _ in range(4)]
     advance(
-        whole[0], whole[1], whole[2], whole[3], origin, covariance, covariance, (1.0, 1.0, 1.0, 1.0)
+        whole[0],
+        whole[1],
+        whole[2],
+        whole[3],
+        origin,
+        covariance,
+        covariance,
+        (1.0, 1.0, 1.0, 1.0),
+        0.0,
     )
     carried(covariance, origin, 0.0, 0.0, np.eye(3))
     observable(covariance, 0.0, np.eye(3))

@@ -279,3 +279,40 @@ def test_errors_of_surfaces_average_out_over_those_in_view() -> None:
     room, little = (standing(0.005, in_view)[1] for in_view in (75.0, 15.0))
     assert little[0, 0] / room[0, 0] == pytest.approx(5.0, rel=0.2)
     assert little[2, 2] / room[2, 2] == pytest.approx(5.0, rel=0.2)
+
+
+def test_what_is_written_blindly_keeps_odometrys_error() -> None:
+    """A match to a map that was just written takes off less of it than one to an old map."""
+    geometry = np.diag([0.5, 0.5, 4.0])
+    left = {}
+    for new in (0.0, 0.2):
+        belief = Belief(0.03)
+        T = np.zeros(3)
+        drive = Prediction(
+            T_map_robot=T,
+            increment=np.zeros(3),
+            covariance=np.diag([0.01**2, 0.01**2, 0.01**2]),
+            twist=np.zeros(3),
+            elapsed=0.2,
+        )
+        nothing = Match(
+            T_map_robot=T, information=np.zeros((3, 3)), matched=0.0, score=0.0, tau=0.0
+        )
+        match = Match(T_map_robot=T, information=1e5 * geometry, matched=1.0, score=0.0, tau=5.0)
+        for _ in range(100):
+            belief.update(T, drive, nothing, None)
+        blind = belief.covariance[0, 0]
+        evidence = Evidence(
+            geometry=20.0 * geometry,
+            weighed=20.0,
+            in_view=75.0,
+            shared=0.0,
+            paired=20.0,
+            feigned=0.0,
+            new=20.0 * new,
+        )
+        belief.update(T, drive, match, evidence)
+        left[new] = belief.covariance[0, 0] / blind
+        assert np.linalg.eigvalsh(belief.covariance)[0] > 0.0
+    assert left[0.0] < 0.05
+    assert left[0.2] == pytest.approx(0.5, abs=0.05)  # 0.5 x 0.2 x 5 scans a second
