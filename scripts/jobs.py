@@ -3,8 +3,8 @@
 
 A job is a function called as ``call(path, **arguments)`` that writes ``path``. It gets a temporary
 name, which becomes ``<name>-<digest><suffix>`` when the function returns. The digest is that of the
-arguments and of the code that they are given to, so what is found there is what would be written,
-and is not made again.
+arguments, of the code that they are given to, of the data that it reads and of the versions of what
+it calls, so what is found there is what would be written, and is not made again.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from rich.markup import escape
 
 from scripts import interrupt, workers
 from scripts.console import progress
+from scripts.output import versions
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 
 PART = ".part"
@@ -35,7 +36,8 @@ class Job:
     call       a function of a module (workers import it): ``call(path, **arguments)``
     arguments  as JSON has them
     suffix     ending of the file
-    code       folders or files, the digest of whose Python sources is part of the name
+    code       folders or files that the result depends on, data too: the digest of all that is in
+               them, but for what is hidden or compiled, is part of the name
     """
 
     name: str
@@ -53,7 +55,7 @@ class Job:
     def file_name(self) -> str:
         """Where its result goes, within the folder of the jobs."""
         call = f"{self.call.__module__}.{self.call.__qualname__}"
-        told = json.dumps([call, dict(self.arguments)], sort_keys=True)
+        told = json.dumps([call, dict(self.arguments), _versions()], sort_keys=True)
         sources = "".join(_digest(path) for path in self.code)
         return f"{self.name}-{_short(told + sources)}{self.suffix}"
 
@@ -62,13 +64,28 @@ def _short(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:10]
 
 
+_versions = cache(versions)
+
+
 @cache
 def _digest(path: Path) -> str:
-    files = sorted(path.rglob("*.py")) if path.is_dir() else [path]
     whole = hashlib.sha256()
-    for file in files:
-        whole.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    for name, file in _files(path):
+        content = file.read_bytes()
+        whole.update(f"{name}\0{len(content)}\0".encode() + content)
     return whole.hexdigest()
+
+
+def _files(path: Path) -> list[tuple[str, Path]]:
+    """Names within the folder and files: no hidden ones, no ``__pycache__``."""
+    if not path.is_dir():
+        return [(path.name, path)]
+    files = ((file.relative_to(path), file) for file in path.rglob("*") if file.is_file())
+    return sorted(
+        (name.as_posix(), file)
+        for name, file in files
+        if not any(part.startswith((".", "__pycache__")) for part in name.parts)
+    )
 
 
 def run_jobs(

@@ -173,7 +173,9 @@ def reproduce(plan: Plan) -> None:
         "Fig. 9: errors over time",
     )
     report.figure("sweep", fig_sweep(by_share), "RMSE against the share of points that move")
-    report.recipe["shunting"] = SHUNTING
+    report.systems(
+        {"EKF": ("ekf", {"preset": "points"}), "shunting": ("shunting-features", SHUNTING)}
+    )
     report.finish("Simulated landmarks (paper: section 4.2, Figs. 8 and 9, Table 2)")
 
 

@@ -19,7 +19,10 @@ from scipy.ndimage import maximum_filter
 
 from scripts.jobs import Job, run_jobs
 from scripts.output import machine, write_recipe
+from scripts.reproduce.depends import checksums
 from scripts.reproduce.runs import Plan, Run, load_run
+from scripts.reproduce.times import duration
+from slam import create
 from slam.files import replacing, write_text
 from slam.frames import Float
 
@@ -37,9 +40,11 @@ class Report:
     name: str
     plan: Plan
     started: float = field(default_factory=time.perf_counter)
+    cpu_started: float = field(default_factory=time.process_time)
     lines: list[str] = field(default_factory=list)
     quoted: list[str] = field(default_factory=list)  # what the page of all experiments repeats
     made: tuple[int, int] = (0, 0)  # runs made in this call, and of how many
+    cpu_s: float = 0.0  # processor time of the runs, whenever they were made
     recipe: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -52,9 +57,21 @@ class Report:
         listed, runs = list(jobs), self.folder / "runs"
         missing = sum(not (runs / job.file_name()).exists() for job in listed)
         self.made = (missing, len(listed))
+        before = time.process_time()
         files = run_jobs(listed, runs, processes=self.plan.processes, title=self.name)
+        self.cpu_started += time.process_time() - before  # the runs have their own
         self.recipe["runs"] = {job.name: dict(job.arguments) for job in listed}
-        return {name: load_run(file) for name, file in files.items()}
+        done = {name: load_run(file) for name, file in files.items()}
+        self.cpu_s += sum(run.cpu_s for run in done.values())
+        return done
+
+    def systems(self, systems: Mapping[str, tuple[str, Mapping[str, Any]]]) -> None:
+        """Into the recipe: kind, options and whole configuration of each SLAM."""
+        told = self.recipe.setdefault("systems", {})
+        for name, (kind, options) in systems.items():
+            config = getattr(create(kind, **options), "config", None)
+            whole = {} if config is None else {"config": asdict(config)}
+            told[name] = {"slam": kind, "options": dict(options), **whole}
 
     def heading(self, text: str) -> None:
         """A section of the page."""
@@ -91,11 +108,13 @@ class Report:
     def finish(self, title: str) -> None:
         """Write the page and the recipe; the page says on which machine and how long."""
         wall_s = time.perf_counter() - self.started
+        self.cpu_s += time.process_time() - self.cpu_started
         made_on = machine()
         made, whole = self.made
         kept = f" ({whole - made} of {whole} runs were there already)" if made < whole else ""
         said = (
-            f"Wall time of this call {wall_s:.0f} s{kept} with {self.plan.processes} processes on "
+            f"Processor time of all this {duration(self.cpu_s)}, wall time of this call "
+            f"{duration(wall_s)}{kept} with {self.plan.processes} processes on "
             f"{made_on['processor']}, {made_on['cores']} cores"
             + (" (quick: too short and too few to conclude from)." if self.plan.quick else ".")
         )
@@ -103,15 +122,15 @@ class Report:
         write_text(self.folder / "README.md", "\n".join(page).rstrip() + "\n")
         summary = [*self.quoted, said]
         write_text(self.folder / "summary.md", "\n".join(summary).rstrip() + "\n")
-        settings = {
-            key: str(value) if key in ("out", "data") else value
-            for key, value in asdict(self.plan).items()
-        }
-        write_recipe(
-            self.folder,
-            f"reproduce {self.name}",
-            {"plan": settings, "machine": made_on, "wall_s": wall_s, **self.recipe},
-        )
+        self._write_recipe({"machine": made_on, "wall_s": wall_s, "cpu_s": self.cpu_s})
+
+    def _write_recipe(self, measured: Mapping[str, Any]) -> None:
+        plan = self.plan
+        settings = asdict(plan) | {"out": str(plan.out), "seeds": plan.seed_list()}
+        if plan.data is not None:
+            settings["data"] = {"folder": str(plan.data), "sha256": checksums(plan.data)}
+        told = {"plan": settings, **measured, **self.recipe}
+        write_recipe(self.folder, f"reproduce {self.name}", told)
 
 
 def new_figure(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> Any:

@@ -124,5 +124,5 @@ def run_all(
         for variant, options in variants.items()
         for seed in seeds
     )
-    report.recipe["systems"] = {name: list(system) for name, system in SYSTEMS.items()}
+    report.systems(SYSTEMS)
     return {v: [runs[f"{v}-seed-{seed}"] for seed in seeds] for v in variants}

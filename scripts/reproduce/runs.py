@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
-import inspect
+import importlib
 import json
 import math
+import time
+import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import slam
 from scripts.jobs import Job
+from scripts.reproduce.depends import depends_on
 from slam import metrics, se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame
@@ -23,13 +25,10 @@ from slam.replay import Track
 from slam.system import SlamSystem
 from slam.trajectory import Trajectory
 
-_HERE = Path(__file__).parent
-_SLAM = Path(slam.__file__).parent
-SOURCES = (_SLAM, _HERE / "runs.py", _HERE / "census.py")
-SIMULATION = (_SLAM.parent / "sim", _SLAM.parent / "scenes")
 QUANTITIES = ("x", "y", "θ")
 FIRST_SEED = 200  # of the simulated runs: nothing was tuned or tested on it and those after it
 SEEDS, QUICK_SEEDS = 20, 1
+_CPU = "cpu_s"  # its name in a run's file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +55,10 @@ class Plan:
             raise InvalidValueError(f"--seeds must be >= 1, got {self.seeds}")
         if self.processes < 1:
             raise InvalidValueError(f"--jobs must be >= 1, got {self.processes}")
+        if self.data is not None and not self.data.is_dir():
+            raise InvalidValueError(
+                f"--data must be the folder of the Victoria Park dataset, got {self.data}"
+            )
 
     def seed_list(self) -> list[int]:
         """The seeds of the simulated runs; the first is the single run shown as the paper's."""
@@ -65,10 +68,11 @@ class Plan:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """One job's file: ``numbers`` (JSON) and ``arrays``."""
+    """One job's file: ``numbers`` (JSON), ``arrays``, and the processor time that it took."""
 
     numbers: Mapping[str, Any]
     arrays: Mapping[str, NDArray[Any]]
+    cpu_s: float = math.nan
 
 
 def save_run(path: Path, numbers: Mapping[str, Any], arrays: Mapping[str, ArrayLike]) -> None:
@@ -82,16 +86,30 @@ def save_run(path: Path, numbers: Mapping[str, Any], arrays: Mapping[str, ArrayL
 def load_run(path: Path) -> Run:
     """Read it back."""
     with np.load(path) as file:
-        arrays = {name: file[name] for name in file.files if name != "numbers"}
-        return Run(numbers=json.loads(str(file["numbers"])), arrays=arrays)
+        arrays = {name: file[name] for name in file.files}
+    numbers, cpu_s = json.loads(str(arrays.pop("numbers"))), arrays.pop(_CPU, math.nan)
+    return Run(numbers=numbers, arrays=arrays, cpu_s=float(cpu_s))
 
 
 def job(name: str, call: Any, /, **arguments: Any) -> Job:
-    """A job whose result depends on the SLAMs, on the module of ``call`` and, with a scene, on the
-    simulator."""
-    module = Path(inspect.getfile(call))
-    code = (*SOURCES, module, *(SIMULATION if "scene" in arguments else ()))
-    return Job(name=name, call=call, arguments=arguments, code=code)
+    """A job that is made again when anything it depends on changes; its processor time is kept."""
+    if "data" in arguments:
+        arguments["data"] = str(Path(arguments["data"]).resolve())
+    return Job(
+        name=name,
+        call=timed,
+        arguments={"call": f"{call.__module__}:{call.__qualname__}", **arguments},
+        code=depends_on(call, arguments),
+    )
+
+
+def timed(path: Path, *, call: str, **arguments: Any) -> None:
+    """Let ``call`` ("module:function") write its run, and add the processor time that it took."""
+    started = time.process_time()
+    module, _, name = call.partition(":")
+    getattr(importlib.import_module(module), name)(path, **arguments)
+    with zipfile.ZipFile(path, "a") as file, file.open(f"{_CPU}.npy", "w") as member:
+        np.lib.format.write_array(member, np.array(time.process_time() - started))
 
 
 def truth_of(frames: Sequence[Frame]) -> Trajectory:

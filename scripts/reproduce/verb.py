@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +15,9 @@ from rich.markup import escape
 
 from scripts.console import console, note
 from scripts.reproduce.runs import Plan
+from scripts.reproduce.times import total
 from slam.errors import UnknownNameError
+from slam.files import write_text
 
 EXPERIMENTS = ("victoria-park", "landmarks", "chairs", "office", "theory")
 
@@ -42,13 +45,20 @@ def reproduce(
     [bold]mobilia reproduce landmarks[/bold]
     """
     plan = Plan(out=out, seeds=seeds, quick=quick, data=data, processes=jobs or os.cpu_count() or 1)
-    for name in _named(what):
-        if name == "victoria-park" and plan.data is None and "all" in what:
-            note("victoria-park is left out: pass --data with the folder of the dataset")
-            continue
+    names, started = _named(what), time.perf_counter()
+    left_out = "all" in what and plan.data is None
+    if left_out:
+        names.remove("victoria-park")
+    for name in names:
         experiment(name)(plan)
         page = escape(str(plan.out / name / "README.md"))
         console.print(f"[bold]{name}[/bold]: open {page}", soft_wrap=True)
+    if "all" in what:
+        told = total(plan, names, time.perf_counter() - started)
+        write_text(plan.out / "summary.md", told + "\n")
+        console.print(escape(told), soft_wrap=True)
+    if left_out:
+        note("victoria-park is left out: pass --data with the folder of the dataset")
 
 
 def experiment(name: str) -> Callable[[Plan], None]:

@@ -122,6 +122,7 @@ def reproduce(plan: Plan) -> None:
     scans = max(150, int(900 * plan.scale)) if plan.quick else 0
     data = str(plan.data)
     _, gps = _read(data, scans)
+    victoria_graph.read_graph(data)  # complains now, not after the runs
     names = ["odometry", "EKF", "shunting"] if plan.quick else list(SYSTEMS)
     listed = [job("graph", run_graph, data=data, scans=scans)]
     listed += [
@@ -140,7 +141,7 @@ def reproduce(plan: Plan) -> None:
     _page(report, numbers, gps)
     report.figure("fig6", fig6(by_name, tracks, gps), "Fig. 6: maps over GPS (green)")
     _fig7(report, tracks, gps)
-    report.recipe["shunting"] = SHUNTING
+    report.systems({name: SYSTEMS[name] for name in names})
     report.finish("Victoria Park (paper: section 4.1, Figs. 6 and 7, Table 1)")
 
 

@@ -8,10 +8,12 @@ import signal
 import subprocess
 import sys
 import time
+from functools import cache
 from pathlib import Path
 
 import pytest
 
+from scripts import jobs
 from scripts.jobs import Job, run_jobs
 from slam.errors import InvalidValueError, SlamFailedError
 
@@ -52,6 +54,30 @@ def test_other_arguments_and_other_code_are_other_files(tmp_path):
     coded = Job(name="a", call=write, arguments={"text": "one"}, suffix=".txt", code=[source])
     assert len({job.file_name() for job in (plain, other, coded)}) == 3
     assert plain.file_name() == a_job("a", "one").file_name()
+
+
+def test_other_data_and_other_versions_are_other_files(tmp_path, monkeypatch):
+    (package := tmp_path / "package" / "parts").mkdir(parents=True)
+    (package / "code.py").write_text("1")
+    (package / "part.xml").write_text("<a/>")
+
+    def name() -> str:
+        jobs._digest.cache_clear()
+        jobs._versions.cache_clear()
+        code = [tmp_path / "package"]
+        return Job(name="a", call=write, arguments={}, code=code).file_name()
+
+    before = name()
+    for neither in ("__pycache__", ".hidden"):
+        (package / neither).mkdir()
+        (package / neither / "code.bin").write_text("2")
+    assert name() == before
+    (package / "part.xml").write_text("<b/>")
+    assert (other := name()) != before
+    (package / "part.xml").rename(package / "moved.xml")
+    assert (moved := name()) not in (before, other)
+    monkeypatch.setattr(jobs, "_versions", cache(lambda: {"numpy": "9.9"}))
+    assert name() not in (before, other, moved)
 
 
 def test_a_failing_job_is_named_and_leaves_nothing(tmp_path):
