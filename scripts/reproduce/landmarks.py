@@ -92,7 +92,7 @@ def run_one(path: Path, *, moving: float, seed: int, steps: int, keep: bool) -> 
     ekf, ekf_census = _counted(EkfSlam(preset="points"), frames, true_points)
     ours, our_census = _counted(FeaturedShuntingSlam(**SHUNTING), frames, true_points)
     floor = Census(true_points)
-    floor.take(known_points)
+    floor.take(known_points, np.arange(len(known_points)))
     numbers = {
         "odometry": pose_numbers(odometry.online(), truth),
         "EKF": pose_numbers(ekf.online(), truth) | ekf_census.numbers(),
@@ -123,7 +123,7 @@ def _counted(system: Any, frames: Sequence[Frame], true_points: Float) -> tuple[
     for k, frame in enumerate(frames):
         track.take(frame.without_truth())
         if k % EVERY == 0 or k == len(frames) - 1:
-            census.take(landmarks_of(system))
+            census.take(*landmarks_of(system))
     return track, census
 
 
@@ -212,7 +212,8 @@ def _sweep(report: Report, by_share: dict[float, list[Run]]) -> None:
     report.say(_verdict(by_share), quote=True)
     report.say(
         f"Landmarks in the end, medians: true static ones seen twice or more; missed, spurious "
-        f"(no true one within {GATE_M} m), deleted by mistake (once in the map, gone in the end). "
+        f"(no true one within {GATE_M} m), deleted by mistake (once in the map, in the end none "
+        "near and none left that once was it). "
         f"Of the shunting map: peaks of activity from {PEAK} on, between neurons.",
         quote=True,
     )

@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scores of a drive through Victoria Park: against GPS and the graph, at loops, of landmarks."""
+"""Scores of a drive through Victoria Park: against GPS and the graph, and at loops."""
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scripts.reproduce.census import Census
-from scripts.reproduce.runs import Run, statistics
+from scripts.reproduce.runs import statistics
 from slam import se2
 from slam.frames import Float
 from slam.logs.victoria_park import GpsTrack
@@ -19,7 +17,6 @@ from slam.trajectory import Trajectory
 
 FIRST_M = 100.0  # the fixes up to here turn and move GPS into the map
 FASTEST, SLACK_M, GIVE_UP_S = 8.0, 1.0, 5.0  # m/s: the truck drives 6.6 m/s at most
-GATE_M = 3.0  # between a landmark and the graph's
 LOOP_NEAR_M, LOOP_FAR_M = 2.0, 100.0  # the graph is in one place again, after this way
 
 
@@ -90,11 +87,22 @@ def loop_errors(track: Trajectory, graph: Trajectory) -> Float:
     return np.array(errors)
 
 
+def over_graph(track: Trajectory, graph: Trajectory, gps: GpsTrack) -> Float:
+    """T_graph_map: both laid over GPS by their own first fixes."""
+    return se2.compose(se2.inverse(first_fit(graph, gps)), first_fit(track, gps))
+
+
+def headings_off(track: Trajectory, graph: Trajectory, gps: GpsTrack) -> Float:
+    """(n,) rad: headings against the graph's, turned as the positions are."""
+    turn = float(over_graph(track, graph, gps)[2])
+    return se2.wrap_array(track.poses[:, 2] + turn - graph.poses[:, 2])
+
+
 def pose_numbers(track: Trajectory, graph: Trajectory, gps: GpsTrack) -> dict[str, Any]:
     good, here = good_fixes(gps), at_fixes(track, gps)
     e = (se2.transform(first_fit(track, gps), here) - gps.points)[good]
     shape = (se2.transform(shape_fit(track, gps), here) - gps.points)[good]
-    turned = se2.wrap_array(track.poses[:, 2] - graph.poses[:, 2])
+    turned = headings_off(track, graph, gps)
     closed = loop_errors(track, graph)
     distance, shape_distance = np.hypot(*e.T), np.hypot(*shape.T)
     return {
@@ -109,27 +117,3 @@ def pose_numbers(track: Trajectory, graph: Trajectory, gps: GpsTrack) -> dict[st
         **statistics(e, ("x", "y")),
         **statistics(turned[:, None], ("θ",)),
     }
-
-
-def landmark_numbers(
-    run: Run, graph: Run, track: Trajectory, graph_track: Trajectory, gps: GpsTrack
-) -> dict[str, Any]:
-    """Landmarks against the graph's, both laid over GPS by their own first fixes."""
-    out = {"ms": run.numbers["ms"], "not converged": run.numbers["not converged"]}
-    if not run.numbers["sizes"]:
-        return out
-    T = se2.compose(se2.inverse(first_fit(graph_track, gps)), first_fit(track, gps))
-    seen = _in_reach(graph.arrays["found"], graph_track)
-    census = Census(seen)
-    ends = np.cumsum([0, *run.numbers["sizes"]])
-    for a, b in pairwise(ends.tolist()):
-        census.take(se2.transform(T, run.arrays["found"][a:b]), GATE_M)
-    return out | census.numbers() | {"landmarks": run.numbers["sizes"][-1]}
-
-
-def _in_reach(landmarks: Float, track: Trajectory) -> Float:
-    """Those of the graph that lie within 30 m of the way driven."""
-    way = track.poses[::10, :2]
-    away = np.hypot(*(landmarks[:, None, :] - way[None, :, :]).transpose(2, 0, 1))
-    near: Float = landmarks[away.min(axis=1) < 30.0]
-    return near

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from scripts.reproduce import park_scores, theory_data
+from scripts.reproduce import theory_data
 from scripts.reproduce.census import Census
 from scripts.reproduce.comparison import below_printed
 from scripts.reproduce.paper_numbers import TABLE_1, TABLE_2, TABLE_3
@@ -22,9 +22,8 @@ from scripts.reproduce.verb import reproduce as verb
 from slam import se2
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.logs.victoria_graph import read_graph, stamped
-from slam.logs.victoria_park import GpsTrack, read_victoria_park, twist_of
+from slam.logs.victoria_park import read_victoria_park, twist_of
 from slam.shunting.config import ShuntingConfig
-from slam.trajectory import Trajectory
 
 DT = 0.025
 
@@ -154,39 +153,19 @@ def test_the_graph_is_stamped_by_the_distance_driven(park):
     np.testing.assert_allclose(again.poses, graph.poses, atol=1e-3)
 
 
-def test_outliers_are_fixes_nobody_could_have_driven_to():
-    stamps = np.arange(10, dtype=np.int64) * 200_000_000
-    points = np.column_stack([0.5 * np.arange(10), np.zeros(10)])
-    points[4] += [0.0, 30.0]
-    good = park_scores.good_fixes(GpsTrack(stamps_ns=stamps, points=points))
-    assert good.tolist() == [True] * 4 + [False] + [True] * 5
-    # after a long gap anything goes
-    stamps = stamps + np.where(np.arange(10) >= 4, 10_000_000_000, 0)
-    good = park_scores.good_fixes(GpsTrack(stamps_ns=stamps, points=points))
-    assert good[4]
-
-
-def test_loops_are_returns_after_a_long_way():
-    t = np.linspace(0.0, 4.0 * math.pi, 400)
-    poses = np.column_stack([30.0 * np.cos(t), 30.0 * np.sin(t), t])
-    track = Trajectory(stamps_ns=np.arange(400, dtype=np.int64), poses=poses)
-    pairs = park_scores.loops(track)
-    assert pairs
-    for a, b in pairs:
-        assert np.hypot(*(poses[a] - poses[b])[:2]) < park_scores.LOOP_NEAR_M
-        assert abs(b - a) > 100
-    np.testing.assert_allclose(park_scores.loop_errors(track, track), 0.0, atol=1e-9)
-
-
 def test_census_counts_what_is_missed_spurious_and_deleted():
     true = np.array([[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]])
     census = Census(true)
-    census.take(true[:2] + 0.1)
-    census.take(np.array([[0.1, 0.0], [20.0, 0.0], [0.2, 0.0]]))
+    census.take(true[:2] + 0.1, np.array([3, 4]))
+    census.take(np.array([[0.1, 0.0], [20.0, 0.0], [0.2, 0.0]]), np.array([3, 5, 6]))
     numbers = census.numbers()
     assert numbers["misses"] == 2
     assert numbers["spurious"] == 2
-    assert numbers["deleted by mistake"] == 1
+    assert (numbers["gone"], numbers["deleted by mistake"]) == (1, 1)
+    # the one that was at 5 m is still there, wherever the map has it now
+    census.take(np.array([[0.1, 0.0], [25.0, 0.0]]), np.array([3, 4]))
+    assert census.numbers()["misses"] == 2
+    assert (census.numbers()["gone"], census.numbers()["deleted by mistake"]) == (1, 0)
 
 
 def test_statistics_are_the_papers_and_its_identity_holds():
