@@ -51,7 +51,8 @@ def reproduce(plan: Plan) -> None:
     for variant, runs in by_variant.items():
         report.heading(f"Table 3, {TITLES[variant]}")
         numbers = [run.numbers for run in runs]
-        paper_table(report, TABLE_3, numbers, ("EKF", "shunting", "shunting, paper preset"))
+        names = ("EKF", "shunting", "shunting, paper preset")
+        paper_table(report, f"Table 3, {TITLES[variant]}", TABLE_3, numbers, names)
         told = "; ".join(below_printed(TABLE_3, numbers, "shunting", limits=LIMITS))
         report.say(
             f"Table 3, {TITLES[variant]}: shunting on beams, medians, against the project's "

@@ -15,15 +15,24 @@ _STATISTICS = (("mean", "mean(e)", 0), ("var_e", "var(e)", 1), ("var_p", "var(p)
 
 
 def paper_table(
-    report: Report, printed: Table, runs: Sequence[Numbers], columns: Sequence[str]
+    report: Report, title: str, printed: Table, runs: Sequence[Numbers], columns: Sequence[str]
 ) -> None:
     """One row for each quantity and statistic: paper, our single run, median over the seeds.
 
     Of means the median over the seeds is that of their size, as signs differ from seed to seed.
     """
+    many = len(runs) > 1
+    ours = (
+        "our single run, and medians with quartiles over the seeds, of means the median of their "
+        "size"
+        if many
+        else "our one run"
+    )
+    report.say(
+        f"**{title}**: the paper's numbers, {ours}. var(p) is printed, not compared.", quote=True
+    )
     head = ["", "paper EKF", "paper “Our”"]
     head += [f"{name}, single run" for name in columns]
-    many = len(runs) > 1
     if many:
         head += [f"{name}, {len(runs)} seeds" for name in columns]
     rows = []
@@ -41,7 +50,7 @@ def paper_table(
                     for name in columns
                 ]  # fmt: skip
             rows.append(row)
-    report.table(head, rows)
+    report.table(head, rows, quote=True)
 
 
 def _cell(value: float | None) -> str:

@@ -183,11 +183,11 @@ def _table_2(report: Report, runs: Sequence[Run]) -> None:
     report.heading("Table 2, at 25 % moving")
     report.say(
         "Eq. (14)'s 0.1, 0.03 and 0.001 are taken as standard deviations (m, rad per 0.5 m step; "
-        "m, rad per point). The paper does not say how many of its points moved. Medians with "
-        "quartiles; of means the median of their size."
+        "m, rad per point). The paper does not say how many of its points moved."
     )
     numbers = [run.numbers for run in runs]
-    paper_table(report, TABLE_2, numbers, ("EKF", "shunting", "known associations"))
+    names = ("EKF", "shunting", "known associations")
+    paper_table(report, "Table 2, 25 % moving", TABLE_2, numbers, names)
     told = "; ".join(below_printed(TABLE_2, numbers, "shunting"))
     report.say(f"Table 2, shunting, median, against the paper's “Our”: {told}.", quote=True)
 

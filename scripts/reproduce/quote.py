@@ -2,38 +2,72 @@
 """Results into a page: ``python -m scripts.reproduce.quote out/reproduce docs/paper.md``.
 
 Between ``<!-- landmarks -->`` and ``<!-- /landmarks -->`` (and so on) the page gets what the
-experiment's ``summary.md`` says; experiments that were not run keep what is there.
+experiment's ``summary.md`` says, and its figures as small PNGs in ``pictures/paper`` beside the
+page; between the marks of ``all`` what all took together. Experiments that were not run keep what
+is there.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
+import re
 import sys
 from pathlib import Path
 
+from PIL import Image
+
 from scripts.reproduce.verb import EXPERIMENTS
 from slam.errors import InvalidValueError
-from slam.files import write_text
+from slam.files import write_bytes, write_text
+
+PICTURES = "pictures/paper"
+MOST_BYTES = 150_000
+_COLORS = 128
+_PICTURE = re.compile(r"\]\(([\w-]+\.png)\)")
 
 
 def quote(results: Path, page: Path) -> list[str]:
     """Fill in the page; which experiments it now quotes anew."""
-    text, quoted = page.read_text(), []
-    for name in EXPERIMENTS:
-        summary, begin, end = (
-            results / name / "summary.md",
-            f"<!-- {name} -->\n",
-            f"<!-- /{name} -->",
-        )
+    text, found = page.read_text(), {}
+    for name in ("all", *EXPERIMENTS):
+        summary = results / ("" if name == "all" else name) / "summary.md"
         if not summary.exists():
             continue
+        begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
         if text.count(begin) != 1 or text.count(end) != 1:
             raise InvalidValueError(f"{page} must have one {begin.strip()} and one {end}")
+        told = summary.read_text().strip()
+        found[name] = _PICTURE.findall(told)
+        told = _PICTURE.sub(rf"]({PICTURES}/{name}-\1)", told)
         before, _, rest = text.partition(begin)
-        text = f"{before}{begin}\n{summary.read_text().strip()}\n\n{end}{rest.partition(end)[2]}"
-        quoted.append(name)
+        text = f"{before}{begin}\n{told}\n\n{end}{rest.partition(end)[2]}"
+    for name, files in found.items():
+        _take_pictures(results / name, files, page.parent / PICTURES, name)
     write_text(page, text)
-    return quoted
+    return list(found)
+
+
+def _take_pictures(source: Path, files: list[str], folder: Path, name: str) -> None:
+    """Copies of these, and none that an earlier call left."""
+    for file in files:
+        write_bytes(folder / f"{name}-{file}", compact(source / file))
+    for old in folder.glob(f"{name}-*.png"):
+        if old.name.removeprefix(f"{name}-") not in files:
+            old.unlink()
+
+
+def compact(picture: Path, most: int = MOST_BYTES) -> bytes:
+    """The picture as a PNG of few colours, smaller if need be: ``most`` bytes."""
+    with Image.open(picture) as opened:
+        image = opened.convert("RGB")
+    while True:
+        few = image.quantize(_COLORS, dither=Image.Dither.NONE)
+        few.save(file := io.BytesIO(), "PNG", optimize=True)
+        if file.tell() <= most:
+            return file.getvalue()
+        size = (max(1, image.width * 4 // 5), max(1, image.height * 4 // 5))
+        image = image.resize(size, Image.Resampling.LANCZOS)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -95,7 +95,7 @@ class Report:
             self.quoted += lines
 
     def figure(self, name: str, figure: Figure, caption: str) -> None:
-        """``name``.png and ``name``.svg, and the picture in the page."""
+        """``name``.png and ``name``.svg, and the picture in the page and in the summary."""
         for suffix in ("png", "svg"):
             metadata = {"Software": None} if suffix == "png" else {"Date": None}
             with (
@@ -103,7 +103,7 @@ class Report:
                 mpl.rc_context({"svg.hashsalt": "mobilia"}),
             ):
                 figure.savefig(temporary, dpi=130, metadata=metadata)
-        self.lines += [f"![{caption}]({name}.png)", "", f"*{caption}*", ""]
+        self._add([f"![{caption}]({name}.png)", "", f"*{caption}*", ""], quote=True)
 
     def finish(self, title: str) -> None:
         """Write the page and the recipe; the page says on which machine and how long."""

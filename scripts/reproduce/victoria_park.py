@@ -194,7 +194,7 @@ def _page(report: Report, numbers: dict[str, dict[str, Any]], gps: GpsTrack) -> 
         "see below. The paper does not say what its truth was."
     )
     names = [name for name in numbers if name not in ("odometry", "graph")]
-    paper_table(report, TABLE_1, [numbers], [*names, "graph"])
+    paper_table(report, "Table 1", TABLE_1, [numbers], [*names, "graph"])
     report.heading("Landmarks")
     rows = []
     for name, n in numbers.items():

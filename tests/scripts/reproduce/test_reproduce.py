@@ -15,7 +15,6 @@ from scripts.reproduce import theory_data
 from scripts.reproduce.census import Census
 from scripts.reproduce.comparison import below_printed
 from scripts.reproduce.paper_numbers import TABLE_1, TABLE_2, TABLE_3
-from scripts.reproduce.quote import quote
 from scripts.reproduce.runs import Plan, statistics
 from scripts.reproduce.verb import experiment
 from scripts.reproduce.verb import reproduce as verb
@@ -112,23 +111,6 @@ def whole(folder: Path) -> str:
     assert recipe["settings"]["cpu_s"] > 0.0
     assert {"machine", "wall_s"} <= set(recipe["settings"])
     return page
-
-
-def test_a_page_quotes_what_was_run_and_keeps_the_rest(tmp_path):
-    (tmp_path / "office").mkdir()
-    (tmp_path / "office" / "summary.md").write_text("new \\1 numbers\n")
-    page = tmp_path / "page.md"
-    page.write_text("<!-- office -->\nold\n<!-- /office -->\nby hand\n<!-- chairs -->\nkept\n")
-    assert quote(tmp_path, page) == ["office"]
-    told = page.read_text()
-    assert told.startswith("<!-- office -->\n\nnew \\1 numbers\n\n<!-- /office -->\nby hand\n")
-    assert told.endswith("<!-- chairs -->\nkept\n")
-    assert quote(tmp_path, page) == ["office"]
-    assert page.read_text() == told
-    (tmp_path / "chairs").mkdir()
-    (tmp_path / "chairs" / "summary.md").write_text("more\n")
-    with pytest.raises(InvalidValueError, match="/chairs"):
-        quote(tmp_path, page)
 
 
 def test_without_the_data_it_says_where_to_get_it(tmp_path):
