@@ -200,26 +200,37 @@ def bell(looks: Sequence[int], every_s: float = 0.2) -> tuple[Float, dict[int, F
     return offsets, out
 
 
-def two_sweeps(
-    inputs: Float, start: Float, config: ShuntingConfig, sweeps: int, step: float
-) -> tuple[list[Float], list[Float]]:
-    """The field after each sweep, neuron by neuron and colour by colour (four colours: no two
-    neighbours of the eight share one, so a colour can be updated at once)."""
-    mu = lateral_mu(config.lateral_sum, config.lateral_reach_cells)
-    one, four = start.copy(), start.copy()
-    by_one, by_four = [start.copy()], [start.copy()]
-    rows, columns = start.shape
+def library_sweeps(
+    seen: Observations, config: ShuntingConfig, sweeps: int, step: float
+) -> tuple[list[Float], Float]:
+    """Activities of a new network before and after each sweep of ``Network.integrate`` under one
+    fixed observation, and the input I that this was (all dense, row 0 lowest)."""
+    network, pose = Network(config), np.zeros(3)
+    stamp(network, seen, pose)
+    extent = network.extent()
+    assert extent is not None
+    i0, j0, i1, j1 = extent
+    given = inputs_of(network, (j1 - j0, i1 - i0), i0, j0)
+    out = [_dense(network, extent)]
     for _ in range(sweeps):
-        for j in range(rows):
-            for i in range(columns):
-                at = (slice(j, j + 1), slice(i, i + 1))
-                one[at] = _stepped(one, inputs, at, mu, config, step)
+        stamp(network, seen, pose)
+        network.integrate(seen.view, seen.T_robot_laser, step, write=True)
+        out.append(_dense(network, extent))
+    return out, given
+
+
+def colour_sweeps(inputs: Float, config: ShuntingConfig, sweeps: int, step: float) -> list[Float]:
+    """The same in four colours: neurons two apart are no neighbours, so that all of one colour can
+    be updated at once. Neurons without input stay silent, as in the library."""
+    mu = lateral_mu(config.lateral_sum, config.lateral_reach_cells)
+    x = np.zeros_like(inputs)
+    out = [x.copy()]
+    for _ in range(sweeps):
         for colour in range(4):
             at = (slice(colour // 2, None, 2), slice(colour % 2, None, 2))
-            four[at] = _stepped(four, inputs, at, mu, config, step)
-        by_one.append(one.copy())
-        by_four.append(four.copy())
-    return by_one, by_four
+            x[at] = _stepped(x, inputs, at, mu, config, step)
+        out.append(x.copy())
+    return out
 
 
 def _stepped(
@@ -235,5 +246,7 @@ def _stepped(
                 moved = d[1 + dj : 1 + dj + rows, 1 + di : 1 + di + columns]
                 total += mu / math.hypot(di, dj) * moved[at]
     E = inputs[at] + total
-    out: NDArray[np.float64] = (x[at] + step * E) / (1.0 + step * (config.decay_per_s + E))
-    return out
+    out = (x[at] + step * E) / (1.0 + step * (config.decay_per_s + E))
+    falls = config.threshold * (config.decay_per_s + E) > E
+    silent = (inputs[at] == 0.0) | ((out < config.threshold) & falls)
+    return np.where(silent, 0.0, out)
