@@ -34,6 +34,7 @@ SYSTEMS: dict[str, tuple[str, dict[str, Any]]] = {
     "EKF": ("ekf", {"preset": "corners"}),
     "shunting": ("shunting", {}),
     "shunting, features": ("shunting-features", {}),
+    "shunting, paper preset, beams": ("shunting", {"config": "paper"}),
     "shunting, paper preset": ("shunting-features", {"config": "paper"}),
 }
 EVERY_SCAN, EVERY_BEAM = 8, 4  # of the raw points kept for the figure

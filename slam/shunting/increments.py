@@ -28,6 +28,11 @@ MEMORY, MEMORY_S = 100.0, 20.0  # frames, or s if that is longer, that are avera
 WILD = 16.0  # a squared innovation counts up to so many times its expectation
 
 
+def _noise_share(cell_m: float) -> float:
+    """Variance of a match by the noise of its beams over what the overlaps' curvature claims."""
+    return (SENSOR_SIGMA_M / (SIGMA_CELLS * cell_m)) ** 2 / 2.0
+
+
 class Increments:
     """Predicts, and learns from what became of it.
 
@@ -52,18 +57,19 @@ class Increments:
     @classmethod
     def of_beams(cls, cell_m: float) -> Self:
         """Matches of scans, whose information is the curvature of overlaps between bells."""
-        noise_share = (SENSOR_SIGMA_M / (SIGMA_CELLS * cell_m)) ** 2 / 2.0
-        return cls(noise_share, least_stated=LEAST_STATED, bias=TurnBias())
+        return cls(_noise_share(cell_m), least_stated=LEAST_STATED, bias=TurnBias())
 
     @classmethod
-    def of_points(cls) -> Self:
-        """Matches by least squares, whose information is what the covariances of points say.
+    def of_points(cls, cell_m: float | None = None) -> Self:
+        """Matches of points, whose information is what the covariances of points say, or with
+        ``cell_m`` the curvature of overlaps.
 
         A point is off in the same way for many frames (which side of a trunk is seen): odometry
         looks too good beside such matches, and a bias learnt from them is theirs. So a stated
         covariance is never made smaller, and no bias is learnt.
         """
-        return cls(1.0, least_stated=1.0, bias=None)
+        share = 1.0 if cell_m is None else _noise_share(cell_m)
+        return cls(share, least_stated=1.0, bias=None)
 
     def predict(self, T_map_before: Float, before: Odometry, now: Odometry) -> Prediction:
         """The prior of a frame."""

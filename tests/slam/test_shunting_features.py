@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from slam import create, metrics
+from slam import create, metrics, se2
 from slam.errors import InvalidValueError
 from slam.frames import Features, Frame, Odometry
 from slam.points import PointWorld, PointWorldConfig
 from slam.replay import Track
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.featured import FeaturedShuntingSlam
+from slam.shunting.featured import PAPER_REWARD, FeaturedShuntingSlam
 from slam.shunting.impressions import from_features
 from slam.shunting.matching import Match
 from slam.shunting.network import Network
@@ -91,7 +93,8 @@ def test_it_localises_among_moving_points(moving):
 
 def test_options_are_those_of_the_preset():
     system = create("shunting-features", config="paper", cell_m=0.05)
-    assert system.config == ShuntingConfig.paper(cell_m=0.05)
+    assert system.config == ShuntingConfig.paper(cell_m=0.05, reward=PAPER_REWARD)
+    assert create("shunting-features", config="paper", reward=0.3).config == ShuntingConfig.paper()
     with pytest.raises(InvalidValueError, match="nonsense"):
         create("shunting-features", nonsense=1)
     with pytest.raises(InvalidValueError, match="other"):
@@ -155,3 +158,19 @@ def test_odometry_is_never_trusted_more_than_it_states_beside_points():
         system.update(frame.without_truth())
         assert (system._increments.scales >= 1.0).all()
     assert system._increments.bias is None
+
+
+def poses_of(frames: list[Frame], **options: Any) -> np.ndarray:
+    system = create("shunting-features", cell_m=0.03, range_m=12.5, **options)
+    return np.array([system.update(f.without_truth()).T_map_robot for f in frames])
+
+
+def test_the_papers_preset_climbs_the_logarithms_of_eq_13():
+    """Its objective and the weight of a logarithm tell; for least squares neither is there."""
+    frames = list(PointWorld(PointWorldConfig(n_steps=20), seed=2).stream())
+    printed = poses_of(frames, config="paper")
+    assert not np.array_equal(printed, poses_of(frames, config="paper", reward=1.0))
+    assert not np.array_equal(printed, poses_of(frames, config="paper", objective="sum"))
+    T_first_world = se2.inverse(frames[0].truth)
+    truth = np.array([se2.compose(T_first_world, f.truth) for f in frames])
+    assert np.hypot(*(printed - truth)[:, :2].T).max() < 0.15
