@@ -28,8 +28,9 @@ from slam.frames import Float
 
 COLORS = {
     "truth": "#168c5a", "odometry": "#de6e18", "occupancy": "#7a3fb0", "EKF": "#1f61be",
-    "shunting": "#ce2c3c", "shunting, features": "#b8860b", "shunting, paper preset": "#8c6d1f",
-    "known associations": "#5b6472", "graph": "#5b6472", "GPS": "#168c5a",
+    "shunting": "#ce2c3c", "shunting, features": "#e377c2", "shunting, paper preset": "#8c6d1f",
+    "shunting, paper preset, beams": "#d4a017",
+    "known associations": "#17a2b8", "graph": "#5b6472", "GPS": "#168c5a",
 }  # fmt: skip
 
 

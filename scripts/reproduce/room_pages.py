@@ -18,8 +18,8 @@ from slam.frames import Float
 NAMES = tuple(SYSTEMS)
 RULE = (
     f"Failed: RMSE above {FAILED_M} m or {FAILED_RAD} rad, or the SLAM itself says at the end that "
-    "it is lost. “Shunting” sees the beams; “shunting, features” and “shunting, paper preset” see "
-    "point features (the EKF's corners) with IPJC, the latter with the paper's preset."
+    "it is lost. “Shunting” sees the beams, with its own preset and with the paper's; “shunting, "
+    "features” and “shunting, paper preset” see point features (the EKF's corners) with IPJC."
 )
 
 
