@@ -143,7 +143,7 @@ def _maps(ekf: Track, ours: Track) -> dict[str, Any]:
 def reproduce(plan: Plan) -> None:
     """The sweep, the two figures, the table."""
     report = Report("landmarks", plan)
-    steps = max(20, int((80 if plan.quick else 220) * (plan.scale if plan.quick else 1.0)))
+    steps = 60 if plan.quick else 220
     shares = (0.0, PAPER_SHARE, 0.75) if plan.quick else SHARES
     seeds = plan.seed_list()
     runs = report.run(

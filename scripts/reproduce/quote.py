@@ -23,7 +23,6 @@ from slam.files import write_bytes, write_text
 
 PICTURES = "pictures/paper"
 MOST_BYTES = 150_000
-_COLORS = 128
 _PICTURE = re.compile(r"\]\(([\w-]+\.png)\)")
 
 
@@ -62,7 +61,8 @@ def compact(picture: Path, most: int = MOST_BYTES) -> bytes:
     with Image.open(picture) as opened:
         image = opened.convert("RGB")
     while True:
-        few = image.quantize(_COLORS, dither=Image.Dither.NONE)
+        # not the median cut: it drops colours of few pixels, and thin lines are few pixels
+        few = image.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
         few.save(file := io.BytesIO(), "PNG", optimize=True)
         if file.tell() <= most:
             return file.getvalue()

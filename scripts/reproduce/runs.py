@@ -40,7 +40,6 @@ class Plan:
     quick      short runs, to see that all works
     data       folder of the Victoria Park dataset
     processes  that work at the same time
-    scale      share of the lengths of ``quick``; the tests take less of them
     """
 
     out: Path
@@ -48,7 +47,6 @@ class Plan:
     quick: bool = False
     data: Path | None = None
     processes: int = 1
-    scale: float = 1.0
 
     def __post_init__(self) -> None:
         if self.seeds is not None and self.seeds < 1:

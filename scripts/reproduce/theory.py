@@ -32,10 +32,9 @@ STRIDE = 5
 def reproduce(plan: Plan) -> None:
     """All figures of the theory, and their numbers."""
     report = Report("theory", plan)
-    scale = plan.scale if plan.quick else 1.0
-    seconds = max(2.0, (6.0 if plan.quick else 60.0) * scale)
+    seconds = 4.0 if plan.quick else 60.0
     office = thinned(list(stream("office", seed=FIRST_SEED, dynamism=0.5, seconds=seconds)), STRIDE)
-    steps = max(15, int((60 if plan.quick else 220) * scale))
+    steps = 60 if plan.quick else 220
     world = PointWorldConfig(moving=PAPER_SHARE, n_steps=steps)
     points = list(PointWorld(world, seed=FIRST_SEED).stream())
     _lyapunov(report, office, points)

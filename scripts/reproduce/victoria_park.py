@@ -126,7 +126,7 @@ def reproduce(plan: Plan) -> None:
     if plan.data is None:
         raise InvalidValueError(WHERE)
     report = Report("victoria-park", plan)
-    scans = max(150, int(900 * plan.scale)) if plan.quick else 0
+    scans = 900 if plan.quick else 0
     data = str(plan.data)
     _, gps = _read(data, scans)
     victoria_graph.read_graph(data)  # complains now, not after the runs

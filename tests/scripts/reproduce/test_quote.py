@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from PIL import Image
 
 from scripts.reproduce.comparison import paper_table
 from scripts.reproduce.paper_numbers import TABLE_3
-from scripts.reproduce.quote import MOST_BYTES, compact, quote
+from scripts.reproduce.quote import compact, quote
 from scripts.reproduce.report import Report, new_figure
 from scripts.reproduce.runs import Plan
 from slam.errors import InvalidValueError
@@ -55,10 +56,19 @@ def test_its_figures_come_along_and_those_of_before_go(tmp_path: Path):
 
 
 def test_pictures_get_small_whatever_is_in_them(tmp_path: Path):
-    noise = np.random.default_rng(0).integers(0, 256, (600, 900, 3), dtype=np.uint8)
+    noise = np.random.default_rng(0).integers(0, 256, (90, 120, 3), dtype=np.uint8)
     Image.fromarray(noise).save(tmp_path / "noise.png")
-    small = compact(tmp_path / "noise.png")
-    assert 0.3 * MOST_BYTES < len(small) <= MOST_BYTES
+    assert 2_000 < len(compact(tmp_path / "noise.png", most=6_000)) <= 6_000
+
+
+def test_a_colour_of_few_pixels_is_kept(tmp_path: Path):
+    shades = np.random.default_rng(0).integers(0, 256, (400, 600, 1), dtype=np.uint8)
+    image = np.concatenate([np.full_like(shades, 255), shades, shades // 2], axis=2)
+    image[100, 100] = image[200, 300] = (31, 97, 190)
+    Image.fromarray(image).save(tmp_path / "dots.png")
+    with Image.open(io.BytesIO(compact(tmp_path / "dots.png", most=1_000_000))) as small:
+        kept = np.asarray(small.convert("RGB")).astype(int)
+    np.testing.assert_allclose(kept[100, 100], (31, 97, 190), atol=12)
 
 
 def test_the_papers_table_stands_beside_ours_in_the_summary(tmp_path: Path):

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from scripts.output import write_recipe
 from scripts.reproduce import theory_data
+from scripts.reproduce import verb as verbs
 from scripts.reproduce.census import Census
 from scripts.reproduce.comparison import below_printed
 from scripts.reproduce.paper_numbers import TABLE_1, TABLE_2, TABLE_3
 from scripts.reproduce.runs import Plan, statistics
-from scripts.reproduce.verb import experiment
+from scripts.reproduce.verb import EXPERIMENTS, experiment
 from scripts.reproduce.verb import reproduce as verb
 from slam import se2
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
@@ -27,10 +29,6 @@ from slam.shunting.config import ShuntingConfig
 from slam.shunting.impressions import from_features
 
 DT = 0.025
-
-
-def plan_in(folder: Path, **options) -> Plan:
-    return Plan(out=folder, quick=True, scale=0.01, **options)
 
 
 def write_park(folder: Path, duration_s: float = 36.0) -> None:
@@ -78,15 +76,16 @@ def park(tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("name", ["landmarks", "theory", "chairs", "office"])
-def test_each_experiment_leaves_a_page_figures_and_a_recipe(name, tmp_path):
-    experiment(name)(plan_in(tmp_path))
-    whole(tmp_path / name)
-
-
-def test_the_synthetic_park_is_closed_by_both(tmp_path, park):
-    experiment("victoria-park")(plan_in(tmp_path, data=park))
-    page = whole(tmp_path / "victoria-park")
+def test_quick_leaves_pages_figures_and_recipes_of_all_and_closes_the_synthetic_park(
+    tmp_path, park, capsys
+):
+    verb(["all"], quick=True, data=park, out=tmp_path, jobs=1)
+    for name in EXPERIMENTS:
+        whole(tmp_path / name)
+    told = (tmp_path / "summary.md").read_text()
+    assert told.startswith("victoria-park, landmarks, chairs, office, theory together: processor")
+    assert told in capsys.readouterr().out
+    page = (tmp_path / "victoria-park" / "README.md").read_text()
     assert "1 of them outliers" in page
     rmse = {}
     for row in page.partition("## Table 1")[0].splitlines():
@@ -117,13 +116,33 @@ def whole(folder: Path) -> str:
 
 def test_without_the_data_it_says_where_to_get_it(tmp_path):
     with pytest.raises(InvalidValueError, match=r"aa3_gpsx\.mat"):
-        experiment("victoria-park")(plan_in(tmp_path))
+        experiment("victoria-park")(Plan(out=tmp_path))
     with pytest.raises(LogFormatError, match="no Victoria Park here"):
-        experiment("victoria-park")(plan_in(tmp_path, data=tmp_path))
+        experiment("victoria-park")(Plan(out=tmp_path, data=tmp_path))
     with pytest.raises(InvalidValueError, match="--data must be the folder"):
-        plan_in(tmp_path, data=tmp_path / "features_trees.mat")
+        Plan(out=tmp_path, data=tmp_path / "features_trees.mat")
     with pytest.raises(UnknownNameError, match="no experiment is called 'nonsense'"):
         verb(["nonsense"], out=tmp_path)
+
+
+def test_all_without_the_data_says_at_the_end_what_is_left_out(tmp_path, monkeypatch, capsys):
+    def made_up(name: str):
+        return lambda plan: write_recipe(plan.out / name, name, {"cpu_s": 1.0})
+
+    monkeypatch.setattr(verbs, "experiment", made_up)
+    verb(["all"], out=tmp_path)
+    assert capsys.readouterr().out.strip().splitlines()[-1] == (
+        "note: victoria-park is left out: pass --data with the folder of the dataset"
+    )
+    assert (tmp_path / "summary.md").read_text().startswith("landmarks, chairs, office, theory ")
+
+
+def test_a_missing_graph_is_told_before_anything_runs(tmp_path, park):
+    for name in ("features_trees.mat", "aa3_gpsx.mat"):
+        (tmp_path / name).write_bytes((park / name).read_bytes())
+    with pytest.raises(LogFormatError, match=r"no graph_known_association\.txt"):
+        experiment("victoria-park")(Plan(out=tmp_path / "out", data=tmp_path))
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_graph_is_stamped_by_the_distance_driven(park):
