@@ -7,6 +7,7 @@ from typing import Any
 
 from scripts.figures import styled
 from scripts.reproduce.comparison import below_printed, paper_table
+from scripts.reproduce.map_figures import active, legend_below, map_panels, window_over
 from scripts.reproduce.paper_numbers import TABLE_3
 from scripts.reproduce.report import (
     COLORS,
@@ -14,7 +15,6 @@ from scripts.reproduce.report import (
     draw_activities,
     draw_ellipses,
     error_axes,
-    new_figure,
 )
 from scripts.reproduce.room_pages import (
     RULE,
@@ -79,18 +79,25 @@ def reproduce(plan: Plan) -> None:
 def fig11(run: Run, title: str) -> Any:
     """(a) EKF, (b) shunting on beams, (c) on features with the paper preset."""
     a = run.arrays
-    figure, axes = new_figure(15.0, 5.2, columns=3, sharex=True, sharey=True)
     names = ("EKF", "shunting", "shunting, paper preset")
+    maps = {
+        name: (a[f"activities {name}"], a[f"origin {name}"], float(a[f"cell {name}"]))
+        for name in names
+        if f"activities {name}" in a
+    }
+    things = [a["truth"], a["ellipses EKF"], *(a[f"poses {name}"] for name in names)]
+    whole = window_over([*things, *(active(*drawn) for drawn in maps.values())])
+    figure, axes = map_panels([whole], columns=3, width=14.0)
     for ax, letter, name in zip(axes, "abc", names, strict=True):
         if name == "EKF":
-            draw_ellipses(ax, a["ellipses EKF"], label="landmark, 3 σ")
-        elif f"activities {name}" in a:
-            origin, cell = a[f"origin {name}"], float(a[f"cell {name}"])
-            image = draw_activities(ax, a[f"activities {name}"], origin, cell, "Greys")
+            draw_ellipses(ax, a["ellipses EKF"], label="landmark, 3 σ", dot=1.0)
+        elif name in maps:
+            image = draw_activities(ax, *maps[name], "Greys")
+            figure.colorbar(image, ax=ax, label="activity", shrink=0.8)
         ax.plot(*a["truth"].T[:2], "-", color=COLORS["truth"], lw=1.0, label="true path")
         ax.plot(*a[f"poses {name}"].T[:2], "--", color="#1f61be", lw=1.0, label="estimated path")
-        ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title=f"({letter}) {name}")
-        ax.legend(loc="upper right", fontsize=7)
-    figure.colorbar(image, ax=axes[2], shrink=0.7, label="activity")
+        whole.show(ax)
+        ax.set(title=f"({letter}) {name}")
+    legend_below(figure, axes)
     figure.suptitle(title)
     return figure

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from scripts.figures import styled
 from scripts.reproduce.report import Report, draw_activities, new_figure
 from scripts.reproduce.room_pages import (
@@ -47,14 +49,16 @@ def fig13(run: Run, name: str) -> Any:
     figure, axes = new_figure(10.5, 6.5)
     ax = axes[0]
     ax.grid(visible=False)
-    ax.plot(*a["raw"].T, ".", color="#1f61be", ms=0.8, alpha=0.6, label="raw LIDAR", zorder=3)
+    # beneath the activities, which cover it only as far as they are high
+    ax.plot(*a["raw"].T, ".", color="#1f61be", ms=6.0, mew=0.0, label="raw LIDAR", zorder=1)
     origin, cell = a[f"origin {name}"], float(a[f"cell {name}"])
     image = draw_activities(ax, a[f"activities {name}"], origin, cell, "YlOrRd")
-    image.set_zorder(2)
+    activities = a[f"activities {name}"].astype(np.float32)
+    image.set(zorder=2, alpha=np.clip(0.3 + 1.5 * activities, 0.0, 1.0))
     ax.plot(*a[f"poses {name}"].T[:2], "k.", ms=2.0, label="trajectory", zorder=4)
     low, high = a["raw"].min(axis=0) - 0.5, a["raw"].max(axis=0) + 0.5
     ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title=f"Office, {name}")
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     figure.colorbar(image, ax=ax, shrink=0.7, label="activity")
-    ax.legend(loc="upper right", fontsize=8, markerscale=6.0)
+    ax.legend(loc="upper right", fontsize=8, markerscale=2.0)
     return figure

@@ -28,9 +28,9 @@ from slam.frames import Float
 
 COLORS = {
     "truth": "#168c5a", "odometry": "#de6e18", "occupancy": "#7a3fb0", "EKF": "#1f61be",
-    "shunting": "#ce2c3c", "shunting, features": "#e377c2", "shunting, paper preset": "#8c6d1f",
+    "shunting": "#ce2c3c", "shunting, features": "#e377c2", "shunting, paper preset": "#12a3b4",
     "shunting, paper preset, beams": "#d4a017",
-    "known associations": "#17a2b8", "graph": "#5b6472", "GPS": "#168c5a",
+    "known associations": "#5b6472", "graph": "#111111", "GPS": "#168c5a",
 }  # fmt: skip
 
 
@@ -140,17 +140,17 @@ def new_figure(width: float, height: float, rows: int = 1, columns: int = 1, **o
     return figure, np.atleast_1d(figure.subplots(rows, columns, **options)).ravel()
 
 
-def draw_ellipses(ax: Axes, ellipses: Float, color: str = "black", label: str = "") -> None:
+def draw_ellipses(ax: Axes, ellipses: Float, *, label: str = "", dot: float = 2.5) -> None:
     """(n, 5) centre, half axes, direction; a dot in each so that tiny ones are seen."""
     if len(ellipses):
         ax.add_collection(
             EllipseCollection(
                 2.0 * ellipses[:, 2], 2.0 * ellipses[:, 3], np.degrees(ellipses[:, 4]),
                 units="xy", offsets=ellipses[:, :2], offset_transform=ax.transData,
-                facecolors="none", edgecolors=color, linewidths=0.9,
+                facecolors="none", edgecolors="black", linewidths=0.9,
             )
         )  # fmt: skip
-    ax.plot(ellipses[:, 0], ellipses[:, 1], ".", color=color, ms=2.5, label=label)
+    ax.plot(ellipses[:, 0], ellipses[:, 1], ".", color="black", ms=dot, label=label)
 
 
 def draw_activities(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,13 @@ import numpy as np
 from scripts.figures import styled
 from scripts.reproduce.census import landmarks_of
 from scripts.reproduce.comparison import paper_table
+from scripts.reproduce.map_figures import (
+    active,
+    legend_below,
+    map_panels,
+    window_about,
+    window_over,
+)
 from scripts.reproduce.paper_numbers import TABLE_1
 from scripts.reproduce.park_landmarks import GATE_M, NEAR_M, landmark_numbers
 from scripts.reproduce.park_scores import (
@@ -29,7 +37,6 @@ from scripts.reproduce.report import (
     draw_activities,
     draw_ellipses,
     error_axes,
-    new_figure,
 )
 from scripts.reproduce.runs import Plan, Run, job, save_run
 from slam import create, se2
@@ -216,32 +223,36 @@ def _page(report: Report, numbers: dict[str, dict[str, Any]], gps: GpsTrack) -> 
 
 
 def fig6(by_name: dict[str, Run], tracks: dict[str, Trajectory], gps: GpsTrack) -> Any:
-    """Both maps whole, and a square of each."""
-    figure, axes = new_figure(12.0, 11.0, rows=2, columns=2)
-    for column, name in enumerate(("EKF", "shunting")):
-        a, track = by_name[name].arrays, tracks[name]
-        T_map_gps = se2.inverse(first_fit(track, gps))
-        fixes = se2.transform(T_map_gps, gps.points[good_fixes(gps)])
-        middle = np.median(track.poses[:, :2], axis=0)
-        for row in range(2):
-            ax = axes[2 * row + column]
-            if "ellipses" in a:
-                draw_ellipses(ax, a["ellipses"], label="landmark, 3 σ")
-            else:
-                cell = float(a["cell"])
-                image = draw_activities(
-                    ax, a["activities"], a["origin"], cell, "Greys", swell=not row
-                )
-            ax.plot(*fixes.T, ".", color=COLORS["GPS"], ms=2.0, label="GPS")
-            ax.plot(*track.poses.T[:2], "-", color="#1f61be", lw=0.9, label="path")
-            ax.set(xlabel="x in m", ylabel="y in m", aspect="equal")
-            if row:
-                ax.set(xlim=middle[0] + np.array([-30, 30]), ylim=middle[1] + np.array([-30, 30]))
-            part = "zoomed" if row else "whole"
-            ax.set(title=f"({'abcd'[2 * row + column]}) {name}, {part}")
-    figure.colorbar(image, ax=axes[3], shrink=0.6, label="activity")
-    axes[0].legend(loc="best", fontsize=8)
+    """Both maps whole, and one square of them."""
+    fixes, things = {}, []
+    for name in ("EKF", "shunting"):
+        a, T_map_gps = by_name[name].arrays, se2.inverse(first_fit(tracks[name], gps))
+        fixes[name] = se2.transform(T_map_gps, gps.points[good_fixes(gps)])
+        things += [fixes[name], tracks[name].poses]
+        things.append(a["ellipses"] if "ellipses" in a else active(*_drawn(a)))
+    middle = np.median(tracks["EKF"].poses[:, :2], axis=0)
+    whole, part = window_over(things), window_about(middle, 20.0)
+    figure, axes = map_panels([whole, part], columns=2, width=11.5)
+    for k, ax in enumerate(axes):
+        name = ("EKF", "shunting")[k % 2]
+        a = by_name[name].arrays
+        if "ellipses" in a:
+            draw_ellipses(ax, a["ellipses"], label="landmark, 3 σ", dot=0.5 if k >= 2 else 2.5)
+        else:
+            image = draw_activities(ax, *_drawn(a), "Greys", swell=k < 2)
+        ax.plot(*fixes[name].T, ".", color=COLORS["GPS"], ms=2.0, label="GPS")
+        ax.plot(*tracks[name].poses.T[:2], "-", color="#1f61be", lw=0.9, label="path")
+        (part if k >= 2 else whole).show(ax)
+        ax.set(title=f"({'abcd'[k]}) {name}, {'framed part' if k >= 2 else 'whole'}")
+    for ax in axes[:2]:
+        part.mark(ax)
+    figure.colorbar(image, ax=list(axes), shrink=0.5, aspect=40, label="activity")
+    legend_below(figure, axes)
     return figure
+
+
+def _drawn(a: Mapping[str, Any]) -> tuple[Any, Float, float]:
+    return a["activities"], a["origin"], float(a["cell"])
 
 
 def broken(seconds: Float, errors: Float) -> tuple[Float, Float]:
