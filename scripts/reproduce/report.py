@@ -109,13 +109,14 @@ class Report:
     def finish(self, title: str) -> None:
         """Write the page and the recipe; the page says on which machine and how long."""
         wall_s = time.perf_counter() - self.started
-        self.cpu_s += time.process_time() - self.cpu_started
+        page_cpu_s = time.process_time() - self.cpu_started
+        self.cpu_s += page_cpu_s
         made_on = machine()
         made, whole = self.made
         kept = f" ({whole - made} of {whole} runs were there already)" if made < whole else ""
         said = (
             f"Processor time of all this {duration(self.cpu_s)}, wall time of this call "
-            f"{duration(wall_s)}{kept} with {self.plan.processes} processes on "
+            f"{duration(wall_s)}{kept}; {self.plan.processes} at a time on "
             f"{made_on['processor']}, {made_on['cores']} cores"
             + (" (quick: too short and too few to conclude from)." if self.plan.quick else ".")
         )
@@ -123,7 +124,8 @@ class Report:
         write_text(self.folder / "README.md", "\n".join(page).rstrip() + "\n")
         summary = [*self.quoted, said]
         write_text(self.folder / "summary.md", "\n".join(summary).rstrip() + "\n")
-        self._write_recipe({"machine": made_on, "wall_s": wall_s, "cpu_s": self.cpu_s})
+        times = {"wall_s": wall_s, "cpu_s": self.cpu_s, "page_cpu_s": page_cpu_s}
+        self._write_recipe({"machine": made_on, **times})
 
     def _write_recipe(self, measured: Mapping[str, Any]) -> None:
         plan = self.plan

@@ -18,16 +18,18 @@ def duration(seconds: float) -> str:
 
 def total(plan: Plan, names: Sequence[str], wall_s: float) -> str:
     """How long these experiments took together, from their recipes."""
-    recipes = [read_recipe_words(plan.out / name / RECIPE) for name in names]
-    cpu_s = sum(recipe["settings"]["cpu_s"] for recipe in recipes)
+    recipes = [read_recipe_words(plan.out / name / RECIPE)["settings"] for name in names]
+    cpu_s = sum(recipe["cpu_s"] for recipe in recipes)
+    one_s = sum(recipe["page_cpu_s"] for recipe in recipes)  # of one process, after the runs
+    two_s = (cpu_s - one_s) / 2.0 + one_s
     made_on = machine()
     told = (
         f"{', '.join(names)} together: processor time {duration(cpu_s)}, that is "
-        f"{duration(cpu_s / 2.0)} on 2 cores; wall time of this call {duration(wall_s)} with "
-        f"{plan.processes} processes on {made_on['processor']}, {made_on['cores']} cores."
+        f"{duration(two_s)} on 2 cores; wall time of this call {duration(wall_s)}, "
+        f"{plan.processes} at a time on {made_on['processor']}, {made_on['cores']} cores."
     )
     if plan.quick:
         return told
     return f"{told} The target is 45 min on 2 cores: " + (
-        "met." if cpu_s / 2.0 <= TARGET_S else "**missed.**"
+        "met." if two_s <= TARGET_S else "**missed.**"
     )

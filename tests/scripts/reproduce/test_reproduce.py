@@ -127,7 +127,7 @@ def test_without_the_data_it_says_where_to_get_it(tmp_path):
 
 def test_all_without_the_data_says_at_the_end_what_is_left_out(tmp_path, monkeypatch, capsys):
     def made_up(name: str):
-        return lambda plan: write_recipe(plan.out / name, name, {"cpu_s": 1.0})
+        return lambda plan: write_recipe(plan.out / name, name, {"cpu_s": 1.0, "page_cpu_s": 0.5})
 
     monkeypatch.setattr(verbs, "experiment", made_up)
     verb(["all"], out=tmp_path)

@@ -62,12 +62,12 @@ def test_a_run_keeps_its_processor_time(tmp_path):
 
 
 def test_time_is_told_of_all_whenever_it_was_spent(tmp_path):
-    for name, cpu_s in (("office", 4000.0), ("theory", 1000.0)):
-        write_recipe(tmp_path / name, name, {"cpu_s": cpu_s})
+    for name, cpu_s, page in (("office", 4000.0, 40.0), ("theory", 200.0, 200.0)):
+        write_recipe(tmp_path / name, name, {"cpu_s": cpu_s, "page_cpu_s": page})
     told = total(Plan(out=tmp_path), ["office", "theory"], 13.0)
-    assert "processor time 83 min, that is 42 min on 2 cores; wall time of this call 13 s" in told
+    assert "processor time 70 min, that is 37 min on 2 cores; wall time of this call 13 s" in told
     assert told.endswith("met.")
-    write_recipe(tmp_path / "office", "office", {"cpu_s": 9000.0})
+    write_recipe(tmp_path / "office", "office", {"cpu_s": 9000.0, "page_cpu_s": 40.0})
     assert total(Plan(out=tmp_path), ["office", "theory"], 13.0).endswith("**missed.**")
 
 
