@@ -17,19 +17,11 @@ import numpy as np
 from scripts.figures import styled
 from scripts.reproduce.census import GATE_M, PEAK, Census, landmarks_of
 from scripts.reproduce.comparison import below_printed, paper_table
-from scripts.reproduce.map_figures import (
-    active,
-    legend_below,
-    map_panels,
-    window_about,
-    window_over,
-)
+from scripts.reproduce.landmark_maps import fig8
 from scripts.reproduce.paper_numbers import TABLE_2
 from scripts.reproduce.report import (
     COLORS,
     Report,
-    draw_activities,
-    draw_ellipses,
     error_axes,
     new_figure,
 )
@@ -250,47 +242,6 @@ def _verdict(by_share: dict[float, list[Run]]) -> str:
         told.append(words if met else f"**{words}: missed**")
     few = "" if len(by_share[PAPER_SHARE]) >= 20 else " These are too few seeds to say."
     return f"Seeds in which shunting beats our EKF, target 17 of 20: {'; '.join(told)}.{few}"
-
-
-def fig8(run: Run) -> Any:
-    """(a) EKF with 3 sigma ellipses, (b) activities of the shunting map; (c), (d) one point of
-    them: whole maps show ellipses of centimetres as dots."""
-    a = run.arrays
-    drawn = (a["activities"], a["origin"], float(a["cell"]))
-    whole = window_over([a["true"], a["truth"], a["ellipses"], active(*drawn)])
-    part = window_about(_typical(a["ellipses"]), 0.15)
-    figure, axes = map_panels([whole, part], columns=2, width=11.0)
-    for k, ax in enumerate(axes):
-        name = ("EKF", "shunting")[k % 2]
-        if name == "EKF":
-            draw_ellipses(ax, a["ellipses"], label="landmark, 3 σ")
-        else:
-            image = draw_activities(ax, *drawn, "Greys", swell=k < 2)
-        ax.plot(*a["true"].T, "+", color=COLORS["truth"], ms=7, mew=1.0, label="true static point")
-        ax.plot(*a["truth"].T[:2], "-", color=COLORS["truth"], lw=0.9, label="true path")
-        ax.plot(*a[f"poses {name}"].T[:2], "--", color="#1f61be", lw=1.0, label="estimated path")
-        (part if k >= 2 else whole).show(ax)
-        titles = ("EKF, IPJC and lifecycle", "shunting on features", "EKF", "shunting")
-        ax.set(title=f"({'abcd'[k]}) {titles[k]}{', one point' if k >= 2 else ''}")
-    for ax in axes[:2]:
-        ax.plot(
-            *_typical(a["ellipses"]),
-            "o",
-            ms=14,
-            mfc="none",
-            mec="#ce2c3c",
-            label="shown in (c), (d)",
-        )
-    figure.colorbar(image, ax=list(axes), shrink=0.5, aspect=40, label="activity")
-    legend_below(figure, axes)
-    return figure
-
-
-def _typical(ellipses: Float) -> Float:
-    """Where the landmark of median uncertainty is."""
-    order = np.argsort(ellipses[:, 2])
-    middle: Float = ellipses[order[len(order) // 2], :2]
-    return middle
 
 
 def fig_sweep(by_share: dict[float, list[Run]]) -> Any:
