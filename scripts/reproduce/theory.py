@@ -11,7 +11,8 @@ import numpy as np
 from scripts.accuracy import thinned
 from scripts.figures import styled
 from scripts.reproduce import theory_data
-from scripts.reproduce.landmarks import PAPER_SHARE, SHUNTING
+from scripts.reproduce.landmarks import PAPER_SHARE
+from scripts.reproduce.point_runs import SHUNTING
 from scripts.reproduce.report import Report, new_figure
 from scripts.reproduce.runs import FIRST_SEED, Plan
 from sim.simulation import stream

@@ -11,7 +11,7 @@ import pytest
 
 from scripts.jobs import _digest, run_jobs
 from scripts.output import write_recipe
-from scripts.reproduce import landmarks, rooms
+from scripts.reproduce import park_runs, point_runs, rooms
 from scripts.reproduce.depends import depends_on
 from scripts.reproduce.runs import Plan, job, load_run, save_run, sign_test, spread
 from scripts.reproduce.times import total
@@ -48,9 +48,12 @@ def test_a_run_depends_on_what_makes_it_and_not_on_pages():
     assert {"slam", "rooms.py", "runs.py", "accuracy.py", "sim", "scenes"} <= depends(
         rooms.run_one, scene="office"
     )
-    points = depends(landmarks.run_one)
-    assert {"slam", "landmarks.py", "census.py"} <= points
-    assert not {"sim", "report.py", "paper_numbers.py", "workers.py"} & points
+    assert {"slam", "point_runs.py", "census.py"} <= depends(point_runs.run_one)
+    for runs in (point_runs, park_runs):
+        made_of = depends(runs.run_one)
+        assert (
+            not {"sim", "landmarks.py", "victoria_park.py", "report.py", "map_figures.py"} & made_of
+        )
 
 
 def test_a_run_keeps_its_processor_time(tmp_path):
