@@ -9,11 +9,12 @@ pairs, and among those for the least joint cost, and differ in how they judge on
   test of a pair at depth k costs O(k^2);
 - ``ipjc`` (Li and Olson 2012): each accepted pair updates the state, and the posterior judges the
   next, linearised where the pairs before have moved it. Any test costs O(1), an acceptance O(c^2)
-  for c candidate landmarks; and as the posterior shows which points no landmark can explain any
-  more, hypotheses that leave out good pairs are cut at once.
+  for c candidate landmarks. After each, all pairs that are left are tested anew: the posterior
+  shows which points no landmark can explain any more, and hypotheses that leave out good pairs are
+  cut at once.
 
 On linear problems the costs of JCBB and IPJC are equal (chain rule of the Gaussian), and so are
-their answers.
+their answers wherever the gate on what a pair adds, which only IPJC has, cuts nothing.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 from slam.ekf import kernels, pairs
 from slam.ekf.filter import EkfFilter
 from slam.ekf.hypotheses import MOST_NODES, Association, Best, Effort, Gates, Ints
-from slam.ekf.ipjc import CUT_SHORT, NODES, TESTS, WORK, Search, visit
+from slam.ekf.ipjc import CUT_SHORT, NODES, TESTS, Search, visit
 from slam.ekf.jcbb import Jcbb
 from slam.frames import Float
 
@@ -39,7 +40,7 @@ def individual(
     """Nearest neighbours: the cheapest pair of all first, each point and landmark once."""
     costs = _prior_costs(state, chosen, points, covariances, gates)
     landmarks, plausible = np.full(len(points), -1), _any(costs)
-    effort, total = Effort(tests=costs.size, work=50 * costs.size), 0.0
+    effort, total = Effort(tests=costs.size), 0.0
     while costs.size and np.isfinite(costs.min()):
         k, j = np.unravel_index(int(costs.argmin()), costs.shape)
         total += float(costs[k, j])
@@ -68,8 +69,8 @@ def ipjc(
     costs = _prior_costs(state, chosen, points, covariances, gates)
     columns = np.flatnonzero(np.isfinite(costs).any(axis=0))
     near, order = chosen[columns], _order(costs)
-    k, counts = len(order), np.zeros(5, dtype=np.int64)
-    counts[TESTS], counts[WORK] = costs.size, 50 * costs.size
+    k, counts = len(order), np.zeros(4, dtype=np.int64)
+    counts[TESTS] = costs.size
     search = Search(
         points=points[order],
         covariances=covariances[order],
@@ -94,7 +95,6 @@ def ipjc(
         effort=Effort(
             nodes=int(counts[NODES]),
             tests=int(counts[TESTS]),
-            work=int(counts[WORK]),
             complete=not counts[CUT_SHORT],
         ),
     )

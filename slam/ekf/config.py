@@ -19,12 +19,13 @@ class EkfConfig:
     association          "ipjc" (incremental posterior joint compatibility), "jcbb", "individual"
     individual_gate      a pair alone must lie within this probability of chi-square, 2 dof
     joint_gate           k pairs together, 2 k dof
-    posterior_gate       a pair given the pairs accepted before it, 2 dof. All three are wide: the
-                         first pairs carry the whole error of the odometry, and a step beyond the
-                         gate, one of a thousand at 0.999, would be a step without landmarks
+    posterior_gate       a pair given the pairs accepted before it, 2 dof; IPJC alone. All three are
+                         wide: the first pairs carry the whole error of the odometry, and a step
+                         beyond the gate, one of a thousand at 0.999, would be a step without
+                         landmarks
     noise_scale          factor on the standard deviations of features: the share of linearisation
                          errors, which a 1 mm sensor after steps of 0.1 m and 0.03 rad needs
-    range_m, fov_deg     what the sensor of features sees; farther features are not used
+    range_m, fov_deg     what the sensor of features sees; features beyond are not used
     occluder_m           half width of the things behind which a landmark is hidden, m
     confirm_looks        observations that make an object a landmark; the paper: re-observed once
     detection            probability that a landmark in view is seen

@@ -27,7 +27,7 @@ class Gates:
 
     individual  a pair under the prior, 2 dof
     joint       k pairs, 2 k dof
-    posterior   what one more pair adds to the joint cost, 2 dof
+    posterior   what one more pair adds to the joint cost, 2 dof; only IPJC has this one
     """
 
     individual: float = 0.999999
@@ -49,12 +49,11 @@ class Gates:
 
 @dataclass(kw_only=True)
 class Effort:
-    """What a search did: ``nodes`` looked into, ``tests`` of a pair, and ``work``, the
-    multiplications of tests and acceptances to leading order; ``complete`` unless cut short."""
+    """What a search did: ``nodes`` looked into and ``tests`` of a pair, each counted where it is
+    made; ``complete`` unless cut short."""
 
     nodes: int = 0
     tests: int = 0
-    work: int = 0
     complete: bool = True
 
 

@@ -15,7 +15,7 @@ from slam.ekf.pairs import distances
 Float = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-PAIRS, NODES, TESTS, WORK, CUT_SHORT = range(5)  # places in ``Search.counts``
+PAIRS, NODES, TESTS, CUT_SHORT = range(4)  # places in ``Search.counts``
 
 
 class Search(NamedTuple):
@@ -28,7 +28,7 @@ class Search(NamedTuple):
     most_nodes           hypotheses looked into
     chosen, taken        (k,) place of each point's landmark or -1, (n,): the hypothesis looked into
     best, best_cost      (k,), (1,): the best one so far
-    counts               (5,) pairs of the best one; nodes, tests, work; 1 if it was cut short
+    counts               (4,) pairs of the best one; nodes; tests of a pair; 1 if it was cut short
     """
 
     points: Float
@@ -63,7 +63,6 @@ def _judge(
             wanted[i, j] = search.plausible[i, j] and not search.taken[j]
             tests += wanted[i, j]
     search.counts[TESTS] += tests
-    search.counts[WORK] += 50 * tests
     # No joint cost ever falls: what is too dear now is too dear with any pairs to come.
     limit = search.together[pairs + len(wanted) - first] - cost
     return distances(
@@ -117,7 +116,6 @@ def visit(
             if dearer > search.together[pairs + 1]:
                 break
             if _better(search, pairs + left, dearer):
-                counts[WORK] += 8 * len(P) ** 2
                 now = (pose.copy(), landmarks.copy(), P.copy())
                 z, R = search.points[i : i + 1], search.covariances[i : i + 1]
                 added = absorb(now[0], now[1], len(landmarks), now[2], np.array([j]), z, R)

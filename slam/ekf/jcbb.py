@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joint compatibility branch and bound (Neira and Tardos 2001): the reference, for small sets."""
+"""Joint compatibility branch and bound (Neira and Tardos 2001): the reference, for small sets.
+
+As published: pairs within the individual gate, hypotheses within the joint gate, and no other one.
+"""
 
 from __future__ import annotations
 
@@ -60,12 +63,10 @@ class Jcbb:
             if not np.isfinite(self.costs[k, j]) or j in taken:
                 continue
             grown, whitened = self._grow(k, j, pairs, L, white)
-            added = float((whitened[-2:] ** 2).sum())
-            count = len(pairs) + 1
-            if added <= self.gates.added() and cost + added <= self.gates.together(count):
-                left = len(self.order) - depth - 1
-                if self._promising(count + left, cost + added):
-                    self.visit(depth + 1, [*pairs, (k, j)], grown, whitened, cost + added)
+            total = cost + float((whitened[-2:] ** 2).sum())
+            count, left = len(pairs) + 1, len(self.order) - depth - 1
+            if total <= self.gates.together(count) and self._promising(count + left, total):
+                self.visit(depth + 1, [*pairs, (k, j)], grown, whitened, total)
         if self._promising(len(pairs) + len(self.order) - depth - 1, cost):
             self.visit(depth + 1, pairs, L, white, cost)
 
@@ -75,9 +76,7 @@ class Jcbb:
     def _grow(
         self, k: int, j: int, pairs: list[tuple[int, int]], L: Float, white: Float
     ) -> tuple[Float, Float]:
-        size = len(L)
         self.best.effort.tests += 1
-        self.best.effort.work += (size + 2) ** 2
         rows = slice(2 * j, 2 * j + 2)
         columns = np.array([(2 * i, 2 * i + 1) for _, i in pairs], dtype=np.int64).ravel()
         cross, own = self.S[rows][:, columns], self.S[rows, rows] + self.covariances[k]
@@ -88,7 +87,8 @@ class Jcbb:
 def grow(L: Float, white: Float, cross: Float, own: Float, fresh: Float) -> tuple[Float, Float]:
     """Cholesky factor and whitened innovation with two more rows.
 
-    cross (2, n) and own (2, 2) are their covariances, fresh (2,) their innovation.
+    cross (2, n) and own (2, 2) are their covariances, fresh (2,) their innovation. Where these have
+    no positive definite covariance the new rows are infinite: no gate lets them pass.
     """
     n = len(L)
     grown, whitened = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
@@ -105,6 +105,9 @@ def grow(L: Float, white: Float, cross: Float, own: Float, fresh: Float) -> tupl
         left = own[i, i]
         for j in range(n + i):
             left -= row[j] * row[j]
+        if not left > 0.0:
+            whitened[n:] = np.inf
+            return grown, whitened
         row[n + i] = math.sqrt(left)
         whitened[n + i] /= row[n + i]
     return grown, whitened

@@ -25,7 +25,7 @@ def distances(
 ) -> Float:
     """(k, n) posterior cost of each ``wanted`` (k, n) pair of a point and a landmark.
 
-    inf where not wanted, beyond ``gate`` or beyond ``limit``. Costs are those of
+    inf where not wanted, beyond ``gate``, beyond ``limit`` or singular. Costs are those of
     ``kernels.linearise`` for one pair: O(1) each, whatever the size of the state. Pairs far beyond
     the gate even with a bound on the curvature of h are not iterated.
     """
@@ -53,7 +53,10 @@ def distances(
             u, v = z[k, 0] - x, z[k, 1] - y
             bend = 2.0 * M[2, 2] * (u * u + v * v)
             s00, s11, s01 = p00 + R[k, 0, 0] + bend, p11 + R[k, 1, 1] + bend, p01 + R[k, 0, 1]
-            rough = (s11 * u * u - 2.0 * s01 * u * v + s00 * v * v) / (s00 * s11 - s01 * s01)
+            determinant = s00 * s11 - s01 * s01
+            if not determinant > 0.0:
+                continue
+            rough = (s11 * u * u - 2.0 * s01 * u * v + s00 * v * v) / determinant
             if rough > 2.0 * gate:
                 continue
             cost = pair_cost(pose, landmarks[j], M, z[k], R[k])

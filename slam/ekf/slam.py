@@ -31,6 +31,8 @@ from slam.shunting.motion import assumed_covariance
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
 
+SINGULAR_M2 = 1e-12  # least eigenvalue of a feature's covariance: below it, nobody measured it
+LEAST_M2 = 1e-6  # and 1 mm is taken: finer, the filter's linearisation would not keep up
 LOST_AFTER = 10  # frames in a row in which landmarks should be seen and none is
 PRESETS: dict[str, Callable[..., EkfConfig]] = {
     "points": EkfConfig,
@@ -144,9 +146,14 @@ class EkfSlam:
         return self._used(features)
 
     def _used(self, features: Features) -> tuple[Float, Float]:
-        points = features.points_robot
-        used = polar(points)[0] <= self.config.range_m
-        return points[used], features.covariances[used] * self.config.noise_scale**2
+        """Features within range and field of view, their rim included: a thing beyond it would be
+        left behind in the next frame. Their covariances, none of them singular."""
+        points, config = features.points_robot, self.config
+        distance, bearing = polar(points)
+        used = distance <= config.range_m
+        if config.fov_deg < 360.0:
+            used &= np.abs(bearing) < WITHOUT * math.radians(config.fov_deg) / 2.0
+        return points[used], _regular(features.covariances[used] * config.noise_scale**2)
 
     def _predict(self, odometry: Odometry) -> None:
         if self._before is not None:
@@ -260,3 +267,15 @@ class EkfSlam:
             stamps_ns=np.array(self._stamps, dtype=np.int64),
             poses=np.array(self._poses).reshape(-1, 3),
         )
+
+
+def _regular(covariances: Float) -> Float:
+    """(k, 2, 2) with more on the diagonal where they are singular, the others bit for bit: exact
+    features, or features exact in one direction, must not end a run."""
+    xx, yy, xy = covariances[:, 0, 0], covariances[:, 1, 1], covariances[:, 0, 1]
+    half, apart = 0.5 * (xx + yy), 0.5 * (xx - yy)
+    scale = np.maximum(half, 1.0)
+    flat = half - np.sqrt(apart * apart + xy * xy) < SINGULAR_M2 * scale
+    out = covariances.copy()
+    out[flat] += LEAST_M2 * scale[flat, None, None] * np.eye(2)
+    return out

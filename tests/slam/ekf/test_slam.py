@@ -9,6 +9,7 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -54,10 +55,10 @@ def test_it_is_registered():
 def test_the_static_run_with_ipjc_is_accurate_and_consistent():
     """The rival's bar: 0.05 m, NEES about 3, every landmark where it is and none deleted.
 
-    The last two seeds have odometry errors of 3.5 sigma, beyond gates of the usual width.
+    The last two seeds have odometry errors of 4.5 and 4 sigma, beyond gates of the usual width.
     """
     nees = []
-    for seed in (0, 1, 2, 3, 4, 5, 114, 118):
+    for seed in (*range(10), 78, 90):
         world = PointWorld(PointWorldConfig(), seed=seed)
         system = EkfSlam()
         errors, squares = run(system, world.stream())
@@ -69,7 +70,7 @@ def test_the_static_run_with_ipjc_is_accurate_and_consistent():
         assert away.min(axis=1).max() < 0.1
         assert len(np.unique(away.argmin(axis=1))) == len(landmarks.keys)  # none twice
         assert system.lifecycle.deleted <= 1
-    assert 1.5 < np.mean(nees) < 5.0
+    assert 2.0 < np.mean(nees) < 4.5
 
 
 def test_half_of_the_points_may_move():
@@ -109,6 +110,57 @@ def test_corners_of_an_arena_are_enough():
     assert ellipses.shape == (len(system.landmarks().keys), 5)
     assert np.all(ellipses[:, 2] >= ellipses[:, 3])
     assert np.all(ellipses[:, 3] > 0.0)
+
+
+@pytest.mark.parametrize("association", ["ipjc", "jcbb", "individual"])
+@pytest.mark.parametrize("exact_odometry", [True, False])
+@pytest.mark.parametrize("exact_in", ["all", "range"])
+def test_exact_features_and_odometry_do_not_end_a_run(association, exact_odometry, exact_in):
+    """Covariances of rank 0 and 1, as a simulator may state them."""
+    odometry_std = (1e-9, 1e-9) if exact_odometry else (0.1, 0.03)
+    config = PointWorldConfig(n_steps=12, sensor_std=(1e-9, 1e-9), odometry_std=odometry_std)
+    frames = []
+    for frame in PointWorld(config, seed=0).stream():
+        points, odometry = frame.features.points_robot, frame.odometry
+        covariances = np.zeros((len(points), 2, 2))
+        if exact_in == "range":
+            for k, (x, y) in enumerate(points):
+                covariances[k] = 1e-6 * np.array([[y * y, -x * y], [-x * y, x * x]])
+        if exact_odometry and odometry.increment_covariance is not None:
+            odometry = replace(odometry, increment_covariance=np.zeros((3, 3)))
+        features = replace(frame.features, covariances=covariances)
+        frames.append(replace(frame, features=features, odometry=odometry))
+    system = EkfSlam(association=association)
+    errors = [
+        system.update(frame.without_truth()).T_map_robot - se2.between(frames[0].truth, frame.truth)
+        for frame in frames
+    ]
+    assert rmse(np.array(errors)) < 0.02
+    assert len(system.landmarks().keys) > 10
+
+
+def test_ordinary_covariances_are_taken_as_they_are():
+    frame = next(iter(PointWorld(seed=0).stream()))
+    system = EkfSlam(noise_scale=1.0)
+    system.update(frame.without_truth())
+    np.testing.assert_array_equal(
+        system.filter.landmark_covariances(),
+        0.5 * (frame.features.covariances + frame.features.covariances.transpose(0, 2, 1)),
+    )
+
+
+@pytest.mark.parametrize(("fov_deg", "known"), [(180.0, 1), (360.0, 3)])
+def test_what_lies_beyond_the_field_of_view_is_not_used(fov_deg, known):
+    """Else a candidate there would be left behind in the next frame, again and again."""
+    system = EkfSlam(fov_deg=fov_deg, confirm_looks=3)
+    for k in range(5):
+        odometry = Odometry(stamp_ns=k, T_odom_robot=np.zeros(3))
+        points = np.array([[3.0, 1.0], [-1.0, 3.0], [-2.0, 0.1], [30.0, 0.0]])
+        covariances = np.tile(np.eye(2) * 1e-4, (4, 1, 1))
+        features = Features(stamp_ns=k, points_robot=points, covariances=covariances)
+        system.update(Frame(stamp_ns=k, odometry=odometry, features=features))
+    assert len(system.filter) == len(system.landmarks().keys) == known
+    assert system.lifecycle.keys.tolist() == list(range(known))
 
 
 def test_ellipses_are_those_of_the_covariance():
