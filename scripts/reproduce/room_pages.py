@@ -59,7 +59,7 @@ def verdict(runs: Sequence[Run]) -> str:
 
 def fig_rmse(groups: Mapping[str, Sequence[Run]]) -> Any:
     """RMSE of each seed, one column of dots for each SLAM."""
-    figure, axes = new_figure(4.5 * len(groups), 4.2, columns=len(groups), sharey=True)
+    figure, axes = new_figure(5.2 * len(groups), 4.4, columns=len(groups), sharey=True)
     for ax, (title, runs) in zip(axes, groups.items(), strict=True):
         for k, name in enumerate(NAMES):
             values = np.array([run.numbers[name]["rmse_m"] for run in runs])
@@ -67,7 +67,7 @@ def fig_rmse(groups: Mapping[str, Sequence[Run]]) -> Any:
             ax.plot(x, values, "o", color=COLORS[name], ms=3.5, alpha=0.7)
             ax.plot([k - 0.35, k + 0.35], [np.median(values)] * 2, color=COLORS[name], lw=2.0)
         ax.set(yscale="log", title=title)
-        ax.set_xticks(range(len(NAMES)), [n.replace(", ", ",\n") for n in NAMES], fontsize=7)
+        ax.set_xticks(range(len(NAMES)), [n.replace(" ", "\n") for n in NAMES], fontsize=7)
         ax.axhline(FAILED_M, color="black", lw=0.7, ls=":")
     axes[0].set(ylabel="RMSE of the position in m (dotted: failed)")
     return figure
