@@ -36,10 +36,9 @@ USUAL_M = 0.002  # that residual
 # Weight of the surfaces in view of a room, for which the constants above hold (a beam counts for
 # one where it stands for 0.1 m of surface), and the least share of it.
 WHOLE, LEAST_SHARE = 75.0, 0.005
-WRITTEN = (
-    0.5  # of what a match takes off odometry's error the share that the map keeps, in units of
-)
-# the share of the map in view that was written within CORRELATED_S
+# Of what a match takes off odometry's error the map keeps so many times the share of it that this
+# look writes.
+WRITTEN = 2.4
 CORRELATED_S = 1.0  # for so long the shared error of a scan stays the same
 
 
@@ -129,7 +128,7 @@ class Belief:
             prediction.covariance,
             data,
             (variance * strength, NEW_TIMES**2 * new * variance * strength, frames, TURN_TIMES),
-            min(WRITTEN * new * frames, 1.0),
+            min(WRITTEN * new, 1.0),
         )
         self.covariance = self._drift + self._blind + self._shared
 

@@ -315,4 +315,4 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
         left[new] = belief.covariance[0, 0] / blind
         assert np.linalg.eigvalsh(belief.covariance)[0] > 0.0
     assert left[0.0] < 0.05
-    assert left[0.2] == pytest.approx(0.5, abs=0.05)  # 0.5 x 0.2 x 5 scans a second
+    assert left[0.2] == pytest.approx(2.4 * 0.2, abs=0.05)
