@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +29,10 @@ EVERY = 10  # steps between two looks at which landmarks there are
 SHUNTING: dict[str, Any] = {"cell_m": 0.01, "range_m": 12.5, "freeze_below": 0.0}
 
 
-def with_known_associations(frames: Sequence[Frame], static: set[int]) -> tuple[Trajectory, Float]:
-    """The floor: the same filter, told which point is which and which ones never move."""
+def told(frames: Sequence[Frame], static: set[int]) -> Iterator[EkfFilter]:
+    """The EKF's filter after each frame, told which point is which and which ones never move."""
     state, before = EkfFilter(), None
     index: dict[int, int] = {}
-    poses = []
     for frame in frames:
         covariance = frame.odometry.increment_covariance
         if before is not None and covariance is not None:
@@ -49,6 +48,13 @@ def with_known_associations(frames: Sequence[Frame], static: set[int]) -> tuple[
         state.update(which, seen.points_robot[old], covariances[old])
         for k, at in zip(new, state.add(seen.points_robot[new], covariances[new]), strict=True):
             index[int(seen.ids[k])] = int(at)
+        yield state
+
+
+def with_known_associations(frames: Sequence[Frame], static: set[int]) -> tuple[Trajectory, Float]:
+    """The floor: online poses and landmarks of the filter that is told."""
+    state, poses = EkfFilter(), []
+    for state in told(frames, static):
         poses.append(state.pose.copy())
     stamps = np.array([frame.stamp_ns for frame in frames])
     return Trajectory(stamps_ns=stamps, poses=np.array(poses)), state.landmarks.copy()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scripts that tune the EKF and that count its corners."""
+"""The scripts that tune the EKF, show its bar, measure association and count corners."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
-from scripts import corner_recall, tune_ekf
+from scripts import association_effort, corner_recall, rival_bar, tune_ekf
 from sim.lidar_config import Lms221Config
 from sim.simulation import Simulation
 from slam.frames import LaserSpec, Scan
+from slam.trajectory import Trajectory
 
 
 def test_trials_are_scored_on_the_training_seeds(tmp_path, monkeypatch):
@@ -28,6 +30,64 @@ def test_trials_are_scored_on_the_training_seeds(tmp_path, monkeypatch):
 
 def test_seeds_that_are_shown_are_never_tuned_on():
     assert max(tune_ekf.TRAINING) < 100
+
+
+def test_the_bar_is_judged_on_both_ways_to_associate():
+    bars = list(rival_bar.points([0, 1], steps=25))
+    assert [bar.met for bar in bars if "ATE" in bar.what] == [True, True]
+    assert len(bars) == 4
+    assert "true associations" in bars[0].line()
+    assert "seeds 0 to 1" in bars[0].line()
+
+
+def test_nees_bounds_are_those_of_chi_square():
+    low, high = rival_bar.nees_bounds(10)
+    np.testing.assert_allclose([10 * low, 10 * high], chi2.ppf([0.025, 0.975], 30))
+
+
+def test_the_score_is_the_error_in_units_of_what_was_said():
+    stamps = np.arange(5)
+    truth = Trajectory(stamps_ns=stamps, poses=np.zeros((5, 3)))
+    poses = np.zeros((5, 3))
+    poses[1:, 0] = 0.2
+    covariances = np.tile(np.diag([0.01, 0.01, 0.01]), (5, 1, 1))
+    covariances[0] = 0.0  # the first pose is exact, and says nothing
+    error, nees = rival_bar.scored(Trajectory(stamps_ns=stamps, poses=poses), covariances, truth)
+    assert error == pytest.approx(0.2 * math.sqrt(0.8))
+    assert nees == pytest.approx(4.0)
+
+
+def test_loops_that_are_not_closed_are_told_with_their_place():
+    errors = np.full(20, 0.5)
+    errors[[3, 7, 8]] = [4.0, 14.9, 5.0]
+    at = 400 * np.arange(20)
+    at[8] = at[7] + 50
+    bar = rival_bar.closed(errors, at, 0)
+    assert not bar.met
+    assert "17 of 20 (85%), worst 14.9 m" in bar.value
+    assert "frames 1200, 2800 to 2850 (2)" in bar.value
+    assert rival_bar.closed(errors[9:], at[9:], 0).met
+    assert not rival_bar.closed(errors[9:], at[9:], 1).met
+
+
+def test_bar_refuses_impossible_numbers_of_seeds(capsys):
+    assert rival_bar.main(["--seeds", "0"]) == 1
+    assert "--seeds must lie in [1, 100], got 0" in capsys.readouterr().err
+
+
+def test_effort_of_association_is_told_for_each_number_of_pairs_and_clutter():
+    lines = list(association_effort.table((4, 6), (0, 2), range(2)))
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    assert rows[0] == [
+        "pairs", "clutter", "JCBB ms", "IPJC ms", "JCBB nodes", "IPJC nodes", "JCBB tests",
+        "IPJC tests",
+    ]  # fmt: skip
+    assert [row[:2] for row in rows[2:]] == [["4", "0"], ["4", "2"], ["6", "0"], ["6", "2"]]
+    assert [float(cell) for cell in rows[2][4:6]] == [5, 4]  # straight down
+    assert float(rows[3][4]) > 5
+    assert all(float(row[2]) > 0.0 for row in rows[2:])
+    single = list(association_effort.depths((2, 5)))
+    assert [line.split("|")[1].strip() for line in single[2:]] == ["2", "5"]
 
 
 def test_truths_lie_where_the_scene_has_them():
