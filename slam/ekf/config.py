@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
+from slam.ekf.hypotheses import Gates
 from slam.errors import InvalidValueError
 
 Association = Literal["ipjc", "jcbb", "individual"]
@@ -74,6 +75,13 @@ class EkfConfig:
             raise InvalidValueError(f"EkfConfig.{name} must be a number, got {value!r}")
         if not low <= value <= high:
             raise InvalidValueError(f"EkfConfig.{name} must lie in [{low}, {high}], got {value}")
+
+    @property
+    def gates(self) -> Gates:
+        """The three together."""
+        return Gates(
+            individual=self.individual_gate, joint=self.joint_gate, posterior=self.posterior_gate
+        )
 
     @classmethod
     def corners(cls, **changes: Any) -> EkfConfig:

@@ -16,7 +16,6 @@ from slam.ekf.association import METHODS
 from slam.ekf.config import EkfConfig
 from slam.ekf.corners import CornerConfig, corners
 from slam.ekf.filter import EkfFilter
-from slam.ekf.hypotheses import Gates
 from slam.ekf.lifecycle import (
     WITHOUT,
     Lifecycle,
@@ -97,11 +96,7 @@ class EkfSlam:
 
     def _configure(self, config: EkfConfig) -> None:
         self.config = config
-        self._gates = Gates(
-            individual=config.individual_gate,
-            joint=config.joint_gate,
-            posterior=config.posterior_gate,
-        )
+        self._gates = config.gates
 
     def reset(self) -> None:
         """Forget everything; the next frame is the origin."""

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.ekf.association import ipjc
+from slam.ekf.config import EkfConfig
 from slam.ekf.corners import corners
 from slam.ekf.filter import EkfFilter
 from slam.ekf.hypotheses import Gates
@@ -48,7 +49,7 @@ LEAST_M2 = 1e-6  # variance of a feature, at least
 # and the lattice widens the bells of feature and peak to some three times their variances, which
 # takes two thirds of what their overlap says of the pose. 2 to 5 does as well.
 PAPER_REWARD = 3.0
-GATES = Gates()
+GATES, CORNER_GATES = Gates(), EkfConfig.corners().gates  # as the EKF takes points, and corners
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,12 +86,14 @@ class FeaturedShuntingSlam(ShuntingSlam):
         """As for the scans, with corners in their place."""
         if frame.features is None and frame.scan is not None:
             features = corners(frame.scan, twist=frame.odometry.twist)
+            self._gates = CORNER_GATES
             frame = dataclasses.replace(frame, scan=None, features=features)
         return super().update(frame)
 
     def reset(self) -> None:
         """Forget everything; the next frame is the origin."""
         super().reset()
+        self._gates = GATES
         exact = self.config.objective == "sum"
         self._increments = Increments.of_points(None if exact else self.config.cell_m)
 
@@ -145,7 +148,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
             free = np.flatnonzero(~accepted)
             if len(chosen) == 0 or len(free) == 0:
                 continue
-            found = ipjc(state, chosen, points[free], covariances[free], GATES).landmarks
+            found = ipjc(state, chosen, points[free], covariances[free], self._gates).landmarks
             pairs = free[found >= 0]
             state.update(found[found >= 0], points[pairs], covariances[pairs])
             accepted[pairs] = True

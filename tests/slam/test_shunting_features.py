@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from slam import create, metrics, se2
+from slam.ekf.config import EkfConfig
 from slam.errors import InvalidValueError
-from slam.frames import Features, Frame, Odometry
+from slam.frames import Features, Frame, LaserSpec, Odometry, Scan
 from slam.points import PointWorld, PointWorldConfig
 from slam.replay import Track
 from slam.shunting.config import ShuntingConfig
@@ -174,3 +175,15 @@ def test_the_papers_preset_climbs_the_logarithms_of_eq_13():
     T_first_world = se2.inverse(frames[0].truth)
     truth = np.array([se2.compose(T_first_world, f.truth) for f in frames])
     assert np.hypot(*(printed - truth)[:, :2].T).max() < 0.15
+
+
+def test_corners_of_scans_are_paired_by_the_gates_that_the_ekf_has_for_them():
+    spec = LaserSpec(n_beams=181, angle_min=-np.pi / 2, angle_increment=np.pi / 180)
+    scan = Scan(stamp_ns=0, ranges=np.full(181, 3.0, np.float32), spec=spec)
+    odometry = Odometry(stamp_ns=0, T_odom_robot=np.zeros(3))
+    system = FeaturedShuntingSlam()
+    assert system._gates == EkfConfig().gates
+    system.update(Frame(stamp_ns=0, odometry=odometry, scan=scan))
+    assert system._gates == EkfConfig.corners().gates
+    system.reset()
+    assert system._gates == EkfConfig().gates
