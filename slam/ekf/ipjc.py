@@ -119,8 +119,9 @@ def visit(
                 now = (pose.copy(), landmarks.copy(), P.copy())
                 z, R = search.points[i : i + 1], search.covariances[i : i + 1]
                 added = absorb(now[0], now[1], len(landmarks), now[2], np.array([j]), z, R)
-                search.chosen[i], search.taken[j] = j, True
-                visit(search, now[0], now[1], now[2], i + 1, pairs + 1, cost + added)
-                search.chosen[i], search.taken[j] = -1, False
+                if added >= 0.0:  # else singular but for rounding: no pair
+                    search.chosen[i], search.taken[j] = j, True
+                    visit(search, now[0], now[1], now[2], i + 1, pairs + 1, cost + added)
+                    search.chosen[i], search.taken[j] = -1, False
             j = _next(costs[i], costs[i, j], j)
         i += 1

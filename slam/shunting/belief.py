@@ -39,6 +39,7 @@ WHOLE, LEAST_SHARE = 75.0, 0.005
 # Of what a match takes off odometry's error the map keeps so many times the share of it that this
 # look writes.
 WRITTEN = 2.4
+FORGOTTEN = 1e-6  # a sum that faded to less holds nothing
 CORRELATED_S = 1.0  # for so long the shared error of a scan stays the same
 
 
@@ -52,11 +53,15 @@ class Belief:
     along_rad     direction in the map of the one that is not observable, None unless it is one
     """
 
-    def __init__(self, cell_m: float) -> None:
+    def __init__(self, cell_m: float, *, whole: float = WHOLE) -> None:
+        """``whole``: weight in view from which on shared errors average out as in a room; 0 for
+        points, which share none.
+        """
         self.covariance: Float = np.zeros((3, 3))
         self.newest_drift: Float = np.zeros((3, 3))
         self.unobservable = 0
         self.along_rad: float | None = None
+        self._whole = whole
         self._lattice = (LATTICE_CELLS * cell_m) ** 2
         self._products, self._pairs = AT_FIRST * USUAL_M**2, AT_FIRST
         self._geometry: Float = np.zeros((3, 3))
@@ -69,9 +74,8 @@ class Belief:
     @property
     def shared_m2(self) -> float:
         """Variance, m^2, of the residual that neighbouring points of a surface share."""
-        if self._pairs == 0.0:  # years since anything was seen
-            return USUAL_M**2
-        return max(self._products, 0.0) / self._pairs
+        # the usual one where nothing was seen for so long that the sums are used up
+        return (max(self._products, 0.0) + FORGOTTEN * USUAL_M**2) / (self._pairs + FORGOTTEN)
 
     def relocated(self, covariance: Float) -> None:
         """Found again somewhere in the map, to within ``covariance`` (3, 3)."""
@@ -108,7 +112,7 @@ class Belief:
             self._learn(evidence, prediction.elapsed)
             strength = match.tau * float(match.information[0, 0] + match.information[1, 1])
             new = evidence.new / max(evidence.weighed, 1e-9)
-        if strength > 0.0 and self._weighed > 0.0:
+        if strength > 0.0 and self._weighed > FORGOTTEN:
             feigned = self._feigned / self._weighed
             geometry = self._geometry * (1.0 / self._weighed)
             self.unobservable, along = observable(geometry, feigned, data)
@@ -134,8 +138,8 @@ class Belief:
 
     def _fewer(self) -> float:
         """By how much the shared errors of surfaces average out less than in a whole room."""
-        seen = self._in_view / max(self._looks, 1e-9)
-        return max(WHOLE / max(seen, LEAST_SHARE * WHOLE), 1.0)
+        seen = self._in_view / max(self._looks, FORGOTTEN)
+        return max(self._whole / max(seen, LEAST_SHARE * WHOLE), 1.0)
 
     def _learn(self, evidence: Evidence, elapsed: float) -> None:
         keep = math.exp(-elapsed / SHARED_S)

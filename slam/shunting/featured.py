@@ -8,7 +8,7 @@ map's activity, those looked at more than once first. Then Eq. (13):
 - preset `paper`, as printed: the sum of the logarithms of overlaps is climbed, over the features
   that were paired, from where the pairs lead;
 - preset `robust`: for pairs of Gaussians these logarithms are squares, so the best pose is that of
-  least squares, found by one iterated update of an `EkfFilter` that knows the peaks as landmarks.
+  least squares, found by iterated updates of an `EkfFilter` that knows the peaks as landmarks.
   Each feature and each peak has a covariance of its own; a peak's is read off the shape of its bell
   and the time it was looked at.
 
@@ -18,6 +18,8 @@ Whatever is seen is written to the map, paired or not.
 from __future__ import annotations
 
 import dataclasses
+from collections import deque
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -31,6 +33,7 @@ from slam.ekf.filter import EkfFilter
 from slam.ekf.hypotheses import Gates
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame
+from slam.shunting.belief import Belief
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.impressions import SIGMA_CELLS, Observations
 from slam.shunting.increments import Increments
@@ -38,7 +41,7 @@ from slam.shunting.matching import Match, seen_by
 from slam.shunting.motion import Prediction, inverted, turned
 from slam.shunting.overlap import evaluate
 from slam.shunting.peaks import Peaks, peaks
-from slam.shunting.slam import ShuntingSlam
+from slam.shunting.slam import FIRST_LOOK_S, LONGEST_LOOK_S, ShuntingSlam
 from slam.system import Estimate, register
 
 LEAST_PEAK = 0.1  # lower activities are no landmark to associate with
@@ -49,6 +52,7 @@ LEAST_M2 = 1e-6  # variance of a feature, at least
 # and the lattice widens the bells of feature and peak to some three times their variances, which
 # takes two thirds of what their overlap says of the pose. 2 to 5 does as well.
 PAPER_REWARD = 3.0
+PRESETS = {"robust": ShuntingConfig.robust, "paper": ShuntingConfig.paper}
 GATES, CORNER_GATES = Gates(), EkfConfig.corners().gates  # as the EKF takes points, and corners
 
 
@@ -71,19 +75,22 @@ class FeaturedShuntingSlam(ShuntingSlam):
 
     def __init__(self, config: ShuntingConfig | str = "robust", **options: Any) -> None:
         """``options`` replace fields of the preset; ``paper`` has ``PAPER_REWARD`` here."""
-        if isinstance(config, str):
-            presets = {"robust": ShuntingConfig.robust, "paper": ShuntingConfig.paper}
-            unknown = sorted(set(options) - set(ShuntingConfig.__dataclass_fields__))
-            if config not in presets or unknown:
-                raise InvalidValueError(
-                    f"FeaturedShuntingSlam knows no preset {config!r} or option {unknown}"
-                )
+        if isinstance(config, ShuntingConfig):
+            if options:
+                raise InvalidValueError("FeaturedShuntingSlam takes a config, or options, not both")
+        elif config in PRESETS and set(options) <= set(ShuntingConfig.__dataclass_fields__):
             own = {"reward": PAPER_REWARD} if config == "paper" else {}
-            config = presets[config](**(own | options))
+            config = PRESETS[config](**(own | options))
+        else:
+            raise InvalidValueError(
+                "FeaturedShuntingSlam takes a ShuntingConfig, or one of the presets "
+                f"{list(PRESETS)} and its options, got {config!r} and {sorted(options)}"
+            )
         super().__init__(config)
 
     def update(self, frame: Frame) -> Estimate:
         """As for the scans, with corners in their place."""
+        self._gates = GATES
         if frame.features is None and frame.scan is not None:
             features = corners(frame.scan, twist=frame.odometry.twist)
             self._gates = CORNER_GATES
@@ -94,10 +101,23 @@ class FeaturedShuntingSlam(ShuntingSlam):
         """Forget everything; the next frame is the origin."""
         super().reset()
         self._gates = GATES
+        self._steps_s: deque[float] = deque(maxlen=20)
+        self._first_counts_s = 0.0
+        self._belief = Belief(self.config.cell_m, whole=0.0)
         exact = self.config.objective == "sum"
         self._increments = Increments.of_points(None if exact else self.config.cell_m)
 
+    def _first(self, frame: Frame) -> Estimate:
+        self._first_counts_s = FIRST_LOOK_S
+        return super()._first(frame)
+
     def _match(self, observations: Observations, prediction: Prediction) -> Match:
+        step = min(max(prediction.elapsed, 1e-3), LONGEST_LOOK_S)
+        self._steps_s.append(step)
+        if self._first_counts_s > 0.0:  # however long it acted, it was one look
+            age = self.network.cells.age
+            age *= np.float32(step / self._first_counts_s)
+            self._first_counts_s = 0.0
         agreed = self._agreed(observations, prediction)
         if int(agreed.accepted.sum()) < ENOUGH_PAIRS:
             return super()._match(observations, prediction)
@@ -135,15 +155,16 @@ class FeaturedShuntingSlam(ShuntingSlam):
         before = self._T_map_robot
         reach = self.config.range_m + 1.0
         marks = peaks(self.network, LEAST_PEAK, centre=before[:2], reach_m=reach)
+        looks = np.maximum(marks.ages_s / median(self._steps_s), 1.0)
         state = EkfFilter()
         state.pose = before.copy()
         state.add(
             se2.transform(se2.inverse(before), marks.points_map),
-            self._places(marks, prediction.elapsed),
+            self._places(marks, looks),
         )
         state.predict(prediction.increment, turned(prediction.prior, -float(before[2])))
         prior = state.pose_covariance()
-        again = marks.ages_s > 1.5 * prediction.elapsed
+        again = looks > 1.5
         for chosen in (np.flatnonzero(again), np.flatnonzero(~again)):
             free = np.flatnonzero(~accepted)
             if len(chosen) == 0 or len(free) == 0:
@@ -158,9 +179,8 @@ class FeaturedShuntingSlam(ShuntingSlam):
             information=inverted(state.pose_covariance()) - inverted(prior),
         )
 
-    def _places(self, marks: Peaks, elapsed: float) -> Float:
+    def _places(self, marks: Peaks, looks: Float) -> Float:
         """(n, 2, 2) how sure the peaks' places are, robot frame: one look's, over their number."""
-        looks = np.maximum(marks.ages_s / max(elapsed, 1e-3), 1.0)
         R = se2.rotation(-float(self._T_map_robot[2]))
         out: Float = np.einsum("ij,njk,lk->nil", R, marks.spreads / looks[:, None, None], R)
         lattice = (PEAK_CELLS * self.config.cell_m) ** 2 * np.eye(2)

@@ -316,3 +316,32 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
         assert np.linalg.eigvalsh(belief.covariance)[0] > 0.0
     assert left[0.0] < 0.05
     assert left[0.2] == pytest.approx(2.4 * 0.2, abs=0.05)
+
+
+@pytest.mark.parametrize("blind_s", [700.0, 16000.0])
+def test_long_blindness_leaves_a_covariance_that_can_be(blind_s: float) -> None:
+    """Faded sums come to stand at the smallest numbers there are; they must count as nothing."""
+    belief, T = Belief(0.05), np.zeros(3)
+    nothing = Evidence(
+        geometry=np.zeros((3, 3)),
+        weighed=0.0,
+        in_view=0.0,
+        shared=0.0,
+        paired=0.0,
+        feigned=0.0,
+        new=0.0,
+    )
+    still = Prediction(
+        T_map_robot=T,
+        increment=T,
+        covariance=np.diag([1e-6, 1e-6, 1e-6]),
+        twist=T,
+        elapsed=0.5,
+    )
+    match = Match(T_map_robot=T, information=1e4 * np.eye(3), matched=1.0, score=0.0, tau=1.0)
+    seen = dataclasses.replace(nothing, geometry=np.eye(3), weighed=1.0, in_view=75.0)
+    belief.update(T, still, match, seen)
+    for _ in range(round(blind_s / still.elapsed)):
+        belief.update(T, still, match, nothing)
+    assert np.isfinite(belief.covariance).all()
+    assert belief.shared_m2 < 1e-4

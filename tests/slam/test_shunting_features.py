@@ -187,3 +187,54 @@ def test_corners_of_scans_are_paired_by_the_gates_that_the_ekf_has_for_them():
     assert system._gates == EkfConfig.corners().gates
     system.reset()
     assert system._gates == EkfConfig().gates
+
+
+@pytest.mark.parametrize("every_s", [0.027, 0.2, 1.0, 10.0])
+def test_a_look_is_a_look_at_any_rate(every_s):
+    """The first frame acts for a second, and none for more than three; each is one look."""
+    points = np.array([[4.0, 1.0], [1.0, -5.0], [-3.0, 2.0]])
+    covariances = np.repeat(0.02**2 * np.eye(2)[None], 3, axis=0)
+    system = Counting(cell_m=0.02, range_m=12.5, freeze_below=0.0, short_term_weight=0.0)
+    for k in range(4):
+        stamp_ns = round(k * every_s * 1e9)
+        features = Features(stamp_ns=stamp_ns, points_robot=points, covariances=covariances)
+        odometry = Odometry(
+            stamp_ns=stamp_ns, T_odom_robot=np.zeros(3), increment_covariance=0.01 * np.eye(3)
+        )
+        system.update(Frame(stamp_ns=stamp_ns, odometry=odometry, features=features))
+        if k > 0:
+            np.testing.assert_allclose(system.looks, k, rtol=0.02)
+
+
+class Counting(FeaturedShuntingSlam):
+    """Keeps how often the peaks were looked at before a frame."""
+
+    looks: np.ndarray
+
+    def _places(self, marks, looks):
+        self.looks = looks
+        return super()._places(marks, looks)
+
+
+def test_it_is_as_sure_on_points_as_it_may_be():
+    values = []
+    for seed in range(4):
+        frames = list(PointWorld(PointWorldConfig(n_steps=120), seed=seed).stream())
+        system = FeaturedShuntingSlam(cell_m=0.01, range_m=12.5, freeze_below=0.0)
+        T_first_world = se2.inverse(frames[0].truth)
+        for k, frame in enumerate(frames):
+            estimate = system.update(frame.without_truth())
+            e = estimate.T_map_robot - se2.compose(T_first_world, frame.truth)
+            e[2] = se2.wrap(float(e[2]))
+            if k > 5:
+                values.append(e @ np.linalg.solve(estimate.covariance, e) / 3.0)
+    assert 0.3 < np.mean(values) < 3.0
+
+
+@pytest.mark.parametrize(
+    ("config", "options"),
+    [(ShuntingConfig.paper(), {"reward": 9.0}), (3, {}), (ShuntingConfig(), {"nonsense": 1})],
+)
+def test_options_beside_a_configuration_and_other_things_are_refused(config, options):
+    with pytest.raises(InvalidValueError, match="FeaturedShuntingSlam takes"):
+        FeaturedShuntingSlam(config, **options)
