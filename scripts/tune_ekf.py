@@ -21,13 +21,17 @@ from typing import Any
 
 import numpy as np
 
+import scenes
+import sim
 import slam
 from scripts.accuracy import thinned
+from scripts.compare.plan import scripts_of, sources
 from scripts.jobs import Job, run_jobs
 from scripts.reproduce.runs import follow, sign_test, truth_of
 from sim.simulation import stream
 from slam import create, metrics
 from slam.ekf.slam import PRESETS
+from slam.errors import InvalidValueError, MobiliaError
 from slam.frames import Float, Frame
 from slam.points import PointWorld, PointWorldConfig
 
@@ -73,6 +77,12 @@ def run_one(
     path.write_text(json.dumps(scores))
 
 
+def made_of(preset: str) -> tuple[Path, ...]:
+    """The code that a run depends on; rooms are simulated for corners only."""
+    called = (slam,) if preset == "points" else (slam, sim, scenes)
+    return (*sources(*called), *scripts_of(__file__, "scripts.tune_ekf"))
+
+
 def tune(
     preset: str, seeds: Sequence[int], folder: Path, processes: int, knobs: Sequence[str]
 ) -> list[tuple[dict[str, Any], Float]]:
@@ -82,13 +92,14 @@ def tune(
     for knob in knobs:
         trials += [{knob: value} for value in VALUES[knob] if value != getattr(frozen, knob)]
     worlds = range(len(WORLDS[preset]))
+    code = made_of(preset)
     jobs = [
         Job(
             name=f"{preset}-{world}-seed-{seed}",
             call=run_one,
             arguments={"preset": preset, "world": world, "seed": seed, "trials": trials},
             suffix=".json",
-            code=(Path(slam.__file__).parent, Path(__file__)),
+            code=code,
         )
         for seed in seeds
         for world in worlds
@@ -130,10 +141,18 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("out/tune-ekf"))
     parser.add_argument("--knobs", nargs="+", choices=list(VALUES), default=list(VALUES))
     wanted = parser.parse_args(arguments)
-    seeds = list(TRAINING)[: wanted.seeds]
-    results = tune(wanted.preset, seeds, wanted.out, wanted.jobs, wanted.knobs)
-    for line in table(wanted.preset, results):
-        print(line)
+    try:
+        if not 1 <= wanted.seeds <= len(TRAINING):
+            raise InvalidValueError(
+                f"--seeds must lie in [1, {len(TRAINING)}], the training seeds, got {wanted.seeds}"
+            )
+        seeds = list(TRAINING)[: wanted.seeds]
+        results = tune(wanted.preset, seeds, wanted.out, wanted.jobs, wanted.knobs)
+        for line in table(wanted.preset, results):
+            print(line)
+    except MobiliaError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
     return 0
 
 

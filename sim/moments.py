@@ -47,14 +47,15 @@ def toured(
 def thinned(moments: Iterable[Moment], every: int) -> Iterator[Moment]:
     """The first of each ``every``, its odometry with the covariance of all motion since the last.
 
-    Zero, where the odometry tells none.
+    None, where the odometry stated none: zero would say that it is exact.
     """
-    spread: Float = np.zeros((3, 3))
+    spread: Float | None = None
     for k, moment in enumerate(moments):
         odometry = moment.frame.odometry
-        if odometry.increment_covariance is not None:
-            spread = spread + odometry.increment_covariance
+        stated = odometry.increment_covariance
+        if stated is not None:
+            spread = stated if spread is None else spread + stated
         if k % every == 0:
             odometry = replace(odometry, increment_covariance=spread)
             yield replace(moment, frame=replace(moment.frame, odometry=odometry))
-            spread = np.zeros((3, 3))
+            spread = None

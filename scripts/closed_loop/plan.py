@@ -3,26 +3,19 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
-from pathlib import Path
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
 from typing import Any
-
-import numpy as np
 
 import scenes
 import sim
 import slam
-from scripts.compare.plan import source_of, sources
+from scripts.closed_loop import runs
+from scripts.compare.plan import scripts_of, source_of, sources
 from scripts.jobs import Job
 from scripts.session import file_name
-from sim.loop import GoalResult, LoopConfig, LoopRun, closed_loop
-from sim.loop.referee import Tally
-from sim.loop.run import goal_order
-from sim.simulation import Simulation
-from slam.errors import InvalidValueError, SlamFailedError
-from slam.guests import Limits, limited
+from sim.loop import LoopConfig
+from slam.errors import InvalidValueError
 
 RUNS = "runs"  # folder of the jobs' files
 MAX_RUNS = 100_000
@@ -69,79 +62,13 @@ class Plan:
         goals = list(self.goals) if isinstance(self.goals, tuple) else self.goals
         return Job(
             name=f"{file_name(self.scene)}_d{level:g}_s{seed}_{file_name(name)}",
-            call=run_one,
+            call=runs.run_one,
             arguments={
                 "scene": self.scene, "dynamism": level, "seed": seed, "slam": name,
                 "goals": goals or None, "loop": asdict(self.loop),
             },
-            code=(*sources(sim, scenes, slam), Path(__file__), *source_of(name)),
+            code=(
+                *sources(sim, scenes, slam), *scripts_of(runs.__file__, runs.__name__),
+                *source_of(name),
+            ),
         )  # fmt: skip
-
-
-def run_one(
-    path: Path,
-    *,
-    scene: str,
-    dynamism: float,
-    seed: int,
-    slam: str,
-    goals: list[str] | int | None,
-    loop: Mapping[str, Any],
-) -> None:
-    """A job: one run, into ``path``. A SLAM that cannot be made has failed at every goal."""
-    simulation = Simulation(scene, seed=seed, dynamism=dynamism)
-    try:
-        system = limited(slam, Limits())
-    except SlamFailedError as error:
-        save(path, _failed(goal_order(simulation.world, goals), error))
-        return
-    run = closed_loop(simulation, system, config=LoopConfig(**loop), goals=goals, name=slam)
-    save(path, run)
-
-
-def _failed(goals: Sequence[str], error: SlamFailedError) -> LoopRun:
-    """The run of a SLAM that never was."""
-    return LoopRun(
-        goals=tuple(
-            GoalResult(goal=goal, outcome="failed", reason=error.outcome, tally=Tally())
-            for goal in goals
-        ),
-        stamps_ns=np.zeros(0, dtype=np.int64),
-        believed=np.zeros((0, 3)),
-        true=np.zeros((0, 3)),
-        commands=np.zeros((0, 2)),
-        trusted=np.zeros(0, dtype=np.bool_),
-        goal_of=np.zeros(0, dtype=np.int64),
-        lost_s=None,
-        found_s=None,
-        failure=(error.outcome, str(error)),
-    )
-
-
-_ARRAYS = ("stamps_ns", "believed", "true", "commands", "trusted", "goal_of")
-
-
-def save(path: Path, run: LoopRun) -> None:
-    """Arrays as they are, goals and the rest as JSON."""
-    arrays = {name: getattr(run, name) for name in _ARRAYS}
-    rest = {f.name: getattr(run, f.name) for f in fields(run) if f.name not in _ARRAYS}
-    rest["goals"] = [asdict(goal) for goal in run.goals]
-    np.savez_compressed(path, **arrays, rest=np.array(json.dumps(rest)))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Driven:
-    """A run read back: who and where, goals and the rest as ``LoopRun`` has them, arrays."""
-
-    identity: Mapping[str, Any]
-    goals: list[dict[str, Any]]
-    rest: Mapping[str, Any]
-    arrays: Mapping[str, Any]
-
-
-def load(path: Path, identity: Mapping[str, Any]) -> Driven:
-    """What ``save`` wrote."""
-    with np.load(path) as file:
-        rest = json.loads(file["rest"].item())
-        arrays = {name: file[name] for name in _ARRAYS}
-    return Driven(identity=identity, goals=rest.pop("goals"), rest=rest, arrays=arrays)

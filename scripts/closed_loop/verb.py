@@ -16,7 +16,8 @@ from rich.table import Table
 from scenes import registry
 from scripts import workers
 from scripts.closed_loop import pictures, tables
-from scripts.closed_loop.plan import RUNS, Driven, Plan, load
+from scripts.closed_loop.plan import RUNS, Plan
+from scripts.closed_loop.runs import Driven, load
 from scripts.compare.folder import write_csv
 from scripts.compare.verb import levels, named
 from scripts.console import console, level_table

@@ -7,13 +7,14 @@ import importlib.util
 import shlex
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import scenes
 import sim
 import slam
-from scripts.compare import columns, entry, maps, places, recording, sight
+from scripts.compare import entry, recording
 from scripts.compare.imports import with_imports
 from scripts.jobs import Job
 from scripts.session import file_name
@@ -26,7 +27,6 @@ from slam.guests.pipe import PREFIX
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
 SCAN_PERIOD_S = 1.0 / 37.5
-_SCORING = (columns, entry, maps, places, sight)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +98,7 @@ class Plan:
 
     def recordings(self) -> dict[str, Job]:
         """The jobs that simulate, by the names of the runs."""
-        code = (*sources(sim, scenes), Path(recording.__file__))
+        code = (*sources(sim, scenes), *scripts_of(recording.__file__, recording.__name__))
         return {
             run.name: Job(
                 name=run.name,
@@ -112,7 +112,7 @@ class Plan:
     def entries(self) -> Iterator[tuple[Run, str, Job]]:
         """The jobs that run a SLAM over a recording: run, SLAM, job."""
         recordings = {name: job.file_name() for name, job in self.recordings().items()}
-        own = (*sources(slam), *(Path(str(m.__file__)) for m in _SCORING))
+        own = (*sources(slam), *scripts_of(entry.__file__, entry.__name__))
         for name in self.slams:
             code = (*own, *source_of(name))
             for run in self.runs():
@@ -132,6 +132,13 @@ class Plan:
 def sources(*packages: Any) -> tuple[Path, ...]:
     """The folders of packages, for ``Job.code``."""
     return tuple(Path(package.__file__).parent for package in packages)
+
+
+@cache
+def scripts_of(file: str, module: str) -> tuple[Path, ...]:
+    """A script and those that it imports, for ``Job.code`` beside the packages that it calls."""
+    folder = Path(__file__).resolve().parents[1]
+    return tuple(path for path in with_imports(Path(file), module) if folder in path.parents)
 
 
 def source_of(slam: str) -> tuple[Path, ...]:

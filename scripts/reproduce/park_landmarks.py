@@ -86,7 +86,8 @@ class Surveyor:
                 if near.sum() < FEWEST:
                     continue
                 known = [fits[k]] if k in fits else [Laid(T_graph_map=places[k].T_graph_map)]
-                fits[k] = self.lay(points[near], [*known, *before])
+                new = self.lay(points[near], [*known, *before])
+                fits[k] = max([*known, new], key=lambda fit: fit.pairs)
                 before = [fits[k]]
         moved = se2.transform(places[-1].T_graph_map, points)
         most = np.full(len(points), -1)

@@ -17,6 +17,7 @@ from scripts.reproduce.runs import (
     truth_of,
 )
 from slam import create, metrics, se2
+from slam.ekf.config import EkfConfig
 from slam.ekf.filter import EkfFilter
 from slam.ekf.slam import EkfSlam
 from slam.frames import Float, Frame
@@ -31,7 +32,7 @@ SHUNTING: dict[str, Any] = {"cell_m": 0.01, "range_m": 12.5, "freeze_below": 0.0
 
 def told(frames: Sequence[Frame], static: set[int]) -> Iterator[EkfFilter]:
     """The EKF's filter after each frame, told which point is which and which ones never move."""
-    state, before = EkfFilter(), None
+    state, before, scale = EkfFilter(), None, EkfConfig().noise_scale
     index: dict[int, int] = {}
     for frame in frames:
         covariance = frame.odometry.increment_covariance
@@ -44,7 +45,7 @@ def told(frames: Sequence[Frame], static: set[int]) -> Iterator[EkfFilter]:
         old = [k for k, i in enumerate(seen.ids.tolist()) if i in index]
         new = [k for k, i in enumerate(seen.ids.tolist()) if i in static and i not in index]
         which = [index[int(seen.ids[k])] for k in old]
-        covariances = seen.covariances * 1.25**2  # as the EKF's noise_scale
+        covariances = seen.covariances * scale**2
         state.update(which, seen.points_robot[old], covariances[old])
         for k, at in zip(new, state.add(seen.points_robot[new], covariances[new]), strict=True):
             index[int(seen.ids[k])] = int(at)

@@ -9,7 +9,8 @@ import json
 import pytest
 
 from scripts.closed_loop import tables
-from scripts.closed_loop.plan import Driven, Plan, load, run_one
+from scripts.closed_loop.plan import Plan
+from scripts.closed_loop.runs import Driven, load, run_one
 from scripts.closed_loop.verb import _goals, _seeds, carry_out
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError, OutputError, UnknownNameError
@@ -46,6 +47,13 @@ def test_a_killed_call_goes_on_and_ends_with_the_same_bytes(tmp_path):
     ]
     recipe = json.loads((tmp_path / "out" / "recipe.json").read_text())
     assert recipe["settings"]["loop"]["limit_s"] == 1.0
+
+
+def test_a_run_depends_on_what_drives_it_and_not_on_tables():
+    ((_, job),) = plan().jobs()
+    names = {path.name for path in job.code}
+    assert {"slam", "sim", "scenes", "runs.py"} <= names
+    assert not {"plan.py", "tables.py", "pictures.py", "film.py"} & names
 
 
 def test_somebody_elses_folder_and_wrong_names_are_refused(tmp_path):

@@ -28,8 +28,20 @@ def test_trials_are_scored_on_the_training_seeds(tmp_path, monkeypatch):
     assert len(lines) == 4 + len(results) - 1
 
 
-def test_seeds_that_are_shown_are_never_tuned_on():
+def test_runs_on_corners_are_made_again_when_the_rooms_change():
+    corners, points = ({p.name for p in tune_ekf.made_of(w)} for w in ("corners", "points"))
+    assert {"slam", "sim", "scenes", "tune_ekf.py", "accuracy.py", "runs.py"} <= corners
+    assert {"slam", "tune_ekf.py", "runs.py"} <= points
+    assert not {"sim", "scenes"} & points
+
+
+@pytest.mark.parametrize("seeds", ["0", "21"])
+def test_seeds_that_are_shown_are_never_tuned_on(seeds, capsys):
     assert max(tune_ekf.TRAINING) < 100
+    assert tune_ekf.main(["points", "--seeds", seeds]) == 1
+    assert (
+        f"--seeds must lie in [1, 20], the training seeds, got {seeds}" in capsys.readouterr().err
+    )
 
 
 def test_the_bar_is_judged_on_both_ways_to_associate():

@@ -109,6 +109,14 @@ def test_after_a_change_in_a_helper_its_runs_are_made_again(own: Path):
     assert files()["own_module:System"] != before["own_module:System"]
 
 
+def test_rows_are_scored_again_when_what_scores_them_changes():
+    plan = Plan(slams=("odometry",), scenes=("arena",), levels=(0.0,), seeds=(1,))
+    ((_, _, job),) = plan.entries()
+    scoring = {"columns.py", "entry.py", "maps.py", "memory.py", "places.py", "sight.py"}
+    assert scoring | {"slam", "statistics.py"} <= {path.name for path in job.code}
+    assert not {"tables.py", "verb.py", "plan.py"} & {path.name for path in job.code}
+
+
 def test_a_good_one_is_charged_its_own_time_and_memory():
     row = scored("none")
     assert row["failure"] is None

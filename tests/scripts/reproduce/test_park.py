@@ -87,6 +87,21 @@ def test_what_a_drifted_map_has_lost_is_counted():
     assert counts == [3, 3, 3, 2]
 
 
+def test_a_place_keeps_its_better_fit(monkeypatch):
+    """On the way back a worse one is offered."""
+    offered = iter([(9, 1.0), (5, 2.0), (5, 3.0), (4, 4.0)])
+
+    def lay(self, points, starts):
+        pairs, x = next(offered)
+        return park_landmarks.Laid(T_graph_map=np.array([x, 0.0, 0.0]), pairs=pairs)
+
+    monkeypatch.setattr(park_landmarks.Surveyor, "lay", lay)
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    place = park_landmarks.Place(here=np.zeros(2), T_graph_map=np.zeros(3))
+    moved = park_landmarks.Surveyor(points).unbent(points, [place, place])
+    np.testing.assert_array_equal(moved, points + np.array([1.0, 0.0]))
+
+
 def test_headings_are_turned_as_positions_are():
     t = np.linspace(0.0, 3.0, 300)
     poses = np.column_stack([60.0 * np.sin(t), 60.0 * (1.0 - np.cos(t)), t])
