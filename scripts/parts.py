@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +30,21 @@ class Part:
     range_m: float | None = None
 
     def __post_init__(self) -> None:
-        for field, value, least in (
+        if isinstance(self.every, bool) or not isinstance(self.every, int):
+            raise InvalidValueError(f"Part.every must be a whole number, got {self.every!r}")
+        limits: tuple[tuple[str, Any, float], ...] = (
             ("every", self.every, 1),
             ("fov_deg", self.fov_deg, 1.0),
             ("range_m", self.range_m, 0.1),
-        ):
-            if value is not None and not (math.isfinite(value) and value >= least):
-                raise InvalidValueError(f"Part.{field} must be at least {least}, got {value!r}")
+        )
+        for field, value, least in limits:
+            if value is None:
+                continue
+            number = isinstance(value, (int, float)) and math.isfinite(value)
+            if not number or value < least:
+                raise InvalidValueError(
+                    f"Part.{field} must be a number of at least {least}, got {value!r}"
+                )
 
     def of(self, frames: list[Frame]) -> list[Frame]:
         """The same frames with the poorer scans, without labels; scans of one spec share one."""
@@ -45,7 +54,9 @@ class Part:
             if frame.scan is None:
                 raise InvalidValueError("a Part is of frames with scans")
             spec = frame.scan.spec
-            chosen, poorer = specs.setdefault(id(spec), self._spec(spec))
+            if id(spec) not in specs:
+                specs[id(spec)] = self._spec(spec)
+            chosen, poorer = specs[id(spec)]
             ranges = frame.scan.ranges[chosen]
             ranges[ranges > poorer.range_max] = np.inf
             scan = Scan(stamp_ns=frame.scan.stamp_ns, ranges=ranges, spec=poorer)
@@ -59,6 +70,11 @@ class Part:
             middle = 0.5 * (spec.angles[0] + spec.angles[-1])
             wide = 0.5 * math.radians(self.fov_deg) + 1e-9
             chosen = chosen[np.abs(spec.angles[chosen] - middle) <= wide]
+            if not len(chosen):
+                raise InvalidValueError(
+                    f"Part.fov_deg must hold at least one of the beams, got {self.fov_deg:g} "
+                    f"with one beam of {self.every}"
+                )
         poorer = replace(
             spec,
             n_beams=len(chosen),

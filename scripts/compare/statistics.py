@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import scipy  # scipy.stats comes with its first use: a second that other verbs need not pay
 
+from slam.errors import InvalidValueError
+
 RESAMPLES = 2000
 SEED = 20070411  # of every bootstrap: the same table gives the same intervals
 CONFIDENCE = 0.95
@@ -59,10 +61,15 @@ def censored_median(lasted: Sequence[float], ended: Sequence[bool]) -> float | N
 
     The least duration at which the estimated share that lasts longer, the product over all ends up
     to then of 1 - ends / (those watched for so long), is at most one half. Infinite where the share
-    stays above; None of nothing.
+    stays above; None of nothing. Raises ``InvalidValueError`` for what is no duration, or no pairs.
     """
+    if len(lasted) != len(ended):
+        raise InvalidValueError(f"{len(lasted)} durations must have as many ends, got {len(ended)}")
     if not lasted:
         return None
+    for duration in lasted:
+        if not math.isfinite(duration):
+            raise InvalidValueError(f"durations must be finite, got {duration}")
     watched = scipy.stats.CensoredData.right_censored(
         np.asarray(lasted, float), ~np.asarray(ended, bool)
     )

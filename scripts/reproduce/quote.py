@@ -36,6 +36,8 @@ def quote(results: Path, page: Path) -> list[str]:
         begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
         if text.count(begin) != 1 or text.count(end) != 1:
             raise InvalidValueError(f"{page} must have one {begin.strip()} and one {end}")
+        if text.index(end) < text.index(begin):
+            raise InvalidValueError(f"{page} must have {begin.strip()} before {end}")
         told = summary.read_text().strip()
         found[name] = _PICTURE.findall(told)
         told = _PICTURE.sub(rf"]({PICTURES}/{name}-\1)", told)

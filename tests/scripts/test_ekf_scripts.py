@@ -76,6 +76,7 @@ def test_loops_that_are_not_closed_are_told_with_their_place():
     at[8] = at[7] + 50
     bar = rival_bar.closed(errors, at, 0)
     assert not bar.met
+    assert "set after the result was known" in bar.what
     assert "17 of 20 (85%), worst 14.9 m" in bar.value
     assert "frames 1200, 2800 to 2850 (2)" in bar.value
     assert rival_bar.closed(errors[9:], at[9:], 0).met

@@ -110,6 +110,8 @@ def test_ctrl_c_leaves_whole_episodes_and_nothing_else(tmp_path):
 
 def test_numpy_without_its_vector_units_makes_the_same_messages(serial, tmp_path):
     found = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    if not found:
+        pytest.skip("this NumPy names no vector units to turn off")
     code = (
         "import sys; from pathlib import Path\n"
         "from sim.recording.episode import record\n"
@@ -126,7 +128,7 @@ def test_numpy_without_its_vector_units_makes_the_same_messages(serial, tmp_path
     digest, cpu = done.stdout.split()[:2]
     made = read_recipe(serial / NAMES[0] / RECIPE)
     assert digest == made.result["messages_sha256"]
-    assert not found or cpu == "none"
+    assert cpu == "none"
 
 
 def test_regenerated_bytes_are_the_same(serial):

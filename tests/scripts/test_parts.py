@@ -56,7 +56,25 @@ def test_scans_of_one_scanner_share_one_poorer_one_and_the_given_ones_stay():
     assert np.isfinite(given[0].scan.ranges[8])
 
 
-@pytest.mark.parametrize("wrong", [{"every": 0}, {"fov_deg": -3.0}, {"range_m": math.nan}])
+def test_a_spec_is_made_once_for_each_scanner(monkeypatch):
+    made, inner = [], Part._spec
+    monkeypatch.setattr(Part, "_spec", lambda self, spec: made.append(spec) or inner(self, spec))
+    Part(name="").of(frames(3))
+    assert len(made) == 1
+
+
+def test_a_part_without_a_beam_is_refused():
+    with pytest.raises(InvalidValueError, match=r"Part\.fov_deg .* got 1 with one beam of 7"):
+        Part(name="", every=7, fov_deg=1.0).of(frames(1))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"every": 0}, {"every": 2.5}, {"every": "2"}, {"every": True}, {"fov_deg": -3.0},
+        {"fov_deg": "90"}, {"range_m": math.nan},
+    ],
+)  # fmt: skip
 def test_parts_that_cannot_be_are_refused(wrong):
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
         Part(name="", **wrong)

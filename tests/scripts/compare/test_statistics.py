@@ -16,6 +16,7 @@ from scripts.compare.statistics import (
     quantile,
     share_interval,
 )
+from slam.errors import InvalidValueError
 
 INF = math.inf
 
@@ -107,3 +108,11 @@ def test_the_censored_median_without_censoring_and_without_an_end():
     assert censored_median([3.0, 0.0, 2.0, 1.0], [True] * 4) == 1.0
     assert censored_median([3.0, 1.0], [False] * 2) == INF
     assert censored_median([], []) is None
+
+
+@pytest.mark.parametrize("wrong", [math.nan, INF, -INF])
+def test_a_duration_is_a_finite_number(wrong):
+    with pytest.raises(InvalidValueError, match=f"durations must be finite, got {wrong}"):
+        censored_median([1.0, wrong], [True, False])
+    with pytest.raises(InvalidValueError, match="2 durations must have as many ends, got 1"):
+        censored_median([1.0, 2.0], [True])

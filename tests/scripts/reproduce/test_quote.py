@@ -33,6 +33,11 @@ def test_a_page_quotes_what_was_run_and_keeps_the_rest(tmp_path):
     (tmp_path / "chairs" / "summary.md").write_text("more\n")
     with pytest.raises(InvalidValueError, match="/chairs"):
         quote(tmp_path, page)
+    page.write_text(mixed_up := "<!-- /chairs -->\nby hand\n<!-- chairs -->\nthe rest\n")
+    (tmp_path / "office" / "summary.md").unlink()
+    with pytest.raises(InvalidValueError, match="<!-- chairs --> before <!-- /chairs -->"):
+        quote(tmp_path, page)
+    assert page.read_text() == mixed_up
 
 
 def test_its_figures_come_along_and_those_of_before_go(tmp_path: Path):
