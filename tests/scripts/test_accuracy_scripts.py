@@ -55,7 +55,9 @@ def test_a_run_that_fails_is_scored_as_lost(stream, monkeypatch, capsys):
 
 def test_nis_is_averaged_over_settled_frames_that_have_one():
     times = np.array([0.0, 5.0, 6.0, 7.0])
-    run = uncertainty.Run(times=times, nees=np.full(4, 2.0), nis=np.array([9.0, 9.0, np.nan, 0.5]))
+    run = uncertainty.Run(
+        rmse_m=0.0, times=times, nees=np.full(4, 2.0), nis=np.array([9.0, 9.0, np.nan, 0.5])
+    )
     assert (run.mean("nees"), run.mean("nis")) == (2.0, 0.5)
 
 
