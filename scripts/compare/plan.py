@@ -15,7 +15,7 @@ import scenes
 import sim
 import slam
 from scripts.compare import entry, recording
-from scripts.compare.imports import with_imports
+from scripts.imports import with_imports
 from scripts.jobs import Job
 from scripts.session import file_name
 from sim.recording.recipe import Recipe

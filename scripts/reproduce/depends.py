@@ -13,7 +13,7 @@ from typing import Any
 import scenes
 import sim
 import slam
-from scripts.compare.imports import with_imports
+from scripts.imports import with_imports
 
 _SCRIPTS = Path(__file__).parents[1]
 # Of what the runs' modules import: these make pages of runs, and no run depends on them.
