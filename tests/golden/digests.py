@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the golden test holds: a digest of every kind of result, and a few numbers beside it.
+
+``python -m tests.golden.digests`` prints how today's results differ from ``golden.json``;
+``--write`` records them anew. A change of code that moves things must leave the file alone. A
+change that moves a number writes it in a commit of its own, which says which figure moved.
+
+A digest holds every bit, so it is promised only on the same versions and CPU features. The numbers
+beside it (end poses and the like) are compared everywhere, to ``TOLERANCE``.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import itertools
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scripts.compare.plan import Plan
+from scripts.compare.verb import carry_out
+from scripts.footage import of_scene
+from scripts.shoot import pictures_at
+from sim.recording.episode import record
+from sim.recording.recipe import Recipe, made_with
+from sim.recording.sums import read_sums
+from sim.simulation import stream
+from slam import create
+from slam.frames import Frame
+from slam.logs import open_log
+from slam.points import PointWorld, PointWorldConfig
+
+FILE = Path(__file__).with_name("golden.json")
+TOLERANCE = 1e-6  # m and rad: beyond rounding, below anything that a figure shows
+OF_THE_MACHINE = ("ms_per_scan_p50", "ms_per_scan_p99", "peak_memory_mb")  # columns of runs.csv
+Golden = dict[str, Any]
+
+
+class Missing(Exception):
+    """What a digest is made of is not on this machine."""
+
+
+class _Digest:
+    """SHA-256 over arrays and words, their types and shapes among them."""
+
+    def __init__(self) -> None:
+        self._hash = hashlib.sha256()
+
+    def add(self, *values: Any) -> None:
+        for value in values:
+            if isinstance(value, str | int | bool) or value is None:
+                self._hash.update(repr(value).encode())
+                continue
+            array = np.ascontiguousarray(value)
+            self._hash.update(f"{array.dtype.str}{array.shape}".encode() + array.tobytes())
+
+    def hex(self) -> str:
+        return self._hash.hexdigest()
+
+
+def frames_of(scene: str, dynamism: float) -> Golden:
+    """Scans, labels, odometry and truth of 3 s."""
+    digest, last = _Digest(), None
+    for frame in stream(scene, seed=7, dynamism=dynamism, seconds=3.0, labels=True):
+        digest.add(frame.stamp_ns, frame.truth, frame.odometry.T_odom_robot)
+        digest.add(frame.odometry.increment_covariance, frame.odometry.twist)
+        if frame.scan is not None:
+            digest.add(frame.scan.ranges, frame.scan.intensities)
+        if frame.labels is not None:
+            labels = frame.labels
+            digest.add(labels.body, labels.kind, labels.displacement, labels.incidence)
+            digest.add(labels.mixed)
+        last = frame
+    assert last is not None
+    return {"sha256": digest.hex(), "end": _numbers(last.truth)}
+
+
+def estimates_of(frames: Iterable[Frame], name: str, **options: Any) -> Golden:
+    """Estimates, covariances, final trajectory and map of a SLAM."""
+    system, digest, estimate = create(name, **options), _Digest(), None
+    for frame in frames:
+        estimate = system.update(frame.without_truth())
+        digest.add(estimate.T_map_robot, estimate.covariance, estimate.converged)
+    assert estimate is not None
+    final, raster = system.trajectory(), system.map()
+    digest.add(final.stamps_ns, final.poses)
+    if raster is not None:
+        digest.add(raster.values, raster.T_map_origin)
+    return {
+        "sha256": digest.hex(),
+        "end": _numbers(estimate.T_map_robot),
+        "end_covariance": _numbers(estimate.covariance),
+        "end_final": _numbers(final.poses[-1]),
+    }
+
+
+def on_room(scene: str, name: str, **options: Any) -> Golden:
+    """On 6 s of a simulated room in which half of all moves."""
+    return estimates_of(stream(scene, seed=11, dynamism=0.5, seconds=6.0), name, **options)
+
+
+def on_points(name: str, **options: Any) -> Golden:
+    """On 60 steps of point features, a quarter of them moving."""
+    world = PointWorld(PointWorldConfig(moving=0.25, n_steps=60), seed=3)
+    return estimates_of(world.stream(), name, **options)
+
+
+def on_intel(name: str, scans: int, **options: Any) -> Golden:
+    """On a real log."""
+    root = os.environ.get("MOBILIA_DATA")
+    data = Path(root) if root else Path(__file__).resolve().parents[3] / "shared" / "data"
+    log = data / "intel" / "intel-corrected.log.xz"
+    if not log.exists():
+        raise Missing(f"NO REAL LOGS: {log} is missing (set MOBILIA_DATA to their folder)")
+    return estimates_of(itertools.islice(open_log(log), scans), name, **options)
+
+
+def episode() -> Golden:
+    """Every file of a generated episode, but its recipe, which names this machine."""
+    with tempfile.TemporaryDirectory() as folder:
+        recipe = Recipe(scene="office", seed=5, dynamism=0.5, seconds=1.0)
+        record(recipe, Path(folder))
+        sums = read_sums(Path(folder) / recipe.name)
+    sums.pop("recipe.json")
+    return {"sha256": sums}
+
+
+def compared() -> Golden:
+    """``runs.csv`` of a small comparison without what the machine decides, and its statistics."""
+    plan = Plan(
+        slams=("shunting", "occupancy", "ekf", "odometry"), scenes=("arena",), levels=(0.0, 1.0),
+        seeds=(7,), seconds=2.0,
+    )  # fmt: skip
+    digest = _Digest()
+    with tempfile.TemporaryDirectory() as folder:
+        carry_out(plan, Path(folder))
+        with (Path(folder) / "runs.csv").open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        for row in rows:
+            digest.add(*(f"{k}={v}" for k, v in sorted(row.items()) if k not in OF_THE_MACHINE))
+        for name in ("levels.csv", "paired.csv"):
+            lines = (Path(folder) / name).read_text().splitlines()
+            digest.add(*(s for s in lines if not any(word in s for word in OF_THE_MACHINE)))
+    errors = [float(row["ate_unaligned_m"]) for row in rows]
+    return {"sha256": digest.hex(), "ate_unaligned_m": _numbers(errors)}
+
+
+def film() -> Golden:
+    """Two film frames without OpenGL."""
+    footage = of_scene({"scene": "arena", "seconds": 2.0, "dynamism": 1.0, "seed": 3}, view=None)
+    digest = _Digest()
+    pictures = pictures_at(footage.stream, footage.show(["shunting"]), [0.5, 1.5], whole=True)
+    digest.add(*pictures)
+    return {"sha256": digest.hex(), "grey": [round(float(p.mean())) for p in pictures]}
+
+
+def _numbers(values: Any) -> list[float]:
+    return [float(value) for value in np.asarray(values, dtype=np.float64).ravel()]
+
+
+MAKERS: dict[str, Callable[[], Golden]] = {
+    **{
+        f"frames/{scene}/{level}": lambda scene=scene, level=level: frames_of(scene, level)
+        for scene in ("arena", "office")
+        for level in (0.0, 1.0)
+    },
+    **{
+        f"estimates/{scene}/{title}": lambda scene=scene, name=name, o=o: on_room(scene, name, **o)
+        for scene in ("arena", "office")
+        for title, name, o in (
+            ("shunting", "shunting", {}),
+            ("shunting-paper", "shunting", {"config": "paper"}),
+            ("occupancy", "occupancy", {}),
+            ("ekf", "ekf", {}),
+            ("shunting-features", "shunting-features", {}),
+        )
+    },
+    "estimates/points/shunting": lambda: on_points("shunting"),
+    "estimates/points/shunting-features-paper": lambda: on_points(
+        "shunting-features", config="paper"
+    ),
+    "estimates/points/ekf": lambda: on_points("ekf"),
+    "estimates/intel/shunting": lambda: on_intel("shunting", 910),
+    "estimates/intel/occupancy": lambda: on_intel("occupancy", 200),
+    "estimates/intel/ekf": lambda: on_intel("ekf", 200),
+    "episode": episode,
+    "compare": compared,
+    "film": film,
+}
+
+
+def read() -> dict[str, Any]:
+    """``made_with`` and ``results`` on file."""
+    found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return found
+
+
+def main() -> int:
+    """Print what differs; with ``--write`` record it."""
+    before = read() if FILE.exists() else {"results": {}}
+    results = {}
+    for name, make in MAKERS.items():
+        try:
+            results[name] = make()
+        except Missing as error:
+            print(f"{name}: left as it was: {error}")
+            results[name] = before["results"][name]
+        same = results[name] == before["results"].get(name)
+        print(f"{'same   ' if same else 'CHANGED'} {name}", flush=True)
+    changed = results != before["results"]
+    if "--write" in sys.argv:
+        text = {"made_with": made_with(), "results": results}
+        FILE.write_text(json.dumps(text, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    return int(changed and "--write" not in sys.argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Results are what they were: bit for bit on the same versions and CPU features."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim.recording.recipe import made_with
+from tests.golden.digests import MAKERS, TOLERANCE, Missing, read
+
+GOLDEN = read()
+
+
+def test_every_result_is_on_file_and_nothing_else():
+    assert sorted(GOLDEN["results"]) == sorted(MAKERS)
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_results_are_what_they_were(name: str):
+    want = GOLDEN["results"][name]
+    try:
+        got = MAKERS[name]()
+    except Missing as error:
+        pytest.skip(str(error))
+    for key in sorted(set(want) - {"sha256"}):
+        np.testing.assert_allclose(got[key], want[key], rtol=0.0, atol=TOLERANCE, err_msg=key)
+    if _elsewhere():
+        pytest.skip(f"the numbers agree; the digests were made with another {_elsewhere()}")
+    assert got["sha256"] == want["sha256"]
+
+
+def _elsewhere() -> str:
+    """What differs here from where the digests were made; the version of mobilia decides no bit."""
+    changes = []
+    for key, there in GOLDEN["made_with"].items():
+        here: Any = made_with()[key]
+        if key == "versions":
+            here, there = ({k: v for k, v in x.items() if k != "mobilia"} for x in (here, there))
+        if here != there:
+            changes.append(key)
+    return ", ".join(changes)
