@@ -143,7 +143,7 @@ def _processor() -> str:
 
 
 def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> None:
-    """``recipe.json``: the command, its settings, the versions it ran with and that of the world."""
+    """``recipe.json``: the command, its settings, the versions, that of the world too."""
     recipe = {"schema": 1, "command": command, "settings": _plain(settings), "versions": versions()}
     recipe["world"] = WORLD
     text = json.dumps(recipe, indent=2, sort_keys=True, allow_nan=False)
