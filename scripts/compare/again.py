@@ -44,7 +44,11 @@ def run_of(path: Path) -> Again:
     if command != "compare" or not isinstance(settings, dict):
         raise LogFormatError(recipe, "no recipe of a comparison")
     check_world(recipe, world_of(recipe, words))
-    settings |= {"slams": slams_of(recipe, settings), "scenes": scenes_of(recipe, settings)}
+    try:
+        settings |= {"slams": slams_of(recipe, settings), "scenes": scenes_of(recipe, settings)}
+    except LogFormatError as error:
+        why = f"no recipe of a comparison: {error.message}"
+        raise LogFormatError(recipe, why) from error
     known = [field.name for field in fields(Plan)]
     try:
         told: dict[str, Any] = {k: v for k, v in settings.items() if k in known}
