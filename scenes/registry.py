@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from scenes.mounting import at_scan_height
 from scenes.scene import SCAN_HEIGHT, Scene
 from slam.errors import InvalidValueError, UnknownNameError
+from slam.names import join_folders, refuse_code
 
 Recipe = Callable[..., Scene]
 F = TypeVar("F", bound=Recipe)
@@ -45,9 +46,10 @@ def build(name: str, seed: int = 0, *, scan_height_m: float = SCAN_HEIGHT, **opt
     options        of the recipe
 
     Raises ``UnknownNameError`` with the nearest known name, ``InvalidValueError`` for an option the
-    recipe does not know or a value it cannot have.
+    recipe does not know or a value it cannot have, ``UntrustedNameError`` for a ``module:function``
+    that was read from a file (``slam.names``).
     """
-    recipe = _load(name) if ":" in name else _find(name)
+    recipe = find(name)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise InvalidValueError(f"seed must be a whole number >= 0, got {seed!r}")
     try:
@@ -58,6 +60,12 @@ def build(name: str, seed: int = 0, *, scan_height_m: float = SCAN_HEIGHT, **opt
     if not isinstance(scene, Scene):
         raise UnknownNameError(f"'{name}' is no recipe: it returned {type(scene).__name__}")
     return at_scan_height(scene, scan_height_m)
+
+
+def find(name: str) -> Recipe:
+    """What makes the scene of that name; raises as ``build`` does for names."""
+    refuse_code(name, "scene")
+    return _load(name) if ":" in name else _find(name)
 
 
 def _find(name: str) -> Recipe:
@@ -72,6 +80,7 @@ def _find(name: str) -> Recipe:
 
 def _load(entry: str) -> Recipe:
     module_name, _, attribute = entry.partition(":")
+    join_folders()
     try:
         module = importlib.import_module(module_name)
     except (ImportError, ValueError) as error:  # ValueError: an empty module name

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import sys
 
-from scripts import interrupt
+from scripts import folder, interrupt
 
 
 def main() -> None:
     """Install the signal handlers, then load and run the command line."""
     interrupt.install()
     try:
+        folder.leave_out()
         from sim import gl
 
         warning = gl.sanitise_environment()  # before anything imports mujoco, as verbs do

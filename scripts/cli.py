@@ -28,6 +28,7 @@ from scripts.run import run
 from scripts.sensor_card import sensor_card
 from scripts.verify import verify
 from slam.errors import MobiliaError
+from slam.names import look_in
 
 _log = logging.getLogger(__name__)
 
@@ -75,7 +76,7 @@ def main(warning: str | None = None) -> None:
 
     warning  of the environment, to be said first
     """
-    sys.path.append(os.getcwd())  # so that module:Class finds what lies in the user's folder
+    look_in(os.getcwd())
     if warning:
         note(warning)
     try:

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from scripts.compare.again import is_run, run_of, why_no_run
 from scripts.film import SIZE, Pace, Size
-from scripts.output import RECIPE, read_recipe_words, slams_of
+from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
 from scripts.session import primary_of, systems_named
 from scripts.show import Show
 from scripts.stage import LogStage, Stage
+from scripts.trust import admitted
+from sim.versions import check_world, world_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import NS_PER_S, Stream
 from slam.logs import open_log
@@ -75,21 +77,24 @@ class Footage:
         self.close()
 
 
-def open_run(path: Path, *, view: str | None = "follow") -> Footage:
+def open_run(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
     """What lies at ``path``: the folder of a run or an episode, a run of a comparison, or a log of
     any known format.
 
-    view  of the 3D camera, None for none
-    Raises ``LogFormatError`` that says what is missing or wrong there.
+    view   of the 3D camera, None for none
+    trust  whether a scene that is code, by the name that a file there has, is run; its SLAM's name
+           stays one from a file
+    Raises ``LogFormatError`` that says what is missing or wrong there, ``UntrustedNameError``
+    without ``trust``, ``WorldVersionError`` for a run of another version of the world.
     """
     if is_run(path):
-        return of_compared(path, view=view)
+        return of_compared(path, view=view, trust=trust)
     recipe = path / RECIPE
     if not recipe.exists():
         return of_log(path)
     words = read_recipe_words(recipe)
     if "recipe" in words:
-        return of_episode(path, view=view)
+        return of_episode(path, view=view, trust=trust)
     settings = words.get("settings")
     if not isinstance(settings, dict):
         raise LogFormatError(recipe, "no recipe of a run: it has no settings")
@@ -102,7 +107,9 @@ def open_run(path: Path, *, view: str | None = "follow") -> Footage:
         )  # fmt: skip
     if "scene" not in settings or "seconds" not in settings:
         raise LogFormatError(path, why_no_run(path, words.get("command", "?")))
+    check_world(recipe, world_of(recipe, words))
     known = {key: settings[key] for key in SIMULATED if key in settings}
+    known["scene"] = admitted(scenes_of(recipe, {"scene": settings["scene"]})[0], "scene", trust)
     try:
         return replace(of_scene(known, view=view), slam=slam)
     except (TypeError, ValueError) as error:
@@ -158,14 +165,16 @@ def of_simulation(
     )
 
 
-def of_episode(path: Path, *, view: str | None = "follow") -> Footage:
+def of_episode(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
     """An episode of a dataset, made again from its recipe."""
     from sim.moments import toured
     from sim.recording.recipe import read_recipe
     from sim.simulation import Simulation
     from sim.twins import Twins
 
-    recipe = read_recipe(path / RECIPE).recipe
+    made = read_recipe(path / RECIPE)
+    check_world(path / RECIPE, made.world)
+    recipe = replace(made.recipe, scene=admitted(made.recipe.scene, "scene", trust))
     settings = {"scene": recipe.scene, "dynamism": recipe.dynamism, "seed": recipe.seed}
     if not recipe.twin:
         simulation = Simulation(**recipe.simulation())
@@ -186,13 +195,13 @@ def of_episode(path: Path, *, view: str | None = "follow") -> Footage:
     return footage
 
 
-def of_compared(path: Path, *, view: str | None = "follow") -> Footage:
+def of_compared(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
     """A run of a comparison, made again with the scans that its SLAMs got."""
     from sim.moments import toured
     from sim.simulation import Simulation
 
     again = run_of(path)
-    recipe = again.recipe
+    recipe = replace(again.recipe, scene=admitted(again.recipe.scene, "scene", trust))
     simulation = Simulation(**recipe.simulation())
     footage = of_simulation(
         simulation,

@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
+from scenes import registry
 from scripts import interrupt, workers
 from scripts.console import console, note, progress
 from sim.recording.dataset import Dataset, Plan, writing
@@ -55,6 +56,7 @@ def generate(
     first = Recipe(scene=scene, seed=seed, dynamism=levels[0], seconds=seconds, scanner=scanner)
     plan = Plan(recipe=first, dynamisms=levels, episodes=episodes, twins=twins)
     workers.check_jobs(jobs)
+    registry.find(scene)  # a wrong name is told, and a module found, before anything starts
     with writing(out, plan) as dataset:
         missing, notes = dataset.missing()
         for line in notes:

@@ -13,8 +13,8 @@ def listing() -> None:
     """List the registered scenes, SLAMs and Gymnasium environments."""
     import gymnasium
 
-    import sim  # noqa: F401  (registers the environments)
     from scenes import registry
+    from sim.versions import WORLD
 
     table = Table(show_header=True, title_justify="left")
     for heading in ("what", "name", "about"):
@@ -23,6 +23,7 @@ def listing() -> None:
         table.add_row("scene", name, registry.describe(name))
     for name in system.names():
         table.add_row("SLAM", name, system.describe(name))
-    for name in sorted(i for i in gymnasium.registry if i.startswith("mobilia/")):
+    ours = (name for name in gymnasium.registry if name.startswith("mobilia/"))
+    for name in sorted(name for name in ours if name.endswith(f"-v{WORLD}")):
         table.add_row("environment", name, f'gymnasium.make("sim:{name}")')
     console.print(table)

@@ -16,8 +16,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from sim.versions import WORLD
 from slam.errors import LogFormatError, OutputError
 from slam.files import write_text
+from slam.names import NameFromFile
 
 RECIPE = "recipe.json"
 LOCK = ".lock"
@@ -141,8 +143,9 @@ def _processor() -> str:
 
 
 def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> None:
-    """``recipe.json``: the command, its settings and the versions it ran with."""
+    """``recipe.json``: the command, its settings, the versions, that of the world too."""
     recipe = {"schema": 1, "command": command, "settings": _plain(settings), "versions": versions()}
+    recipe["world"] = WORLD
     text = json.dumps(recipe, indent=2, sort_keys=True, allow_nan=False)
     write_text(folder / RECIPE, text + "\n")
 
@@ -177,7 +180,21 @@ def read_recipe_words(path: Path) -> dict[str, Any]:
 
 def slams_of(path: Path, settings: Mapping[str, Any]) -> list[str]:
     """The SLAMs that the settings of a recipe name; ``LogFormatError`` for what are no names."""
-    slams = settings.get("slams", [])
-    if not isinstance(slams, list) or not all(isinstance(name, str) for name in slams):
-        raise LogFormatError(path, f"settings.slams must be a list of names, got {slams!r:.80}")
-    return slams
+    return _names(path, settings, "slams")
+
+
+def scenes_of(path: Path, settings: Mapping[str, Any]) -> list[str]:
+    """The same of scenes: ``scenes``, or the one that is called ``scene``."""
+    if "scenes" in settings:
+        return _names(path, settings, "scenes")
+    scene = settings.get("scene")
+    if not isinstance(scene, str):
+        raise LogFormatError(path, f"settings.scene must be a name, got {scene!r:.80}")
+    return [NameFromFile(scene, path)]
+
+
+def _names(path: Path, settings: Mapping[str, Any], key: str) -> list[str]:
+    names = settings.get(key, [])
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise LogFormatError(path, f"settings.{key} must be a list of names, got {names!r:.80}")
+    return [NameFromFile(name, path) for name in names]

@@ -20,6 +20,7 @@ from scripts.rerun_log import RerunLog
 from scripts.shoot import Snapshots, shoot, watched
 from scripts.show import Show
 from scripts.strips import evenly, strip
+from scripts.trust import Trust, admitted
 from slam.errors import InvalidValueError
 
 STRIP_PICTURES = 6
@@ -63,6 +64,7 @@ def render(
         float | None,
         typer.Option(help="1 is real time. Default 1, more where the film would exceed a minute."),
     ] = None,
+    trust: Trust = False,
 ) -> None:
     """Film a run: 3D view, scan by what each beam hit, map, errors with what happened.
 
@@ -85,13 +87,15 @@ def render(
         require_ffmpeg()
     if rerun is not None:
         RerunLog.require()
-    with open_run(run, view=view if out is not None and not no_3d else None) as footage:
+    seen = view if out is not None and not no_3d else None
+    with open_run(run, view=seen, trust=trust) as footage:
         if moments and moments[-1] > footage.duration_s:
             raise InvalidValueError(
                 f"--at must lie within the run's {footage.duration_s:.1f} s, got {moments[-1]:g}"
             )
         pace = _pace(footage, fps, from_s, to_s, speed)
-        show = footage.show([slam or footage.slam or "shunting"], pace=pace, size=pixels)
+        filmed = slam or admitted(footage.slam, "SLAM", trust) or "shunting"
+        show = footage.show([filmed], pace=pace, size=pixels)
         if footage.no_camera:
             note(f"the film has no 3D panel: {footage.no_camera}")
         if strip_to is not None and not moments:

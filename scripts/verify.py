@@ -12,7 +12,9 @@ from rich.markup import escape
 
 from scripts import interrupt
 from scripts.console import console, fail, progress
+from scripts.trust import Trust, admitted
 from sim.recording.dataset import episodes_in
+from sim.recording.recipe import RECIPE, read_recipe
 from sim.recording.verify import Finding, check_hashes, regenerate
 from slam.errors import InvalidValueError
 
@@ -25,6 +27,7 @@ def verify(
         int, typer.Option("--regenerate", help="Simulate this many episodes anew and compare.")
     ] = 0,
     seed: Annotated[int, typer.Option(help="Which ones: seed of that choice.")] = 0,
+    trust: Trust = False,
 ) -> None:
     """Hash every file again; with --regenerate also make episodes anew from their recipes.
 
@@ -37,12 +40,15 @@ def verify(
     findings = [check_hashes(episode) for episode in episodes]
     sound = [e for e, f in zip(episodes, findings, strict=True) if f.verdict != "damaged"]
     count = min(regenerate_, len(sound))
-    chosen = np.random.default_rng(seed).choice(len(sound), count, replace=False)
+    drawn = np.random.default_rng(seed).choice(len(sound), count, replace=False)
+    chosen = [sound[k] for k in sorted(drawn.tolist())]
+    for scene in dict.fromkeys(read_recipe(episode / RECIPE).recipe.scene for episode in chosen):
+        admitted(scene, "scene", trust)
     with progress() as bar:
         task = bar.add_task("making again", total=count, unit="", visible=count > 0)
-        for k in sorted(chosen.tolist()):
+        for episode in chosen:
             interrupt.check()
-            findings.append(regenerate(sound[k]))
+            findings.append(regenerate(episode, trust=trust))
             bar.advance(task)
     for finding in findings:
         _tell(finding)

@@ -1,7 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The moving world: importing it registers an environment ``mobilia/<Scene>-v0`` for each scene."""
+"""The moving world: importing it registers an environment ``mobilia/<Scene>-v1`` for each scene.
+
+The number is the version of the world (``sim.versions``); ids of older ones say what became of it.
+"""
+
+from functools import partial
 
 from gymnasium.envs.registration import register, registry
+
+from sim.versions import WORLD, gone
 
 _SCENES = {
     "Arena": "arena",
@@ -13,8 +20,14 @@ _SCENES = {
     "RandomRooms": "random-rooms",
 }
 for _name, _scene in _SCENES.items():
-    _id = f"mobilia/{_name}-v0"
-    if _id not in registry:
+    for _version in range(WORLD + 1):
+        _id = f"mobilia/{_name}-v{_version}"
+        if _id in registry:
+            continue
+        if _version < WORLD:
+            _gone = partial(gone, f"mobilia/{_name}", _version)
+            register(id=_id, entry_point=_gone, vector_entry_point=_gone)
+            continue
         register(
             id=_id,
             entry_point="sim.env:MobiliaEnv",

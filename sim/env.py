@@ -124,7 +124,9 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     | `seeds`                   | stream name -> seed (``sim.seeds``)                           |
 
     ### Version history
-    v0: first version.
+    The number is that of the world (``sim.versions``).
+    v1: the table of ``sim.dynamism`` was set anew; the same seed gives another world than in v0.
+    v0: first version; making it raises ``WorldVersionError``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  (Gymnasium's own class attribute)

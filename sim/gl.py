@@ -89,7 +89,7 @@ def _try(program: str, backend: str | None) -> str | None:
         environment[VARIABLE] = backend
     try:
         run = subprocess.run(
-            [sys.executable, "-c", program],
+            [sys.executable, "-P", "-c", program],  # no module of the working folder
             env=environment,
             stdin=subprocess.DEVNULL,
             capture_output=True,

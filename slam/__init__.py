@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """SLAM on a stream of frames. Works without a simulator: never imports mujoco, gymnasium or sim."""
 
+# isort: off
+from slam import _numba  # noqa: F401  (before anything else imports Numba)
+
+# isort: on
 from slam import ekf as _ekf  # noqa: F401  (registers itself)
 from slam import guests as _guests  # noqa: F401
 from slam import odometry as _odometry  # noqa: F401

@@ -28,6 +28,10 @@ class UnknownNameError(MobiliaError, LookupError):
         return str(self.args[0]) if self.args else ""
 
 
+class UntrustedNameError(MobiliaError):
+    """A file names code to run, which opening it must not do."""
+
+
 class LogFormatError(MobiliaError):
     """A log or recording cannot be read: which file, which line, what was expected there."""
 

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from slam.checked import covariance, frozen, pose
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError
 from slam.frames import Float, Frame
+from slam.names import join_folders, refuse_code
 from slam.trajectory import Trajectory
 
 
@@ -133,9 +134,11 @@ def create(name: str, **config: Any) -> SlamSystem:
 
     ``config`` goes to its constructor.
 
-    Raises ``UnknownNameError`` with the nearest known name, or what is wrong with the entry, and
-    ``InvalidValueError`` for options that its constructor does not have.
+    Raises ``UnknownNameError`` with the nearest known name, or what is wrong with the entry,
+    ``InvalidValueError`` for options that its constructor does not have, and
+    ``UntrustedNameError`` for a name of code that was read from a file (``slam.names``).
     """
+    refuse_code(name, "SLAM")
     if name.startswith("pipe:"):
         from slam.guests.pipe import PipeSlam  # it imports this module
 
@@ -190,6 +193,7 @@ def _check_options(name: str, factory: Factory, config: Mapping[str, Any]) -> No
 
 def _load(entry: str) -> Factory:
     module_name, _, attribute = entry.partition(":")
+    join_folders()
     try:
         module = importlib.import_module(module_name)
     except (ImportError, TypeError, ValueError) as error:  # the last two: no proper module name

@@ -11,9 +11,11 @@ from typing import Any
 
 from scripts.compare.again import is_run, run_of, why_no_run
 from scripts.compare.folder import RunFile
-from scripts.output import RECIPE, read_recipe_words, slams_of
+from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
 from scripts.session import file_name
+from scripts.trust import admitted
 from sim.recording.recipe import Made, read_recipe
+from sim.versions import check_world, world_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import Float
 from slam.trajectory import read_tum
@@ -55,20 +57,24 @@ class Case:
         return " · ".join([str(scene), *(f"{k} {v}" for k, v in sorted(options.items()))])
 
 
-def case_of(folder: Path, slam: str | None, every: int) -> Case:
+def case_of(folder: Path, slam: str | None, every: int, trust: bool = False) -> Case:
     """The case of a folder of ``mobilia run`` or ``demo``, of an episode of a dataset, or of a run
     of a comparison.
 
-    Raises ``LogFormatError`` that names the file for what cannot be simulated again.
+    trust  whether code that a file there names, as scene or SLAM, is run
+
+    Raises ``LogFormatError`` that names the file for what cannot be simulated again,
+    ``UntrustedNameError`` without ``trust``, ``WorldVersionError`` for a run of another version of
+    the world.
     """
     if not folder.exists():
         raise LogFormatError(folder, "no such folder")
     if is_run(folder):
-        return _compared(folder, slam, every)
+        return _compared(folder, slam, every, trust)
     path = folder / RECIPE if folder.is_dir() else folder
     words = read_recipe_words(path)
     if "recipe" in words:
-        return _episode(path, slam or "shunting", every)
+        return _episode(path, slam or "shunting", every, trust)
     command, settings = words.get("command"), words.get("settings")
     if command not in COMMANDS:
         raise LogFormatError(path.parent, why_no_run(path.parent, command))
@@ -76,6 +82,10 @@ def case_of(folder: Path, slam: str | None, every: int) -> Case:
         raise LogFormatError(path, "no recipe of a run: it has no settings")
     if "scene" not in settings:
         raise LogFormatError(path, "this run was on a log: only a simulated one can be run again")
+    unknown = sorted({"laser", "drive", "name", "start"}.intersection(settings))
+    if unknown:
+        raise LogFormatError(path, f"no recipe of a run: settings.{unknown[0]} is none of them")
+    check_world(path, world_of(path, words))
     slams = slams_of(path, settings)
     if slam is None:
         slam = next((s for s in slams if s != "odometry"), "odometry") if slams else "shunting"
@@ -83,17 +93,21 @@ def case_of(folder: Path, slam: str | None, every: int) -> Case:
     if isinstance(seconds, bool) or not isinstance(seconds, int | float):
         raise LogFormatError(path, f"settings.seconds must be a number, got {seconds!r}")
     world = {k: v for k, v in settings.items() if k not in OF_THE_RUN}
+    world["scene"] = admitted(scenes_of(path, settings)[0], "scene", trust)
+    slam = admitted(slam, "SLAM", trust)
     online = path.parent / f"trajectory_{file_name(slam)}.tum"
     recorded = read_tum(online).poses if every == 1 and online.exists() else None
     return Case(settings=world, seconds=seconds, slam=slam, every=every, recorded=recorded)
 
 
-def _compared(path: Path, slam: str | None, every: int) -> Case:
+def _compared(path: Path, slam: str | None, every: int, trust: bool) -> Case:
     again = run_of(path)
     if every not in (1, again.every):
         raise InvalidValueError(f"--every: in this comparison SLAMs got one scan in {again.every}")
     slam = slam or next((name for name in again.slams if name != "odometry"), "odometry")
     settings = {k: v for k, v in again.recipe.simulation().items() if k != "labels"}
+    settings["scene"] = admitted(again.recipe.scene, "scene", trust)
+    slam = admitted(slam, "SLAM", trust)
     recorded = RunFile(path).believed(slam).poses if slam in again.slams else None
     return Case(
         settings=settings, seconds=again.recipe.seconds, slam=slam, every=again.every,
@@ -101,14 +115,16 @@ def _compared(path: Path, slam: str | None, every: int) -> Case:
     )  # fmt: skip
 
 
-def _episode(path: Path, slam: str, every: int) -> Case:
+def _episode(path: Path, slam: str, every: int, trust: bool) -> Case:
     made = read_recipe(path)
+    check_world(path, made.world)
     recipe = made.recipe
     if recipe.twin:
         raise LogFormatError(
             path, f"a {recipe.twin} twin cannot be changed: take an episode made without --twins"
         )
     settings = {k: v for k, v in recipe.simulation().items() if k != "labels"}
+    settings["scene"] = admitted(recipe.scene, "scene", trust)
     return Case(settings=settings, seconds=recipe.seconds, slam=slam, every=every, made=made)
 
 

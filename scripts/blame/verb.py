@@ -23,6 +23,7 @@ from scripts.compare.again import is_run
 from scripts.console import console, note, progress
 from scripts.output import whole_folder, write_recipe
 from scripts.session import file_name
+from scripts.trust import Trust
 from sim.recording.recipe import SCANNERS
 from slam.divergence import Rule
 from slam.errors import InvalidValueError
@@ -74,6 +75,7 @@ def blame(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an earlier one in that folder.")
     ] = False,
+    trust: Trust = False,
 ) -> None:
     """Find which mover led a SLAM astray, by running the world again without it.
 
@@ -92,7 +94,7 @@ def blame(
         horizon_s=horizon, top=top, repeats=repeats,
     )  # fmt: skip
     if run is not None:
-        case = case_of(run, slam, every)
+        case = case_of(run, slam, every, trust)
     else:
         if scanner not in SCANNERS:
             known = ", ".join(SCANNERS)

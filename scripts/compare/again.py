@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from scripts.compare.plan import Plan
-from scripts.output import RECIPE, read_recipe_words
+from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
 from sim.recording.recipe import Recipe
+from sim.versions import check_world, world_of
 from slam.errors import InvalidValueError, LogFormatError
 
 RUNS = "runs"
@@ -17,7 +18,7 @@ RUNS = "runs"
 
 @dataclass(frozen=True, kw_only=True)
 class Again:
-    """The simulation, of which every SLAM gets one scan in ``every``."""
+    """The simulation, of which every SLAM gets one scan in ``every``; its names are of a file."""
 
     recipe: Recipe
     every: int
@@ -30,7 +31,11 @@ def is_run(path: Path) -> bool:
 
 
 def run_of(path: Path) -> Again:
-    """Of such a file; ``LogFormatError`` says what is wrong with it or its comparison's recipe."""
+    """Of such a file.
+
+    Raises ``LogFormatError`` that says what is wrong with it or its comparison's recipe,
+    ``WorldVersionError`` for one of another version of the world.
+    """
     recipe = path.parent.parent / RECIPE
     words = read_recipe_words(recipe)
     command, settings = words.get("command"), words.get("settings")
@@ -38,6 +43,12 @@ def run_of(path: Path) -> Again:
         raise LogFormatError(path, why_no_run(path, command))
     if command != "compare" or not isinstance(settings, dict):
         raise LogFormatError(recipe, "no recipe of a comparison")
+    check_world(recipe, world_of(recipe, words))
+    try:
+        settings |= {"slams": slams_of(recipe, settings), "scenes": scenes_of(recipe, settings)}
+    except LogFormatError as error:
+        why = f"no recipe of a comparison: {error.message}"
+        raise LogFormatError(recipe, why) from error
     known = [field.name for field in fields(Plan)]
     try:
         told: dict[str, Any] = {k: v for k, v in settings.items() if k in known}

@@ -23,6 +23,7 @@ from sim.simulation import n_frames
 from slam.errors import InvalidValueError
 from slam.guests import Limits
 from slam.guests.pipe import PREFIX
+from slam.names import join_folders
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
@@ -150,6 +151,7 @@ def source_of(slam: str) -> tuple[Path, ...]:
     if slam.startswith(PREFIX):
         named = [path for path in map(Path, shlex.split(command)) if path.is_file()]
         return tuple(file for path in named for file in _whole(path, path.stem))
+    join_folders()
     spec = importlib.util.find_spec(kind)
     return _whole(Path(spec.origin), kind) if spec and spec.origin and spec.has_location else ()
 

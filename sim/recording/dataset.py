@@ -13,10 +13,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from sim.recording.episode import PART
-from sim.recording.recipe import Recipe
+from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, read_sums
 from sim.recording.verify import check_hashes
 from sim.twins import TWINS
+from sim.versions import check_world
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import write_text
 
@@ -77,7 +78,11 @@ class Dataset:
         self.path, self.plan = path, plan
 
     def missing(self) -> tuple[list[Recipe], list[str]]:
-        """Jobs not done yet, and why whole-looking folders among them are not kept."""
+        """Jobs not done yet, and why whole-looking folders among them are not kept.
+
+        Raises ``WorldVersionError`` for episodes of another version of the world: one dataset has
+        one.
+        """
         wanted, notes = [], []
         for job in self.plan.jobs():
             whole = True
@@ -87,7 +92,9 @@ class Dataset:
                     whole = False
                     continue
                 finding = check_hashes(folder)
-                if finding.verdict != "whole":
+                if finding.verdict == "whole":
+                    check_world(folder / RECIPE, read_recipe(folder / RECIPE).world)
+                else:
                     whole = False
                     notes.append(f"made again: {finding.why}")
                     shutil.rmtree(folder)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import os
 import platform
@@ -20,9 +21,13 @@ from sim.dynamism import Dynamism
 from sim.lidar_config import Lms221Config
 from sim.odometry_config import PRESETS
 from sim.seeds import Seeds
+from sim.simulation import Simulation
 from sim.twins import TWINS
+from sim.versions import WORLD, world_of
+from sim.world import World
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import write_text
+from slam.names import NameFromFile
 
 RECIPE = "recipe.json"
 SCHEMA = 1
@@ -36,7 +41,8 @@ _DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "ro
 class Recipe:
     """What decides an episode.
 
-    scene       registered name or ``module:function``; ``options`` of it, e.g. n_chairs
+    scene       registered name or ``module:function``; ``options`` of it, e.g. n_chairs, and
+                ``scan_height_m``, but nothing that ``Simulation`` or ``Recipe`` has a name for
     seed        whole number >= 0
     dynamism    knob in [0, 1]
     seconds     of driving
@@ -76,6 +82,12 @@ class Recipe:
                 )
         if not isinstance(self.options, Mapping):
             raise InvalidValueError(f"Recipe.options must be a mapping, got {self.options!r}")
+        taken = sorted(_NOT_OPTIONS.intersection(self.options))
+        if taken:
+            raise InvalidValueError(
+                f"Recipe.options are of the scene: {taken[0]!r} is none, it would override the "
+                f"recipe's own, got {self.options[taken[0]]!r}"
+            )
         self.laser()
 
     def laser(self) -> Lms221Config:
@@ -114,6 +126,17 @@ class Recipe:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
+# What every recipe or simulation has: as an option it would silently replace that.
+_NOT_OPTIONS = frozenset(
+    {
+        "name",  # of the scene, for ``scenes.build``
+        *(field.name for field in fields(Recipe)),
+        *inspect.signature(Simulation).parameters,
+        *inspect.signature(World).parameters,
+    }
+)
+
+
 def made_with() -> dict[str, Any]:
     """Everything about this machine that can change a bit: versions, and what its CPU can do."""
     versions = {}
@@ -138,6 +161,7 @@ def write_recipe(path: Path, recipe: Recipe, result: Mapping[str, Any]) -> None:
     """``result``: what came out, the hash of the messages among it."""
     text = {
         "schema": SCHEMA,
+        "world": WORLD,
         "recipe": asdict(recipe),
         "recipe_sha256": recipe.sha256,
         "made_with": made_with(),
@@ -148,11 +172,12 @@ def write_recipe(path: Path, recipe: Recipe, result: Mapping[str, Any]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Made:
-    """A recipe that was carried out: by whom, and what came out."""
+    """A recipe that was carried out: by whom, what came out, in which version of the world."""
 
     recipe: Recipe
     made_with: Mapping[str, Any]
     result: Mapping[str, Any]
+    world: int = WORLD
 
     def elsewhere(self) -> str:
         """What is different here, in words; empty on the same versions and CPU."""
@@ -170,7 +195,11 @@ class Made:
 
 
 def read_recipe(path: Path) -> Made:
-    """Inverse of ``write_recipe``; ``LogFormatError`` that names the file for anything else."""
+    """Inverse of ``write_recipe``; ``LogFormatError`` that names the file for anything else.
+
+    The scene's name is one from a file: no code runs by it (``slam.names``). The recipe may be of
+    another version of the world: ``sim.versions.check_world`` before it is simulated.
+    """
     try:
         with path.open("rb") as file:
             raw = file.read(MAX_BYTES + 1)
@@ -192,13 +221,15 @@ def read_recipe(path: Path) -> Made:
     unknown = sorted(set(parts[0]) - {f.name for f in fields(Recipe)})
     if unknown:
         raise LogFormatError(path, f"unknown key {unknown[0]!r} in the recipe")
+    if isinstance(parts[0].get("scene"), str):
+        parts[0]["scene"] = NameFromFile(parts[0]["scene"], path)
     try:
         recipe = Recipe(**parts[0])
     except (InvalidValueError, TypeError) as error:
         raise LogFormatError(path, f"no recipe: {error}") from error
     if recipe.sha256 != data["recipe_sha256"]:
         raise LogFormatError(path, "damaged: recipe_sha256 is not that of the recipe")
-    return Made(recipe=recipe, made_with=parts[1], result=parts[2])
+    return Made(recipe=recipe, made_with=parts[1], result=parts[2], world=world_of(path, data))
 
 
 def _refuse(constant: str) -> float:

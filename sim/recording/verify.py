@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -12,10 +12,11 @@ from sim.recording.bag import MessageHash
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Made, read_recipe
 from sim.recording.sums import SUMS, damage, read_sums
+from sim.versions import not_this_world
 from slam.errors import LogFormatError, OutputError
 from slam.logs.bag_topics import Bag
 
-Verdict = Literal["whole", "damaged", "same bytes", "same messages", "differs"]
+Verdict = Literal["whole", "damaged", "same bytes", "same messages", "differs", "other world"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,15 +68,25 @@ def messages_sha256(folder: Path) -> str:
     return digest.hexdigest()
 
 
-def regenerate(folder: Path) -> Finding:
+def regenerate(folder: Path, *, trust: bool = False) -> Finding:
     """Simulate the episode anew and compare.
 
     A difference on another CPU or with other versions is no damage: NumPy, MuJoCo and zstd promise
-    the same bits on one machine and one version only. Then the verdict says what is different.
+    the same bits on one machine and one version only. Then the verdict says what is different. An
+    episode of another version of the world is not made: the verdict is "other world".
+
+    trust  whether a scene that is code, by the name in the recipe, is run; else that raises
+           ``UntrustedNameError``
     """
     made = read_recipe(folder / RECIPE)
+    why = not_this_world(made.world)
+    if why:
+        return Finding(episode=folder.name, verdict="other world", why=f"not made again: {why}")
+    recipe = made.recipe
+    if trust:
+        recipe = replace(recipe, scene=str(recipe.scene))  # as if it had been typed
     with _scratch() as scratch:
-        record(made.recipe, Path(scratch))
+        record(recipe, Path(scratch))
         again = Path(scratch) / made.recipe.name
         same = read_sums(again) == read_sums(folder)
         result = read_recipe(again / RECIPE).result

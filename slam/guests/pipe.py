@@ -24,6 +24,7 @@ from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Float, Frame, LaserSpec
 from slam.guests import protocol
 from slam.guests.wire import Wire
+from slam.names import child_environment, join_folders, refuse_code
 from slam.system import Estimate, Raster, SlamSystem, create
 from slam.trajectory import Trajectory
 
@@ -70,7 +71,7 @@ class PipeSlam:
     ) -> None:
         self.limits = Limits(scan_s=scan_limit_s, first_s=first_limit_s)
         self._command = _words(command)
-        self._environment = environment
+        self._environment = child_environment(guest=True) if environment is None else environment
         self._start()
 
     def _start(self) -> None:
@@ -179,16 +180,18 @@ def _words(command: str | Sequence[str]) -> list[str]:
 def guarded(name: str, limits: Limits | None = None, **config: Any) -> PipeSlam:
     """``create(name, **config)`` in a child process: what it does there cannot stop this one."""
     limits = limits or Limits()
+    refuse_code(name, "SLAM")
+    join_folders()
     words = [sys.executable, "-m", "slam.guests.serve", name]
     if config:
         words += ["--options", json.dumps(config)]
-    path = os.pathsep.join(folder for folder in sys.path if folder)
+    path = os.pathsep.join(folder or os.getcwd() for folder in sys.path)
     try:
         return PipeSlam(
             words,
             scan_limit_s=limits.scan_s,
             first_limit_s=limits.first_s,
-            environment={**os.environ, "PYTHONPATH": path},
+            environment={**child_environment(guest=False), "PYTHONPATH": path},
         )
     except SlamFailedError as error:
         where = f"SLAM '{name}' cannot be made:"

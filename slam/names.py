@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names that may be code, and where they come from.
+
+A SLAM is ``module:Class`` or ``pipe:COMMAND``, a scene ``module:function``, beside those that are
+registered. Whoever types such a name, on the command line or in Python, runs it. A name that was
+read from a file is a ``NameFromFile``: it resolves to what is registered and to nothing else, until
+``trusted`` makes a name of it as if it had been typed. docs/trust.md has the whole rule.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from slam.errors import UntrustedNameError
+
+SAFE_PATH = "PYTHONSAFEPATH"
+OURS = "mobilia"  # the value of SAFE_PATH where it was us who set it
+_wanted: list[str] = []
+
+
+class NameFromFile(str):
+    """A name as the file ``file`` has it."""
+
+    file: str
+
+    def __new__(cls, text: str, file: str | Path) -> NameFromFile:
+        """``text`` of ``file``."""
+        name = super().__new__(cls, text)
+        name.file = str(file)
+        return name
+
+    def __reduce__(self) -> tuple[type, tuple[str, str]]:
+        """A copy, in another process too, is from that file still."""
+        return type(self), (str(self), self.file)
+
+    def trusted(self) -> str:
+        """The same as if the user had typed it."""
+        return str(self)
+
+
+def is_code(name: str) -> bool:
+    """Whether to resolve ``name`` is to run what it names: a module or a command."""
+    return ":" in name
+
+
+def refuse_code(name: str, what: str) -> None:
+    """Raise ``UntrustedNameError`` for a name of code that was read from a file.
+
+    what  "SLAM" or "scene"
+    """
+    if isinstance(name, NameFromFile) and is_code(name):
+        raise UntrustedNameError(
+            f"{name.file} names code to run: {what} {str(name)[:200]!r}. A file may name what is "
+            "registered; if you trust it, pass --trust (in Python: give the name yourself)"
+        )
+
+
+def look_in(folder: str) -> None:
+    """Let modules be found in ``folder`` too, from the first ``module:name`` that is resolved."""
+    _wanted[:] = [folder]
+
+
+def join_folders() -> None:
+    """Put the folder of ``look_in`` at the end of the import path: a module is about to be found.
+
+    Not before: a folder of somebody else's data may hold a module called like one that we import.
+    """
+    sys.path.extend(folder for folder in _wanted if folder not in sys.path)
+
+
+def child_environment(*, guest: bool) -> dict[str, str]:
+    """Our environment for a child process.
+
+    guest  True for a command of the user, whose Python is to find modules as it always does; False
+           for a Python of ours, which takes none from the working folder unasked
+    """
+    environment = dict(os.environ)
+    if not guest:
+        environment.setdefault(SAFE_PATH, OURS)
+    elif environment.get(SAFE_PATH) == OURS:
+        del environment[SAFE_PATH]
+    return environment
