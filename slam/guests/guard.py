@@ -40,11 +40,12 @@ def main(words: list[str]) -> None:
     if error:
         _say(control, b"errno %d\n" % error)
         return
+    woken = _wake_up()
     _say(control, b"pid %d\n" % guest)
     nothing = os.open(os.devnull, os.O_RDWR)
     for number in (0, 1, 2):  # the guest's now
         os.dup2(nothing, number)
-    _wait(control, parent, guest)
+    _wait(control, woken, parent, guest)
     _kill(guest)
 
 
@@ -93,8 +94,8 @@ def _start(command: list[bytes], environment: dict[bytes, bytes]) -> tuple[int, 
         return guest, int(answer.read() or b"0")
 
 
-def _wait(control: int, parent: int, guest: int) -> None:
-    """Until the order comes; says meanwhile how the guest ended and reaps its orphans."""
+def _wake_up() -> int:
+    """Readable whenever a child or the parent has ended; what else is sent means nothing."""
     woken, wake = os.pipe()
     for number in (woken, wake):
         os.set_blocking(number, False)
@@ -105,6 +106,11 @@ def _wait(control: int, parent: int, guest: int) -> None:
     # Should a fork of mobilia's hold the other end of the socket open. It comes when the thread
     # that started the guard ends as well: hence the look at the parent.
     _prctl(_PDEATHSIG, signal.SIGCHLD)
+    return woken
+
+
+def _wait(control: int, woken: int, parent: int, guest: int) -> None:
+    """Until the order comes; says meanwhile how the guest ended and reaps its orphans."""
     poll = select.poll()
     poll.register(control, select.POLLIN)
     poll.register(woken, select.POLLIN)
