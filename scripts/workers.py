@@ -21,6 +21,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from slam import locks
 from slam.errors import InvalidValueError, MissingDependencyError, MobiliaError, OutputError
 from slam.files import write_text
+from slam.guests import guarding
 
 MAX_JOBS = 1024
 WORKERS_TIMEOUT_S = 30
@@ -59,6 +60,8 @@ def each(
             "initializer": end_with_parent,
             "initargs": (os.getpid(),),
         }
+        if cluster is None:
+            stack.enter_context(guarding.guarded_workers())
         if cluster is not None:
             client = stack.enter_context(_client(cluster))
             if shared is not None:
@@ -104,8 +107,9 @@ def _guarded(
 def end_with_parent(parent: int) -> None:
     """In a new worker: it ends when the process ``parent`` does, be that by SIGKILL.
 
-    On Linux the kernel kills it, whatever it is doing. Elsewhere, and for a worker whose parent
-    started it from another thread than the first, a thread here does when it next gets its turn.
+    On Linux the kernel kills it, whatever it is doing; before it comes to this, a guard does.
+    Elsewhere, and for a worker whose parent started it from another thread than the first, a thread
+    here does when it next gets its turn.
     """
     if _of_the_first_thread(parent):  # else the end of that thread would be taken for the parent's
         ctypes.CDLL(None).prctl(_PDEATHSIG, ctypes.c_ulong(signal.SIGKILL), 0, 0, 0)

@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parent process of one guest: ends it and all that it started when mobilia asks, or dies.
+"""The process that ends what a mobilia has started when that asks for it, or dies.
 
-``wire`` runs this file as a script of its own, with nothing but the standard library (10 MB, some
-10 ms): ``python -I -S guard.py DESCRIPTOR PARENT``. Over that socket it is told what to run and
-answers "pid N" or "errno N", later "exited N" or "signal N". The end of the socket, or the death of
-``PARENT``, is its order to kill.
+``guarding`` runs this file as a script of its own, with nothing but the standard library (10 MB,
+some 10 ms): ``python -I -S guard.py DESCRIPTOR PARENT``. Over that socket it is told what to do.
+The end of the socket, or the death of ``PARENT``, is its order to kill.
 
-On Linux the kernel gives the guard every orphan below it ("child subreaper"), so that processes in
-sessions of their own, daemons too, stay its descendants and are found. The guest itself dies with
-the guard, should that be killed. Elsewhere only the guest's process group is killed.
+Told a command, it is the parent of that guest; it answers "pid N" or "errno N", later "exited N" or
+"signal N". On Linux the kernel gives it every orphan below it ("child subreaper"), so that
+processes in sessions of their own, daemons too, stay its descendants and are found. The guest
+itself dies with the guard, should that be killed. Elsewhere only the guest's process group is
+killed.
+
+Told none, it kills the processes whose environment has its mark (Linux). Worker processes get that:
+one that is still being loaded has had no time to tie itself to its parent.
 """
 
 from __future__ import annotations
@@ -24,6 +28,7 @@ from contextlib import suppress
 
 KILL_LIMIT_S = 3.0  # then it gives up: a process of another user, or one stuck in the kernel
 _AGAIN_S = 0.005
+_QUIET_S = 0.3
 _PDEATHSIG, _CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 _LINUX = sys.platform == "linux"
 
@@ -35,8 +40,15 @@ def main(words: list[str]) -> None:
     told = _told(control)
     if told is None:
         return
+    command, environment, mark = told
+    if not command:
+        woken = _wake_up()
+        _say(control, b"pid 0\n")
+        _wait(control, woken, parent, 0)
+        _kill_marked(mark)
+        return
     _prctl(_CHILD_SUBREAPER, 1)
-    guest, error = _start(*told)
+    guest, error = _start(command, environment)
     if error:
         _say(control, b"errno %d\n" % error)
         return
@@ -54,16 +66,16 @@ def _prctl(option: int, value: int) -> None:
         ctypes.CDLL(None).prctl(option, ctypes.c_ulong(value), 0, 0, 0)
 
 
-def _told(control: int) -> tuple[list[bytes], dict[bytes, bytes]] | None:
-    """Command and environment, None when mobilia has gone before it said them."""
+def _told(control: int) -> tuple[list[bytes], dict[bytes, bytes], bytes] | None:
+    """Command, environment and mark, None when mobilia has gone before it said them."""
     heard = b""
     while len(heard) < 8 or len(heard) < 8 + int.from_bytes(heard[:8], "little"):
         data = os.read(control, 1 << 16)
         if not data:
             return None
         heard += data
-    command, environment = marshal.loads(heard[8:])  # of the same interpreter, from mobilia itself
-    return command, environment
+    command, environment, mark = marshal.loads(heard[8:])  # from mobilia itself
+    return command, environment, mark
 
 
 def _say(control: int, words: bytes) -> None:
@@ -114,7 +126,7 @@ def _wait(control: int, woken: int, parent: int, guest: int) -> None:
     poll = select.poll()
     poll.register(control, select.POLLIN)
     poll.register(woken, select.POLLIN)
-    alive = True
+    alive = guest > 0
     while os.getppid() == parent:
         alive = alive and _look(control, guest)
         for descriptor, _ in poll.poll():
@@ -157,6 +169,29 @@ def _kill(guest: int) -> None:
         except ChildProcessError:
             return
         time.sleep(_AGAIN_S)
+
+
+def _kill_marked(mark: bytes) -> None:
+    """Until none has been seen for a while: one between fork and exec shows no mark."""
+    deadline = time.monotonic() + KILL_LIMIT_S
+    seen = time.monotonic()
+    while time.monotonic() < min(deadline, seen + _QUIET_S):
+        for entry in os.listdir("/proc") if _LINUX else ():
+            if entry.isdigit() and (stat := _stat(int(entry))) and _has(int(entry), mark):
+                _send(int(entry), stat[1], signal.SIGKILL)
+                seen = time.monotonic()
+        time.sleep(_AGAIN_S)
+
+
+def _has(pid: int, mark: bytes) -> bool:
+    """But for trackers of shared memory, which clean up and end when their users have."""
+    with suppress(OSError):
+        with open(f"/proc/{pid}/environ", "rb") as environment:
+            if mark not in environment.read().split(b"\0"):
+                return False
+        with open(f"/proc/{pid}/cmdline", "rb") as command:
+            return b"resource_tracker" not in command.read()
+    return False
 
 
 def _descendants() -> dict[int, int]:

@@ -3,29 +3,22 @@
 
 from __future__ import annotations
 
-import errno
-import marshal
 import os
 import selectors
-import signal
-import socket
 import subprocess
-import sys
 import time
 import weakref
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
 from slam.errors import InvalidValueError, SlamFailedError
+from slam.guests.guarding import Guard
 
 MAX_LINE_BYTES = 1 << 28  # a map of 5000 x 5000 cells
 KEPT_WORDS = 4000  # bytes of its standard error
 _CHUNK = 1 << 16
-_SCRIPT = Path(__file__).with_name("guard.py")
-_BEGIN_S = 60.0  # for the guard's start, on a machine that is busy
-_DISMISS_S = 5.0  # for its end: it gives up earlier by itself
 _LEAVE_S = 1.0  # from the end of its input to the end of its life
 _STATUS_S = 0.2  # from the end of its output to the end of its life
 
@@ -47,7 +40,7 @@ class Wire:
         farewell: bytes = b"",
     ) -> None:
         try:
-            self._guard = _Guard(command, os.environ if environment is None else environment)
+            self._guard = Guard(command, os.environ if environment is None else environment)
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             raise InvalidValueError(f"cannot start {command[0]!r}: {why}") from error
@@ -177,92 +170,7 @@ def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes], IO[b
     return streams
 
 
-class _Guard:
-    """The guest's parent (``guard``), as seen from here: how it is told and what it says."""
-
-    def __init__(self, command: Sequence[str], environment: Mapping[str, str]) -> None:
-        encoded = [os.fsencode(word) for word in command]
-        variables = {os.fsencode(name): os.fsencode(value) for name, value in environment.items()}
-        if any(b"\0" in word for word in (*encoded, *variables, *variables.values())):
-            raise ValueError("embedded null byte")
-        self._socket, its_end = socket.socketpair()
-        with its_end, ExitStack() as if_it_fails:
-            if_it_fails.callback(self._socket.close)
-            words = [sys.executable, "-I", "-S", str(_SCRIPT), str(its_end.fileno())]
-            self.process = subprocess.Popen(
-                [*words, str(os.getpid())],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                bufsize=0,
-                pass_fds=[its_end.fileno()],
-                start_new_session=True,  # what interrupts us at a terminal does not end it
-            )
-            if_it_fails.pop_all()
-        self._status = ""
-        try:
-            self.pid = self._begin(marshal.dumps((encoded, variables)))
-        except BaseException:
-            self.dismiss()
-            raise
-
-    def _begin(self, told: bytes) -> int:
-        self._socket.settimeout(_BEGIN_S)
-        with suppress(BrokenPipeError, ConnectionResetError):
-            self._socket.sendall(len(told).to_bytes(8, "little") + told)
-        word, number = self._hear()
-        if word == "errno":
-            raise OSError(number, os.strerror(number))
-        if word != "pid":
-            raise OSError(errno.ECHILD, "its guard did not start")
-        self._socket.setblocking(False)
-        return number
-
-    def _hear(self) -> tuple[str, int]:
-        """The next that it says; "" when it has gone."""
-        line = b""
-        with suppress(ConnectionResetError):
-            while not line.endswith(b"\n") and (more := self._socket.recv(1)):
-                line += more
-        word, _, number = line.decode().partition(" ")
-        return (word, int(number)) if number else ("", 0)
-
-    def status(self) -> str:
-        """How the guest has ended, in words, "" while it lives."""
-        with suppress(BlockingIOError):
-            if not self._status:
-                self._status = _in_words(*self._hear())
-        return self._status
-
-    def hush(self) -> None:
-        """Close the guest's input and output."""
-        for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
-            if stream is not None:
-                with suppress(OSError):
-                    stream.close()
-
-    def dismiss(self) -> None:
-        """It kills the guest and all that this started, and ends."""
-        self.hush()
-        self._socket.close()
-        try:
-            self.process.wait(_DISMISS_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-
-
-def _in_words(how: str, number: int) -> str:
-    if how == "exited":
-        return f"ended with status {number}"
-    if how == "signal":
-        with suppress(ValueError):
-            return f"was ended by {signal.Signals(number).name}"
-        return f"was ended by signal {number}"
-    return "was ended with its guard"
-
-
-def _end(guard: _Guard, farewell: bytes = b"", leave_s: float = _LEAVE_S) -> None:
+def _end(guard: Guard, farewell: bytes = b"", leave_s: float = _LEAVE_S) -> None:
     """Say farewell, close the guest's input, wait a moment, have it killed."""
     process = guard.process
     if process.stdin is not None and farewell:
