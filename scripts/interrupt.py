@@ -20,9 +20,14 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
 
 
 def install() -> None:
-    """From now on SIGINT and SIGTERM raise ``InterruptedBySignal`` in the main thread."""
+    """From now on SIGINT, SIGTERM and SIGHUP raise ``InterruptedBySignal`` in the main thread.
+
+    SIGHUP, the end of the terminal, stays ignored where nohup has it so.
+    """
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, _interrupt)
 
 
 def check() -> None:

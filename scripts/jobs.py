@@ -23,6 +23,7 @@ from rich.markup import escape
 from scripts import interrupt, workers
 from scripts.console import progress
 from scripts.output import versions
+from slam import locks
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 
 PART = ".part"
@@ -100,7 +101,8 @@ def run_jobs(
     ``folder``; the file of each job by its name.
 
     A job that fails stops the rest and is named in the error; results that are whole stay, and the
-    next call goes on from them. Raises ``InvalidValueError`` for two jobs of one name.
+    next call goes on from them. Raises ``InvalidValueError`` for two jobs of one name,
+    ``OutputError`` while another call, or workers that it left, write into ``folder``.
     """
     wanted: dict[str, Job] = {}
     for job in jobs:
@@ -110,6 +112,13 @@ def run_jobs(
     if processes < 1:
         raise InvalidValueError(f"processes must be >= 1, got {processes}")
     folder.mkdir(parents=True, exist_ok=True)
+    with locks.locked(folder):
+        return _make_missing(wanted, folder, processes, cluster, title)
+
+
+def _make_missing(
+    wanted: Mapping[str, Job], folder: Path, processes: int, cluster: str | None, title: str
+) -> dict[str, Path]:
     files = {name: folder / job.file_name() for name, job in wanted.items()}
     missing = [job for name, job in wanted.items() if not files[name].exists()]
     with progress() as bar:

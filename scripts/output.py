@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import math
 import os
@@ -17,12 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from sim.versions import WORLD
+from slam import locks
 from slam.errors import LogFormatError, OutputError
 from slam.files import write_text
 from slam.names import NameFromFile
 
 RECIPE = "recipe.json"
-LOCK = ".lock"
 MAX_RECIPE_BYTES = 1 << 20
 
 
@@ -67,17 +66,11 @@ def locked_folder(out: Path) -> Iterator[None]:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot write {out}: {error.strerror or error}") from error
-    others = [file.name for file in out.iterdir() if file.name != LOCK]
+    others = [file.name for file in out.iterdir() if file.name not in locks.NAMES]
     if others and not (out / RECIPE).exists():
         raise OutputError(f"{out} holds files that mobilia did not write: choose another --out")
-    lock = out / LOCK
-    with lock.open("w") as held:
-        try:
-            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise OutputError(f"{out} is being written by another process") from error
+    with locks.locked(out):
         yield
-        lock.unlink(missing_ok=True)
 
 
 def _refuse(path: Path, overwrite: bool) -> None:

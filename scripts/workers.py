@@ -3,22 +3,30 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
 import os
+import signal
+import threading
+import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
 import joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
+from slam import locks
 from slam.errors import InvalidValueError, MissingDependencyError, MobiliaError, OutputError
 from slam.files import write_text
+from slam.guests import guarding
 
 MAX_JOBS = 1024
 WORKERS_TIMEOUT_S = 30
+_LOOK_S = 0.25  # between a worker's looks at its parent
+_PDEATHSIG = 1  # linux/prctl.h
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -35,16 +43,25 @@ def each(
 
     jobs     processes here; 1 runs in this one
     cluster  address of a Dask scheduler (tcp://host:port) instead
-    shared   folder that every worker must see: checked before anything starts
+    shared   folder that they write to: on a cluster every worker must see it, which is checked
+             before anything starts; where it is locked (``slam.locks``) jobs hold on to it
 
     ``call`` must be a function of a module. An error of ours stops everything and is raised here.
+    When this process is killed, its workers here end at once; those of a cluster end their jobs.
     """
     check_jobs(jobs)
     if cluster is None and (jobs == 1 or len(items) < 2):
         yield from map(call, items)
         return
     with ExitStack() as stack:
-        backend: dict[str, Any] = {"backend": "loky", "n_jobs": min(jobs, max(len(items), 1))}
+        backend: dict[str, Any] = {
+            "backend": "loky",
+            "n_jobs": min(jobs, max(len(items), 1)),
+            "initializer": end_with_parent,
+            "initargs": (os.getpid(),),
+        }
+        if cluster is None:
+            stack.enter_context(guarding.guarded_workers())
         if cluster is not None:
             client = stack.enter_context(_client(cluster))
             if shared is not None:
@@ -52,7 +69,8 @@ def each(
             backend = {"backend": "dask", "wait_for_workers_timeout": WORKERS_TIMEOUT_S}
         stack.enter_context(joblib.parallel_config(**backend))
         parallel = joblib.Parallel(return_as="generator_unordered", batch_size=1)
-        results = parallel(joblib.delayed(_guarded)(call, item) for item in items)
+        held = (shared, locks.ticket(shared)) if shared is not None else None
+        results = parallel(joblib.delayed(_guarded)(call, item, held) for item in items)
         try:
             for result, error in results:
                 if error is not None:
@@ -65,6 +83,8 @@ def each(
             ) from error
         finally:
             results.close()
+            if shared is not None:
+                locks.idle(shared)
 
 
 def check_jobs(jobs: int) -> None:
@@ -73,12 +93,42 @@ def check_jobs(jobs: int) -> None:
         raise InvalidValueError(f"--jobs must be 1 to {MAX_JOBS}, got {jobs}")
 
 
-def _guarded(call: Callable[[T], R], item: T) -> tuple[R | None, MobiliaError | None]:
+def _guarded(
+    call: Callable[[T], R], item: T, held: tuple[Path, str] | None
+) -> tuple[R | None, MobiliaError | None]:
     """Errors as values: as exceptions they would come back wrapped in a worker's traceback."""
     try:
-        return call(item), None
+        with locks.working(*held) if held is not None and held[1] else nullcontext():
+            return call(item), None
     except MobiliaError as error:
         return None, error
+
+
+def end_with_parent(parent: int) -> None:
+    """In a new worker: it ends when the process ``parent`` does, be that by SIGKILL.
+
+    On Linux the kernel kills it, whatever it is doing; before it comes to this, a guard does.
+    Elsewhere, and for a worker whose parent started it from another thread than the first, a thread
+    here does when it next gets its turn.
+    """
+    if _of_the_first_thread(parent):  # else the end of that thread would be taken for the parent's
+        ctypes.CDLL(None).prctl(_PDEATHSIG, ctypes.c_ulong(signal.SIGKILL), 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+
+
+def _of_the_first_thread(parent: int) -> bool:
+    with suppress(OSError):  # no Linux, or one that does not tell
+        children = Path(f"/proc/{parent}/task/{parent}/children").read_text()
+        return str(os.getpid()) in children.split()
+    return False
+
+
+def _watch(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_LOOK_S)
+    os._exit(1)
 
 
 def _client(address: str) -> Any:

@@ -82,6 +82,12 @@ def _candidates() -> tuple[str, ...]:
     return tuple(sorted(known, key=lambda name: name != wish))
 
 
+# It waits for the probe: the thread that started it does not end before this process does.
+_ENDS_WITH_US = (  # PR_SET_PDEATHSIG of linux/prctl.h, SIGKILL
+    "import ctypes; ctypes.CDLL(None).prctl(1, 9, 0, 0, 0)\n" if sys.platform == "linux" else ""
+)
+
+
 def _try(program: str, backend: str | None) -> str | None:
     """Run a Python program with that library; None when it worked, else why not, in one line."""
     environment = {name: value for name, value in os.environ.items() if name != VARIABLE}
@@ -89,7 +95,7 @@ def _try(program: str, backend: str | None) -> str | None:
         environment[VARIABLE] = backend
     try:
         run = subprocess.run(
-            [sys.executable, "-P", "-c", program],  # no module of the working folder
+            [sys.executable, "-P", "-c", _ENDS_WITH_US + program],  # -P: no module from here
             env=environment,
             stdin=subprocess.DEVNULL,
             capture_output=True,

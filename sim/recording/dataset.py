@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import shutil
@@ -18,11 +17,11 @@ from sim.recording.sums import SUMS, read_sums
 from sim.recording.verify import check_hashes
 from sim.twins import TWINS
 from sim.versions import check_world
+from slam import locks
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import write_text
 
 PLAN = "dataset.json"
-LOCK = ".lock"
 MAX_EPISODES = 1_000_000
 
 
@@ -119,25 +118,20 @@ class Dataset:
 def writing(path: Path, plan: Plan) -> Iterator[Dataset]:
     """The dataset at ``path``, locked against other writers, cleared of torn episodes.
 
-    Raises ``OutputError`` when somebody else writes there, when the folder follows another plan or
-    holds files that are no dataset, or cannot be written.
+    Raises ``OutputError`` when somebody else writes there, or workers that a killed run left still
+    do, when the folder follows another plan or holds files that are no dataset, or cannot be
+    written.
     """
     path = path.absolute()
-    lock = path / LOCK
     try:
         path.mkdir(parents=True, exist_ok=True)
-        with lock.open("w") as held:
-            try:
-                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise OutputError(f"{path} is being written by another process") from error
+        with locks.locked(path):
             try:
                 _claim(path, plan)
                 _clear(path)  # of what a killed run left
                 yield Dataset(path, plan)
             finally:
                 _clear(path)  # of what killed workers left
-                lock.unlink(missing_ok=True)
     except OutputError:
         raise
     except OSError as error:
@@ -156,7 +150,9 @@ def _claim(path: Path, plan: Plan) -> None:
         if file.read_text(encoding="utf-8", errors="replace") != plan.text():
             raise OutputError(f"{file} is of another dataset: choose another --out")
         return
-    others = [name for name in os.listdir(path) if name != LOCK and not name.endswith(PART)]
+    others = [
+        name for name in os.listdir(path) if name not in locks.NAMES and not name.endswith(PART)
+    ]
     if others:
         raise OutputError(f"{path} holds files that are no dataset: choose another --out")
     write_text(file, plan.text())

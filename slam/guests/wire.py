@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import selectors
-import signal
 import subprocess
 import time
 import weakref
@@ -15,22 +14,23 @@ from pathlib import Path
 from typing import IO
 
 from slam.errors import InvalidValueError, SlamFailedError
+from slam.guests.guarding import Guard
 
 MAX_LINE_BYTES = 1 << 28  # a map of 5000 x 5000 cells
 KEPT_WORDS = 4000  # bytes of its standard error
 _CHUNK = 1 << 16
-_SHELL = "/bin/sh"
 _LEAVE_S = 1.0  # from the end of its input to the end of its life
 _STATUS_S = 0.2  # from the end of its output to the end of its life
 
 
 class Wire:
-    """``command`` running in a process group of its own.
+    """``command`` running in a session of its own.
 
     The child reads requests from its standard input and answers each with one line on its standard
     output; ``farewell`` and the end of its input mean that it is to end. When it is not needed any
-    more, whether closed, garbage collected or at the end of this program, its whole group is
-    killed; a guard sees to it should this program be killed. POSIX only.
+    more, whether closed, garbage collected or at the end of this program, it is killed with all
+    that it started, in whatever session; its parent, a ``guard``, sees to it even when this program
+    is killed. POSIX only; where there is no Linux, only its process group is killed.
     """
 
     def __init__(
@@ -40,33 +40,19 @@ class Wire:
         farewell: bytes = b"",
     ) -> None:
         try:
-            self._guard = _guard()
-        except OSError as error:
-            raise InvalidValueError(f"cannot start {_SHELL!r}: {error.strerror}") from error
-        try:
-            self._process = subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                bufsize=0,
-                env=None if environment is None else dict(environment),
-                start_new_session=True,
-            )
+            self._guard = Guard(command, os.environ if environment is None else environment)
         except (OSError, ValueError) as error:
-            _dismiss(self._guard)
             why = getattr(error, "strerror", None) or error
             raise InvalidValueError(f"cannot start {command[0]!r}: {why}") from error
-        self._stdin, self._stdout, self._stderr = _pipes(self._process)
-        self._finalizer = weakref.finalize(self, _end, self._process, self._guard, farewell)
-        _tell(self._guard, self._process.pid)
+        self._stdin, self._stdout, self._stderr = _pipes(self._guard.process)
+        self._finalizer = weakref.finalize(self, _end, self._guard, farewell)
         self._heard = bytearray()
         self._words = bytearray()
 
     @property
     def pid(self) -> int:
         """Process and process group."""
-        return self._process.pid
+        return self._guard.pid
 
     @property
     def open(self) -> bool:
@@ -87,7 +73,7 @@ class Wire:
             return self._exchange(request, time.monotonic() + limit_s, limit_s)
         except BaseException:
             if self._finalizer.detach():
-                _end(self._process, self._guard, leave_s=0.0)
+                _end(self._guard, leave_s=0.0)
             raise
 
     def _exchange(self, request: bytes, deadline: float, limit_s: float) -> bytes:
@@ -143,7 +129,7 @@ class Wire:
     def _epitaph(self) -> str:
         """How it ended."""
         deadline = time.monotonic() + _STATUS_S
-        while not (status := _exit_status(self._process)) and time.monotonic() < deadline:
+        while not (status := self._guard.status()) and time.monotonic() < deadline:
             time.sleep(0.005)
         if not status:
             return f"closed its standard output{self._last_words()}"
@@ -174,32 +160,6 @@ class Wire:
         return None
 
 
-def _guard() -> subprocess.Popen[bytes]:
-    """Reads the number of a process group; at the end of its input it kills that."""
-    return subprocess.Popen(
-        [_SHELL, "-c", 'read -r group && { read -r _; kill -s KILL -- "-$group"; }'],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        bufsize=0,
-        start_new_session=True,  # what interrupts us at a terminal does not end it
-    )
-
-
-def _tell(guard: subprocess.Popen[bytes], group: int) -> None:
-    assert guard.stdin is not None
-    with suppress(OSError):
-        guard.stdin.write(b"%d\n" % group)
-
-
-def _dismiss(guard: subprocess.Popen[bytes]) -> None:
-    """Before its group is reaped and the number another's."""
-    guard.kill()
-    assert guard.stdin is not None
-    guard.stdin.close()
-    guard.wait()
-
-
 def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes], IO[bytes]]:
     assert process.stdin is not None
     assert process.stdout is not None
@@ -210,36 +170,14 @@ def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes], IO[b
     return streams
 
 
-def _exit_status(process: subprocess.Popen[bytes]) -> str:
-    """How it has ended, in words, "" while it lives; it stays to be reaped."""
-    info = os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)
-    if info is None:
-        return ""
-    if info.si_code == os.CLD_EXITED:
-        return f"ended with status {info.si_status}"
-    with suppress(ValueError):
-        return f"was ended by {signal.Signals(info.si_status).name}"
-    return f"was ended by signal {info.si_status}"
-
-
-def _end(
-    process: subprocess.Popen[bytes],
-    guard: subprocess.Popen[bytes],
-    farewell: bytes = b"",
-    leave_s: float = _LEAVE_S,
-) -> None:
-    """Say farewell, close its input, wait a moment, kill its group, reap it."""
+def _end(guard: Guard, farewell: bytes = b"", leave_s: float = _LEAVE_S) -> None:
+    """Say farewell, close the guest's input, wait a moment, have it killed."""
+    process = guard.process
     if process.stdin is not None and farewell:
         with suppress(OSError):
             os.write(process.stdin.fileno(), farewell)
-    for stream in (process.stdin, process.stdout, process.stderr):
-        if stream is not None:
-            with suppress(OSError):
-                stream.close()
+    guard.hush()
     deadline = time.monotonic() + leave_s
-    while not _exit_status(process) and time.monotonic() < deadline:
+    while not guard.status() and time.monotonic() < deadline:
         time.sleep(0.005)
-    with suppress(OSError):  # not reaped yet: the number of its group is still its own
-        os.killpg(process.pid, signal.SIGKILL)
-    _dismiss(guard)
-    process.wait()
+    guard.dismiss()

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A guard process (``guard``) as seen from mobilia: how it is told and what it says."""
+
+from __future__ import annotations
+
+import errno
+import marshal
+import os
+import signal
+import socket
+import subprocess
+import sys
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
+from pathlib import Path
+
+_SCRIPT = Path(__file__).with_name("guard.py")
+_BEGIN_S = 60.0  # for the guard's start, on a machine that is busy
+_DISMISS_S = 5.0  # for its end: it gives up earlier by itself
+MARK = "MOBILIA_COMMAND"  # variable that worker processes of one command have in common
+
+
+class Guard:
+    """``command`` below a guard, to which its three streams belong.
+
+    Without a command it guards the processes with ``mark``, "name=value", in their environment.
+    Raises ``OSError`` and ``ValueError`` as ``subprocess.Popen`` does.
+    """
+
+    def __init__(
+        self, command: Sequence[str], environment: Mapping[str, str], mark: str = ""
+    ) -> None:
+        encoded = [os.fsencode(word) for word in command]
+        variables = {os.fsencode(name): os.fsencode(value) for name, value in environment.items()}
+        if any(b"\0" in word for word in (*encoded, *variables, *variables.values())):
+            raise ValueError("embedded null byte")
+        self._socket, its_end = socket.socketpair()
+        with its_end, ExitStack() as if_it_fails:
+            if_it_fails.callback(self._socket.close)
+            words = [sys.executable, "-I", "-S", str(_SCRIPT), str(its_end.fileno())]
+            self.process = subprocess.Popen(
+                [*words, str(os.getpid())],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                bufsize=0,
+                pass_fds=[its_end.fileno()],
+                env={name: value for name, value in os.environ.items() if name != MARK},
+                start_new_session=True,  # what interrupts us at a terminal does not end it
+            )
+            if_it_fails.pop_all()
+        self._status = ""
+        try:
+            self.pid = self._begin(marshal.dumps((encoded, variables, os.fsencode(mark))))
+        except BaseException:
+            self.dismiss()
+            raise
+
+    def _begin(self, told: bytes) -> int:
+        self._socket.settimeout(_BEGIN_S)
+        with suppress(BrokenPipeError, ConnectionResetError):
+            self._socket.sendall(len(told).to_bytes(8, "little") + told)
+        word, number = self._hear()
+        if word == "errno":
+            raise OSError(number, os.strerror(number))
+        if word != "pid":
+            raise OSError(errno.ECHILD, "its guard did not start")
+        self._socket.setblocking(False)
+        return number
+
+    def _hear(self) -> tuple[str, int]:
+        """The next that it says; "" when it has gone."""
+        line = b""
+        with suppress(ConnectionResetError):
+            while not line.endswith(b"\n") and (more := self._socket.recv(1)):
+                line += more
+        word, _, number = line.decode().partition(" ")
+        return (word, int(number)) if number else ("", 0)
+
+    def status(self) -> str:
+        """How the guest has ended, in words, "" while it lives."""
+        with suppress(BlockingIOError):
+            if not self._status:
+                self._status = _in_words(*self._hear())
+        return self._status
+
+    def hush(self) -> None:
+        """Close the guest's input and output."""
+        for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
+            if stream is not None:
+                with suppress(OSError):
+                    stream.close()
+
+    def dismiss(self) -> None:
+        """It kills the guest and all that this started, and ends."""
+        self.hush()
+        self._socket.close()
+        try:
+            self.process.wait(_DISMISS_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+def _in_words(how: str, number: int) -> str:
+    if how == "exited":
+        return f"ended with status {number}"
+    if how == "signal":
+        with suppress(ValueError):
+            return f"was ended by {signal.Signals(number).name}"
+        return f"was ended by signal {number}"
+    return "was ended with its guard"
+
+
+@contextmanager
+def guarded_workers() -> Iterator[None]:
+    """What is started meanwhile gets a mark, and is killed when this process ends.
+
+    By SIGKILL too; guests have guards of their own. Linux only, elsewhere nothing.
+    """
+    if sys.platform != "linux":
+        yield
+        return
+    before = os.environ.get(MARK)  # of a worker that has workers
+    os.environ[MARK] = _workers_guard(os.getpid())
+    try:
+        yield
+    finally:
+        os.environ.pop(MARK)
+        if before is not None:
+            os.environ[MARK] = before
+
+
+_workers_guards: dict[str, Guard] = {}  # they end with this process
+
+
+@cache
+def _workers_guard(_process: int) -> str:
+    """The mark; one for each process, as workers stay for the next call."""
+    value = uuid.uuid4().hex
+    _workers_guards[value] = Guard((), {}, f"{MARK}={value}")
+    _workers_guards[value].hush()
+    return value

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Folders with one writer at a time, whose workers hold on to them too.
+
+A writer that is killed frees its lock at once, its worker processes end a moment later. So there
+are two files: ``.lock``, held by the writer, and ``.lock.workers``, held by its workers while they
+do a job. The next writer waits until those have ended and writes a new ticket into the latter; a
+worker that comes with an old ticket does nothing. Locks are ``flock``: over NFS they hold between
+machines where the mount has them (not with ``nolock`` or ``local_lock``), for workers of one thread
+each.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import time
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+from slam.errors import OutputError
+
+LOCK = ".lock"
+WORKERS = ".lock.workers"
+NAMES = frozenset((LOCK, WORKERS))  # in a folder that was left by a killed command
+WAIT_S = 5.0  # for workers of a writer that is over
+_AGAIN_S = 0.02
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """``folder``, which must exist, is this writer's alone.
+
+    Raises ``OutputError`` when another writes there, or workers of one that is over still do after
+    ``WAIT_S``; ``OSError`` when the folder cannot be written.
+    """
+    with _alone(folder):
+        with (folder / WORKERS).open("a") as workers:
+            if not _got(workers, fcntl.LOCK_EX, WAIT_S):
+                raise OutputError(
+                    f"{folder} is still being written by workers of an earlier command: "
+                    "try again when they have ended"
+                )
+            workers.truncate(0)
+            workers.write(uuid.uuid4().hex)
+        try:
+            yield
+        finally:
+            if idle(folder, wait_s=0.0):  # else the next writer has to wait for them
+                (folder / WORKERS).unlink(missing_ok=True)
+            (folder / LOCK).unlink(missing_ok=True)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Hold the writer's lock; on a new file where its last holder has just removed the old one."""
+    path = folder / LOCK
+    while True:
+        with path.open("a") as held:
+            try:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise OutputError(f"{folder} is being written by another process") from error
+            if _same(held, path):
+                yield
+                return
+
+
+def _same(held: IO[str], path: Path) -> bool:
+    with suppress(FileNotFoundError):
+        return os.path.samestat(os.fstat(held.fileno()), path.stat())
+    return False
+
+
+def _got(file: IO[str], kind: int, wait_s: float) -> bool:
+    """Whether the lock was had in that time."""
+    deadline = time.monotonic() + wait_s
+    while True:
+        with suppress(BlockingIOError):
+            fcntl.flock(file, kind | fcntl.LOCK_NB)
+            return True
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(_AGAIN_S)
+
+
+def ticket(folder: Path) -> str:
+    """What the workers of the present writer are to show; "" where ``folder`` is not locked."""
+    with suppress(FileNotFoundError):
+        return (folder / WORKERS).read_text(encoding="ascii")
+    return ""
+
+
+@contextmanager
+def working(folder: Path, shown: str) -> Iterator[None]:
+    """In a worker: no other writer takes ``folder`` up until the job is done.
+
+    Raises ``OutputError`` when one has, or the folder cannot be locked.
+    """
+    with _shared(folder) as own:
+        if own != shown:
+            raise OutputError(f"{folder} has been taken up by another command")
+        yield
+
+
+@contextmanager
+def _shared(folder: Path) -> Iterator[str]:
+    try:
+        file = (folder / WORKERS).open(encoding="ascii")
+    except FileNotFoundError:
+        yield ""
+        return
+    except OSError as error:
+        raise OutputError(f"cannot lock {folder}: {error.strerror or error}") from error
+    with file:
+        try:
+            own = file.read() if _got(file, fcntl.LOCK_SH, WAIT_S) else ""
+        except OSError as error:
+            raise OutputError(f"cannot lock {folder}: {error.strerror or error}") from error
+        yield own
+
+
+def idle(folder: Path, wait_s: float = WAIT_S) -> bool:
+    """Wait until no worker has a job in ``folder``; False when one still has after ``wait_s``."""
+    with suppress(FileNotFoundError), (folder / WORKERS).open("a") as workers:
+        return _got(workers, fcntl.LOCK_EX, wait_s)
+    return True

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A signal unwinds the command; one that is ignored on purpose stays so."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+REPO = Path(__file__).resolve().parents[2]
+CODE = (
+    "import time; from scripts import interrupt\n"
+    "interrupt.install()\n"
+    "print('ready', flush=True)\n"
+    "try:\n"
+    "    time.sleep(float({seconds}))\n"
+    "    print('undisturbed')\n"
+    "except interrupt.InterruptedBySignal:\n"
+    "    print('unwound')\n"
+)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_unwinds(number):
+    assert said_after(number, [sys.executable, "-c", CODE.format(seconds=60)]) == "unwound"
+
+
+def test_the_end_of_the_terminal_is_ignored_under_nohup():
+    words = ["nohup", sys.executable, "-c", CODE.format(seconds=0.5)]
+    assert said_after(signal.SIGHUP, words) == "undisturbed"
+
+
+def said_after(number: signal.Signals, words: list[str]) -> str:
+    with subprocess.Popen(
+        words, cwd=REPO, env={**os.environ, "PYTHONPATH": str(REPO)},
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(number)
+        return process.stdout.read().strip()

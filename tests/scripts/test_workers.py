@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Worker processes end with the command, and no command takes up a folder that they still write."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from scripts import workers
+from scripts.jobs import Job, run_jobs
+from slam import locks
+from slam.errors import MobiliaError, OutputError
+from slam.guests.wire import Wire
+
+REPO = Path(__file__).resolve().parents[2]
+MARK = "MOBILIA_TEST_WORKERS"
+
+
+def never_ends(path: Path, *, guest: bool) -> None:
+    """A job that starts what a job may start and never comes to an end."""
+    if guest:
+        wire = Wire(["sh", "-c", "setsid sleep 300 & echo 1; sleep 300"])
+        wire.ask(b"", 10.0)
+    path.with_suffix(f".{os.getpid()}.begun").touch()
+    while True:
+        sum(range(1_000_000))
+
+
+def quick(path: Path, *, guest: bool) -> None:
+    path.write_text(str(guest))
+
+
+def some_jobs(call=never_ends, guest: bool = True) -> list[Job]:
+    return [Job(name=f"j{k}", call=call, arguments={"guest": guest}) for k in range(2)]
+
+
+def marked(mark: str) -> list[int]:
+    """Processes with that mark in their environment that are not over."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if f"{MARK}={mark}".encode() in (process / "environ").read_bytes().split(b"\0"):
+                found.append(int(process.name))
+    return found
+
+
+def begin(folder: Path, mark: str) -> subprocess.Popen[bytes]:
+    """``run_jobs`` in a process of its own, up to where both workers are at work."""
+    code = (
+        "from pathlib import Path; from scripts.jobs import run_jobs\n"
+        "from tests.scripts.test_workers import some_jobs\n"
+        f"run_jobs(some_jobs(), Path({str(folder)!r}), processes=2)"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(REPO), MARK: mark}
+    command = subprocess.Popen([sys.executable, "-c", code], cwd=REPO, env=environment)
+    deadline = time.monotonic() + 60.0
+    while len(list(folder.glob(".*.begun"))) < 2:
+        assert time.monotonic() < deadline
+        assert command.poll() is None
+        time.sleep(0.02)
+    return command
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_workers_and_their_guests_end_with_a_killed_command(tmp_path):
+    command = begin(tmp_path, "killed")
+    assert len(marked("killed")) >= 11  # the command, 2 workers, 2 guests, their children, guards
+    command.kill()
+    command.wait()
+    killed = time.monotonic()
+    while left := marked("killed"):
+        assert time.monotonic() - killed < 10.0, left
+        time.sleep(0.01)
+    print(f"the last process ended {time.monotonic() - killed:.2f} s after the kill")
+    for begun in tmp_path.glob(".*.begun"):
+        begun.unlink()
+    files = run_jobs(some_jobs(quick), tmp_path, processes=2)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        path.name for path in files.values()
+    )
+
+
+def kill_a_worker(folder: Path) -> None:
+    while not (begun := list(folder.glob(".*.begun"))):
+        time.sleep(0.02)
+    os.kill(int(begun[0].suffixes[-2][1:]), signal.SIGKILL)
+
+
+def test_a_killed_worker_is_one_line(tmp_path):
+    killer = threading.Thread(target=kill_a_worker, args=(tmp_path,))
+    killer.start()
+    with pytest.raises(MobiliaError, match=r"a worker process was killed, .* goes on from here"):
+        run_jobs(some_jobs(guest=False), tmp_path, processes=2)
+    killer.join()
+
+
+def test_a_folder_that_a_left_worker_writes_is_not_taken_up(tmp_path, monkeypatch):
+    monkeypatch.setattr(locks, "WAIT_S", 0.1)
+    with locks.locked(tmp_path):
+        left = locks.working(tmp_path, locks.ticket(tmp_path))
+        left.__enter__()
+    with pytest.raises(OutputError, match="still being written by workers"):
+        run_jobs(some_jobs(quick), tmp_path, processes=2)
+    left.__exit__(None, None, None)
+    assert len(run_jobs(some_jobs(quick), tmp_path, processes=2)) == 2
+
+
+def holds(folder: Path) -> bool:
+    return locks.idle(folder, wait_s=0.0)
+
+
+def test_jobs_hold_on_to_a_locked_folder(tmp_path):
+    with locks.locked(tmp_path):
+        found = list(workers.each(holds, [tmp_path] * 2, jobs=2, shared=tmp_path))
+    assert found == [False, False]
+    assert list(workers.each(holds, [tmp_path] * 2, jobs=2, shared=tmp_path)) == [True, True]
