@@ -23,6 +23,7 @@ from slam.shunting.visibility import View, view_of_beams, view_of_features
 SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
 SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
 NEAR_JOIN_CELLS = 3.0
+MOST_STD_M = 3.0  # of a feature; one known worse says nothing, and fills the map in saying it
 SPACING_M, LEAST_WEIGHT = 0.1, 0.3  # beams closer than this share one observation's weight
 
 
@@ -162,9 +163,13 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
 
 
 def from_features(features: Features, config: ShuntingConfig) -> Observations:
-    """Point features within range; their covariance widened to what the lattice can carry."""
+    """Point features within range; their covariance widened to what the lattice can carry.
+
+    Those with a standard deviation beyond ``MOST_STD_M`` are left out.
+    """
     points = features.points_robot
     near = (points * points).sum(axis=1) <= config.range_m**2
+    near &= features.covariances.diagonal(axis1=1, axis2=2).max(axis=1, initial=0.0) <= MOST_STD_M**2
     floor = (SIGMA_CELLS * config.cell_m) ** 2
     given = features.covariances[near]
     covariances = np.stack([given[:, 0, 0] + floor, given[:, 0, 1], given[:, 1, 1] + floor], axis=1)
