@@ -69,9 +69,9 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     ### Action space
     ``Box(-1, 1, (2,), float32)``: forward speed (times 0.8 m/s) and turn rate (times 1.2 rad/s,
-    counter-clockwise), ramped by the robot. Finite numbers beyond [-1, 1] are clipped; NaN, infinities
-    and anything that is not two numbers are refused with ``InvalidValueError``, and the room stays as
-    it was.
+    counter-clockwise), ramped by the robot. Finite numbers beyond [-1, 1] are clipped; NaN,
+    infinities and anything that is not two numbers are refused with ``InvalidValueError``, and the
+    room stays as it was.
 
     ### Observation space
     ``Dict`` of what the robot itself knows:

@@ -63,7 +63,10 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         frames: bool = False,
         **settings: Any,
     ) -> None:
-        for name, value, most in (("num_envs", num_envs, MOST_ENVS), ("n_threads", n_threads, 1024)):
+        for name, value, most in (
+            ("num_envs", num_envs, MOST_ENVS),
+            ("n_threads", n_threads, 1024),
+        ):
             if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
                 raise InvalidValueError(
                     f"{name} must be a whole number >= 1 and <= {most}, got {value!r}"

@@ -37,7 +37,7 @@ LEAST_INCREMENT = 1e-5  # rad; the finest scanners have 4e-4
 MOST_RANGE_M = float(np.finfo(np.float32).max)  # ranges are such numbers
 MOST_SWEEP_S = 100.0  # from a scan's first beam to its last
 MOST_FEATURE_M = 1e9  # from the robot: their squares must not overflow
-MOST_MOUNT_M = 1e3  # from the robot's origin to its laser
+MOST_MOUNT_M = 30.0  # from the robot's origin to its laser
 
 
 def to_ns(seconds: float) -> int:
@@ -59,9 +59,10 @@ class LaserSpec(ByContent):
     angle_increment    rad between neighbouring beams, at least 1e-5
     range_min/max      m; a return outside is no valid measurement
     beam_time_offsets  (n_beams,) s after the scan's stamp at which each beam was measured, whole
-                       nanoseconds, up to 100 s. The LMS-221 interlaces: in a 0.5 degree scan neighbours are
-                       one mirror turn (13.3 ms) apart. All zero where a log does not say.
-    T_robot_laser      (3,) pose of the laser on the robot (m, m, rad), within 1 km of its origin
+                       nanoseconds, up to 100 s. The LMS-221 interlaces: in a 0.5 degree scan
+                       neighbours are one mirror turn (13.3 ms) apart. All zero where a log does
+                       not say.
+    T_robot_laser      (3,) pose of the laser on the robot (m, m, rad), within 30 m of its origin
 
     Raises ``InvalidValueError`` for anything else.
     """

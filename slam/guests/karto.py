@@ -23,7 +23,7 @@ from slam.system import register
 KEEP_M, KEEP_RAD = 0.2, math.radians(10.0)  # Karto's minimum travel distance and heading
 BASE, NEAR_M = 20, 8.0  # kept scans matched against, and how far from the predicted place
 RANGE_M = 20.0
-MOST_BEAMS = 10_000  # its matcher takes half a minute for ten times as many
+MOST_BEAMS = 4000  # its matcher takes seconds a scan for as many
 NOTHING_M = 1e3  # a range that its matcher takes for no return
 FINE_RAD = math.radians(0.1)
 NARROW, WIDE = (0.3, 0.35), (1.2, 0.5)  # m across, rad either way; WIDE where NARROW does poorly

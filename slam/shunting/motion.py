@@ -16,7 +16,6 @@ FLOOR_M, FLOOR_RAD = 0.002, 0.0015  # standard deviation per sqrt(0.2 s): skew, 
 # The matcher is given a stated covariance no tighter than this: else the map slips unnoticed.
 LEAST_SCALE, LEAST_M, LEAST_RAD = 2.25, 0.004, 0.003
 IDENTITY = np.eye(3)
-LEAST_SHARE = 1e-6  # of the largest variance: added where a covariance is singular
 LEAST_VARIANCE = 1e-12  # of an increment, m^2 and rad^2
 # Without a covariance: a worn robot on a log, see ``assumed_covariance``.
 ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
@@ -36,15 +35,14 @@ def turned(covariance: Float, theta: float) -> Float:
 def inverted(matrix: Float) -> Float:
     """Inverse of a symmetric positive definite (3, 3) matrix, in a fixed order of operations.
 
-    One that rounding has left singular is inverted with a little more on its diagonal.
+    One that rounding has left singular is taken without its correlations.
     """
     (a, b, c), (_, d, e), (_, _, f) = matrix.tolist()
     aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
     bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
     det = a * aa + b * ab + c * ac
     if det <= 0.0:
-        least = max(LEAST_SHARE * max(a, d, f), LEAST_VARIANCE)
-        return inverted(matrix + np.diag([least] * 3))
+        return np.diag([1.0 / max(v, LEAST_VARIANCE) for v in (a, d, f)])
     adjugate = [[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]
     return np.array([[entry / det for entry in row] for row in adjugate])
 

@@ -280,7 +280,10 @@ class ShuntingSlam:
         slam.config = config
         warm_up()
         slam.reset()
-        memory.fill(slam.network, arrays)
+        try:
+            memory.fill(slam.network, arrays)
+        except InvalidValueError as error:  # blocks farther apart than a map can be
+            raise LogFormatError(path, str(error)) from error
         slam._T_map_robot = state.T_map_robot
         slam._resumed = state.covariance + COARSE
         slam._belief.resumed(state.covariance)
