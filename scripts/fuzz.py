@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Damage files at random and read them: ``python -m scripts.fuzz --seconds 60``.
+"""Odd input of every kind: ``python -m scripts.fuzz --seconds 60`` and ``--cases 500 --seed 0``.
+
+``--cases`` calls ``update`` of every SLAM, ``step``, ``reset`` and the constructors of environments
+with odd arguments (``scripts.fuzz_calls``) so many times each, in a child process with a limit on
+time, and prints what came of it. ``--seconds`` damages files at random and reads them:
 
 Bags (MCAP packed and plain, sqlite3, ROS 1), CARMEN logs and recipes. A reader may succeed or raise
 one of our errors; anything else, or more than ten seconds for one file, is a finding. The damaged
-file is kept and named. The same seed damages the same files in the same way.
+file is kept and named. The same seed damages the same files in the same way. Exit status 1 when
+anything was found.
 """
 
 from __future__ import annotations
@@ -20,14 +25,19 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from types import FrameType
 
 import numpy as np
+from rich.table import Table
 from rosbags.rosbag1 import Writer as WriterOfRos1
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from scripts.console import console
+from scripts.fuzz_calls import GROUPS, Tally
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from slam.errors import MobiliaError
@@ -35,6 +45,7 @@ from slam.logs import read_bag, read_carmen, write_carmen
 from slam.logs.bag_topics import ROS1, ROS2, Bag
 
 HANG_S = 10
+CASE_S = 120  # of odd calls: six scans of 100 000 beams take half of it on a busy machine
 MEMORY_BYTES = 6 << 30
 _TOPICS = ("/scan", "/scan_turn", "/odom", "/tf_static", "/ground_truth/pose")
 
@@ -164,13 +175,89 @@ def attack(sample: Sample, folder: Path, rng: np.random.Generator) -> tuple[str,
     return "read", ""
 
 
+def _child(wire: Connection, seed: int) -> None:
+    """Run the cases that are asked for, until the end."""
+    from scripts import fuzz_calls
+
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, resource.RLIM_INFINITY))
+    while True:
+        group, number = wire.recv()
+        wire.send(fuzz_calls.run(group, number, seed))
+
+
+class _Runner:
+    """A child that runs cases; one that hangs or dies is replaced."""
+
+    def __init__(self, seed: int) -> None:
+        self._seed = seed
+        self._process: SpawnProcess | None = None
+
+    def run(self, group: str, number: int) -> Tally:
+        """One case; a finding where the child hangs or ends."""
+        if self._process is None:
+            context = get_context("spawn")
+            self._wire, theirs = context.Pipe()
+            self._process = context.Process(target=_child, args=(theirs, self._seed), daemon=True)
+            self._process.start()
+            theirs.close()
+        try:
+            self._wire.send((group, number))
+            if self._wire.poll(CASE_S):
+                tally: Tally = self._wire.recv()
+                return tally
+            found = f"no end within {CASE_S} s"
+        except (EOFError, OSError):
+            self._process.join(1.0)
+            found = f"the process ended ({self._process.exitcode})"
+        self.close()
+        return Tally(findings=[found])
+
+    def close(self) -> None:
+        """End the child."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+            self._wire.close()
+            self._process = None
+
+
+def call(cases: int, seed: int) -> int:
+    """Run so many cases of each group; the number of findings. Prints a table."""
+    table = Table("target", "cases", "answered", "refused", "warnings", "findings")
+    runner, findings = _Runner(seed), 0
+    try:
+        for group, (_, names) in GROUPS.items():
+            whole = {name: Tally() for name in names}
+            for number in range(cases):
+                name = names[number % len(names)]
+                tally = runner.run(group, number)
+                whole[name].add(tally)
+                for words in tally.findings:
+                    console.print(f"{group} {name}, case {number}: {words}", markup=False)
+            for k, (name, tally) in enumerate(whole.items()):
+                n = len(range(k, cases, len(names)))
+                counts = (n, tally.answered, tally.refused, tally.warned.total())
+                found = len(tally.findings)
+                table.add_row(f"{group} {name}", *map(str, counts), str(found))
+                findings += found
+                for words, count in tally.warned.items():
+                    console.print(f"{group} {name}: {count} x {words}", markup=False)
+    finally:
+        runner.close()
+    console.print(table)
+    return findings
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Attack for a while; exit status 1 when something was found."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, default=Path("out/fuzz"), help="where findings go")
+    parser.add_argument("--cases", type=int, help="of odd calls, instead of damaged files")
     wanted = parser.parse_args(arguments)
+    if wanted.cases is not None:
+        return 1 if call(wanted.cases, wanted.seed) else 0
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, resource.RLIM_INFINITY))
     outcomes: Counter[tuple[str, str]] = Counter()
     findings = 0

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import fields
 from types import MappingProxyType
 from typing import Any
@@ -42,11 +43,37 @@ def instance(name: str, value: Any, kind: type) -> None:
         raise InvalidValueError(f"{name} must be a {kind.__name__}, got {value!r}")
 
 
+def one_of(name: str, value: Any, known: Sequence[str]) -> None:
+    """Raise ``InvalidValueError`` unless ``value`` is one of these words."""
+    if not isinstance(value, str) or value not in known:
+        raise InvalidValueError(f"{name} must be one of {', '.join(known)}, got {value!r}")
+
+
+def number(name: str, value: Any) -> None:
+    """Raise ``InvalidValueError`` unless ``value`` is one finite number."""
+    if isinstance(value, bool) or not isinstance(value, _NUMBER) or not math.isfinite(value):
+        raise InvalidValueError(f"{name} must be a finite number, got {value!r}")
+
+
+def whole_numbers(name: str, value: Any, meaning: str, most: int) -> tuple[int, int]:
+    """Two whole numbers from 1 to ``most``; ``InvalidValueError`` naming what is none."""
+    try:
+        out = tuple(value)
+    except TypeError:
+        out = ()
+    whole = all(isinstance(v, (int, np.integer)) and not isinstance(v, bool) for v in out)
+    if len(out) != 2 or not whole or not all(1 <= v <= most for v in out):
+        raise InvalidValueError(
+            f"{name} must be {meaning}, whole numbers from 1 to {most}, got {value!r:.200}"
+        )
+    return int(out[0]), int(out[1])
+
+
 def numbers(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
     """``n`` numbers; ``InvalidValueError`` naming what is none."""
     try:
-        out = tuple(float(v) for v in value)
-    except (TypeError, ValueError):
+        out = () if isinstance(value, (str, bytes)) else tuple(float(v) for v in value)
+    except (TypeError, ValueError, OverflowError):
         out = ()
     if len(out) != n:
         raise InvalidValueError(f"{name} must be {meaning}, got {value!r}")

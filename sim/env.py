@@ -12,19 +12,23 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from scenes.scene import SCAN_HEIGHT
-from sim.env_options import episode
+from sim.actions import clipped
+from sim.checks import instance, number, one_of, whole_numbers
+from sim.env_options import checked_seed, episode
 from sim.lidar import Lms221Config, ScanResult
 from sim.pose_source import PoseSource
 from sim.seeds import Seeds
 from sim.simulation import Simulation
 from slam._jit import njit
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, MobiliaError
 from slam.frames import LaserSpec
 from slam.system import SlamSystem
 
 V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
 GOAL_RADIUS_M = 0.4
 _MAX_TICKS = 2**40
+VIEWS = ("top", "follow", "persp")  # as in ``sim.pictures``, which needs OpenGL to import
+MAX_PX = 8192  # edge of a picture
 
 Observation = dict[str, Any]  # arrays by name; Gymnasium types Dict spaces so
 
@@ -56,12 +60,18 @@ def _told(
     return out, valid
 
 
+class ResetNeededError(MobiliaError, gymnasium.error.ResetNeeded):
+    """The environment must be reset first."""
+
+
 class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """A robot with an LMS-221 in a room that does not sit still; a step is one whole scan.
 
     ### Action space
     ``Box(-1, 1, (2,), float32)``: forward speed (times 0.8 m/s) and turn rate (times 1.2 rad/s,
-    counter-clockwise), ramped by the robot.
+    counter-clockwise), ramped by the robot. Finite numbers beyond [-1, 1] are clipped; NaN,
+    infinities and anything that is not two numbers are refused with ``InvalidValueError``, and the
+    room stays as it was.
 
     ### Observation space
     ``Dict`` of what the robot itself knows:
@@ -93,7 +103,8 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     ### Episode end
     ``terminated`` within 0.4 m of the goal, or (``terminate_on_collision``) on a hard collision;
-    ``truncated`` after ``time_limit_s``.
+    ``truncated`` after ``time_limit_s``. A step after the end goes on in the same room; one before
+    the first reset raises ``ResetNeededError``.
 
     ### Arguments
     ``scene``, ``dynamism``, ``laser``, ``scan_height_m``, ``odometry``, ``labels`` as in
@@ -105,11 +116,12 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     "top", "follow" or "persp" for the former; ``render_size`` (width, height) px.
 
     ### Reset options
-    They hold for one episode; an unknown key is refused by name.
+    They hold for one episode. An unknown key or a value of the wrong kind is refused by name with
+    ``InvalidValueError``, as is a seed that is no whole number >= 0; the episode before goes on.
 
     | key                       | meaning                                                       |
     |---------------------------|---------------------------------------------------------------|
-    | `goal`                    | (x, y) m: reward and end of the episode                       |
+    | `goal`                    | (x, y) m within 10 km: reward and end of the episode          |
     | `start`                   | (x, y, heading) of the robot; refused where it does not fit   |
     | `n_chairs`, `n_people`    | counts, for scenes that have them                             |
     | `scene`                   | any options of the scene recipe, e.g. ``{"n_chairs": 8}``     |
@@ -150,12 +162,20 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         view: str = "top",
         render_size: tuple[int, int] = (640, 480),
     ) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise InvalidValueError(
-                f"render_mode must be 'rgb_array', 'map' or None, got {render_mode!r}"
-            )
-        if not (math.isfinite(time_limit_s) and time_limit_s > 0.0):
+        if render_mode is not None:
+            one_of("render_mode", render_mode, self.metadata["render_modes"])
+        one_of("view", view, VIEWS)
+        number("time_limit_s", time_limit_s)
+        if not time_limit_s > 0.0:
             raise InvalidValueError(f"time_limit_s must be > 0, got {time_limit_s}")
+        for name, value in (("terminate_on_collision", terminate_on_collision), ("labels", labels)):
+            if not isinstance(value, (bool, np.bool_)):
+                raise InvalidValueError(f"{name} must be True or False, got {value!r}")
+        for name, word in (("scene", scene), ("odometry", odometry)):
+            instance(name, word, str)
+        if laser is not None:
+            instance("laser", laser, Lms221Config)
+        width, height = whole_numbers("render_size", render_size, "(width, height) in px", MAX_PX)
         self.render_mode = render_mode
         self.time_limit_s = time_limit_s
         self.terminate_on_collision = terminate_on_collision
@@ -168,7 +188,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "labels": labels,
         }
         self._pose_source = None if pose_source is None else PoseSource(pose_source)
-        self._view, self._size = view, render_size
+        self._view, self._size = view, (width, height)
         self._renderer: Any = None
         self._simulation: Simulation | None = None
         self._goal: tuple[float, float] | None = None
@@ -182,21 +202,21 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def simulation(self) -> Simulation:
-        """The running simulation; raises ``gymnasium.error.ResetNeeded`` before the first reset."""
+        """The running simulation; raises ``ResetNeededError`` before the first reset."""
         if self._simulation is None:
-            raise gymnasium.error.ResetNeeded("call reset() before using the environment")
+            raise ResetNeededError("call reset() before using the environment")
         return self._simulation
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Build the scene anew and take a first scan standing still."""
-        super().reset(seed=seed)
         plan = episode(self._settings, options)
-        self._goal = plan.goal
+        super().reset(seed=checked_seed(seed))
         own = Seeds(int(self.np_random.integers(2**31)), **plan.seeds)
+        simulation = Simulation(seed=own, **plan.settings)
         self._close_renderer()
-        self._simulation = Simulation(seed=own, **plan.settings)
+        self._simulation, self._goal = simulation, plan.goal
         if self._simulation.spec.n_beams != self._n_beams:
             self._set_space(self._simulation.spec)
         if self._pose_source is not None:
@@ -214,10 +234,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def act(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool]:
         """``step`` without the info."""
-        try:
-            v, omega = (min(max(float(part), -1.0), 1.0) for part in action)
-        except (TypeError, ValueError):
-            raise InvalidValueError(f"an action is two numbers, got {action!r}") from None
+        v, omega = clipped(action)
         simulation = self.simulation
         simulation.world.set_command(v * V_MAX_MPS, omega * OMEGA_MAX_RADPS)
         scan = simulation.sense()

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+import numpy as np
+
 from sim.checks import numbers
 from sim.dynamism import Dynamism
 from sim.lidar import Lms221Config
@@ -18,6 +20,8 @@ OPTIONS = (
     "goal", "start", "seeds", "scene", "n_chairs", "n_people", "dynamism", "moving_share", "rates",
     "scan_height_m", "resolution_deg", "noise_std_m", "laser",
 )  # fmt: skip
+
+FAR_M = 1e4  # of a goal from the world's origin: the observation space tells no more
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +38,10 @@ def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> E
 
     Raises ``InvalidValueError`` naming the option that is unknown or has a value it cannot have.
     """
+    if not isinstance(options, Mapping | None):
+        raise InvalidValueError(f"reset options must be a dictionary or None, got {options!r:.200}")
+    if not all(isinstance(name, str) for name in options or {}):
+        raise InvalidValueError(f"reset options have words as keys, got {options!r:.200}")
     given = {k: v for k, v in (options or {}).items() if v is not None or k not in OPTIONS}
     for name in sorted(given):
         if name not in OPTIONS:
@@ -51,11 +59,22 @@ def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> E
     if "start" in given:
         merged["start"] = _finite("start", given["start"], 3, "(x m, y m, heading rad)")
     goal = _finite("goal", given["goal"], 2, "(x, y) in m") if "goal" in given else None
+    if goal is not None and max(map(abs, goal)) > FAR_M:
+        raise InvalidValueError(f"option goal must lie within {FAR_M:g} m, got {given['goal']!r}")
     return Episode(
         settings=merged,
         seeds=mapping("seeds", given.get("seeds")),
         goal=None if goal is None else (goal[0], goal[1]),
     )
+
+
+def checked_seed(seed: Any) -> int | None:
+    """None or a whole number >= 0, of NumPy's or Python's; else ``InvalidValueError``."""
+    if seed is None:
+        return None
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InvalidValueError(f"seed must be a whole number >= 0 or None, got {seed!r:.200}")
+    return int(seed)
 
 
 def mapping(name: str, value: Any) -> dict[str, Any]:

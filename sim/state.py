@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError
 
+MOST_AXES = 8  # of an array; ours have up to three
 _MAGIC = b"mobilia-world-1\n"
 
 
@@ -29,20 +31,36 @@ def unpack(block: bytes) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     if not isinstance(block, bytes) or block[: len(_MAGIC)] != _MAGIC or len(block) < start:
         raise InvalidValueError("this is no saved world: it does not start with its mark")
     at = start + int.from_bytes(block[len(_MAGIC) : start], "little")
+    if at > len(block):
+        raise InvalidValueError(
+            f"this saved world is damaged: a header of {at - start} bytes in {len(block)}"
+        )
     try:
         header = json.loads(block[start:at])
         arrays: dict[str, NDArray[Any]] = {}
         for name in sorted(header["arrays"]):
-            dtype, shape = header["arrays"][name]
-            count = int(np.prod(shape, dtype=np.int64))
-            arrays[name] = np.frombuffer(block, np.dtype(dtype), count, at).reshape(shape).copy()
-            at += arrays[name].nbytes
-        words: dict[str, Any] = header["words"]
-    except (ValueError, KeyError, TypeError) as error:
+            claimed, edges = header["arrays"][name]
+            dtype, shape = _claimed(name, claimed, edges, len(block) - at)
+            array = np.frombuffer(block, dtype, math.prod(shape), at)
+            arrays[name] = array.reshape(shape).copy()
+            at += array.nbytes
+        words: dict[str, Any] = dict(header["words"])
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InvalidValueError(f"this saved world is damaged: {error}") from error
     if at != len(block):
         raise InvalidValueError(f"this saved world is damaged: {len(block) - at} bytes too many")
     return arrays, words
+
+
+def _claimed(name: str, dtype: Any, shape: Any, left: int) -> tuple[np.dtype[Any], tuple[int, ...]]:
+    """Type and shape of an array, which must be plain numbers and fit the ``left`` bytes."""
+    kind = np.dtype(dtype) if isinstance(dtype, str) else None
+    if kind is None or kind.kind not in "biuf" or kind.shape:
+        raise ValueError(f"array {name!r} is of type {dtype!r:.40}, which is no number's")
+    whole = isinstance(shape, list) and all(type(edge) is int and edge >= 0 for edge in shape)
+    if not whole or len(shape) > MOST_AXES or math.prod(shape) * kind.itemsize > left:
+        raise ValueError(f"array {name!r} of shape {shape!r:.60} does not fit {left} bytes")
+    return kind, tuple(shape)
 
 
 def random_words(rng: np.random.Generator) -> dict[str, Any]:

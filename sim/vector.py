@@ -11,19 +11,21 @@ depend on it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from sim.env import MobiliaEnv, Observation
+from sim.actions import array_of, of_rooms
+from sim.env import MobiliaEnv, Observation, ResetNeededError
+from sim.env_options import checked_seed
 from slam.errors import InvalidValueError
 
+MOST_ENVS = 4096  # each holds a physics model of its own
 Outcome = tuple[float, bool, bool]
 
 
@@ -61,9 +63,16 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         frames: bool = False,
         **settings: Any,
     ) -> None:
-        for name, value in (("num_envs", num_envs), ("n_threads", n_threads)):
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise InvalidValueError(f"{name} must be a whole number >= 1, got {value!r}")
+        for name, value, most in (
+            ("num_envs", num_envs, MOST_ENVS),
+            ("n_threads", n_threads, 1024),
+        ):
+            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+                raise InvalidValueError(
+                    f"{name} must be a whole number >= 1 and <= {most}, got {value!r}"
+                )
+        if not isinstance(frames, (bool, np.bool_)):
+            raise InvalidValueError(f"frames must be True or False, got {frames!r}")
         source = settings.get("pose_source")
         if num_envs > 1 and source is not None and not isinstance(source, str):
             raise InvalidValueError(
@@ -91,21 +100,30 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         options: dict[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
         """Reset all rooms, or those of ``options["reset_mask"]``."""
+        if not isinstance(options, Mapping | None):
+            raise InvalidValueError(
+                f"reset options must be a dictionary or None, got {options!r:.200}"
+            )
         own = dict(options or {})
-        mask = np.asarray(own.pop("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
+        mask = array_of(own.pop("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
         if mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
             raise InvalidValueError(
                 f"option reset_mask must be ({self.num_envs},) bool with one true, got {mask!r}"
             )
-        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if (
-            seed is None or isinstance(seed, int)
-        ) else list(seed)  # fmt: skip
-        if len(seeds) != self.num_envs:
-            raise InvalidValueError(f"{len(seeds)} seeds for {self.num_envs} environments")
+        seeds = self._seeds(seed)
         for i in np.flatnonzero(mask).tolist():
             self._restart(i, seeds[i], own)
         self._ended[mask] = False
         return self._observations(), self._infos()
+
+    def _seeds(self, seed: Any) -> list[int | None]:
+        """One for each room."""
+        if isinstance(seed, (list, tuple, np.ndarray)):
+            if len(np.atleast_1d(np.array(seed, dtype=object))) != self.num_envs:
+                raise InvalidValueError(f"seed must be {self.num_envs} seeds, got {seed!r:.200}")
+            return [checked_seed(one) for one in seed]
+        first = checked_seed(seed)
+        return [None if first is None else first + i for i in range(self.num_envs)]
 
     def _restart(self, i: int, seed: int | None, options: dict[str, Any] | None) -> None:
         observation, _ = self.envs[i].reset(seed=seed, options=options)
@@ -125,10 +143,16 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
     ) -> tuple[
         Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
     ]:
-        """One scan in every room."""
+        """One scan in every room.
+
+        Actions as in the single environment: finite ones are clipped, anything else is refused with
+        ``InvalidValueError`` before any room moves. ``ResetNeededError`` before the first reset.
+        """
+        commands = of_rooms(actions, self.num_envs)
+        for env in self.envs:
+            env.simulation  # noqa: B018  (raises where it was never reset)
         if self.mode == AutoresetMode.DISABLED and self._ended.any():
-            raise gymnasium.error.ResetNeeded(f"reset first: {np.flatnonzero(self._ended)}")
-        commands = np.asarray(actions)
+            raise ResetNeededError(f"reset first: {np.flatnonzero(self._ended)}")
         rooms = range(self.num_envs)
         if self._pool is None:
             results = [self._one(i, commands[i]) for i in rooms]
@@ -176,6 +200,9 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
             infos["frame"][:] = [s.frame for s in simulations]
         infos |= {f"_{name}": np.ones(n, dtype=np.bool_) for name in tuple(infos)}
         return infos | (final or {})
+
+    def render(self) -> None:
+        """None: pictures are left to the single environment."""
 
     def close_extras(self, **kwargs: Any) -> None:
         """Called by ``close``."""

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from slam.errors import InvalidValueError, NotFiniteError
 
 Float = NDArray[np.float64]
+MOST_NS = 2**63 - 1  # of a stamp, either way; Unix times reach it in the year 2262
 
 
 def frozen(
@@ -107,12 +108,15 @@ def covariance(owner: str, name: str, value: ArrayLike) -> Float:
     return array
 
 
-def check_stamp(owner: str, value: object) -> None:
-    """Raise ``InvalidValueError`` unless it is a whole number, of nanoseconds."""
+def stamp(owner: str, value: object) -> int:
+    """A whole number of nanoseconds that 64 bits hold; ``InvalidValueError`` for anything else."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
         raise InvalidValueError(
             f"{owner}.stamp_ns must be an integer number of nanoseconds, got {value!r}"
         )
+    if not -MOST_NS - 1 <= value <= MOST_NS:
+        raise InvalidValueError(f"{owner}.stamp_ns must fit 64 bits, got {value}")
+    return int(value)
 
 
 class ByContent:

@@ -18,12 +18,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.checked import ByContent, check_stamp, covariance, finite, frozen, pose, possible
+from slam.checked import (
+    ByContent,
+    covariance,
+    finite,
+    frozen,
+    pose,
+    possible,
+    stamp,
+)
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
 NS_PER_S = 1_000_000_000
 MOST_TWIST = 1e3  # m/s and rad/s: faster, de-skewing would tear a scan apart
+MOST_BEAMS = 1_000_000  # of a scan; a thousand times those of common scanners
+LEAST_INCREMENT = 1e-5  # rad; the finest scanners have 4e-4
+MOST_RANGE_M = float(np.finfo(np.float32).max)  # ranges are such numbers
+MOST_SWEEP_S = 100.0  # from a scan's first beam to its last
+MOST_FEATURE_M = 1e9  # from the robot: their squares must not overflow
+MOST_MOUNT_M = 30.0  # from the robot's origin to its laser
 
 
 def to_ns(seconds: float) -> int:
@@ -40,14 +54,17 @@ def to_s(nanoseconds: int) -> float:
 class LaserSpec(ByContent):
     """Geometry and timing of a planar scanner; one object shared by all its scans.
 
-    n_beams            number of beams, counted counter-clockwise (right to left)
-    angle_min          rad, direction of beam 0 in the laser frame
-    angle_increment    rad between neighbouring beams, > 0
+    n_beams            number of beams, counted counter-clockwise (right to left), up to 10^6
+    angle_min          rad, direction of beam 0 in the laser frame, within two turns
+    angle_increment    rad between neighbouring beams, at least 1e-5
     range_min/max      m; a return outside is no valid measurement
     beam_time_offsets  (n_beams,) s after the scan's stamp at which each beam was measured, whole
-                       nanoseconds. The LMS-221 interlaces: in a 0.5 degree scan neighbours are
-                       one mirror turn (13.3 ms) apart. All zero where a log does not say.
-    T_robot_laser      (3,) pose of the laser on the robot (m, m, rad)
+                       nanoseconds, up to 100 s. The LMS-221 interlaces: in a 0.5 degree scan
+                       neighbours are one mirror turn (13.3 ms) apart. All zero where a log does
+                       not say.
+    T_robot_laser      (3,) pose of the laser on the robot (m, m, rad), within 30 m of its origin
+
+    Raises ``InvalidValueError`` for anything else.
     """
 
     n_beams: int
@@ -59,26 +76,54 @@ class LaserSpec(ByContent):
     T_robot_laser: Float = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        if not isinstance(self.n_beams, (int, np.integer)) or self.n_beams < 1:
+        self._check_angles()
+        if not 0.0 <= self.range_min < self.range_max <= MOST_RANGE_M:
             raise InvalidValueError(
-                f"LaserSpec.n_beams must be a whole number >= 1, got {self.n_beams!r}"
+                f"LaserSpec needs 0 <= range_min < range_max <= {MOST_RANGE_M:.3g}, "
+                f"got {self.range_min} and {self.range_max} m"
             )
+        object.__setattr__(self, "beam_time_offsets", self._offsets())
+        mounted = pose("LaserSpec", "T_robot_laser", self.T_robot_laser)
+        if max(map(abs, mounted.tolist())) > MOST_MOUNT_M:
+            raise InvalidValueError(
+                f"LaserSpec.T_robot_laser must lie within {MOST_MOUNT_M:g} m and rad, "
+                f"got {mounted.tolist()}"
+            )
+        object.__setattr__(self, "T_robot_laser", mounted)
+        angles = self.angle_min + np.arange(self.n_beams) * self.angle_increment
+        angles.setflags(write=False)
+        object.__setattr__(self, "_angles", angles)
+
+    def _check_angles(self) -> None:
+        whole = isinstance(self.n_beams, (int, np.integer)) and not isinstance(self.n_beams, bool)
+        if not whole or not 1 <= self.n_beams <= MOST_BEAMS:
+            raise InvalidValueError(
+                f"LaserSpec.n_beams must be a whole number >= 1 and <= {MOST_BEAMS}, "
+                f"got {self.n_beams!r}"
+            )
+        for name in ("angle_min", "angle_increment", "range_min", "range_max"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (float, int, np.number)):
+                raise InvalidValueError(f"LaserSpec.{name} must be a number, got {value!r}")
         if not (math.isfinite(self.angle_min) and math.isfinite(self.angle_increment)):
             raise InvalidValueError("LaserSpec.angle_min and angle_increment must be finite")
-        if self.angle_increment <= 0.0:
+        if abs(self.angle_min) > 2.0 * math.tau:
             raise InvalidValueError(
-                f"LaserSpec.angle_increment must be > 0 rad, got {self.angle_increment}"
+                f"LaserSpec.angle_min must lie within two turns (in radians, not degrees?), "
+                f"got {self.angle_min} rad"
+            )
+        if self.angle_increment < LEAST_INCREMENT:
+            raise InvalidValueError(
+                f"LaserSpec.angle_increment must be > 0 rad, at least {LEAST_INCREMENT:g}, "
+                f"got {self.angle_increment}"
             )
         if (self.n_beams - 1) * self.angle_increment > 1.05 * math.tau:
             raise InvalidValueError(
                 f"LaserSpec.angle_increment must keep {self.n_beams} beams within one turn (in "
                 f"radians, not degrees?), got {self.angle_increment} rad"
             )
-        if not 0.0 <= self.range_min < self.range_max < math.inf:
-            raise InvalidValueError(
-                "LaserSpec needs 0 <= range_min < range_max < inf, "
-                f"got {self.range_min} and {self.range_max} m"
-            )
+
+    def _offsets(self) -> Float:
         raw = np.asarray(self.beam_time_offsets, dtype=np.float64)
         offsets = frozen(
             "LaserSpec",
@@ -87,18 +132,12 @@ class LaserSpec(ByContent):
             (self.n_beams,),
         )
         finite("LaserSpec", "beam_time_offsets", offsets)
-        if offsets.min() < 0.0:
+        if offsets.min() < 0.0 or offsets.max() > MOST_SWEEP_S:
             raise InvalidValueError(
-                f"LaserSpec.beam_time_offsets must be >= 0 s (the stamp is the earliest beam's), "
-                f"got {offsets.min()}"
+                f"LaserSpec.beam_time_offsets must be >= 0 s (the stamp is the earliest beam's) "
+                f"and <= {MOST_SWEEP_S:g} s, got {offsets.min()} to {offsets.max()}"
             )
-        object.__setattr__(self, "beam_time_offsets", offsets)
-        object.__setattr__(
-            self, "T_robot_laser", pose("LaserSpec", "T_robot_laser", self.T_robot_laser)
-        )
-        angles = self.angle_min + np.arange(self.n_beams) * self.angle_increment
-        angles.setflags(write=False)
-        object.__setattr__(self, "_angles", angles)
+        return offsets
 
     @property
     def angles(self) -> Float:
@@ -128,7 +167,7 @@ class Scan(ByContent):
     intensities: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
-        check_stamp("Scan", self.stamp_ns)
+        object.__setattr__(self, "stamp_ns", stamp("Scan", self.stamp_ns))
         n = self.spec.n_beams
         ranges = frozen("Scan", "ranges", self.ranges, (n,), np.float32)
         if (ranges < 0.0).any():
@@ -157,7 +196,7 @@ class Features(ByContent):
     """Point features with uncertainty: landmarks, tree trunks, extracted corners.
 
     stamp_ns      ns
-    points_robot  (k, 2) m
+    points_robot  (k, 2) m, within 10^9 m
     covariances   (k, 2, 2) m^2, in the robot frame
     ids           optional (k,) int64, true identities: for evaluation only, no SLAM may read them
     """
@@ -168,9 +207,14 @@ class Features(ByContent):
     ids: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
-        check_stamp("Features", self.stamp_ns)
+        object.__setattr__(self, "stamp_ns", stamp("Features", self.stamp_ns))
         points = frozen("Features", "points_robot", self.points_robot, (None, 2))
         finite("Features", "points_robot", points)
+        if points.size and np.abs(points).max() > MOST_FEATURE_M:
+            raise InvalidValueError(
+                f"Features.points_robot must lie within {MOST_FEATURE_M:g} m, "
+                f"got {np.abs(points).max():g}"
+            )
         k = len(points)
         covariances = frozen("Features", "covariances", self.covariances, (k, 2, 2))
         finite("Features", "covariances", covariances)
@@ -209,7 +253,7 @@ class Odometry(ByContent):
     twist: Float | None = None
 
     def __post_init__(self) -> None:
-        check_stamp("Odometry", self.stamp_ns)
+        object.__setattr__(self, "stamp_ns", stamp("Odometry", self.stamp_ns))
         object.__setattr__(
             self, "T_odom_robot", pose("Odometry", "T_odom_robot", self.T_odom_robot)
         )
@@ -287,7 +331,7 @@ class Frame(ByContent):
     labels: BeamLabels | None = None
 
     def __post_init__(self) -> None:
-        check_stamp("Frame", self.stamp_ns)
+        object.__setattr__(self, "stamp_ns", stamp("Frame", self.stamp_ns))
         sensed = self.scan if self.scan is not None else self.features
         if self.odometry.stamp_ns != self.stamp_ns or (
             sensed is not None and sensed.stamp_ns != self.stamp_ns

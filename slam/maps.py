@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
 from pathlib import Path
@@ -12,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import replacing, write_bytes
 from slam.system import Raster
@@ -28,15 +30,20 @@ _STOPS_RGB = np.array([[252, 250, 245], [233, 160, 76], [22, 33, 58]], dtype=np.
 _GAP = rb"\s+(?:#[^\n]*\n\s*)*"  # PGM allows comments between the words of its header
 _PGM_HEADER = re.compile(rb"P5" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)" + _GAP + rb"255\s")
 _MAX_HEADER_BYTES = 4096
-_MAX_PIXELS = 1 << 30
+_MAX_PIXELS = 1 << 28  # 490 m square at 3 cm cells
+_MAX_YAML_BYTES = 1 << 16
+_EDITED = ": the sum differs (after a change on purpose, delete the two lines of sums in the YAML)"
+_IMAGE_SUM, _FIELDS_SUM = "sha256 of the image:", "sha256 of the lines below:"
 
 
 def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
     """``<stem>.pgm`` and ``<stem>.yaml``; returns the two paths.
 
     Values above 0.65 are occupied (black), below 0.196 free, all between and NaN unknown: what a
-    map_server in "trinary" mode makes of them. Raises ``OutputError`` when they cannot be written
-    and ``InvalidValueError`` for a raster without cells.
+    map_server in "trinary" mode makes of them. Two comments at the head of the YAML, which a
+    map_server skips, hold sums of the image and of the fields, for ``read_map``. Raises
+    ``OutputError`` when they cannot be written and ``InvalidValueError`` for a raster without
+    cells.
     """
     _check_cells(raster)
     pgm, yaml = stem.with_name(stem.name + ".pgm"), stem.with_name(stem.name + ".yaml")
@@ -52,9 +59,11 @@ def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
         f"occupied_thresh: {OCCUPIED_THRESHOLD}",
         f"free_thresh: {FREE_THRESHOLD}",
     ]
+    image, fields = header + _gray(raster)[::-1].tobytes(), "\n".join(lines) + "\n"
+    sums = f"# {_IMAGE_SUM} {_sha256(image)}\n# {_FIELDS_SUM} {_sha256(fields.encode())}\n"
     with replacing(yaml) as new_yaml, replacing(pgm) as new_pgm:  # the image is in place first
-        new_pgm.write_bytes(header + _gray(raster)[::-1].tobytes())
-        new_yaml.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        new_pgm.write_bytes(image)
+        new_yaml.write_text(sums + fields, encoding="utf-8")
     return pgm, yaml
 
 
@@ -62,21 +71,27 @@ def read_map(yaml: Path) -> Raster:
     """The raster of a map_server YAML file: 1 occupied, 0 free, NaN unknown.
 
     Reads binary PGM images in mode trinary, the ones ``write_map`` and map_saver write.
-    Raises ``LogFormatError`` naming the file when one of the two is missing or wrong.
+    Raises ``LogFormatError`` naming the file when one of the two is missing, wrong, too large, or
+    not what the sums of ``write_map`` say; files without these sums are read as they are.
     """
-    fields = _yaml_fields(yaml)
+    text = text_of(yaml, _MAX_YAML_BYTES)
+    image_sum = _checked_sums(yaml, text)
+    fields = _yaml_fields(yaml, text)
     resolution = _numbers(yaml, fields, "resolution", 1)[0]
     origin = _numbers(yaml, fields, "origin", 3)
     negate = fields.get("negate", "0").lower() in ("1", "true")
     if fields.get("mode", "trinary") != "trinary":
         raise LogFormatError(yaml, f"mode must be trinary, got {fields['mode']!r}")
-    gray = _read_pgm(yaml.parent / _field(yaml, fields, "image"))
-    occupancy = gray / 255.0 if negate else (255 - gray.astype(np.int64)) / 255.0
-    values = np.full(gray.shape, np.nan, dtype=np.float32)
-    values[occupancy > _numbers(yaml, fields, "occupied_thresh", 1)[0]] = 1.0
-    values[occupancy < _numbers(yaml, fields, "free_thresh", 1)[0]] = 0.0
+    gray = _read_pgm(yaml.parent / _field(yaml, fields, "image"), image_sum)
+    grays = np.arange(256)
+    occupancy = grays / 255.0 if negate else (255 - grays) / 255.0
+    meant = np.full(256, np.nan, dtype=np.float32)
+    meant[occupancy > _numbers(yaml, fields, "occupied_thresh", 1)[0]] = 1.0
+    meant[occupancy < _numbers(yaml, fields, "free_thresh", 1)[0]] = 0.0
     try:
-        return Raster(values=values[::-1], resolution_m=resolution, T_map_origin=np.array(origin))
+        return Raster(
+            values=meant[gray[::-1]], resolution_m=resolution, T_map_origin=np.array(origin)
+        )
     except InvalidValueError as error:
         raise LogFormatError(yaml, str(error)) from error
 
@@ -124,14 +139,8 @@ def _plain(value: float) -> str:
     return np.format_float_positional(value, trim="0")
 
 
-def _yaml_fields(yaml: Path) -> dict[str, str]:
+def _yaml_fields(yaml: Path, text: str) -> dict[str, str]:
     """``key: value`` lines; a map_server file has no deeper structure but one bracketed list."""
-    try:
-        text = yaml.read_text(encoding="utf-8")
-    except OSError as error:
-        raise LogFormatError(yaml, f"cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise LogFormatError(yaml, "not a text file") from error
     fields: dict[str, str] = {}
     for number, line in enumerate(text.splitlines(), 1):
         content = re.sub(r"(^|\s)#.*", "", line).strip()
@@ -161,11 +170,25 @@ def _numbers(yaml: Path, fields: dict[str, str], key: str, count: int) -> list[f
     return values
 
 
-def _read_pgm(path: Path) -> NDArray[np.uint8]:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
+def _checked_sums(yaml: Path, text: str) -> str | None:
+    """The image's sum that ``write_map`` noted, None where there is none; checks the fields'."""
+    first, _, rest = text.partition("\n")
+    second, _, fields = rest.partition("\n")
+    if not first.startswith(f"# {_IMAGE_SUM} ") or not second.startswith(f"# {_FIELDS_SUM} "):
+        return None
+    if second.split()[-1] != _sha256(fields.encode()):
+        raise LogFormatError(yaml, f"its fields are not those that were written{_EDITED}")
+    return first.split()[-1]
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _read_pgm(path: Path, image_sum: str | None) -> NDArray[np.uint8]:
+    data = bytes_of(path, _MAX_PIXELS + _MAX_HEADER_BYTES)
+    if image_sum is not None and _sha256(data) != image_sum:
+        raise LogFormatError(path, f"is not the image that was written{_EDITED}")
     header = _PGM_HEADER.match(data[:_MAX_HEADER_BYTES])
     if header is None:
         raise LogFormatError(path, "not a binary PGM image of 8 bits (P5, maximum 255)")

@@ -34,8 +34,10 @@ class OdometrySlam:
     def update(self, frame: Frame) -> Estimate:
         """The odometry pose relative to the first frame.
 
-        Raises ``InvalidValueError`` where a step is none (``slam.steps``), as all SLAMs here do.
+        Raises ``InvalidValueError`` for a frame that does not come after the last one and where a
+        step is none (``slam.steps``), as all SLAMs here do.
         """
+        steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         now = frame.odometry
         if self._first is None or self._before is None:
             self._first = self._before = now
@@ -46,7 +48,10 @@ class OdometrySlam:
         if increment_covariance is not None and self._stamps:
             T_before_now = se2.between(self._T_map_robot, T_map_robot)
             self._covariance = se2.propagate(
-                self._covariance, self._T_map_robot, T_before_now, increment_covariance
+                self._covariance,
+                self._T_map_robot,
+                T_before_now,
+                steps.known(increment_covariance),
             )
         self._T_map_robot = T_map_robot
         self._stamps.append(frame.stamp_ns)

@@ -1,15 +1,50 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The motion between two frames by odometry, and what can be none."""
+"""From frame to frame: the order of stamps, the motion by odometry, and what can be none."""
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, Odometry
 
 MOST_STEP_M = 1000.0  # between two frames: farther, the stream is broken or of another run
+MOST_STD = 1e4  # m and rad, of an increment; with more, rounding would eat what is known beside
+HUGE = 1.0  # m^2 or rad^2: from there on,
+MOST_CORRELATION = 1.0 - 1e-6  # exact correlations would leave nothing of what is known beside
+LEAST_SHARE = 1e-12  # of the larger variance of position that the smaller one must have
+
+
+def check_order(before_ns: int | None, now_ns: int) -> None:
+    """Raise ``InvalidValueError`` unless the frame at ``now_ns`` comes after the last one."""
+    if before_ns is not None and now_ns <= before_ns:
+        raise InvalidValueError(f"frames must come in order: {now_ns} ns after {before_ns} ns")
+
+
+def known(covariance: Float, most_m: float = MOST_STD, most_rad: float = MOST_STD) -> Float:
+    """A copy of an increment's covariance (3, 3) with standard deviations lowered to at most
+    these, the correlations kept: beyond, they mean "not known"."""
+    out = np.array(covariance, dtype=np.float64)
+    most = zip(np.diag(out).tolist(), (most_m, most_m, most_rad), strict=True)
+    scale = np.array([min(1.0, limit / math.sqrt(v)) if v > 0.0 else 1.0 for v, limit in most])
+    if scale.min() < 1.0:
+        out *= scale[:, None] * scale[None, :]
+    return out
+
+
+def invertible(covariance: Float) -> Float:
+    """``known``, and such that its inverse can be computed: the very numbers, unless a variance is
+    ``HUGE``."""
+    out = known(covariance)
+    variances = np.diag(out).copy()
+    if variances.max() > HUGE:
+        out *= MOST_CORRELATION
+        least = LEAST_SHARE * max(variances[0], variances[1])
+        np.fill_diagonal(out, np.maximum(variances, [least, least, 0.0]))
+    return out
 
 
 def increment(before: Odometry, now: Odometry) -> Float:

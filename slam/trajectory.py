@@ -11,11 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.bounded import text_of
 from slam.checked import finite, frozen
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import write_text
 from slam.frames import NS_PER_S, Float
 
+MAX_TUM_BYTES = 1 << 28  # two million poses, 16 hours of scans
 MAX_STAMP_S = 9e9  # what 64-bit nanoseconds hold: year 2255
 
 
@@ -60,12 +62,7 @@ def write_tum(path: Path, trajectory: Trajectory) -> None:
 
 def read_tum(path: Path) -> Trajectory:
     """The planar part of a TUM trajectory file; raises ``LogFormatError`` with the line."""
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise LogFormatError(path, "not a text file") from error
+    lines = text_of(path, MAX_TUM_BYTES).splitlines()
     stamps: list[int] = []
     poses: list[tuple[float, float, float]] = []
     for number, line in enumerate(lines, 1):

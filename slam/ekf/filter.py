@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slam import se2
+from slam import se2, steps
 from slam.ekf import kernels
 from slam.errors import InvalidValueError
 from slam.frames import Float
@@ -59,10 +59,7 @@ class EkfFilter:
         """
         heading = float(self.pose[2])
         self.pose = se2.compose(self.pose, increment)
-        Q = np.array(covariance, dtype=np.float64)
-        most = zip(np.diag(Q).tolist(), (MOST_STD_M, MOST_STD_M, math.pi), strict=True)
-        scale = np.array([min(1.0, limit / math.sqrt(v)) if v > 0.0 else 1.0 for v, limit in most])
-        Q *= scale[:, None] * scale[None, :]
+        Q = steps.known(np.asarray(covariance), MOST_STD_M, math.pi)
         bend = 0.25 * Q[2, 2]
         Q[:2, :2] += bend * np.array([[Q[1, 1], -Q[0, 1]], [-Q[0, 1], Q[0, 0]]])
         kernels.disturb(self._P, self.pose, self._landmarks, self._n, heading, Q)

@@ -15,7 +15,7 @@ from slam import se2, steps
 from slam.ekf.association import METHODS
 from slam.ekf.config import EkfConfig
 from slam.ekf.corners import CornerConfig, corners
-from slam.ekf.filter import EkfFilter
+from slam.ekf.filter import MOST_STD_M, EkfFilter
 from slam.ekf.lifecycle import (
     WITHOUT,
     Lifecycle,
@@ -109,10 +109,7 @@ class EkfSlam:
 
     def update(self, frame: Frame) -> Estimate:
         """Predict, associate with landmarks, then with candidates, judge all, add what is new."""
-        if self._stamps and frame.stamp_ns <= self._stamps[-1]:
-            raise InvalidValueError(
-                f"frames must come in order: {frame.stamp_ns} ns after {self._stamps[-1]} ns"
-            )
+        steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         if not self._stamps and not self._told:
             name = "points" if frame.features is not None else "corners"
             self._configure(PRESETS[name](**self._options))
@@ -142,10 +139,13 @@ class EkfSlam:
 
     def _used(self, features: Features) -> tuple[Float, Float]:
         """Features within range and field of view, their rim included: a thing beyond it would be
-        left behind in the next frame. Their covariances, none of them singular."""
+        left behind in the next frame; without those that are known to ``MOST_STD_M`` only. Their
+        covariances, none of them singular."""
         points, config = features.points_robot, self.config
         distance, bearing = polar(points)
         used = distance <= config.range_m
+        variances = features.covariances.diagonal(axis1=1, axis2=2)
+        used &= variances.max(axis=1, initial=0.0) <= MOST_STD_M**2
         if config.fov_deg < 360.0:
             used &= np.abs(bearing) < WITHOUT * math.radians(config.fov_deg) / 2.0
         return points[used], _regular(features.covariances[used] * config.noise_scale**2)

@@ -9,6 +9,7 @@ from types import ModuleType
 
 import numpy as np
 
+from slam import steps
 from slam.errors import InvalidValueError, MissingDependencyError, SlamFailedError
 from slam.frames import Float, Frame, LaserSpec, Odometry
 from slam.shunting.config import ShuntingConfig
@@ -53,10 +54,7 @@ class Guest(ABC):
         """Guess by odometry, let the guest match."""
         if frame.scan is None:
             raise InvalidValueError(f"{type(self).__name__} needs a laser scan in every frame")
-        if self._stamps and frame.stamp_ns <= self._stamps[-1]:
-            raise InvalidValueError(
-                f"frames must come in order: {frame.stamp_ns} ns after {self._stamps[-1]} ns"
-            )
+        steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         before = frame.odometry if self._before is None else self._before
         prediction = predict(self._T_map_robot, before, frame.odometry)
         if self._before is None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from slam import se2
+from slam.errors import InvalidValueError
 from slam.frames import Float, LaserSpec
 from slam.guests.guest import Guest, needed
 from slam.shunting.motion import Prediction
@@ -22,6 +23,7 @@ from slam.system import register
 KEEP_M, KEEP_RAD = 0.2, math.radians(10.0)  # Karto's minimum travel distance and heading
 BASE, NEAR_M = 20, 8.0  # kept scans matched against, and how far from the predicted place
 RANGE_M = 20.0
+MOST_BEAMS = 4000  # its matcher takes seconds a scan for as many
 NOTHING_M = 1e3  # a range that its matcher takes for no return
 FINE_RAD = math.radians(0.1)
 NARROW, WIDE = (0.3, 0.35), (1.2, 0.5)  # m across, rad either way; WIDE where NARROW does poorly
@@ -43,6 +45,10 @@ class KartoSlam(Guest):
         self._places: list[Float] = []
 
     def _begin(self, spec: LaserSpec) -> None:
+        if spec.n_beams > MOST_BEAMS:
+            raise InvalidValueError(
+                f"KartoSlam takes scanners of up to {MOST_BEAMS} beams, got {spec.n_beams}"
+            )
         self._spec = spec
         reach = min(spec.range_max, RANGE_M)
         first, step = spec.angle_min, spec.angle_increment

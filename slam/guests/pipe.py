@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from slam import steps
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Float, Frame, LaserSpec
 from slam.guests import protocol
@@ -123,7 +124,11 @@ class PipeSlam:
         self._forget()
 
     def update(self, frame: Frame) -> Estimate:
-        """Tell the frame, without truth, and hear the estimate."""
+        """Tell the frame, without truth, and hear the estimate.
+
+        Raises ``InvalidValueError`` for a frame that does not come after the last one.
+        """
+        steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         request = protocol.frame_line(frame, self._laser)
         limit_s = self.limits.scan_s if self._stamps else self.limits.first_s
         with self._over_if_it_fails():

@@ -269,8 +269,10 @@ def map_of(message: Message) -> Raster | None:
     if isinstance(resolution_m, bool) or not isinstance(resolution_m, (int, float)):
         raise SlamFailedError(f"answered a map of resolution {resolution_m!r:.40}", "bad")
     try:
+        with np.errstate(over="ignore"):  # what is past float32 is outside [0, 1], too
+            cells = values.astype(np.float32).reshape(height, width)
         return Raster(
-            values=values.astype(np.float32).reshape(height, width),
+            values=cells,
             resolution_m=float(resolution_m),
             T_map_origin=_numbers(message, "T_map_origin", 3),
         )

@@ -14,6 +14,7 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from slam.errors import LogFormatError, MobiliaError
+from slam.logs import unpacking
 
 SCAN = "sensor_msgs/msg/LaserScan"
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -21,6 +22,7 @@ INCREMENT = "geometry_msgs/msg/PoseWithCovarianceStamped"
 POSE = "geometry_msgs/msg/PoseStamped"
 CLOUD = "sensor_msgs/msg/PointCloud2"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+unpacking.bound_rosbags()
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 for _name in TRANSFORMS:  # the library's ROS 1 has none of the two
     ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", _name))

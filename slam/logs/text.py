@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import BinaryIO, cast
 
 from slam.errors import LogFormatError
+from slam.logs.unpacking import MAX_TEXT_BYTES, open_xz
 
 MAX_LINE_BYTES = 1 << 20  # a 20 000 beam scan needs a fifth of it
 _GZIP, _XZ = b"\x1f\x8b", b"\xfd7zXZ\x00"
@@ -23,9 +24,9 @@ def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
 
     Raises ``LogFormatError`` that names file and line when the file is missing, no regular file,
     empty, unreadable, corrupt, binary, or does not end with a newline: every logger ends its lines,
-    so a file that stops inside one was cut off.
+    so a file that stops inside one was cut off. So it does beyond ``MAX_TEXT_BYTES``.
     """
-    number = 0
+    number, total = 0, 0
     try:
         if not path.exists():
             raise LogFormatError(path, "no such file")
@@ -34,6 +35,11 @@ def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
         with _open(path) as file:
             while raw := file.readline(MAX_LINE_BYTES):
                 number += 1
+                total += len(raw)
+                if total > MAX_TEXT_BYTES:
+                    raise LogFormatError(
+                        path, f"unpacks to more than {MAX_TEXT_BYTES} bytes", number
+                    )
                 yield number, _text(path, number, raw)
     except (EOFError, zlib.error, lzma.LZMAError, gzip.BadGzipFile) as error:
         raise LogFormatError(path, f"corrupt or truncated file: {error}", number + 1) from error
@@ -49,7 +55,7 @@ def _open(path: Path) -> BinaryIO:
     if magic.startswith(_GZIP) or (magic and path.suffix == ".gz"):
         return cast(BinaryIO, gzip.open(path, "rb"))
     if magic.startswith(_XZ) or (magic and path.suffix == ".xz"):
-        return cast(BinaryIO, lzma.open(path, "rb"))
+        return open_xz(path)
     return path.open("rb")
 
 

@@ -28,6 +28,7 @@ from slam import se2
 from slam.errors import LogFormatError
 from slam.frames import NS_PER_S, Features, Float, Frame, Odometry, Stream, StreamMetadata, to_ns
 from slam.logs.text import numbered_lines
+from slam.logs.unpacking import check_mat
 
 AXLES_M, HALF_TRACK_M = 2.83, 0.76  # L, H
 LASER_AHEAD_M, LASER_LEFT_M = 3.78, 0.50  # a + L (of the rear axle), b
@@ -126,7 +127,10 @@ def _load(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat  # takes half a second that other logs need not pay
 
     try:
+        check_mat(path)
         values: dict[str, Any] = loadmat(path)
+    except LogFormatError:
+        raise
     except OSError as error:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
     except Exception as error:

@@ -91,10 +91,12 @@ class FeaturedShuntingSlam(ShuntingSlam):
     def update(self, frame: Frame) -> Estimate:
         """As for the scans, with corners in their place."""
         self._gates = GATES
-        if frame.features is None and frame.scan is not None:
-            features = corners(frame.scan, twist=frame.odometry.twist)
-            self._gates = CORNER_GATES
-            frame = dataclasses.replace(frame, scan=None, features=features)
+        if frame.scan is not None:  # its beams are no features
+            features = frame.features
+            if features is None:
+                features = corners(frame.scan, twist=frame.odometry.twist)
+                self._gates = CORNER_GATES
+            frame = dataclasses.replace(frame, scan=None, labels=None, features=features)
         return super().update(frame)
 
     def reset(self) -> None:

@@ -23,6 +23,8 @@ from slam.shunting.visibility import View, view_of_beams, view_of_features
 SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
 SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
 NEAR_JOIN_CELLS = 3.0
+MOST_SWEPT_M = 50.0  # during one sweep; beyond, the beams of a scan belong to no one place
+MOST_STD_M = 3.0  # of a feature; one known worse says nothing, and fills the map in saying it
 SPACING_M, LEAST_WEIGHT = 0.1, 0.3  # beams closer than this share one observation's weight
 
 
@@ -105,9 +107,16 @@ def _deskew(
 def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
     """Beams, moved to where the robot was at the scan's stamp.
 
-    ``twist`` is the body velocity (vx, vy, omega) over the sweep.
+    ``twist`` is the body velocity (vx, vy, omega) over the sweep. Raises ``InvalidValueError``
+    where that drives more than ``MOST_SWEPT_M`` during it.
     """
     spec = scan.spec
+    swept = spec.sweep_duration * math.hypot(float(twist[0]), float(twist[1]))
+    if swept > MOST_SWEPT_M:
+        raise InvalidValueError(
+            f"Odometry.twist must drive at most {MOST_SWEPT_M:g} m during a scan's sweep, "
+            f"got {swept:g} m"
+        )
     n = spec.n_beams
     points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
     beams = np.empty(n, np.int64)
@@ -162,9 +171,15 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
 
 
 def from_features(features: Features, config: ShuntingConfig) -> Observations:
-    """Point features within range; their covariance widened to what the lattice can carry."""
+    """Point features within range; their covariance widened to what the lattice can carry.
+
+    Those with a standard deviation beyond ``MOST_STD_M`` are left out.
+    """
     points = features.points_robot
     near = (points * points).sum(axis=1) <= config.range_m**2
+    near &= (
+        features.covariances.diagonal(axis1=1, axis2=2).max(axis=1, initial=0.0) <= MOST_STD_M**2
+    )
     floor = (SIGMA_CELLS * config.cell_m) ** 2
     given = features.covariances[near]
     covariances = np.stack([given[:, 0, 0] + floor, given[:, 0, 1], given[:, 1, 1] + floor], axis=1)

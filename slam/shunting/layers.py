@@ -28,7 +28,8 @@ class Changes:
 
 def existence(network: Network) -> Raster | None:
     """The larger of trace and short-term activity relative to saturation; NaN where no neuron
-    lives. None for an empty network.
+    lives. None for an empty network. Raises ``InvalidValueError`` where it would be
+    too large for a raster.
     """
     found = _whole(network)
     if found is None:
@@ -66,7 +67,7 @@ def _around(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _whole(network: Network) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
-    extent = network.extent()
+    extent = network.raster_extent()
     if extent is None:
         return None
     i0, j0, i1, j1 = extent

@@ -3,15 +3,16 @@
 
 A NumPy archive (.npz) without pickled objects. ``header`` is JSON text with ``format``, ``version``
 and ``state``; ``places`` (n, 2) are the blocks' indices (x, y); ``x``, ``y``, ``age`` and
-``facing`` (n, 8, 8) their neurons. Older readers refuse newer versions.
+``facing`` (n, 8, 8) their neurons. The header's ``sha256`` is the sum of all the rest; maps of
+before it have none, which is said in the log. Older readers refuse newer versions.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
-import zipfile
-import zlib
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.archives import read_arrays
 from slam.checked import covariance, pose
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing
@@ -29,6 +31,14 @@ from slam.shunting.network import Network
 
 FORMAT, VERSION = "mobilia shunting memory", 1
 _ARRAYS = ("places", "x", "y", "age", "facing")
+# What a file may claim.
+MAX_BYTES = 1 << 30  # of all arrays: 1.2 million blocks, 70 000 m^2 of neurons of 3 cm
+FARTHEST = 1 << 20  # blocks from the origin: 250 km
+MOST_AGE_S = 1.5e8  # 13 times the slowest pace, two minutes a scan
+MOST_ODDS = 3.5  # as in ``slam.shunting.occupancy``
+MOST_POSE = 1e6  # m and rad, and standard deviations
+MOST_VALUES, MOST_COUNT = 10_000, 1e12
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,55 +62,108 @@ class State:
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_map_robot", pose("State", "T_map_robot", self.T_map_robot))
         object.__setattr__(self, "covariance", covariance("State", "covariance", self.covariance))
+        if not isinstance(self.kind, str):
+            raise InvalidValueError(f"State.kind must be a word, got {self.kind!r:.40}")
+        if max(map(abs, self.T_map_robot.tolist())) > MOST_POSE:
+            raise InvalidValueError(f"State.T_map_robot must lie within {MOST_POSE:g} m and rad")
+        if self.covariance.max() > MOST_POSE**2:
+            raise InvalidValueError(f"State.covariance must lie within {MOST_POSE:g}^2")
+        for name in ("usual", "supports"):
+            values = getattr(self, name)
+            if not isinstance(values, (list, tuple)) or len(values) > MOST_VALUES:
+                raise InvalidValueError(f"State.{name} must be up to {MOST_VALUES} numbers")
+            for value in values:
+                _positive(name, value, (int, float))
+        _positive("tracked_s", self.tracked_s, (int, float))
+        _positive("tracked", self.tracked, (int,))
+
+
+def _positive(name: str, value: object, kinds: tuple[type, ...]) -> None:
+    """Raise ``InvalidValueError`` unless it is a number from 0 to ``MOST_COUNT``."""
+    number = isinstance(value, kinds) and not isinstance(value, bool)
+    if not number or not 0.0 <= value <= MOST_COUNT:  # type: ignore[operator]
+        raise InvalidValueError(
+            f"State.{name} must be a number in [0, {MOST_COUNT:g}], got {value!r:.40}"
+        )
 
 
 def save(path: Path, network: Network, state: State) -> None:
     """Write both; the file appears whole or not at all. Raises ``OutputError``."""
     slots, places = living(network.cells)
-    header = {
+    header: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "config": dataclasses.asdict(network.config),
         "state": dataclasses.asdict(state)
         | {"T_map_robot": state.T_map_robot.tolist(), "covariance": state.covariance.tolist()},
     }
+    cells = network.cells
+    arrays: dict[str, NDArray[Any]] = {
+        "places": places,
+        "x": cells.x[slots],
+        "y": cells.y[slots],
+        "age": cells.age[slots],
+        "facing": cells.facing[slots],
+    }
+    header["sha256"] = _sum(header, arrays)
     with replacing(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(
-            file,
-            header=np.array(json.dumps(header)),
-            places=places,
-            x=network.cells.x[slots],
-            y=network.cells.y[slots],
-            age=network.cells.age[slots],
-            facing=network.cells.facing[slots],
-        )
+        content: Any = {"header": np.array(json.dumps(header)), **arrays}
+        np.savez_compressed(file, **content)
+
+
+def _sum(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> str:
+    """Of the header but its own entry, and of all arrays."""
+    rest = {name: value for name, value in header.items() if name != "sha256"}
+    found = hashlib.sha256(json.dumps(rest, sort_keys=True).encode())
+    for name in _ARRAYS:
+        array = np.ascontiguousarray(arrays[name])
+        found.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        found.update(array.tobytes())
+    return found.hexdigest()
 
 
 def read(path: Path) -> tuple[ShuntingConfig, State, dict[str, NDArray[Any]]]:
     """Knobs, state and arrays of a file that ``save`` wrote.
 
-    Raises ``LogFormatError`` for a file that is missing, cut short, damaged, of another kind or of
-    a newer version.
+    Raises ``LogFormatError`` for a file that is missing, cut short, damaged, of another kind, of a
+    newer version, or that claims more than a map can have (``MAX_BYTES``, checked before anything
+    is unpacked).
     """
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            header = json.loads(str(archive["header"]))
-            if not isinstance(header, dict) or header.get("format") != FORMAT:
-                raise LogFormatError(path, f"not a {FORMAT}")
-            if header.get("version") != VERSION:
-                raise LogFormatError(
-                    path, f"version {header.get('version')!r} of a {FORMAT}; {VERSION} is known"
-                )
-            arrays = {name: archive[name] for name in _ARRAYS}
-        config, state = ShuntingConfig(**header["config"]), State(**header["state"])
-    except FileNotFoundError as error:
-        raise LogFormatError(path, "cannot be read: no such file") from error
-    except (OSError, EOFError, KeyError, TypeError, ValueError, AttributeError) as error:
-        raise LogFormatError(path, f"not a whole {FORMAT}: {error}") from error
-    except (zipfile.BadZipFile, zlib.error, InvalidValueError) as error:
-        raise LogFormatError(path, f"damaged {FORMAT}: {error}") from error
+    arrays = read_arrays(path, ("header", *_ARRAYS), max_bytes=MAX_BYTES)
+    header = _header(path, arrays.pop("header"))
     _check(path, arrays)
+    if "sha256" not in header:
+        _log.warning("%s: a map of before sums; damage to it would not be noticed", path)
+    elif header["sha256"] != _sum(header, arrays):
+        raise LogFormatError(path, f"damaged {FORMAT}: its content is not what was written")
+    try:
+        config, state = ShuntingConfig(**header["config"]), State(**header["state"])
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise LogFormatError(path, f"damaged {FORMAT}: {error}") from error
+    _check_ages(path, arrays["age"], state.kind)
     return config, state, arrays
+
+
+def _header(path: Path, text: NDArray[Any]) -> dict[str, Any]:
+    """The words; a number in them that is NaN or infinite is no JSON."""
+
+    def refuse(word: str) -> None:
+        raise ValueError(f"{word} is no number")
+
+    try:
+        header = json.loads(str(text), parse_constant=refuse)
+    except (ValueError, RecursionError) as error:
+        raise LogFormatError(path, f"not a whole {FORMAT}: its header: {error}") from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise LogFormatError(path, f"not a {FORMAT}")
+    if header.get("version") != VERSION:
+        raise LogFormatError(
+            path, f"version {header.get('version')!r} of a {FORMAT}; {VERSION} is known"
+        )
+    unknown = sorted(set(header) - {"format", "version", "config", "state", "sha256"})
+    if unknown:
+        raise LogFormatError(path, f"damaged {FORMAT}: its header has {unknown[0][:40]!r}")
+    return header
 
 
 def _check(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
@@ -115,8 +178,22 @@ def _check(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
         array = arrays[name]
         if array.shape != shape or array.dtype != kind or not np.isfinite(array).all():
             raise LogFormatError(path, f"{name} must be finite {kind.__name__} of shape {shape}")
-    if len(np.unique(arrays["places"], axis=0)) != n:
+    for name in ("x", "y"):
+        if n and not 0.0 <= arrays[name].min() <= arrays[name].max() <= 1.0:
+            raise LogFormatError(path, f"{name} must lie in [0, 1]")
+    places = arrays["places"]
+    if n and (places.min() <= -FARTHEST or places.max() >= FARTHEST):
+        raise LogFormatError(path, f"places must lie within {FARTHEST} blocks")
+    if len(np.unique(places, axis=0)) != n:
         raise LogFormatError(path, "places: a block occurs twice")
+
+
+def _check_ages(path: Path, ages: NDArray[Any], kind: str) -> None:
+    """Seconds of looking; of an ordinary grid, log-odds."""
+    least = -MOST_ODDS if kind == "OccupancySlam" else 0.0
+    most = MOST_ODDS if kind == "OccupancySlam" else MOST_AGE_S
+    if ages.size and not least <= ages.min() <= ages.max() <= most:
+        raise LogFormatError(path, f"age must lie in [{least:g}, {most:g}] in a map of {kind}")
 
 
 def fill(network: Network, arrays: dict[str, NDArray[Any]]) -> None:

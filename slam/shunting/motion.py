@@ -33,11 +33,16 @@ def turned(covariance: Float, theta: float) -> Float:
 
 
 def inverted(matrix: Float) -> Float:
-    """Inverse of a symmetric positive definite (3, 3) matrix, in a fixed order of operations."""
+    """Inverse of a symmetric positive definite (3, 3) matrix, in a fixed order of operations.
+
+    One that rounding has left singular is taken without its correlations.
+    """
     (a, b, c), (_, d, e), (_, _, f) = matrix.tolist()
     aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
     bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
     det = a * aa + b * ab + c * ac
+    if det <= 0.0:
+        return np.diag([1.0 / max(v, LEAST_VARIANCE) for v in (a, d, f)])
     adjugate = [[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]
     return np.array([[entry / det for entry in row] for row in adjugate])
 
@@ -118,7 +123,7 @@ def predict(
         increment = bias.corrected(increment)
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
     given = now.increment_covariance
-    unscaled = assumed_covariance(increment) if given is None else np.asarray(given)
+    unscaled = assumed_covariance(increment) if given is None else steps.invertible(given)
     unscaled = unscaled + LEAST_VARIANCE * IDENTITY
     share = min(max(elapsed, 1e-3), 1.0) / 0.2
     floor = share * FLOOR_M**2, share * FLOOR_RAD**2

@@ -21,6 +21,7 @@ from slam.shunting.visibility import View
 
 MAX_BLOCKS_ACROSS = 1 << 15  # directory edge; 7.8 km at 3 cm neurons
 MAX_DIRECTORY = 1 << 26  # entries, 256 MiB: 1.9 km square
+MAX_CELLS = 1 << 28  # of a raster, 1 GiB a layer: 490 m square at 3 cm neurons
 
 
 class Network:
@@ -120,6 +121,18 @@ class Network:
             return None
         (i0, j0), (i1, j1) = places.min(axis=0).tolist(), (places.max(axis=0) + 1).tolist()
         return i0 * SIDE, j0 * SIDE, i1 * SIDE, j1 * SIDE
+
+    def raster_extent(self) -> tuple[int, int, int, int] | None:
+        """``extent``; ``InvalidValueError`` where a raster of it would exceed ``MAX_CELLS``."""
+        found = self.extent()
+        if found is not None:
+            across, along = found[2] - found[0], found[3] - found[1]
+            if across * along > MAX_CELLS:
+                raise InvalidValueError(
+                    f"the map is {across * self.cell:.0f} m x {along * self.cell:.0f} m; as a "
+                    f"raster of {self.cell} m it would have more than {MAX_CELLS} cells"
+                )
+        return found
 
     def bytes_per_neuron(self) -> float:
         """Bytes of every array, unused slots and directory included, per neuron that is alive."""

@@ -137,7 +137,7 @@ class Grid(Network):
 
     def probabilities(self) -> Raster | None:
         """p of every cell that was ever seen, NaN elsewhere."""
-        extent = self.extent()
+        extent = self.raster_extent()
         if extent is None:
             return None
         i0, j0, i1, j1 = extent

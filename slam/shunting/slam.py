@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from slam import se2
+from slam import se2, steps
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import Float, Frame, Odometry
 from slam.shunting import layers, memory
@@ -85,10 +85,7 @@ class ShuntingSlam:
         """
         if self._before is None and self._resumed is None:
             return self._first(frame)
-        if self._stamps and frame.stamp_ns <= self._stamps[-1]:
-            raise InvalidValueError(
-                f"frames must come in order: {frame.stamp_ns} ns after {self._stamps[-1]} ns"
-            )
+        steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         prediction = self._predict(frame.odometry)
         observations = observe(frame, prediction.twist, self.config)
         if float(observations.weights.sum()) >= TELLING:
@@ -283,7 +280,10 @@ class ShuntingSlam:
         slam.config = config
         warm_up()
         slam.reset()
-        memory.fill(slam.network, arrays)
+        try:
+            memory.fill(slam.network, arrays)
+        except InvalidValueError as error:  # blocks farther apart than a map can be
+            raise LogFormatError(path, str(error)) from error
         slam._T_map_robot = state.T_map_robot
         slam._resumed = state.covariance + COARSE
         slam._belief.resumed(state.covariance)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from scripts.fuzz import Sample, attack, corpus, damaged
+from scripts.fuzz_calls import GROUPS, Tally, frames, run
 
 
 @pytest.fixture(scope="module")
@@ -36,3 +37,22 @@ def test_damaged_files_never_raise_anything_but_our_errors(samples, tmp_path: Pa
 def test_the_same_seed_does_the_same_damage(samples):
     once, again = (damaged(samples[0].data, np.random.default_rng(5)) for _ in range(2))
     assert once == again != samples[0].data
+
+
+@pytest.mark.parametrize("group", list(GROUPS))
+def test_odd_calls_raise_nothing_but_our_errors(group):
+    """``python -m scripts.fuzz --cases 500`` goes on for longer."""
+    whole = Tally()
+    for number in range(16):
+        whole.add(run(group, number, seed=3))
+    assert whole.findings == []
+    assert whole.answered > 0
+    assert whole.refused > 0
+
+
+def test_the_same_seed_makes_the_same_calls():
+    def odd() -> list:
+        rng = np.random.default_rng(4)
+        return [frame for _ in range(5) for frame in frames(rng)]
+
+    assert odd() == odd()

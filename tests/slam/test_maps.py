@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
+
 import cv2
 import numpy as np
 import pytest
@@ -25,7 +28,11 @@ def test_the_image_has_the_highest_row_first_and_the_three_grays(tmp_path):
     assert data.startswith(b"P5\n4 3\n255\n")
     assert list(data[-12:]) == [0, 0, 0, 0, 205, 205, 205, 205, 254, 254, 254, 254]
     assert cv2.imread(str(pgm), cv2.IMREAD_UNCHANGED).shape == (3, 4)
+    sums = [hashlib.sha256(pgm.read_bytes()).hexdigest()]
+    sums.append(hashlib.sha256(yaml.read_bytes().split(b"\n", 2)[2]).hexdigest())
     assert yaml.read_text().splitlines() == [
+        f"# sha256 of the image: {sums[0]}",
+        f"# sha256 of the lines below: {sums[1]}",
         "image: map.pgm",
         "mode: trinary",
         "resolution: 0.05",
@@ -75,6 +82,54 @@ def test_maps_of_other_writers(tmp_path):
     np.testing.assert_array_equal(maps.read_map(tmp_path / "a.yaml").values, [[0.0, 1.0]])
 
 
+def without_sums(yaml):
+    """The file as other writers make it."""
+    yaml.write_text(yaml.read_text().split("\n", 2)[2])
+
+
+def test_every_flipped_byte_and_every_cut_is_noticed_or_changes_nothing(tmp_path):
+    pgm, yaml = maps.write_map(tmp_path / "map", small_map())
+    whole = maps.read_map(yaml)
+    noticed = 0
+    for path in (pgm, yaml):
+        data = path.read_bytes()
+        damaged = [data[:k] for k in range(len(data))]
+        damaged += [
+            data[:k] + bytes([data[k] ^ 1 << k % 8]) + data[k + 1 :] for k in range(len(data))
+        ]
+        for broken in damaged:
+            path.write_bytes(broken)
+            try:
+                back = maps.read_map(yaml)
+            except LogFormatError:
+                noticed += 1
+                continue
+            np.testing.assert_array_equal(back.values, whole.values)
+            np.testing.assert_array_equal(back.T_map_origin, whole.T_map_origin)
+            assert back.resolution_m == whole.resolution_m
+        path.write_bytes(data)
+    assert noticed > 400
+
+
+def test_a_file_claims_no_more_than_a_map_can_have(tmp_path):
+    pgm, yaml = maps.write_map(tmp_path / "map", small_map())
+    without_sums(yaml)
+    pgm.write_bytes(b"P5\n1000000 1000000\n255\n" + bytes(12))
+    with pytest.raises(LogFormatError, match="1000000 x 1000000 pixels expected, found 12"):
+        maps.read_map(yaml)
+    with pgm.open("wb") as file:
+        file.truncate(1 << 30)  # a hole: no bytes on the disk
+    with pytest.raises(LogFormatError, match=r"map\.pgm: has 1073741824 bytes; at most"):
+        maps.read_map(yaml)
+    pgm.unlink()
+    os.mkfifo(pgm)
+    with pytest.raises(LogFormatError, match=r"map\.pgm: cannot be read: not a file"):
+        maps.read_map(yaml)
+    yaml.write_bytes(b"image: a.pgm\n" * 10_000)
+    with pytest.raises(LogFormatError, match=r"map\.yaml: has 130000 bytes"):
+        maps.read_map(yaml)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "match"),
     [
@@ -90,6 +145,7 @@ def test_maps_of_other_writers(tmp_path):
 )
 def test_damaged_maps_are_refused(tmp_path, old, new, match):
     _, yaml = maps.write_map(tmp_path / "map", small_map())
+    without_sums(yaml)
     yaml.write_text(yaml.read_text().replace(old, new))
     with pytest.raises(LogFormatError, match=match):
         maps.read_map(yaml)
@@ -99,6 +155,7 @@ def test_missing_and_truncated_files_are_refused(tmp_path):
     with pytest.raises(LogFormatError, match="cannot be read"):
         maps.read_map(tmp_path / "none.yaml")
     pgm, yaml = maps.write_map(tmp_path / "map", small_map())
+    without_sums(yaml)
     pgm.write_bytes(pgm.read_bytes()[:-1])
     with pytest.raises(LogFormatError, match="4 x 3 pixels expected, found 11"):
         maps.read_map(yaml)

@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import io
 import json
+import math
+import zipfile
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import pytest
@@ -13,7 +16,7 @@ import pytest
 from slam import se2
 from slam.errors import LogFormatError, OutputError
 from slam.frames import Frame
-from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.shunting import ShuntingConfig, ShuntingSlam, memory
 from slam.shunting.occupancy import OccupancySlam
 from tests.world2d import Drive, World2D, arena, frames, laser, rectangle, wander
 
@@ -97,8 +100,12 @@ def rewritten(source: Path, target: Path, **changes: Any) -> Path:
     with np.load(source) as archive:
         content = {name: archive[name] for name in archive.files}
     header = json.loads(str(content["header"]))
+    del header["sha256"]
     for name, value in changes.items():
-        if name in content:
+        if name in content and np.ndim(value) == 0:
+            content[name] = content[name].copy()
+            content[name].flat[0] = value
+        elif name in content:
             content[name] = value
         else:
             header[name] = value
@@ -118,6 +125,12 @@ def rewritten(source: Path, target: Path, **changes: Any) -> Path:
         ({"state": {}}, "T_map_robot"),
         ({"places": np.zeros((1, 2), np.int64)}, "x must be finite float32"),
         ({"x": np.zeros(0, np.float64)}, "x must be finite float32"),
+        ({"x": np.float32(1.5)}, r"x must lie in \[0, 1\]"),
+        ({"y": np.float32(-0.5)}, r"y must lie in \[0, 1\]"),
+        ({"age": np.float32(-1.0)}, "age must lie in"),
+        ({"places": np.int64(2**62)}, "places must lie within"),
+        ({"somebody": 1}, "its header has 'somebody'"),
+        ({"sha256": "0" * 64}, "its content is not what was written"),
     ],
 )
 def test_what_is_no_such_file_is_refused(
@@ -157,3 +170,81 @@ def test_missing_cut_and_foreign_files_are_refused(
     (tmp_path / "file").touch()
     with pytest.raises(OutputError):
         saved[1].save(tmp_path / "file" / "map.npz")
+
+
+def test_every_flipped_byte_and_every_cut_is_noticed_or_changes_nothing(tmp_path: Path) -> None:
+    stream = frames(ROOMS, wander(1.0), rate_hz=5.0, spec=laser(19), seed=7)[:2]
+    slam = ShuntingSlam(CONFIG)
+    for frame in stream:
+        slam.update(frame.without_truth())
+    path = tmp_path / "small.npz"
+    slam.save(path)
+    data, (config, state, arrays) = path.read_bytes(), memory.read(path)
+    again = tmp_path / "again.npz"
+    slam.save(again)
+    assert again.read_bytes() == data
+    rng = np.random.default_rng(0)
+    # all of the archive's own words at the end, some of the rest
+    flips = [*rng.integers(0, len(data), 150).tolist(), *range(len(data) - 150, len(data))]
+    damaged = [data[:k] + bytes([data[k] ^ 1 << k % 8]) + data[k + 1 :] for k in flips]
+    damaged += [data[:k] for k in rng.integers(0, len(data), 50).tolist()]
+    noticed = 0
+    for broken in damaged:
+        path.write_bytes(broken)
+        try:
+            found = memory.read(path)
+        except LogFormatError:
+            noticed += 1
+            continue
+        assert (found[0], found[1].kind) == (config, state.kind)
+        np.testing.assert_array_equal(found[1].T_map_robot, state.T_map_robot)
+        for name, array in arrays.items():
+            np.testing.assert_array_equal(found[2][name], array)
+    assert noticed > 250
+
+
+def test_a_map_of_before_sums_is_read_and_said_so(
+    saved: tuple[Path, ShuntingSlam, list[Frame]],
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    path = rewritten(saved[0], tmp_path / "older.npz")
+    back = ShuntingSlam.load(path)
+    assert back.network.extent() == saved[1].network.extent()
+    assert "older.npz: a map of before sums" in caplog.text
+
+
+def test_a_small_file_that_unpacks_to_very_much_is_refused(
+    saved: tuple[Path, ShuntingSlam, list[Frame]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(memory, "MAX_BYTES", 1 << 25)
+    path = tmp_path / "bomb.npz"
+    with np.load(saved[0]) as archive:
+        header = archive["header"]
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr("header.npy", _npy(header))
+        for name in ("places", "x", "y", "age", "facing"):
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                if name == "x":
+                    _write_zeros(member, (1 << 18, 8, 8))  # 64 MiB
+                else:
+                    member.write(_npy(np.zeros(0)))
+    assert path.stat().st_size < 1 << 20
+    with pytest.raises(
+        LogFormatError, match=r"bomb\.npz: unpacks to 6711.* bytes; at most 33554432"
+    ):
+        ShuntingSlam.load(path)
+
+
+def _npy(array: np.ndarray[Any, Any]) -> bytes:
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+def _write_zeros(member: IO[bytes], shape: tuple[int, ...]) -> None:
+    np.lib.format.write_array_header_1_0(
+        member, {"descr": "<f4", "fortran_order": False, "shape": shape}
+    )
+    for _ in range(4 * math.prod(shape) >> 24):
+        member.write(bytes(1 << 24))

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files read whole, once their size is known to be one that such a file may have."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from slam.errors import LogFormatError
+
+
+def bytes_of(path: Path, most: int) -> bytes:
+    """``path.read_bytes``; ``LogFormatError`` unless it is a file of at most ``most`` bytes."""
+    try:
+        found = path.stat()  # before it is opened: a named pipe would wait for ever
+        if not stat.S_ISREG(found.st_mode):
+            raise LogFormatError(path, "cannot be read: not a file")
+        if found.st_size > most:
+            raise LogFormatError(path, f"has {found.st_size} bytes; at most {most} are allowed")
+        return path.read_bytes()
+    except (OSError, ValueError) as error:  # the last: a null byte in the name
+        why = getattr(error, "strerror", None) or error
+        raise LogFormatError(path, f"cannot be read: {why}") from error
+
+
+def text_of(path: Path, most: int) -> str:
+    """The same as text in UTF-8; ``LogFormatError`` where it is none."""
+    try:
+        return bytes_of(path, most).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise LogFormatError(path, "not a text file") from error
