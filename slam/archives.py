@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""NumPy archives (.npz) as data: bounded before they are unpacked, one error for all damage."""
+
+from __future__ import annotations
+
+import math
+import stat
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterable
+from pathlib import Path
+from tokenize import TokenError
+from typing import IO, Any
+
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from slam.errors import LogFormatError
+
+MAX_BYTES = 1 << 31  # of all arrays unpacked: more than any file of ours
+_ENCRYPTED = 1  # bit of a member's flags
+_MAX_EXTRA = 32  # bytes of a member's extra field: that of Zip64; more may hide other members
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # what NumPy writes
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+# What zipfile, zlib and NumPy raise for bytes that are no whole archive.
+BROKEN = (
+    zipfile.BadZipFile, zlib.error, struct.error, TokenError, SyntaxError, EOFError, OSError,
+    ValueError, TypeError, KeyError, IndexError, OverflowError, MemoryError, RecursionError,
+    NotImplementedError,
+)  # fmt: skip
+
+
+def read_arrays(
+    path: Path, names: Iterable[str] | None = None, *, max_bytes: int = MAX_BYTES
+) -> dict[str, NDArray[Any]]:
+    """The arrays of a file that ``np.savez`` or ``np.savez_compressed`` wrote, by name.
+
+    names      those to read; all when None
+    max_bytes  that they may have unpacked, all together
+
+    Sizes are checked before anything is unpacked: a member's header must claim what its entry in
+    the archive claims. Objects (pickles) are refused. Raises ``LogFormatError``, which names the
+    file, for one that is missing, torn, damaged, too large or lacks a name.
+    """
+    _check_is_file(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = _members(path, archive)
+            wanted = list(members) if names is None else list(names)
+            for name in wanted:
+                if name not in members:
+                    raise LogFormatError(path, f"holds no array {name!r}")
+            claimed = sum(members[name].file_size for name in wanted)
+            if claimed > max_bytes:
+                raise LogFormatError(
+                    path, f"unpacks to {claimed} bytes; at most {max_bytes} are allowed"
+                )
+            return {name: _array(path, archive, members[name], max_bytes) for name in wanted}
+    except LogFormatError:
+        raise
+    except BROKEN as error:
+        why = f"{type(error).__name__}: {error}"
+        raise LogFormatError(path, f"no whole NumPy archive ({why})") from error
+
+
+def _check_is_file(path: Path) -> None:
+    """Before it is opened: a named pipe would wait for ever."""
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError) as error:  # the last: a null byte in the name
+        why = getattr(error, "strerror", None) or error
+        raise LogFormatError(path, f"cannot be read: {why}") from error
+    if not stat.S_ISREG(mode):
+        raise LogFormatError(path, "cannot be read: not a file")
+
+
+def _members(path: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    members: dict[str, zipfile.ZipInfo] = {}
+    for info in archive.infolist():
+        name = info.filename.removesuffix(".npy")
+        if name == info.filename or name in members:
+            raise LogFormatError(path, f"no NumPy archive: member {info.filename[:80]!r}")
+        odd = info.comment or len(info.extra) > _MAX_EXTRA or info.flag_bits & _ENCRYPTED
+        if odd or info.compress_type not in _METHODS:
+            raise LogFormatError(path, f"array {name!r} is packed as NumPy never does")
+        members[name] = info
+    return members
+
+
+def _array(
+    path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, max_bytes: int
+) -> NDArray[Any]:
+    with archive.open(info) as member:
+        _check_header(path, info, member, max_bytes)
+    with archive.open(info) as member:
+        array: NDArray[Any] = npy.read_array(member, allow_pickle=False)
+        return array
+
+
+def _check_header(path: Path, info: zipfile.ZipInfo, member: IO[bytes], max_bytes: int) -> None:
+    """Shape times item size must be the bytes that the archive claims for it."""
+    version = npy.read_magic(member)
+    if version not in _HEADERS:
+        raise LogFormatError(path, f"{info.filename}: version {version} of .npy is not known")
+    shape, _, dtype = _HEADERS[version](member)
+    count = math.prod(shape)
+    if dtype.hasobject:
+        raise LogFormatError(path, f"{info.filename}: holds objects, not numbers or text")
+    rest = info.file_size - member.tell()
+    if min(shape, default=0) < 0 or count * dtype.itemsize != rest or count > max_bytes:
+        raise LogFormatError(
+            path, f"{info.filename}: shape {shape} of {dtype} does not fit its {rest} bytes"
+        )
