@@ -208,6 +208,9 @@ def of_compared(path: Path, *, view: str | None = "follow") -> Footage:
 
 def of_log(path: Path) -> Footage:
     """A log: its scans are all that is known of the world."""
+    from sim.recording.verify import check_bag
+
+    check_bag(path)
     stream = read_bag(path, labels=True) if is_bag(path) else open_log(path)
     first_ns = last_ns = None
     labelled, frames = False, 0

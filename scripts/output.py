@@ -16,11 +16,14 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from sim.recording.sums import SUMS, check_vouched, write_sums
 from slam.errors import LogFormatError, OutputError
 from slam.files import write_text
 
 RECIPE = "recipe.json"
 LOCK = ".lock"
+# What comparisons and drives consist of: all else in their folders is somebody else's.
+GROWING = ("*.npz", "*.npz.sha256", "*.csv", "*.png", "runs.json", RECIPE, "report.html")
 MAX_RECIPE_BYTES = 1 << 20
 
 
@@ -42,6 +45,7 @@ def whole_folder(path: Path, *, overwrite: bool) -> Iterator[Path]:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
     try:
         yield temporary
+        write_sums(temporary)
         _take_place(temporary, path)
     except OSError as error:
         if isinstance(error, OutputError):
@@ -74,7 +78,9 @@ def locked_folder(out: Path) -> Iterator[None]:
             fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise OutputError(f"{out} is being written by another process") from error
+        (out / SUMS).unlink(missing_ok=True)  # what follows changes files: not whole until the end
         yield
+        write_sums(out, GROWING)
         lock.unlink(missing_ok=True)
 
 
@@ -165,6 +171,7 @@ def read_recipe_words(path: Path) -> dict[str, Any]:
             raw = file.read(MAX_RECIPE_BYTES + 1)
         if len(raw) > MAX_RECIPE_BYTES:
             raise LogFormatError(path, f"more than {MAX_RECIPE_BYTES} bytes: no recipe")
+        check_vouched(path)
         words = json.loads(raw.decode("utf-8"))
     except OSError as error:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error

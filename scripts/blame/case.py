@@ -14,6 +14,7 @@ from scripts.compare.folder import RunFile
 from scripts.output import RECIPE, read_recipe_words, slams_of
 from scripts.session import file_name
 from sim.recording.recipe import Made, read_recipe
+from sim.recording.sums import check_vouched
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import Float
 from slam.trajectory import read_tum
@@ -84,6 +85,7 @@ def case_of(folder: Path, slam: str | None, every: int) -> Case:
         raise LogFormatError(path, f"settings.seconds must be a number, got {seconds!r}")
     world = {k: v for k, v in settings.items() if k not in OF_THE_RUN}
     online = path.parent / f"trajectory_{file_name(slam)}.tum"
+    check_vouched(online)
     recorded = read_tum(online).poses if every == 1 and online.exists() else None
     return Case(settings=world, seconds=seconds, slam=slam, every=every, recorded=recorded)
 
