@@ -14,6 +14,7 @@ from scripts.output import RECIPE, read_recipe_words, slams_of
 from scripts.session import primary_of, systems_named
 from scripts.show import Show
 from scripts.stage import LogStage, Stage
+from sim.recording.sums import check_vouched
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import NS_PER_S, Stream
 from slam.logs import open_log
@@ -86,6 +87,7 @@ def open_run(path: Path, *, view: str | None = "follow") -> Footage:
         return of_compared(path, view=view)
     recipe = path / RECIPE
     if not recipe.exists():
+        check_vouched(recipe)  # one that is listed is lost: not what a log is
         return of_log(path)
     words = read_recipe_words(recipe)
     if "recipe" in words:

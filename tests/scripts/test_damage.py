@@ -15,6 +15,7 @@ import typer
 
 from scripts import results
 from scripts.damage import Tally, damaged, damages, try_consumers, try_verify
+from scripts.footage import open_run
 from scripts.output import LOCK, locked_folder, whole_folder, write_recipe
 from scripts.report.page import REPORT
 from scripts.samples import COMPARED, SAMPLES
@@ -327,6 +328,14 @@ def test_names_in_a_list_cannot_lead_elsewhere_or_write_to_the_terminal(copied):
         (copied / SUMS).write_text(f"{'0' * 64}  {name}\n")
         with pytest.raises(LogFormatError, match="no hash and file name"):
             read_sums(copied)
+
+
+def test_an_episode_without_its_recipe_is_no_log(copied):
+    (copied / EPISODES[0] / RECIPE).unlink()
+    with pytest.raises(LogFormatError, match=r"recipe\.json: cannot be read"):
+        open_run(copied / EPISODES[0], view=None)
+    with open_run(copied / EPISODES[1] / f"{EPISODES[1]}.mcap", view=None) as footage:
+        assert footage.slam == ""
 
 
 def test_a_folder_of_nothing_of_ours_is_refused(tmp_path):
