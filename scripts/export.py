@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rich.markup import escape
 
 from scripts.console import console
+from sim.recording.verify import check_bag
 from slam.errors import InvalidValueError
 from slam.files import replacing
 from slam.frames import Frame, Stream
@@ -38,6 +39,7 @@ def export(
     }  # fmt: skip
     if to not in writers:
         raise InvalidValueError(f"--to must be one of {', '.join(writers)}, got {to!r}")
+    check_bag(episode)
     stream = read_bag(episode, labels=True) if is_bag(episode) else open_log(episode)
     suffix = {"tum": ".tum", "carmen": ".log.gz", "npz": ".npz"}[to]
     plain = episode.absolute()

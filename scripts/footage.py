@@ -15,6 +15,7 @@ from scripts.session import primary_of, systems_named
 from scripts.show import Show
 from scripts.stage import LogStage, Stage
 from scripts.trust import admitted
+from sim.recording.sums import check_vouched
 from sim.versions import check_world, world_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import NS_PER_S, Stream
@@ -91,6 +92,7 @@ def open_run(path: Path, *, view: str | None = "follow", trust: bool = False) ->
         return of_compared(path, view=view, trust=trust)
     recipe = path / RECIPE
     if not recipe.exists():
+        check_vouched(recipe)  # one that is listed is lost: not what a log is
         return of_log(path)
     words = read_recipe_words(recipe)
     if "recipe" in words:
@@ -217,6 +219,9 @@ def of_compared(path: Path, *, view: str | None = "follow", trust: bool = False)
 
 def of_log(path: Path) -> Footage:
     """A log: its scans are all that is known of the world."""
+    from sim.recording.verify import check_bag
+
+    check_bag(path)
     stream = read_bag(path, labels=True) if is_bag(path) else open_log(path)
     first_ns = last_ns = None
     labelled, frames = False, 0

@@ -4,7 +4,8 @@
 A job is a function called as ``call(path, **arguments)`` that writes ``path``. It gets a temporary
 name, which becomes ``<name>-<digest><suffix>`` when the function returns. The digest is that of the
 arguments, of the code that they are given to, of the data that it reads and of the versions of what
-it calls, so what is found there is what would be written, and is not made again.
+it calls, so what is found there is what would be written, and is not made again. The hash of its
+content lies beside it, as ``<file>.sha256``: one that was damaged since is made again.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from typing import Any
 from rich.markup import escape
 
 from scripts import interrupt, workers
-from scripts.console import progress
+from scripts.console import note, progress
 from scripts.output import versions
+from sim.recording.sums import damage_beside, write_beside
 from slam import locks
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 
@@ -101,8 +103,9 @@ def run_jobs(
     ``folder``; the file of each job by its name.
 
     A job that fails stops the rest and is named in the error; results that are whole stay, and the
-    next call goes on from them. Raises ``InvalidValueError`` for two jobs of one name,
-    ``OutputError`` while another call, or workers that it left, write into ``folder``.
+    next call goes on from them. One that is not what its hash says is named and made again. Raises
+    ``InvalidValueError`` for two jobs of one name, ``OutputError`` while another call, or workers
+    that it left, write into ``folder``.
     """
     wanted: dict[str, Job] = {}
     for job in jobs:
@@ -120,7 +123,7 @@ def _make_missing(
     wanted: Mapping[str, Job], folder: Path, processes: int, cluster: str | None, title: str
 ) -> dict[str, Path]:
     files = {name: folder / job.file_name() for name, job in wanted.items()}
-    missing = [job for name, job in wanted.items() if not files[name].exists()]
+    missing = [job for name, job in wanted.items() if not _whole(files[name])]
     with progress() as bar:
         done = len(wanted) - len(missing)
         task = bar.add_task(escape(title), total=len(wanted), completed=done, unit="")
@@ -136,6 +139,16 @@ def _make_missing(
     return files
 
 
+def _whole(file: Path) -> bool:
+    """Whether it is there, as it was made; a note says so where it is not as it was made."""
+    if not os.path.lexists(file):
+        return False
+    wrong = damage_beside(file)
+    if wrong:
+        note(f"made again: {wrong}")
+    return not wrong
+
+
 def _make_pair(pair: tuple[Job, Path]) -> None:
     make(*pair)
 
@@ -147,6 +160,7 @@ def make(job: Job, file: Path) -> None:
     temporary = file.with_name(f".{file.stem}.{os.getpid()}{PART}{file.suffix}")
     try:
         job.call(temporary, **job.arguments)
+        write_beside(file, temporary)
         os.replace(temporary, file)
     except MobiliaError:
         raise

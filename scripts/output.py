@@ -15,6 +15,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from sim.recording.sums import SUMS, check_vouched, write_sums
 from sim.versions import WORLD
 from slam import locks
 from slam.errors import LogFormatError, OutputError
@@ -22,6 +23,8 @@ from slam.files import write_text
 from slam.names import NameFromFile
 
 RECIPE = "recipe.json"
+# What comparisons and drives consist of: all else in their folders is somebody else's.
+GROWING = ("*.npz", "*.npz.sha256", "*.csv", "*.png", "runs.json", RECIPE, "report.html")
 MAX_RECIPE_BYTES = 1 << 20
 
 
@@ -43,6 +46,7 @@ def whole_folder(path: Path, *, overwrite: bool) -> Iterator[Path]:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
     try:
         yield temporary
+        write_sums(temporary)
         _take_place(temporary, path)
     except OSError as error:
         if isinstance(error, OutputError):
@@ -70,7 +74,9 @@ def locked_folder(out: Path) -> Iterator[None]:
     if others and not (out / RECIPE).exists():
         raise OutputError(f"{out} holds files that mobilia did not write: choose another --out")
     with locks.locked(out):
+        (out / SUMS).unlink(missing_ok=True)  # what follows changes files: not whole until the end
         yield
+        write_sums(out, GROWING)
 
 
 def _refuse(path: Path, overwrite: bool) -> None:
@@ -161,6 +167,7 @@ def read_recipe_words(path: Path) -> dict[str, Any]:
             raw = file.read(MAX_RECIPE_BYTES + 1)
         if len(raw) > MAX_RECIPE_BYTES:
             raise LogFormatError(path, f"more than {MAX_RECIPE_BYTES} bytes: no recipe")
+        check_vouched(path)
         words = json.loads(raw.decode("utf-8"))
     except OSError as error:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error

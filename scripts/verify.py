@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mobilia verify``: is a dataset what it was, and does its recipe still make it?"""
+"""``mobilia verify``: is a result what it was, and does its recipe still make it?"""
 
 from __future__ import annotations
 
@@ -12,17 +12,25 @@ from rich.markup import escape
 
 from scripts import interrupt
 from scripts.console import console, fail, progress
+from scripts.results import check
 from scripts.trust import Trust, admitted
 from sim.recording.dataset import episodes_in
 from sim.recording.recipe import RECIPE, read_recipe
-from sim.recording.verify import Finding, check_hashes, regenerate
+from sim.recording.verify import STATUS, Finding, regenerate
 from slam.errors import InvalidValueError
 
-_COLORS = {"whole": "green", "same bytes": "green", "same messages": "green", "damaged": "red"}
+_COLORS = {
+    "whole": "green", "same bytes": "green", "damaged": "red", "incomplete": "red",
+}  # fmt: skip
 
 
 def verify(
-    folder: Annotated[Path, typer.Argument(help="A dataset, or one episode.")],
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            help="A dataset, an episode, a folder of run, demo, compare, drive or blame, or a map."
+        ),
+    ],
     regenerate_: Annotated[
         int, typer.Option("--regenerate", help="Simulate this many episodes anew and compare.")
     ] = 0,
@@ -31,14 +39,16 @@ def verify(
 ) -> None:
     """Hash every file again; with --regenerate also make episodes anew from their recipes.
 
-    Exit status 1 when a file is damaged, or when an episode comes out otherwise on the very CPU and
-    versions that made it. On others it may: that is said, and is no failure.
+    Exit status: 0 all well. 1 damaged: a file is not what it was, or an episode comes out otherwise
+    on the very CPU and versions that made it (on others it may: that is said, and is no failure).
+    3 incomplete: a file or an episode is missing. 4 foreign: something is there that no SHA256SUMS
+    lists. 5 same messages, other bytes: a bag was packed anew. The first that holds counts.
     """
     if regenerate_ < 0 or seed < 0:
         raise InvalidValueError("--regenerate and --seed must be >= 0")
-    episodes = episodes_in(folder)
-    findings = [check_hashes(episode) for episode in episodes]
-    sound = [e for e, f in zip(episodes, findings, strict=True) if f.verdict != "damaged"]
+    findings = check(folder)
+    checked = len(findings)
+    sound = _sound(folder, findings) if regenerate_ else []
     count = min(regenerate_, len(sound))
     drawn = np.random.default_rng(seed).choice(len(sound), count, replace=False)
     chosen = [sound[k] for k in sorted(drawn.tolist())]
@@ -54,9 +64,21 @@ def verify(
         _tell(finding)
     bad = [finding for finding in findings if not finding.ok]
     if bad:
-        fail(f"{len(bad)} of {len(episodes)} episodes are not what they were: {bad[0].why}")
-        raise typer.Exit(1)
-    console.print(f"{len(episodes)} episodes, {count} of them made again: all well")
+        worst = min(bad, key=lambda finding: list(STATUS).index(finding.verdict))
+        fail(f"{len(bad)} of {len(findings)} findings are not 'whole'; {_words(worst)}")
+        raise typer.Exit(worst.status)
+    console.print(f"{checked} checked, {count} of them made again: all well")
+
+
+def _sound(folder: Path, findings: list[Finding]) -> list[Path]:
+    """The episodes that can be made again: planned, and with nothing of theirs missing."""
+    sound = {f.episode for f in findings if f.verdict not in ("damaged", "incomplete")}
+    return [path for path in episodes_in(folder.resolve()) if path.name in sound]
+
+
+def _words(finding: Finding) -> str:
+    why = finding.why if len(finding.why) <= 300 else f"{finding.why[:300]} ..."
+    return f"{finding.verdict}: {why}"
 
 
 def _tell(finding: Finding) -> None:

@@ -15,6 +15,7 @@ from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
 from scripts.session import file_name
 from scripts.trust import admitted
 from sim.recording.recipe import Made, read_recipe
+from sim.recording.sums import check_vouched
 from sim.versions import check_world, world_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import Float
@@ -96,6 +97,7 @@ def case_of(folder: Path, slam: str | None, every: int, trust: bool = False) -> 
     world["scene"] = admitted(scenes_of(path, settings)[0], "scene", trust)
     slam = admitted(slam, "SLAM", trust)
     online = path.parent / f"trajectory_{file_name(slam)}.tum"
+    check_vouched(online)
     recorded = read_tum(online).poses if every == 1 and online.exists() else None
     return Case(settings=world, seconds=seconds, slam=slam, every=every, recorded=recorded)
 

@@ -15,7 +15,8 @@ from sim.loop import GoalResult, LoopConfig, LoopRun, closed_loop
 from sim.loop.referee import Tally
 from sim.loop.run import goal_order
 from sim.simulation import Simulation
-from slam.errors import SlamFailedError
+from slam.archives import read_arrays
+from slam.errors import LogFormatError, SlamFailedError
 from slam.guests import Limits, limited
 
 
@@ -81,8 +82,10 @@ class Driven:
 
 
 def load(path: Path, identity: Mapping[str, Any]) -> Driven:
-    """What ``save`` wrote."""
-    with np.load(path) as file:
-        rest = json.loads(file["rest"].item())
-        arrays = {name: file[name] for name in _ARRAYS}
-    return Driven(identity=identity, goals=rest.pop("goals"), rest=rest, arrays=arrays)
+    """What ``save`` wrote; ``LogFormatError`` for anything else."""
+    arrays = read_arrays(path, (*_ARRAYS, "rest"))
+    try:
+        rest = json.loads(arrays.pop("rest").item())
+        return Driven(identity=identity, goals=rest.pop("goals"), rest=rest, arrays=arrays)
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise LogFormatError(path, f"no run of a drive: {error}") from error

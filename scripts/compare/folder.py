@@ -18,14 +18,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scripts.compare.columns import COLUMNS
 from scripts.compare.plan import Run
-from slam.errors import LogFormatError
+from sim.recording.sums import check_vouched
+from slam.archives import read_arrays
+from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing, write_text
 from slam.frames import Float
 from slam.system import Raster
@@ -65,18 +66,27 @@ def _plain(value: Any) -> Any:
 
 def merge(path: Path, recording: Path, entries: Mapping[str, Path]) -> list[Row]:
     """Write ``runs/<run>.npz`` from a recording and each SLAM's entry; the rows, SLAM by SLAM."""
-    with np.load(recording) as file:
-        arrays = {name: file[name] for name in _OF_RECORDING}
+    arrays: dict[str, Any] = dict(read_arrays(recording, _OF_RECORDING))
     rows: list[Row] = []
     for k, (slam, entry) in enumerate(entries.items()):
-        with np.load(entry) as file:
-            rows.append({"slam": slam, **json.loads(file["row"].item())})
-            arrays |= {f"slam{k}_{name}": file[name] for name in file.files if name != "row"}
+        own = read_arrays(entry)
+        rows.append({"slam": slam, **_row(entry, own.pop("row", None))})
+        arrays |= {f"slam{k}_{name}": value for name, value in own.items()}
     arrays["slams"] = np.array(list(entries))
     arrays["schema"] = np.array(SCHEMA)
     with replacing(path) as temporary:
         np.savez_compressed(temporary, **arrays)
     return rows
+
+
+def _row(entry: Path, text: Any) -> Row:
+    try:
+        row: Row = json.loads(text.item())
+    except (ValueError, TypeError, AttributeError) as error:
+        raise LogFormatError(entry, f"no entry of a comparison: {error}") from error
+    if not isinstance(row, dict):
+        raise LogFormatError(entry, "no entry of a comparison: its row is no object")
+    return row
 
 
 _OF_RECORDING = (
@@ -104,7 +114,7 @@ class Believed:
 
 
 class RunFile:
-    """A file of ``runs/``.
+    """A file of ``runs/``; ``LogFormatError`` for one that is damaged or something else.
 
     slams      names in order
     stamps_ns  (n,); ``truth`` (n, 3) T_world_robot; ``ranges`` (n, beams) m of the shared scans
@@ -115,14 +125,14 @@ class RunFile:
     """
 
     def __init__(self, path: Path) -> None:
+        check_vouched(path)
+        self._arrays = read_arrays(path)
         try:
-            with path.open("rb") as opened, np.load(opened) as file:
-                self._arrays = dict(file)
             self._take()
-        except (OSError, ValueError, BadZipFile, EOFError) as error:
-            raise LogFormatError(path, f"no run of a comparison: {error}") from error
         except KeyError as error:
             raise LogFormatError(path, f"no run of this schema: it lacks {error}") from error
+        except (ValueError, TypeError, IndexError, InvalidValueError) as error:
+            raise LogFormatError(path, f"no run of a comparison: {error}") from error
 
     def _take(self) -> None:
         a = self._arrays
@@ -211,11 +221,17 @@ _WORDS = frozenset(
 
 
 def read_csv(path: Path) -> list[Row]:
-    """The rows of a table: numbers as floats, empty cells as None."""
+    """The rows of a table: numbers as floats, empty cells as None; vouched for, if by anything."""
+    check_vouched(path)
     try:
         with path.open(newline="", encoding="utf-8") as file:
             return [{k: _value(k, v) for k, v in row.items()} for row in csv.DictReader(file)]
-    except (OSError, ValueError, TypeError) as error:  # the last: a line of another length
+    except (
+        OSError,
+        ValueError,
+        TypeError,
+        csv.Error,
+    ) as error:  # TypeError: a line of another length
         raise LogFormatError(path, f"no table: {_why(error)}") from error
 
 
@@ -226,10 +242,11 @@ def _value(column: str, cell: str) -> Any:
 
 
 def read_json(path: Path) -> Row:
-    """The object of a JSON file."""
+    """The object of a JSON file; vouched for, if by anything."""
+    check_vouched(path)
     try:
         data: Row = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise LogFormatError(path, f"cannot be read: {_why(error)}") from error
     if not isinstance(data, dict):
         raise LogFormatError(path, "holds no JSON object")

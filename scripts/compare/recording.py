@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from sim.moments import Moment, thinned, toured
 from sim.recording.recipe import Recipe
 from sim.simulation import Simulation
+from slam.archives import read_arrays
+from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import BeamClass, Float, Frame, LaserSpec, Odometry, Scan
 from slam.system import Raster
 from slam.trajectory import Trajectory
@@ -121,9 +123,17 @@ def _spec_arrays(spec: LaserSpec) -> dict[str, Any]:
 
 
 def load(path: Path) -> Recording:
-    """Inverse of ``record``."""
-    with np.load(path) as file:
-        a = dict(file)
+    """Inverse of ``record``; ``LogFormatError`` for a file that is damaged or something else."""
+    a = read_arrays(path)
+    try:
+        return _recording(a)
+    except KeyError as error:
+        raise LogFormatError(path, f"no recording of a comparison: it lacks {error}") from error
+    except (ValueError, TypeError, IndexError, OverflowError, InvalidValueError) as error:
+        raise LogFormatError(path, f"no recording of a comparison: {error}") from error
+
+
+def _recording(a: Mapping[str, Any]) -> Recording:
     scalars = {name: a[f"laser_{name}"].item() for name in _SPEC}
     spec = LaserSpec(**scalars, **{name: a[f"laser_{name}"] for name in _SPEC_ARRAYS})
     frames = [

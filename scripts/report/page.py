@@ -17,6 +17,7 @@ from scripts.report import closed, curves, metrics, pictures, style, tables, wor
 from scripts.report.closed import Driven
 from scripts.report.metrics import METRICS
 from scripts.report.study import LEAST_RUNS, Study
+from sim.recording.sums import add_to_sums
 from slam.files import write_text
 
 REPORT = "report.html"
@@ -27,6 +28,7 @@ def write(study: Study, drives: Sequence[Driven] = ()) -> Path:
     """Write ``report.html`` into the comparison's folder; its path."""
     path = study.compared.folder / REPORT
     write_text(path, render(study, drives))
+    add_to_sums(path)
     return path
 
 

@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from scripts.jobs import Job
 from scripts.reproduce.depends import depends_on
 from slam import metrics, se2
-from slam.errors import InvalidValueError
+from slam.archives import read_arrays
+from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import Float, Frame
 from slam.replay import Track
 from slam.system import SlamSystem
@@ -82,11 +83,13 @@ def save_run(path: Path, numbers: Mapping[str, Any], arrays: Mapping[str, ArrayL
 
 
 def load_run(path: Path) -> Run:
-    """Read it back."""
-    with np.load(path) as file:
-        arrays = {name: file[name] for name in file.files}
-    numbers, cpu_s = json.loads(str(arrays.pop("numbers"))), arrays.pop(_CPU, math.nan)
-    return Run(numbers=numbers, arrays=arrays, cpu_s=float(cpu_s))
+    """Read it back; ``LogFormatError`` for anything else."""
+    arrays = read_arrays(path)
+    try:
+        numbers, cpu_s = json.loads(str(arrays.pop("numbers"))), arrays.pop(_CPU, math.nan)
+        return Run(numbers=numbers, arrays=arrays, cpu_s=float(cpu_s))
+    except (ValueError, TypeError, KeyError) as error:
+        raise LogFormatError(path, f"no run of an experiment: {error}") from error
 
 
 def job(name: str, call: Any, /, **arguments: Any) -> Job:

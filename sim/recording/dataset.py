@@ -6,15 +6,16 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator
+import stat
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from sim.recording.episode import PART
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
-from sim.recording.sums import SUMS, read_sums
-from sim.recording.verify import check_hashes
+from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
+from sim.recording.verify import Finding, check_hashes, finding, listed_in
 from sim.twins import TWINS
 from sim.versions import check_world
 from slam import locks
@@ -22,7 +23,9 @@ from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import write_text
 
 PLAN = "dataset.json"
+SCHEMA = 1
 MAX_EPISODES = 1_000_000
+MAX_BYTES = 1 << 20  # of dataset.json
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +51,9 @@ class Plan:
             raise InvalidValueError(
                 f"Plan.dynamisms must be different numbers, got {self.dynamisms}"
             )
+        count = self.episodes * len(self.dynamisms)
+        if count > MAX_EPISODES:
+            raise InvalidValueError(f"Plan: at most {MAX_EPISODES} episodes, got {count}")
         names = [name for recipe in self.jobs() for name in self.folders(recipe)]
         if len(set(names)) != len(names):
             raise InvalidValueError("Plan.dynamisms are too close: two episodes have one name")
@@ -65,9 +71,17 @@ class Plan:
         """Names of the episodes that a job makes."""
         return [recipe.of_twin(name).name for name in TWINS] if self.twins else [recipe.name]
 
+    def planned(self) -> dict[str, Recipe]:
+        """Every episode: folder and recipe."""
+        return {
+            recipe.name: recipe
+            for job in self.jobs()
+            for recipe in (map(job.of_twin, TWINS) if self.twins else [job])
+        }
+
     def text(self) -> str:
         """``dataset.json``."""
-        return json.dumps({"schema": 1, **asdict(self)}, indent=1, sort_keys=True) + "\n"
+        return json.dumps({"schema": SCHEMA, **asdict(self)}, indent=1, sort_keys=True) + "\n"
 
 
 class Dataset:
@@ -87,31 +101,115 @@ class Dataset:
             whole = True
             for name in self.plan.folders(job):
                 folder = self.path / name
-                if not folder.exists():
+                if not os.path.lexists(folder):
                     whole = False
                     continue
-                finding = check_hashes(folder)
-                if finding.verdict == "whole":
+                found = check_hashes(folder)
+                if found.verdict == "whole":
                     check_world(folder / RECIPE, read_recipe(folder / RECIPE).world)
+                elif found.verdict == "foreign":
+                    notes.append(f"left as it is: {found.why}")
                 else:
+                    if found.foreign:
+                        raise OutputError(f"move away what is not ours, to go on: {found.why}")
                     whole = False
-                    notes.append(f"made again: {finding.why}")
+                    notes.append(f"made again: {found.why}")
                     shutil.rmtree(folder)
             if not whole:
                 wanted.append(job)
         return wanted, notes
 
     def finish(self) -> None:
-        """Write SHA256SUMS over all files of all episodes; ``OutputError`` when one is missing."""
-        lines = []
-        for job in self.plan.jobs():
-            for name in self.plan.folders(job):
-                try:
-                    sums = read_sums(self.path / name)
-                except LogFormatError as error:
-                    raise OutputError(f"{self.path / name} is not there: {error}") from error
-                lines += [f"{digest}  {name}/{file}\n" for file, digest in sums.items()]
-        write_text(self.path / SUMS, "".join(sorted(lines, key=lambda line: line[66:])))
+        """Write SHA256SUMS over the plan and all files of all episodes, their own SHA256SUMS among
+        them; ``OutputError`` when one is missing."""
+        sums = {PLAN: sha256(self.path / PLAN)}
+        for name in self.plan.planned():
+            try:
+                sums |= _sums_of(self.path / name)
+            except LogFormatError as error:
+                raise OutputError(f"{self.path / name} is not there: {error}") from error
+        write_text(self.path / SUMS, text_of(sums))
+
+
+def _sums_of(episode: Path) -> dict[str, str]:
+    """What the dataset's SHA256SUMS says of an episode."""
+    sums = {f"{episode.name}/{file}": digest for file, digest in read_sums(episode).items()}
+    return sums | {f"{episode.name}/{SUMS}": sha256(episode / SUMS)}
+
+
+def read_plan(path: Path) -> Plan:
+    """``dataset.json`` of the dataset ``path``, byte by byte as ``generate`` writes it.
+
+    Raises ``LogFormatError`` for one that is missing or anything else.
+    """
+    file = path / PLAN
+    try:
+        if not stat.S_ISREG(file.stat().st_mode):
+            raise LogFormatError(file, "cannot be read: not a file")
+        with file.open("rb") as opened:
+            raw = opened.read(MAX_BYTES + 1)
+        if len(raw) > MAX_BYTES:
+            raise LogFormatError(file, f"more than {MAX_BYTES} bytes: no plan")
+        data = json.loads(raw.decode("utf-8"))
+        if not isinstance(data, dict) or data.pop("schema", None) != SCHEMA:
+            raise LogFormatError(file, f"no plan of schema {SCHEMA}")
+        levels, recipe = tuple(data.pop("dynamisms")), Recipe(**data.pop("recipe"))
+        plan = Plan(recipe=recipe, dynamisms=levels, **data)
+        whole = plan.text().encode() == raw
+    except OSError as error:
+        raise LogFormatError(file, f"cannot be read: {error.strerror or error}") from error
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise LogFormatError(file, f"no plan of a dataset: {error}") from error
+    if not whole:
+        raise LogFormatError(file, "damaged: not as it was written")
+    return plan
+
+
+def check_dataset(path: Path) -> list[Finding]:
+    """The dataset itself, then every episode of its plan: all files against all SHA256SUMS.
+
+    An episode that is not planned is foreign, one that is planned and not there is missing.
+    """
+    listed, found = listed_in(path)
+    try:
+        planned: Mapping[str, Recipe | None] = read_plan(path).planned()
+    except LogFormatError as error:
+        missing = not os.path.lexists(path / PLAN)
+        found.append(Fault(kind="incomplete" if missing else "damaged", name=PLAN, why=str(error)))
+        planned = dict.fromkeys(sorted({name.partition("/")[0] for name in listed} - {PLAN}))
+    episodes = [check_hashes(path / name, recipe) for name, recipe in planned.items()]
+    if listed:
+        found += _against(path, listed, episodes)
+    found += _strangers(path, set(planned))
+    return [finding(path.resolve().name, found), *episodes]
+
+
+def _against(path: Path, listed: Mapping[str, str], episodes: Sequence[Finding]) -> list[Fault]:
+    """Where the dataset's SHA256SUMS and those of the episodes do not say the same."""
+    sums: dict[str, str] = {}
+    for name in (PLAN, *(episode.episode for episode in episodes)):
+        try:
+            sums |= {PLAN: sha256(path / PLAN)} if name == PLAN else _sums_of(path / name)
+        except LogFormatError:  # told already; all that is listed of it passes
+            sums |= {k: v for k, v in listed.items() if k == name or k.startswith(f"{name}/")}
+    found = []
+    for name in sorted(listed.keys() | sums.keys()):
+        if name not in listed:
+            why = f"{path / SUMS} does not list {name}: 'mobilia generate' as before writes it anew"
+        elif name not in sums:
+            why = f"{path / SUMS} lists {name}, which no episode has"
+        elif sums[name] != listed[name]:
+            why = f"{path / name} is damaged: it is not what {path / SUMS} says"
+        else:
+            continue
+        found.append(Fault(kind="damaged", name=name, why=why))
+    return found
+
+
+def _strangers(path: Path, planned: set[str]) -> list[Fault]:
+    """What lies beside the episodes."""
+    there = set(os.listdir(path)) - {PLAN, SUMS}
+    return foreign(path, there, planned)
 
 
 @contextmanager

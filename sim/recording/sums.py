@@ -1,17 +1,41 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SHA256SUMS: what ``sha256sum -c`` reads, for a folder and all that lies in it."""
+"""SHA256SUMS: what ``sha256sum -c`` reads, for a folder and all that lies in it.
+
+It is written last. A changed byte in it is a hash that does not fit, a lost line an unlisted file,
+one line more a missing file; it is read strictly, so that blanks, case and order count as well. A
+file that is made alone has its hash beside it instead, as ``<name>.sha256``.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import os
 import re
-from pathlib import Path
+import stat
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path, PurePosixPath
+from typing import Literal, NoReturn
 
 from slam.errors import LogFormatError
 from slam.files import write_text
 
 SUMS = "SHA256SUMS"
+BESIDE = ".sha256"
+PART, LOCK = ".part", ".lock"  # of names of what is being written
+MAX_BYTES = 1 << 28  # of a SHA256SUMS: two million files
 _LINE = re.compile(r"([0-9a-f]{64})  (\S.*)")
+Kind = Literal["damaged", "incomplete", "foreign", "same messages"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """One thing that is not as it was: ``name`` of the file within its folder, and ``why``."""
+
+    kind: Kind
+    name: str
+    why: str
 
 
 def sha256(path: Path) -> str:
@@ -26,43 +50,182 @@ def sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
-def write_sums(folder: Path) -> None:
-    """Of every file in the folder but hidden ones, by relative name."""
-    names = sorted(p.relative_to(folder).as_posix() for p in folder.iterdir() if _counts(p))
-    write_text(folder / SUMS, "".join(f"{sha256(folder / name)}  {name}\n" for name in names))
+def text_of(sums: Mapping[str, str]) -> str:
+    """The one way in which these hashes are written."""
+    return "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items()))
 
 
-def _counts(path: Path) -> bool:
-    return path.is_file() and path.name != SUMS and not path.name.startswith(".")
+def write_sums(folder: Path, ours: Sequence[str] = ("*",)) -> None:
+    """Of every file in the folder and below but hidden ones, by relative name.
+
+    ours  patterns of the names that are listed; whatever else lies there stays foreign
+
+    One with its hash beside it gets that hash: it may have been damaged since.
+    """
+    files, _ = tree(folder)
+    shown = [
+        name
+        for name in files - {SUMS}
+        if not _hidden(name) and name.isprintable() and any(fnmatchcase(name, p) for p in ours)
+    ]
+    write_text(folder / SUMS, text_of({name: _digest(folder / name) for name in shown}))
+
+
+def add_to_sums(path: Path) -> None:
+    """List a file anew in its folder's SHA256SUMS, where there is one."""
+    if (path.parent / SUMS).exists():
+        sums = read_sums(path.parent) | {path.name: sha256(path)}
+        write_text(path.parent / SUMS, text_of(sums))
 
 
 def read_sums(folder: Path) -> dict[str, str]:
     """File name -> hash; ``LogFormatError`` for a file that is missing or something else."""
-    path = folder / SUMS
+    return _read(folder / SUMS)
+
+
+def _read(path: Path) -> dict[str, str]:
     try:
-        lines = path.read_text(encoding="ascii").splitlines()
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise LogFormatError(path, "cannot be read: not a file")
+        with path.open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+        lines = raw.decode("utf-8").split("\n")
     except OSError as error:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         raise LogFormatError(path, "not a list of hashes") from error
+    if len(raw) > MAX_BYTES:
+        raise LogFormatError(path, f"more than {MAX_BYTES} bytes: no list of hashes")
     sums: dict[str, str] = {}
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(lines[:-1] if lines[-1] == "" else lines, 1):
         found = _LINE.fullmatch(line)
-        if found is None or ".." in Path(found[2]).parts or Path(found[2]).is_absolute():
+        if found is None or not _is_inside(found[2]):
             raise LogFormatError(path, f"no hash and file name: {line[:80]!r}", number)
         sums[found[2]] = found[1]
     if not sums:
         raise LogFormatError(path, "lists no file")
+    if raw != text_of(sums).encode():
+        raise LogFormatError(path, "damaged: not as it was written (order, repetition, last line)")
     return sums
 
 
-def damage(folder: Path) -> dict[str, str]:
-    """File name -> what is wrong with it, by the folder's SHA256SUMS; empty where all is well."""
-    wrong = {}
-    for name, wanted in read_sums(folder).items():
+def _is_inside(name: str) -> bool:
+    path = PurePosixPath(name)
+    return name.isprintable() and not path.is_absolute() and ".." not in path.parts
+
+
+def write_beside(path: Path, content: Path) -> None:
+    """``<name>.sha256`` of what lies in ``content`` and will be called ``path``."""
+    write_text(_beside(path), text_of({path.name: sha256(content)}))
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(path.name + BESIDE)
+
+
+def damage_beside(path: Path) -> str:
+    """What is wrong with a file by the hash beside it; "" where all is well."""
+    for file in (path, _beside(path)):
+        if file.is_symlink():
+            return f"{file} is a link"
+    if not _beside(path).exists():
+        return f"{path} has no hash beside it: no {_beside(path).name}"
+    try:
+        wanted = _read(_beside(path))
+        if list(wanted) != [path.name]:
+            return f"{_beside(path)} is damaged: not of {path.name}"
+        if sha256(path) != wanted[path.name]:
+            return f"{path} is damaged: its hash is not that of {_beside(path).name}"
+    except LogFormatError as error:
+        return str(error)
+    return ""
+
+
+def _digest(path: Path) -> str:
+    try:
+        return _read(_beside(path))[path.name]
+    except (LogFormatError, KeyError):
+        return sha256(path)
+
+
+def tree(folder: Path) -> tuple[set[str], set[str]]:
+    """Names of all files in the folder and below, and of what is neither file nor folder.
+
+    Links are such, and not followed; so are empty folders. A folder in it that has a SHA256SUMS of
+    its own is another result and left out. Raises ``LogFormatError`` for one that cannot be read.
+    """
+    files, others = set(), set()
+    for here, folders, names in os.walk(folder, onerror=_unreadable):
+        if here != os.fspath(folder) and SUMS in names:
+            folders.clear()
+            continue
+        above = Path(here).relative_to(folder)
+        for name in (*folders, *names):
+            inner = (above / name).as_posix()
+            try:
+                mode = os.lstat(os.path.join(here, name)).st_mode
+            except OSError as error:  # gone meanwhile
+                _unreadable(error)
+            if stat.S_ISREG(mode):
+                files.add(inner)
+            elif not stat.S_ISDIR(mode):
+                others.add(inner)
+        if not folders and not names and here != os.fspath(folder):
+            others.add(above.as_posix())
+    return files, others
+
+
+def _unreadable(error: OSError) -> NoReturn:
+    raise LogFormatError(error.filename, f"cannot be read: {error.strerror}") from error
+
+
+def faults(folder: Path, listed: Mapping[str, str]) -> list[Fault]:
+    """What is wrong with a folder by the hashes that its SHA256SUMS lists, links unfollowed."""
+    files, others = tree(folder)
+    found = []
+    for name, wanted in listed.items():
         path = folder / name
-        if not path.is_file():
-            wrong[name] = f"{path} is missing"
+        if name not in files:
+            found.append(Fault(kind="incomplete", name=name, why=f"{path} is missing"))
         elif sha256(path) != wanted:
-            wrong[name] = f"{path} is damaged: its hash is not that of {SUMS}"
-    return wrong
+            why = f"{path} is damaged: its hash is not that of {SUMS}"
+            found.append(Fault(kind="damaged", name=name, why=why))
+    return found + foreign(folder, (files | others) - {SUMS}, set(listed))
+
+
+def foreign(folder: Path, there: set[str], known: set[str]) -> list[Fault]:
+    """Of the names ``there`` those not ``known``; a folder that holds nothing known is one."""
+    ours = {above.as_posix() for name in known for above in PurePosixPath(name).parents}
+    tops = {_top(name, ours) for name in there - known}
+    return [Fault(kind="foreign", name=top, why=_stranger(folder, top)) for top in sorted(tops)]
+
+
+def _top(name: str, ours: set[str]) -> str:
+    """The outermost folder above ``name`` with nothing of ours, or the name itself."""
+    strange = [above.as_posix() for above in PurePosixPath(name).parents]
+    return next((above for above in reversed(strange) if above not in ours | {"."}), name)
+
+
+def _stranger(folder: Path, name: str) -> str:
+    shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in name)
+    last = PurePosixPath(name).name
+    if last == LOCK or (last.startswith(".") and PART in last):
+        return f"{folder}/{shown} is left of a run that was killed, or is being written"
+    if (folder / name).is_symlink():
+        return f"{folder}/{shown} is a link, which no run leaves and nothing vouches for"
+    return f"{folder}/{shown} is foreign: not listed in {SUMS}"
+
+
+def _hidden(name: str) -> bool:
+    return any(part.startswith(".") for part in PurePosixPath(name).parts)
+
+
+def check_vouched(path: Path) -> None:
+    """Raise ``LogFormatError`` when a SHA256SUMS in the folder of ``path``, or in the one above,
+    lists it with another hash. A file that none lists passes."""
+    for folder in (path.parent, path.parent.parent):
+        if not (folder / SUMS).is_file():
+            continue
+        wanted = read_sums(folder).get(path.relative_to(folder).as_posix())
+        if wanted is not None and sha256(path) != wanted:
+            raise LogFormatError(path, f"damaged: its hash is not that of {folder / SUMS}")

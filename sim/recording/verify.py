@@ -3,53 +3,123 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 from sim.recording.bag import MessageHash
 from sim.recording.episode import record
-from sim.recording.recipe import RECIPE, Made, read_recipe
-from sim.recording.sums import SUMS, damage, read_sums
+from sim.recording.recipe import RECIPE, Made, Recipe, read_recipe
+from sim.recording.sums import SUMS, Fault, check_vouched, faults, read_sums
 from sim.versions import not_this_world
 from slam.errors import LogFormatError, OutputError
 from slam.logs.bag_topics import Bag
 
-Verdict = Literal["whole", "damaged", "same bytes", "same messages", "differs", "other world"]
+Verdict = Literal[
+    "whole", "damaged", "incomplete", "foreign", "same bytes", "same messages", "differs",
+    "other world",
+]  # fmt: skip
+# Exit status of each; of several the first in this order counts.
+STATUS: dict[str, int] = {
+    "damaged": 1, "differs": 1, "incomplete": 3, "foreign": 4, "same messages": 5,
+    "whole": 0, "same bytes": 0, "other world": 0,
+}  # fmt: skip
+METADATA = "metadata.yaml"
+_FILES = ("map.pgm", "map.yaml", METADATA, RECIPE, "relations.txt", "trajectory.tum")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """``verdict`` on an episode, and why; ``ok`` when there is nothing to worry about."""
+    """``verdict`` on an episode or a folder, and why; ``ok`` when there is nothing to worry about.
+
+    foreign  files in it that nobody vouches for
+    """
 
     episode: str
     verdict: Verdict
     why: str = ""
+    foreign: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
-        """Neither damaged nor different without a reason."""
-        return self.verdict not in ("damaged", "differs") or "CPU or version" in self.why
+        """All is there as it was, or made otherwise by another machine, as that may be."""
+        return self.status == 0
+
+    @property
+    def status(self) -> int:
+        """Exit status: 1 damaged, 3 incomplete, 4 foreign files, 5 other bytes, 0 for the rest."""
+        explained = self.verdict in ("differs", "same messages") and "CPU or version" in self.why
+        return 0 if explained else STATUS[self.verdict]
 
 
-def check_hashes(folder: Path) -> Finding:
-    """Every file against SHA256SUMS, and the recipe against itself.
+def finding(name: str, faults: Sequence[Fault]) -> Finding:
+    """The worst of these faults, and all of them in words."""
+    worst = next((v for v in STATUS if any(fault.kind == v for fault in faults)), "whole")
+    return Finding(
+        episode=name,
+        verdict=cast(Verdict, worst),
+        why="; ".join(fault.why for fault in faults),
+        foreign=tuple(fault.name for fault in faults if fault.kind == "foreign"),
+    )
 
-    A bag of other bytes but the very messages of the recipe was packed anew, not damaged.
-    """
+
+def listed_in(folder: Path) -> tuple[dict[str, str], list[Fault]]:
+    """What the folder's SHA256SUMS lists; nothing, and why, when it is missing or damaged."""
     try:
-        made, wrong, listed = read_recipe(folder / RECIPE), damage(folder), read_sums(folder)
-        for name in (RECIPE, "metadata.yaml"):
-            if name not in listed:
-                wrong[name] = f"{folder / SUMS} does not list {name}"
-        repacked = bool(wrong) and all(name.endswith((".mcap", "metadata.yaml")) for name in wrong)
-        if repacked and _has_its_messages(folder, made):
-            return Finding(episode=folder.name, verdict="same messages", why="packed otherwise")
+        return read_sums(folder), []
     except LogFormatError as error:
-        wrong = {RECIPE: str(error)}
-    verdict: Verdict = "damaged" if wrong else "whole"
-    return Finding(episode=folder.name, verdict=verdict, why="; ".join(wrong.values()))
+        missing = not os.path.lexists(folder / SUMS)
+        return {}, [Fault(kind="incomplete" if missing else "damaged", name=SUMS, why=str(error))]
+
+
+def check_hashes(folder: Path, planned: Recipe | None = None) -> Finding:
+    """Every file against SHA256SUMS, and the recipe against itself and the one that is ``planned``.
+
+    A bag of other bytes but the very messages of the recipe was packed anew, not damaged: then all
+    else must be what it was, metadata.yaml too.
+    """
+    if folder.is_symlink() or not folder.is_dir():
+        return finding(folder.name, [_absent(folder)])
+    listed, found = listed_in(folder)
+    if not listed:
+        return finding(folder.name, found)
+    try:
+        found = faults(folder, listed)
+        made = read_recipe(folder / RECIPE)
+    except LogFormatError as error:
+        if not any(fault.name == RECIPE for fault in found):
+            found.append(Fault(kind="damaged", name=RECIPE, why=str(error)))
+        return finding(folder.name, found)
+    bag = f"{made.recipe.name}.mcap"
+    found += _unlisted(folder, listed, (*_FILES, bag))
+    if planned is not None and made.recipe != planned:
+        why = f"{folder / RECIPE} is not the recipe that is planned for it"
+        found.append(Fault(kind="damaged", name=RECIPE, why=why))
+    broken = [(fault.kind, fault.name) for fault in found if fault.kind != "foreign"]
+    if broken == [("damaged", bag)] and _has_its_messages(folder, made):
+        found = [_repacked(folder, f) if f.name == bag else f for f in found]
+    return finding(folder.name, found)
+
+
+def _repacked(folder: Path, fault: Fault) -> Fault:
+    why = f"{folder / fault.name} was packed otherwise: same messages, other bytes"
+    return replace(fault, kind="same messages", why=why)
+
+
+def _absent(folder: Path) -> Fault:
+    why = "is no folder: foreign" if os.path.lexists(folder) else "is missing"
+    return Fault(kind="incomplete", name=folder.name, why=f"{folder} {why}")
+
+
+def _unlisted(folder: Path, listed: Mapping[str, str], wanted: Sequence[str]) -> list[Fault]:
+    return [
+        Fault(kind="damaged", name=name, why=f"{folder / SUMS} does not list {name}")
+        for name in wanted
+        if name not in listed
+    ]
 
 
 def _has_its_messages(folder: Path, made: Made) -> bool:
@@ -57,6 +127,22 @@ def _has_its_messages(folder: Path, made: Made) -> bool:
         return messages_sha256(folder) == made.result.get("messages_sha256")
     except LogFormatError:
         return False
+
+
+def check_bag(path: Path) -> None:
+    """Raise ``LogFormatError`` for a bag in an episode that is not the one that was written.
+
+    path  of the episode's folder or of its .mcap; whatever lies in no episode passes
+    """
+    folder = path if path.is_dir() else path.parent
+    if not (folder / SUMS).is_file() or not (folder / RECIPE).is_file():
+        return
+    for bag in sorted(folder.glob("*.mcap")) if path.is_dir() else [path]:
+        try:
+            check_vouched(bag)
+        except LogFormatError:
+            if not _has_its_messages(folder, read_recipe(folder / RECIPE)):
+                raise
 
 
 def messages_sha256(folder: Path) -> str:
@@ -98,7 +184,7 @@ def regenerate(folder: Path, *, trust: bool = False) -> Finding:
 def _difference(episode: str, made: Made, messages: str) -> Finding:
     elsewhere = made.elsewhere()
     if messages == made.result.get("messages_sha256"):
-        why = f"packed otherwise ({elsewhere})" if elsewhere else "packed otherwise"
+        why = "packed otherwise" + (f": other CPU or version: {elsewhere}" if elsewhere else "")
         return Finding(episode=episode, verdict="same messages", why=why)
     if elsewhere:
         return Finding(episode=episode, verdict="differs", why=f"other CPU or version: {elsewhere}")

@@ -42,9 +42,38 @@ def a_job(name: str, text: str, call=write) -> Job:
 def test_what_is_there_is_not_made_again(tmp_path):
     first = run_jobs([a_job("a", "one"), a_job("b", "two")], tmp_path)
     assert {name: file.read_text() for name, file in first.items()} == {"a": "one", "b": "two"}
-    first["a"].write_text("kept")
+    before = first["a"].stat().st_mtime_ns
     again = run_jobs([a_job("a", "one")], tmp_path)
-    assert again["a"].read_text() == "kept"
+    assert again["a"].stat().st_mtime_ns == before
+
+
+def cut(file: Path) -> None:
+    file.write_text(file.read_text()[:-1])
+
+
+def flip(file: Path) -> None:
+    file.write_text("x" + file.read_text()[1:])
+
+
+def link(file: Path) -> None:
+    file.rename(file.with_suffix(".moved"))
+    file.symlink_to(file.with_suffix(".moved"))
+
+
+@pytest.mark.parametrize("damage", [cut, flip, link, Path.unlink])
+@pytest.mark.parametrize("which", ["", ".sha256"])
+def test_a_damaged_result_is_named_and_made_again(tmp_path, capsys, damage, which):
+    (file,) = run_jobs([a_job("a", "one")], tmp_path).values()
+    capsys.readouterr()
+    damage(file.with_name(file.name + which))
+    (again,) = run_jobs([a_job("a", "one")], tmp_path).values()
+    told = capsys.readouterr().out.replace("\n", "")
+    if damage is not Path.unlink or which:
+        assert "made again" in told
+        assert file.name in told
+    assert (again, again.read_text(), again.is_symlink()) == (file, "one", False)
+    run_jobs([a_job("a", "one")], tmp_path)
+    assert "made again" not in capsys.readouterr().out
 
 
 def test_other_arguments_and_other_code_are_other_files(tmp_path):
@@ -84,7 +113,7 @@ def test_a_failing_job_is_named_and_leaves_nothing(tmp_path):
     jobs = [a_job("good", "one"), a_job("bad", "two", write_half_and_fail)]
     with pytest.raises(SlamFailedError, match="bad: RuntimeError: half"):
         run_jobs(jobs, tmp_path)
-    assert [file.name.partition("-")[0] for file in tmp_path.iterdir()] == ["good"]
+    assert {file.name.partition("-")[0] for file in tmp_path.iterdir()} == {"good"}
 
 
 def test_names_are_unique_and_plain(tmp_path):

@@ -225,7 +225,7 @@ def run_of_another_schema(folder: Path) -> None:
         (lambda folder: (folder / "paired.csv").write_bytes(b"\xff"), "paired.csv: no table"),
         (lambda folder: (folder / "runs.csv").write_text("scene\n"), "a table without rows"),
         (without_a_column, "a table without the column 'outcome'"),
-        (damage("runs/room_d1_s102.npz"), "room_d1_s102.npz: no run of a comparison"),
+        (damage("runs/room_d1_s102.npz"), "room_d1_s102.npz: no whole NumPy archive"),
         (run_of_another_schema, "it lacks 'stamps_ns'"),
     ],
 )

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Is what a verb left still what it left: a dataset, an episode, a run, a comparison, a map."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from scripts.compare import folder as compared
+from scripts.compare.again import is_run
+from scripts.compare.plan import Run
+from scripts.output import MAX_RECIPE_BYTES, RECIPE
+from scripts.session import file_name
+from sim.recording.dataset import PLAN, check_dataset
+from sim.recording.sums import SUMS, Fault, check_vouched, faults
+from sim.recording.verify import METADATA, Finding, check_hashes, finding, listed_in
+from slam.errors import LogFormatError
+from slam.maps import read_map
+from slam.shunting import memory
+
+_TABLES = ("runs.csv", "runs.json", "levels.csv")
+# What a verb always leaves, by the command in the recipe: a lost line is no way out.
+_ALWAYS = {
+    "run": ("results.json", "trajectories.png", "trajectory_odometry.tum"),
+    "demo": ("results.json", "trajectories.png", "trajectory_odometry.tum"),
+    "compare": (*_TABLES, "paired.csv"),
+    "drive": (*_TABLES, "goals.csv", "closed_loop.png", "paths.png"),
+    "blame": ("blame.json", "blame.png"),
+}
+
+
+def check(path: Path) -> list[Finding]:
+    """One finding for each result at ``path``: for a dataset itself and for each of its episodes.
+
+    Raises ``LogFormatError`` when nothing is there that a verb of ours leaves.
+    """
+    try:
+        if not path.exists():
+            raise LogFormatError(path, "no such file or folder")
+        if not path.is_dir():
+            return [_check_file(path)]
+        way = _way(path)
+        if way is None:
+            raise LogFormatError(path, "holds no dataset, episode, run, comparison or map")
+        return way(path)
+    except OSError as error:
+        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
+
+
+def _way(folder: Path) -> Callable[[Path], list[Finding]] | None:
+    """How the folder is checked, by what is left of it."""
+    listed, _ = listed_in(folder)
+    names = {*os.listdir(folder), *listed}
+    if PLAN in names:
+        return check_dataset
+    if METADATA in names or any(name.endswith(".mcap") for name in names):
+        return lambda path: [check_hashes(path.resolve())]
+    if RECIPE in names or SUMS in names:
+        return _check_result
+    if any(True for _ in folder.glob(f"*/{METADATA}")):
+        return check_dataset
+    return None
+
+
+def _check_result(folder: Path) -> list[Finding]:
+    """A folder of ``run``, ``demo``, ``compare``, ``drive`` or ``blame``, and those within it."""
+    listed, found = listed_in(folder)
+    if listed:
+        found = faults(folder, listed)
+        known = {fault.name for fault in found}
+        for name in _wanted(folder):
+            if name not in listed and name not in known:
+                why = f"{folder / SUMS} does not list {name}"
+                found.append(Fault(kind="damaged", name=name, why=why))
+    inner = [path.parent for path in sorted(folder.glob(f"*/{SUMS}"))]
+    return [finding(folder.resolve().name, found), *(f for one in inner for f in check(one))]
+
+
+def _wanted(folder: Path) -> list[str]:
+    """What must be in it, as far as its recipe and its table can be read."""
+    try:
+        with (folder / RECIPE).open("rb") as file:
+            recipe: Any = json.loads(file.read(MAX_RECIPE_BYTES))
+        command = str(recipe["command"])
+        names = [RECIPE, *_ALWAYS.get(command, ())]
+        if command in ("run", "demo"):
+            slams = recipe["settings"].get("slams", [])
+            names += [f"trajectory_{file_name(str(slam))}.tum" for slam in slams]
+        if command == "compare":
+            rows = compared.read_csv(folder / compared.RUNS)
+            runs = {(row["scene"], row["dynamism"], int(row["seed"])) for row in rows}
+            names += [f"runs/{Run(scene=s, dynamism=d, seed=k).name}.npz" for s, d, k in runs]
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return [RECIPE]  # damaged, which its hash says
+    except LogFormatError:
+        return names
+    return sorted(names)
+
+
+def _check_file(path: Path) -> Finding:
+    """A map, or a run of a comparison."""
+    try:
+        if path.suffix in (".yaml", ".pgm"):
+            return _check_map(path.with_suffix(".yaml"))
+        if is_run(path):
+            compared.RunFile(path)
+        elif path.suffix == ".npz":
+            check_vouched(path)
+            memory.read(path)
+        else:
+            raise LogFormatError(path, "no dataset, episode, run, comparison or map")
+    except LogFormatError as error:
+        return finding(path.name, [Fault(kind="damaged", name=path.name, why=str(error))])
+    return finding(path.name, [])
+
+
+def _check_map(yaml: Path) -> Finding:
+    """A map of two files, which a SHA256SUMS beside them lists."""
+    read_map(yaml)
+    listed, found = listed_in(yaml.parent)
+    for path in (yaml, yaml.with_suffix(".pgm")):
+        check_vouched(path)
+        if listed and path.name not in listed:
+            why = f"{yaml.parent / SUMS} does not list {path.name}: nothing vouches for it"
+            found.append(Fault(kind="incomplete", name=path.name, why=why))
+    return finding(yaml.name, found)
