@@ -23,9 +23,8 @@ from rich.markup import escape
 from scripts import interrupt, workers
 from scripts.console import progress
 from scripts.output import versions
-from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
-
-PART = ".part"
+from slam.errors import InvalidValueError, MobiliaError, OutputError, SlamFailedError
+from slam.files import PART, is_full, make_folder, put, reason
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,7 +108,7 @@ def run_jobs(
         wanted[job.name] = job
     if processes < 1:
         raise InvalidValueError(f"processes must be >= 1, got {processes}")
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     files = {name: folder / job.file_name() for name, job in wanted.items()}
     missing = [job for name, job in wanted.items() if not files[name].exists()]
     with progress() as bar:
@@ -138,10 +137,15 @@ def make(job: Job, file: Path) -> None:
     temporary = file.with_name(f".{file.stem}.{os.getpid()}{PART}{file.suffix}")
     try:
         job.call(temporary, **job.arguments)
-        os.replace(temporary, file)
+        put(temporary, file)
+    except OutputError as error:
+        raise OutputError(str(error).replace(str(temporary), str(file.parent))) from error
     except MobiliaError:
         raise
     except Exception as error:
+        if isinstance(error, OSError) and is_full(error, file.parent):
+            said = f"cannot write {file.parent}: {reason(error, file.parent)}"
+            raise OutputError(said) from error
         raise SlamFailedError(f"{job.name}: {type(error).__name__}: {error}") from error
     finally:
         temporary.unlink(missing_ok=True)

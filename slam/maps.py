@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError, LogFormatError, OutputError
-from slam.files import replacing, write_bytes
+from slam.files import replacing, sync_names, unfinished, write_bytes
 from slam.system import Raster
 
 OCCUPIED_THRESHOLD = 0.65
@@ -52,10 +52,20 @@ def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
         f"occupied_thresh: {OCCUPIED_THRESHOLD}",
         f"free_thresh: {FREE_THRESHOLD}",
     ]
-    with replacing(yaml) as new_yaml, replacing(pgm) as new_pgm:  # the image is in place first
-        new_pgm.write_bytes(header + _gray(raster)[::-1].tobytes())
+    with replacing(yaml) as new_yaml:
         new_yaml.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        with replacing(pgm) as new_pgm:  # the image is in place first
+            new_pgm.write_bytes(header + _gray(raster)[::-1].tobytes())
+            _withdraw(yaml)
     return pgm, yaml
+
+
+def _withdraw(yaml: Path) -> None:
+    """An earlier YAML file never stands beside a newer image: a power cut leaves no such pair."""
+    if yaml.is_file():
+        yaml.unlink()
+        if not unfinished(yaml):
+            sync_names(yaml.parent)
 
 
 def read_map(yaml: Path) -> Raster:

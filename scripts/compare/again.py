@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scripts.compare.plan import Plan
-from scripts.output import RECIPE, read_recipe_words
+from scripts.output import RECIPE, check_whole, read_recipe_words
 from sim.recording.recipe import Recipe
 from slam.errors import InvalidValueError, LogFormatError
 
@@ -31,6 +31,7 @@ def is_run(path: Path) -> bool:
 
 def run_of(path: Path) -> Again:
     """Of such a file; ``LogFormatError`` says what is wrong with it or its comparison's recipe."""
+    check_whole(path.parent.parent)
     recipe = path.parent.parent / RECIPE
     words = read_recipe_words(recipe)
     command, settings = words.get("command"), words.get("settings")

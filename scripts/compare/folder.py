@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from scripts.compare.columns import COLUMNS
 from scripts.compare.plan import Run
+from scripts.output import check_whole
 from slam.errors import LogFormatError
 from slam.files import replacing, write_text
 from slam.frames import Float
@@ -197,7 +198,8 @@ class Compared:
 
 
 def read(folder: Path) -> Compared:
-    """A comparison on file; ``LogFormatError`` for a folder that holds none."""
+    """A comparison on file; ``LogFormatError`` for a folder that holds none, or half of one."""
+    check_whole(folder)
     compared = Compared(folder)
     settings = compared.recipe.get("settings")
     if not isinstance(settings, dict) or settings.get("compare_schema") != SCHEMA:

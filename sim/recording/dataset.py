@@ -12,13 +12,12 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from sim.recording.episode import PART
 from sim.recording.recipe import Recipe
 from sim.recording.sums import SUMS, read_sums
 from sim.recording.verify import check_hashes
 from sim.twins import TWINS
 from slam.errors import InvalidValueError, LogFormatError, OutputError
-from slam.files import write_text
+from slam.files import PART, is_part, make_folder, reason, write_text
 
 PLAN = "dataset.json"
 LOCK = ".lock"
@@ -118,7 +117,7 @@ def writing(path: Path, plan: Plan) -> Iterator[Dataset]:
     path = path.absolute()
     lock = path / LOCK
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        make_folder(path)
         with lock.open("w") as held:
             try:
                 fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -134,7 +133,7 @@ def writing(path: Path, plan: Plan) -> Iterator[Dataset]:
     except OutputError:
         raise
     except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+        raise OutputError(f"cannot write {path}: {reason(error, path)}") from error
 
 
 def _clear(path: Path) -> None:
@@ -149,7 +148,7 @@ def _claim(path: Path, plan: Plan) -> None:
         if file.read_text(encoding="utf-8", errors="replace") != plan.text():
             raise OutputError(f"{file} is of another dataset: choose another --out")
         return
-    others = [name for name in os.listdir(path) if name != LOCK and not name.endswith(PART)]
+    others = [name for name in os.listdir(path) if name != LOCK and not is_part(name)]
     if others:
         raise OutputError(f"{path} holds files that are no dataset: choose another --out")
     write_text(file, plan.text())
