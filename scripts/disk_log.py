@@ -28,6 +28,7 @@ from slam import files
 
 State = dict[str, bytes | None]
 _WRITES = os.O_WRONLY | os.O_RDWR
+_EVENTS = ("open", "os.mkdir", "os.remove", "os.rmdir", "os.rename", "os.link")
 _listening: list[DiskLog] = []
 
 
@@ -134,6 +135,11 @@ class DiskLog:
             gone = os.path.lexists(path) and not (event == "os.rmdir" and os.listdir(path))
             if self._below(path) and gone:
                 self._names({self._place(path): None})
+        elif event == "os.link":
+            old, new = self._path(args[0], args[2]), self._path(args[1], args[3])
+            if self._below(new) and old.exists() and not new.exists():
+                folder, name = self._place(old)
+                self._names({self._place(new): self._folders[folder][name]})
         elif event == "os.rename":
             old, new = self._path(args[0], args[2]), self._path(args[1], args[3])
             if self._below(old) and self._below(new) and old.exists():
@@ -261,7 +267,7 @@ def _listen() -> None:
 
 
 def _heard(event: str, args: tuple[Any, ...]) -> None:
-    if _listening and event in ("open", "os.mkdir", "os.remove", "os.rmdir", "os.rename"):
+    if _listening and event in _EVENTS:
         for log in tuple(_listening):
             log.happens(event, args)
 

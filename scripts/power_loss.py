@@ -45,6 +45,7 @@ from slam.system import Raster
 CLOCKS = ("milliseconds", "ms_per_scan_p50", "ms_per_scan_p99", "peak_memory_mb", "cpu_s")
 OF_CLOCKS = ("SHA256SUMS",)  # beside files that hold clock readings
 HIDDEN = (".lock", READY)
+_ASIDE = (".old", ".earlier.pgm")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +99,7 @@ def tried(case: Case, scratch: Path, *, resumes: int, draws: int = 1) -> Outcome
     disks = list(_disks(log, draws))
     for where, state in disks:
         outcome.disks += 1
-        _look(case, where, state, before, after, outcome)
+        _look(case, where, _as_read(state), before, after, outcome)
     picked = np.unique(np.linspace(0, len(disks) - 1, resumes).astype(int)) if resumes else ()
     for k in picked:
         where, state = disks[k]
@@ -150,6 +151,21 @@ def _found(
     return "torn" if any(name.endswith(case.opened) for name in there) else "absent"
 
 
+def _as_read(state: State) -> State:
+    """A map whose YAML file names the kept image of an earlier one, as its readers see it."""
+    seen = dict(state)
+    for name, data in _files(state).items():
+        kept = (
+            re.search(rb"image: (\.(.+)\.earlier\.pgm)\n", data) if name.endswith(".yaml") else None
+        )
+        if data is not None and kept is not None:
+            folder = name.rpartition("/")[0]
+            seen[name] = data.replace(kept[1], kept[2] + b".pgm")
+            image = state.get(f"{folder}/{kept[1].decode()}")
+            seen[f"{folder}/{kept[2].decode()}.pgm"] = image
+    return seen
+
+
 def _place(name: str) -> str:
     """Where the next run puts a file that lies in ``READY``, or in an earlier run put aside."""
     return re.sub(r"\.([^/]+)\.\d+\.old/", r"\1/", name.replace(f"{READY}/", ""))
@@ -164,7 +180,7 @@ def _files(state: State) -> dict[str, bytes]:
 
 
 def _hidden(name: str) -> bool:
-    return any(files.is_part(p) or p in HIDDEN or p.endswith(".old") for p in name.split("/"))
+    return any(files.is_part(p) or p in HIDDEN or p.endswith(_ASIDE) for p in name.split("/"))
 
 
 def _difference(case: Case, state: State, wanted: State) -> str:
