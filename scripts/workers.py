@@ -6,6 +6,7 @@ from __future__ import annotations
 import importlib
 import os
 import uuid
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -64,7 +65,9 @@ def each(
                 "the same command again goes on from here"
             ) from error
         finally:
-            results.close()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # that tasks are cancelled: we know
+                results.close()
 
 
 def check_jobs(jobs: int) -> None:
