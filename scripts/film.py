@@ -7,17 +7,16 @@ import math
 import re
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import imageio.v2 as imageio
 import imageio_ffmpeg
+import numpy as np
 
 from scripts.draw import Picture
 from slam.errors import InvalidValueError, MissingDependencyError, OutputError
-from slam.files import replacing
+from slam.files import reason, replacing
 
 Size = tuple[int, int]
 
@@ -92,35 +91,82 @@ class Pace:
 
 @contextmanager
 def film(path: Path, fps: float) -> Iterator[Film]:
-    """A film that appears under ``path`` when the block ends well, and not at all otherwise."""
+    """A film that appears under ``path`` when the block ends well, and not at all otherwise.
+
+    Raises ``OutputError`` when ffmpeg stops or ends badly (disk full, say), or got no picture.
+    """
     require_ffmpeg()
     with replacing(path) as temporary:
-        writer = imageio.get_writer(
-            temporary, format="FFMPEG", fps=fps, codec="libx264", pixelformat="yuv420p",
-            macro_block_size=2, ffmpeg_log_level="error",
-            ffmpeg_params=["-preset", "veryfast", "-crf", "21", "-movflags", "+faststart"],
-        )  # fmt: skip
+        reel = Film(temporary, path, fps)
         try:
-            yield Film(writer, path)
+            yield reel
+            reel.finish()
         finally:
-            writer.close()
+            reel.stop()
 
 
-@dataclass(eq=False)
 class Film:
-    """Takes (height, width, 3) uint8 pictures one at a time."""
+    """Takes (height, width, 3) uint8 pictures of one size, one at a time.
 
-    writer: Any
-    path: Path
-    frames: int = 0
-    last: Picture | None = None
+    imageio's own writer does not tell how ffmpeg ended: a film cut short would pass for a whole one
+    """
+
+    def __init__(self, temporary: Path, path: Path, fps: float) -> None:
+        self.frames = 0
+        self.last: Picture | None = None
+        self._temporary, self._path, self._fps = temporary, path, fps
+        self._ffmpeg: subprocess.Popen[bytes] | None = None
 
     def add(self, picture: Picture) -> None:
         """Append one picture; raises ``OutputError`` when ffmpeg stops (disk full, say)."""
+        if self._ffmpeg is None:
+            self._ffmpeg = self._start(picture.shape[1], picture.shape[0])
+        assert self._ffmpeg.stdin is not None
         try:
-            self.writer.append_data(picture)
+            self._ffmpeg.stdin.write(np.ascontiguousarray(picture).data)
         except OSError as error:
-            why = str(error).strip().partition("\n")[0]
-            raise OutputError(f"cannot write {self.path}: ffmpeg stopped ({why})") from error
+            raise self._failure(error) from error
         self.frames += 1
         self.last = picture
+
+    def finish(self) -> None:
+        """Wait until ffmpeg has written all of it."""
+        if self._ffmpeg is None:
+            raise OutputError(f"cannot write {self._path}: a film needs a picture")
+        assert self._ffmpeg.stdin is not None
+        try:
+            self._ffmpeg.stdin.close()
+        except OSError as error:
+            raise self._failure(error) from error
+        if self._ffmpeg.wait() != 0:
+            raise self._failure(OSError(f"exit status {self._ffmpeg.returncode}"))
+
+    def stop(self) -> None:
+        """End ffmpeg if it still runs."""
+        if self._ffmpeg is None:
+            return
+        self._ffmpeg.kill()
+        assert self._ffmpeg.stdin is not None
+        with suppress(OSError):
+            self._ffmpeg.stdin.close()
+        self._ffmpeg.wait()
+
+    def _failure(self, error: OSError) -> OutputError:
+        why = reason(error, self._path.parent)
+        return OutputError(f"cannot write {self._path}: {why} (ffmpeg stopped)")
+
+    def _start(self, width: int, height: int) -> subprocess.Popen[bytes]:
+        command = [
+            imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "quiet",
+            "-f", "rawvideo", "-vcodec", "rawvideo", "-s", f"{width}x{height}",
+            "-pix_fmt", "rgb24", "-r", f"{self._fps:.02f}", "-i", "-", "-an",
+            "-vcodec", "libx264", "-pix_fmt", "yuv420p", "-preset", "veryfast", "-crf", "21",
+            "-movflags", "+faststart", str(self._temporary),
+        ]  # fmt: skip
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            process_group=0,  # Ctrl-C is ours to handle
+        )

@@ -26,9 +26,8 @@ from scripts.console import note, progress
 from scripts.output import versions
 from sim.recording.sums import damage_beside, write_beside
 from slam import locks
-from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
-
-PART = ".part"
+from slam.errors import InvalidValueError, MobiliaError, OutputError, SlamFailedError
+from slam.files import PART, is_full, make_folder, put, reason
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +113,7 @@ def run_jobs(
         wanted[job.name] = job
     if processes < 1:
         raise InvalidValueError(f"processes must be >= 1, got {processes}")
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     with locks.locked(folder):
         return _make_missing(wanted, folder, processes, cluster, title)
 
@@ -161,10 +160,15 @@ def make(job: Job, file: Path) -> None:
     try:
         job.call(temporary, **job.arguments)
         write_beside(file, temporary)
-        os.replace(temporary, file)
+        put(temporary, file)
+    except OutputError as error:
+        raise OutputError(str(error).replace(str(temporary), str(file.parent))) from error
     except MobiliaError:
         raise
     except Exception as error:
+        if isinstance(error, OSError) and is_full(error, file.parent):
+            said = f"cannot write {file.parent}: {reason(error, file.parent)}"
+            raise OutputError(said) from error
         raise SlamFailedError(f"{job.name}: {type(error).__name__}: {error}") from error
     finally:
         temporary.unlink(missing_ok=True)

@@ -7,10 +7,11 @@ import json
 import math
 import os
 import platform
+import re
 import shutil
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -19,12 +20,29 @@ from sim.recording.sums import SUMS, check_vouched, write_sums
 from sim.versions import WORLD
 from slam import locks
 from slam.errors import LogFormatError, OutputError
-from slam.files import write_text
+from slam.files import (
+    PART,
+    clear_parts,
+    exchange,
+    is_part,
+    locked,
+    make_folder,
+    put,
+    reason,
+    remove,
+    remove_empty,
+    sync,
+    sync_names,
+    sync_tree,
+    write_text,
+)
 from slam.names import NameFromFile
 
 RECIPE = "recipe.json"
 # What comparisons and drives consist of: all else in their folders is somebody else's.
 GROWING = ("*.npz", "*.npz.sha256", "*.csv", "*.png", "runs.json", RECIPE, "report.html")
+OLD = ".old"  # of the earlier run, while a new one takes its place
+STAGED, READY = ".tables.part", ".tables.ready"  # of ``together``, before and after it counts
 MAX_RECIPE_BYTES = 1 << 20
 
 
@@ -35,28 +53,30 @@ def whole_folder(path: Path, *, overwrite: bool) -> Iterator[Path]:
     Raises ``OutputError`` when ``path`` exists and ``overwrite`` is off, when it exists and holds
     no recipe of ours (then it is somebody else's and never replaced), or cannot be written. On any
     failure, Ctrl-C included, the temporary folder is removed and an earlier run stays as it was.
+    What killed runs left is removed first. After a power cut the new or the earlier run is there.
     """
-    path = path.absolute()
-    _refuse(path, overwrite)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    made = [parent for parent in path.parents if not parent.exists()]
+    said, path = path, path.absolute()
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{PART}")
+    made: list[Path] = []
     try:
-        temporary.mkdir(parents=True)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
-    try:
-        yield temporary
-        write_sums(temporary)
-        _take_place(temporary, path)
-    except OSError as error:
-        if isinstance(error, OutputError):
+        made = make_folder(path.parent)
+        _put_back(path)
+        _refuse(path, overwrite)
+        clear_parts(path)
+        temporary.mkdir()
+        with locked(temporary):
+            yield temporary
+            write_sums(temporary)
+            _take_place(temporary, path)
+    except OutputError as error:
+        if str(temporary) not in str(error):
             raise
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+        raise OutputError(str(error).replace(str(temporary), str(said))) from error
+    except OSError as error:
+        raise OutputError(f"cannot write {said}: {reason(error, path.parent)}") from error
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        for parent in made:  # innermost first; one that holds something stays
-            with suppress(OSError):
-                parent.rmdir()
+        remove(temporary)
+        remove_empty(made)
 
 
 @contextmanager
@@ -64,19 +84,80 @@ def locked_folder(out: Path) -> Iterator[None]:
     """A folder of ours that grows, and nobody else's at the moment.
 
     Raises ``OutputError`` for one that holds files without a recipe, is being written now, or
-    cannot be made.
+    cannot be written.
     """
+    made: list[Path] = []
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        made = make_folder(out)
+        others = [
+            f.name for f in out.iterdir() if f.name not in locks.NAMES and not is_part(f.name)
+        ]
+        if others and not (out / RECIPE).exists():
+            raise OutputError(f"{out} holds files that mobilia did not write: choose another --out")
+        with locks.locked(out):
+            (out / SUMS).unlink(missing_ok=True)  # what follows changes files: whole at the end
+            yield
+            write_sums(out, GROWING)
+    except OutputError:
+        raise
     except OSError as error:
-        raise OutputError(f"cannot write {out}: {error.strerror or error}") from error
-    others = [file.name for file in out.iterdir() if file.name not in locks.NAMES]
-    if others and not (out / RECIPE).exists():
-        raise OutputError(f"{out} holds files that mobilia did not write: choose another --out")
-    with locks.locked(out):
-        (out / SUMS).unlink(missing_ok=True)  # what follows changes files: not whole until the end
-        yield
-        write_sums(out, GROWING)
+        raise OutputError(f"cannot write {out}: {reason(error, out)}") from error
+    finally:
+        remove_empty(made)
+
+
+@contextmanager
+def together(folder: Path) -> Iterator[Path]:
+    """Yield a folder to write files into; when the block succeeds they all take their places in
+    ``folder``, or none of them does.
+
+    They are written and synced first, which is where a full disk strikes. Then the folder is
+    renamed: from that moment on they count. A process that ends before the last of them is in its
+    place leaves that folder, ``check_whole`` refuses to read, and the next ``together`` or
+    ``put_tables`` moves the rest.
+    """
+    put_tables(folder)
+    staged = folder / STAGED
+    try:
+        remove(staged)
+        staged.mkdir()
+        yield staged
+        put(staged, folder / READY)
+    except OutputError as error:
+        raise OutputError(str(error).replace(str(staged), str(folder))) from error
+    except OSError as error:
+        raise OutputError(f"cannot write {folder}: {reason(error, folder)}") from error
+    finally:
+        remove(staged)
+    put_tables(folder)
+
+
+def put_tables(folder: Path) -> None:
+    """Move what ``together`` had ready when it was stopped; ``OutputError`` when that cannot be."""
+    ready = folder / READY
+    if not ready.is_dir():
+        return
+    try:
+        places = {folder}
+        for file in sorted(file for file in ready.rglob("*") if file.is_file()):
+            place = folder / file.relative_to(ready)
+            make_folder(place.parent)
+            os.replace(file, place)
+            places.add(place.parent)
+        for changed in sorted(places):
+            sync(changed)
+        shutil.rmtree(ready)
+        sync(folder)
+    except OSError as error:
+        raise OutputError(f"cannot write {folder}: {reason(error, folder)}") from error
+
+
+def check_whole(folder: Path) -> None:
+    """``LogFormatError`` for a folder whose files were stopped on the way to their places."""
+    if (folder / READY).is_dir():
+        raise LogFormatError(
+            folder, "unfinished, its tables are not all in place: the same command again goes on"
+        )
 
 
 def _refuse(path: Path, overwrite: bool) -> None:
@@ -95,18 +176,34 @@ def _refuse(path: Path, overwrite: bool) -> None:
 
 
 def _take_place(temporary: Path, path: Path) -> None:
-    """Move the new folder in and the old one out; the old one comes back if that fails."""
+    """Move the new folder in and the old one out, at once where the system can do that."""
     if not path.exists():
-        temporary.rename(path)
+        put(temporary, path)
         return
-    aside = path.with_name(f".{path.name}.{os.getpid()}.old")
+    sync_tree(temporary)
+    if exchange(temporary, path):
+        sync_names(path.parent)  # the old one has the temporary name, which is removed
+        return
+    aside = path.with_name(f".{path.name}.{os.getpid()}{OLD}")
     path.rename(aside)
     try:
         temporary.rename(path)
     except OSError:
         aside.rename(path)
         raise
-    shutil.rmtree(aside, ignore_errors=True)
+    sync_names(path.parent)
+    remove(aside)
+
+
+def _put_back(path: Path) -> None:
+    """Where ``exchange`` cannot be had: an earlier run that a cut between two renames hid."""
+    hidden = re.compile(rf"\.{re.escape(path.name)}\.\d+{re.escape(OLD)}")
+    for old in sorted(file for file in path.parent.iterdir() if hidden.fullmatch(file.name)):
+        if path.exists():
+            remove(old)
+        else:
+            old.rename(path)
+            sync_names(path.parent)
 
 
 def versions() -> dict[str, str]:

@@ -10,6 +10,7 @@ import signal
 import threading
 import time
 import uuid
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
@@ -82,7 +83,9 @@ def each(
                 "the same command again goes on from here"
             ) from error
         finally:
-            results.close()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # that tasks are cancelled: we know
+                results.close()
             if shared is not None:
                 locks.idle(shared)
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 
 from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError, LogFormatError, OutputError
-from slam.files import replacing, write_bytes
+from slam.files import part_of, put, replacing, sync, sync_names, unfinished, write_bytes
 from slam.system import Raster
 
 OCCUPIED_THRESHOLD = 0.65
@@ -61,10 +63,42 @@ def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
     ]
     image, fields = header + _gray(raster)[::-1].tobytes(), "\n".join(lines) + "\n"
     sums = f"# {_IMAGE_SUM} {_sha256(image)}\n# {_FIELDS_SUM} {_sha256(fields.encode())}\n"
-    with replacing(yaml) as new_yaml, replacing(pgm) as new_pgm:  # the image is in place first
-        new_pgm.write_bytes(image)
+    with replacing(yaml) as new_yaml:
         new_yaml.write_text(sums + fields, encoding="utf-8")
+        with replacing(pgm) as new_pgm:  # the image is in place first
+            new_pgm.write_bytes(image)
+            _keep_earlier(yaml, pgm)
+    _kept(pgm).unlink(missing_ok=True)
     return pgm, yaml
+
+
+def _keep_earlier(yaml: Path, pgm: Path) -> None:
+    """Let the YAML file of an earlier map name a second link to its image, which stays when ``pgm``
+    is replaced: a power cut between the two files leaves the earlier map, not half of each."""
+    try:
+        text = yaml.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return  # none, or none that could be read
+    line, kept = f"image: {pgm.name}\n", _kept(pgm)
+    if line not in text or unfinished(pgm) or not pgm.is_file():
+        return
+    kept.unlink(missing_ok=True)
+    try:
+        os.link(pgm, kept)
+    except OSError:  # a file system without links
+        shutil.copyfile(pgm, kept)
+        sync(kept)
+    sync_names(pgm.parent)
+    part = part_of(kept.with_suffix(".yaml"))
+    try:
+        part.write_text(text.replace(line, f"image: {kept.name}\n"), encoding="utf-8")
+        put(part, yaml)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _kept(pgm: Path) -> Path:
+    return pgm.with_name(f".{pgm.stem}.earlier.pgm")
 
 
 def read_map(yaml: Path) -> Raster:

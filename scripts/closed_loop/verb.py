@@ -22,7 +22,7 @@ from scripts.compare.folder import write_csv
 from scripts.compare.verb import levels, named
 from scripts.console import console, level_table
 from scripts.jobs import run_jobs
-from scripts.output import locked_folder, machine, write_recipe
+from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.files import write_text
@@ -113,11 +113,15 @@ def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
     with locked_folder(out):
         settings = {"drive_schema": SCHEMA, **asdict(plan)}
         rules = {"lost_rule": LOST_RULE, "found_rule": FOUND_RULE}
-        write_recipe(out, "drive", {**settings, **rules, "machine": machine()})
+        settings |= {**rules, "machine": machine()}
+        if not (out / RECIPE).exists():  # else that of the tables there stays with them
+            write_recipe(out, "drive", settings)
         wanted = list(plan.jobs())
         files = run_jobs([j for _, j in wanted], out / RUNS, processes=jobs, title="driving")
         runs = [load(files[job.name], identity) for identity, job in wanted]
-        return _write(out, plan, runs)
+        with together(out) as staged:
+            write_recipe(staged, "drive", settings)
+            return _write(staged, plan, runs)
 
 
 def _write(out: Path, plan: Plan, runs: list[Driven]) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scripts.compare.plan import Plan
-from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
+from scripts.output import RECIPE, check_whole, read_recipe_words, scenes_of, slams_of
 from sim.recording.recipe import Recipe
 from sim.versions import check_world, world_of
 from slam.errors import InvalidValueError, LogFormatError
@@ -36,6 +36,7 @@ def run_of(path: Path) -> Again:
     Raises ``LogFormatError`` that says what is wrong with it or its comparison's recipe,
     ``WorldVersionError`` for one of another version of the world.
     """
+    check_whole(path.parent.parent)
     recipe = path.parent.parent / RECIPE
     words = read_recipe_words(recipe)
     command, settings = words.get("command"), words.get("settings")

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from scripts.compare.columns import COLUMNS
 from scripts.compare.plan import Run
+from scripts.output import check_whole
 from sim.recording.sums import check_vouched
 from slam.archives import read_arrays
 from slam.errors import InvalidValueError, LogFormatError
@@ -207,7 +208,8 @@ class Compared:
 
 
 def read(folder: Path) -> Compared:
-    """A comparison on file; ``LogFormatError`` for a folder that holds none."""
+    """A comparison on file; ``LogFormatError`` for a folder that holds none, or half of one."""
+    check_whole(folder)
     compared = Compared(folder)
     settings = compared.recipe.get("settings")
     if not isinstance(settings, dict) or settings.get("compare_schema") != SCHEMA:

@@ -22,7 +22,7 @@ from scripts.compare.recording import load
 from scripts.console import console, level_table
 from scripts.generate import sweep
 from scripts.jobs import Job, run_jobs
-from scripts.output import locked_folder, machine, write_recipe
+from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
 from slam.errors import InvalidValueError
 from slam.frames import BeamClass
 from slam.guests import Limits, limited
@@ -117,22 +117,26 @@ def carry_out(
     out = out.absolute()
     with locked_folder(out):
         settings = {"compare_schema": files.SCHEMA, **asdict(plan), "lost_rule": LOST_RULE}
-        write_recipe(out, "compare", {**settings, "machine": machine()})
+        settings["machine"] = machine()
+        if not (out / RECIPE).exists():  # else that of the tables there stays with them
+            write_recipe(out, "compare", settings)
         simulations, entries = plan.recordings(), list(plan.entries())
         ways: dict[str, Any] = {"processes": jobs, "cluster": cluster}
         recordings = run_jobs(simulations.values(), out / RECORDINGS, title="simulating", **ways)
         only: list[Job] = [job for _, _, job in entries]
         done = run_jobs(only, out / ENTRIES, title="running SLAMs", **ways)
-        rows: list[dict[str, Any]] = []
-        for run in plan.runs():
-            own = {name: done[job.name] for its, name, job in entries if its == run}
-            merged = files.merge(out / "runs" / f"{run.name}.npz", recordings[run.name], own)
-            about = asdict(run) | _about(recordings[run.name])
-            rows += [about | row for row in merged]
-        files.write_csv(out / files.RUNS, rows, COLUMNS)
-        files.write_json(out / files.RUNS_JSON, rows)
-        files.write_csv(out / files.LEVELS, tables.levels(rows), tables.LEVEL_COLUMNS)
-        files.write_csv(out / files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS)
+        with together(out) as staged:
+            rows: list[dict[str, Any]] = []
+            for run in plan.runs():
+                own = {name: done[job.name] for its, name, job in entries if its == run}
+                merged = files.merge(staged / "runs" / f"{run.name}.npz", recordings[run.name], own)
+                about = asdict(run) | _about(recordings[run.name])
+                rows += [about | row for row in merged]
+            files.write_csv(staged / files.RUNS, rows, COLUMNS)
+            files.write_json(staged / files.RUNS_JSON, rows)
+            files.write_csv(staged / files.LEVELS, tables.levels(rows), tables.LEVEL_COLUMNS)
+            files.write_csv(staged / files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS)
+            write_recipe(staged, "compare", settings)
     return rows
 
 

@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from scripts.closed_loop.tables import LEVEL_COLUMNS
 from scripts.closed_loop.verb import SCHEMA
 from scripts.compare.folder import Row, read_csv, read_json
+from scripts.output import check_whole
 from scripts.report import style
 from scripts.report.curves import HEIGHT, WIDTH
 from scripts.report.metrics import digits
@@ -53,6 +54,7 @@ class Driven:
 
 def driven(folder: Path) -> Driven:
     """A drive on file; ``LogFormatError`` for a folder that holds none."""
+    check_whole(folder)
     settings = read_json(folder / "recipe.json").get("settings")
     if not isinstance(settings, dict) or settings.get("drive_schema") != SCHEMA:
         raise LogFormatError(folder, f"no closed-loop drive of schema {SCHEMA}")

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from sim.recording.episode import PART
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
 from sim.recording.verify import Finding, check_hashes, finding, listed_in
@@ -20,7 +19,7 @@ from sim.twins import TWINS
 from sim.versions import check_world
 from slam import locks
 from slam.errors import InvalidValueError, LogFormatError, OutputError
-from slam.files import write_text
+from slam.files import PART, is_part, make_folder, reason, write_text
 
 PLAN = "dataset.json"
 SCHEMA = 1
@@ -222,7 +221,7 @@ def writing(path: Path, plan: Plan) -> Iterator[Dataset]:
     """
     path = path.absolute()
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        make_folder(path)
         with locks.locked(path):
             try:
                 _claim(path, plan)
@@ -233,7 +232,7 @@ def writing(path: Path, plan: Plan) -> Iterator[Dataset]:
     except OutputError:
         raise
     except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+        raise OutputError(f"cannot write {path}: {reason(error, path)}") from error
 
 
 def _clear(path: Path) -> None:
@@ -248,9 +247,7 @@ def _claim(path: Path, plan: Plan) -> None:
         if file.read_text(encoding="utf-8", errors="replace") != plan.text():
             raise OutputError(f"{file} is of another dataset: choose another --out")
         return
-    others = [
-        name for name in os.listdir(path) if name not in locks.NAMES and not name.endswith(PART)
-    ]
+    others = [name for name in os.listdir(path) if name not in locks.NAMES and not is_part(name)]
     if others:
         raise OutputError(f"{path} holds files that are no dataset: choose another --out")
     write_text(file, plan.text())

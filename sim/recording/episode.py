@@ -23,11 +23,11 @@ from sim.recording.sums import write_sums
 from sim.simulation import Simulation
 from sim.twins import TWINS, Twins
 from slam.errors import OutputError
+from slam.files import PART, put, reason
 from slam.frames import BeamClass, Frame
 from slam.maps import write_map
 from slam.trajectory import Trajectory, write_tum
 
-PART = ".part"
 Result = dict[str, Any]
 
 
@@ -126,10 +126,8 @@ def _whole(path: Path) -> Iterator[Path]:
             yield aside / path.name
             if path.exists():  # somebody else was faster, with the same bytes
                 return
-            (aside / path.name).rename(path)
+            put(aside / path.name, path)
         finally:
             shutil.rmtree(aside, ignore_errors=True)
     except OSError as error:
-        cause = error.__cause__ if isinstance(error, OutputError) else error
-        reason = getattr(cause, "strerror", None) or error
-        raise OutputError(f"cannot write {path}: {reason}") from error
+        raise OutputError(f"cannot write {path}: {reason(error, path.parent)}") from error

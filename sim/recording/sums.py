@@ -18,12 +18,13 @@ from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 from typing import Literal, NoReturn
 
+from slam import locks
 from slam.errors import LogFormatError
 from slam.files import write_text
 
 SUMS = "SHA256SUMS"
 BESIDE = ".sha256"
-PART, LOCK = ".part", ".lock"  # of names of what is being written
+PART = ".part"  # in names of what is being written
 MAX_BYTES = 1 << 28  # of a SHA256SUMS: two million files
 _LINE = re.compile(r"([0-9a-f]{64})  (\S.*)")
 Kind = Literal["damaged", "incomplete", "foreign", "same messages"]
@@ -209,7 +210,7 @@ def _top(name: str, ours: set[str]) -> str:
 def _stranger(folder: Path, name: str) -> str:
     shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in name)
     last = PurePosixPath(name).name
-    if last == LOCK or (last.startswith(".") and PART in last):
+    if last in locks.NAMES or (last.startswith(".") and PART in last):
         return f"{folder}/{shown} is left of a run that was killed, or is being written"
     if (folder / name).is_symlink():
         return f"{folder}/{shown} is a link, which no run leaves and nothing vouches for"

@@ -4,12 +4,24 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
 
-from scripts.output import whole_folder, write_recipe
-from slam.errors import OutputError
+from scripts.compare import folder as compared
+from scripts.compare.again import run_of
+from scripts.output import (
+    check_whole,
+    locked_folder,
+    put_tables,
+    together,
+    whole_folder,
+    write_recipe,
+)
+from scripts.report.closed import driven
+from slam.errors import LogFormatError, OutputError
+from slam.files import write_text
 
 
 def make(path: Path, text: str, *, overwrite: bool = False) -> None:
@@ -69,3 +81,102 @@ def test_a_recipe_is_strict_json(tmp_path: Path):
         write_recipe(folder, "test", {"rates": {"stay": float("inf")}, "sizes": (1, 2.5)})
     recipe = json.loads((tmp_path / "run" / "recipe.json").read_text(), parse_constant=pytest.fail)
     assert recipe["settings"] == {"rates": {"stay": "inf"}, "sizes": [1, 2.5]}
+
+
+def tables(folder: Path, text: str) -> None:
+    with together(folder) as staged:
+        for name in ("a.csv", "runs/b.csv"):
+            write_text(staged / name, text)
+
+
+def contents(folder: Path) -> dict[str, str]:
+    return {
+        file.relative_to(folder).as_posix(): file.read_text()
+        for file in folder.rglob("*")
+        if file.is_file()
+    }
+
+
+def test_tables_appear_together_or_not_at_all(tmp_path: Path):
+    tables(tmp_path, "old")
+    (tmp_path / "mine.txt").write_text("mine")
+
+    def half_of_them() -> None:
+        with together(tmp_path) as staged:
+            write_text(staged / "a.csv", "new")
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(OutputError, match=f"cannot write {tmp_path}: No space left on device"):
+        half_of_them()
+    assert contents(tmp_path) == {"a.csv": "old", "runs/b.csv": "old", "mine.txt": "mine"}
+    tables(tmp_path, "new")
+    assert contents(tmp_path) == {"a.csv": "new", "runs/b.csv": "new", "mine.txt": "mine"}
+
+
+def test_tables_stopped_on_the_way_are_refused_and_then_finished(tmp_path: Path, monkeypatch):
+    tables(tmp_path, "old")
+    replace, calls = os.replace, []
+
+    def cut(one, two):
+        calls.append(two)
+        if len(calls) == 5:  # two files in the staging folder, that folder, the first in its place
+            raise KeyboardInterrupt
+        replace(one, two)
+
+    monkeypatch.setattr("os.replace", cut)
+    with pytest.raises(KeyboardInterrupt):
+        tables(tmp_path, "new")
+    monkeypatch.undo()
+    assert contents(tmp_path) == {
+        "a.csv": "new", ".tables.ready/runs/b.csv": "new", "runs/b.csv": "old",
+    }  # fmt: skip
+    for reader in (check_whole, compared.read, driven):
+        with pytest.raises(LogFormatError, match=r"unfinished, .*: the same command again goes on"):
+            reader(tmp_path)
+    with pytest.raises(LogFormatError, match="unfinished"):
+        run_of(tmp_path / "runs" / "b.npz")
+    put_tables(tmp_path)
+    check_whole(tmp_path)
+    assert contents(tmp_path) == {"a.csv": "new", "runs/b.csv": "new"}
+
+
+@pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_a_failure_leaves_no_lock(tmp_path: Path, failure: BaseException):
+    def failing(out: Path) -> None:
+        with locked_folder(out):
+            raise failure
+
+    with pytest.raises((OutputError, KeyboardInterrupt)) as caught:
+        failing(tmp_path / "deep" / "out")
+    assert list(tmp_path.iterdir()) == []
+    if isinstance(failure, OSError):
+        said = f"cannot write {tmp_path / 'deep' / 'out'}: No space left on device"
+        assert str(caught.value) == said
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / ".recipe.17.part.json").write_text("left by a cut")
+    with locked_folder(tmp_path / "out"), pytest.raises(OutputError, match="another process"):
+        failing(tmp_path / "out")
+
+
+def test_what_killed_runs_left_is_removed_or_put_back(tmp_path: Path):
+    make(tmp_path / "run", "one")
+    (tmp_path / ".run.17.part").mkdir()
+    (tmp_path / ".run.17.part" / "half").touch()
+    (tmp_path / ".run2.17.part").mkdir()
+    (tmp_path / "run").rename(tmp_path / ".run.17.old")
+    with pytest.raises(OutputError, match="holds an earlier run"):
+        make(tmp_path / "run", "two")
+    assert (tmp_path / "run" / "data.txt").read_text() == "one"
+    make(tmp_path / "run", "two", overwrite=True)
+    assert sorted(p.name for p in tmp_path.iterdir()) == [".run2.17.part", "run"]
+
+
+def test_hidden_names_are_not_told(tmp_path: Path):
+    def full() -> None:
+        with whole_folder(tmp_path / "run", overwrite=False) as folder:
+            raise OutputError(f"cannot write {folder / 'film.mp4'}: No space left on device")
+
+    with pytest.raises(OutputError) as caught:
+        full()
+    said = f"cannot write {tmp_path / 'run' / 'film.mp4'}: No space left on device"
+    assert str(caught.value) == said

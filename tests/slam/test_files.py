@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import errno
+import os
+
 import pytest
 
+from slam import files
 from slam.errors import MobiliaError, OutputError
-from slam.files import replacing, write_bytes, write_text
+from slam.files import exchange, is_part, locked, reason, replacing, write_bytes, write_text
 
 
 def tree(folder):
@@ -77,3 +81,64 @@ def test_a_disk_error_inside_is_named_once(tmp_path):
         raise OSError(28, "No space left on device")
     assert str(caught.value) == f"cannot write {tmp_path / 'b'}: No space left on device"
     assert tree(tmp_path) == []
+
+
+def test_what_a_killed_run_left_is_removed_and_what_is_being_written_is_not(tmp_path):
+    path = tmp_path / "a.txt"
+    for name in (".a.17.part.txt", ".a.txt.17.part", ".ab.17.part.txt", ".a.x.17.part.txt"):
+        (tmp_path / name).write_text("left")
+    (tmp_path / ".a.18.part.txt").write_text("being written")
+    with locked(tmp_path / ".a.18.part.txt"):
+        write_text(path, "whole")
+    assert tree(tmp_path) == [".a.18.part.txt", ".a.x.17.part.txt", ".ab.17.part.txt", "a.txt"]
+    write_text(path, "whole")
+    assert ".a.18.part.txt" not in tree(tmp_path)
+
+
+def test_two_things_are_swapped_or_neither(tmp_path):
+    for name in ("a", "b"):
+        write_text(tmp_path / name / "of", name)
+    if not exchange(tmp_path / "a", tmp_path / "b"):
+        pytest.skip("this system cannot swap names")
+    assert (tmp_path / "a" / "of").read_text() == "b"
+    assert (tmp_path / "b" / "of").read_text() == "a"
+    with pytest.raises(OSError, match="No such file"):
+        exchange(tmp_path / "a", tmp_path / "missing")
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_disk_that_is_full_only_when_synced(tmp_path, monkeypatch, place):
+    """Of a file: nothing is left. Of the folder after the rename: told, and the file is whole."""
+    write_text(tmp_path / "a", "old")
+    fsync, calls = os.fsync, []
+
+    def full(number):
+        calls.append(number)
+        if len(calls) == place + 1:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        fsync(number)
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OutputError, match=r"cannot write .*/a: No space left on device"):
+        write_text(tmp_path / "a", "new")
+    assert tree(tmp_path) == ["a"]
+    assert (tmp_path / "a").read_text() == ("old", "new")[place]
+
+
+def test_a_full_disk_is_called_one_whatever_the_writer_said(tmp_path, monkeypatch):
+    broken = BrokenPipeError(errno.EPIPE, "Broken pipe")
+    wrapped = OSError("encoder error -2 when writing image file")
+    wrapped.__cause__ = OSError(errno.ENOSPC, "No space left on device")
+    assert reason(wrapped, tmp_path) == "No space left on device"
+    assert reason(broken, tmp_path) == "Broken pipe"
+    assert reason(OSError("words\nmore"), tmp_path) == "words"
+    monkeypatch.setattr(files, "_free_bytes", lambda folder: 0)
+    assert reason(broken, tmp_path) == "No space left on device"
+    assert reason(PermissionError(errno.EACCES, "Permission denied"), tmp_path) != reason(
+        broken, tmp_path
+    )
+
+
+def test_names_of_what_is_unfinished():
+    assert all(map(is_part, (".a.1.part", ".a.host.1.part", ".a.1.part.npz")))
+    assert not any(map(is_part, ("a.part", ".a", ".apart", "a.1.part.npz", ".tables.ready")))
