@@ -23,6 +23,7 @@ from scripts.quotes.results import RESULTS, SCHEMA, commit, write
 from slam.errors import InvalidValueError, MobiliaError
 
 OURS = "shunting"
+CODE = ("slam", "sim", "scenes", "scripts/compare")  # what decides the numbers
 LESS = (
     "ate_unaligned_m", "ate_se2_m", "heading_rmse_rad", "lost", "ms_per_scan_p50", "ghost_rate",
     "ghost_left_rate", "half_life_s", "half_life_observations",
@@ -39,7 +40,7 @@ def distil(compared: Compared, command: str) -> tuple[dict[str, Any], dict[str, 
     head = {
         "schema": SCHEMA,
         "command": command,
-        "commit": commit(),
+        "commit": commit(*CODE),
         "machine": settings["machine"],
         "versions": compared.recipe["versions"],
         "scenes": settings["scenes"],

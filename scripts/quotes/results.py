@@ -22,14 +22,18 @@ CODE = ("slam", "sim", "scenes", "scripts")
 Cell = list[Any]
 
 
-def commit() -> str:
-    """The commit of the code that measures; ``InvalidValueError`` where the code is not that."""
-    changed = _git("status", "--porcelain", "--untracked-files=no", "--", *CODE)
+def commit(*code: str) -> str:
+    """The last commit that changed ``code`` (paths; default all of it).
+
+    Raises ``InvalidValueError`` where the code here is another than that.
+    """
+    paths = code or CODE
+    changed = _git("status", "--porcelain", "--untracked-files=no", "--", *paths)
     if changed:
         raise InvalidValueError(
             f"commit these first, so that results can name the code:\n{changed}"
         )
-    return _git("rev-parse", "HEAD")
+    return _git("log", "-1", "--format=%H", "--", *paths)
 
 
 def _git(*words: str) -> str:
