@@ -252,13 +252,19 @@ def _cm(pair: Interval) -> str:
 
 def tie(full: Comparison, noise: Comparison) -> str:
     """Beside the table of the scanner with noise only."""
+    highest = [
+        f"{_cm(pair)} in the {scene}"
+        for scene in full.scenes
+        if (pair := full.pairs(scene, GRID, ATE)[-1]) is not None
+    ]
     return (
         "**The factors over the ordinary grid (`occupancy`) in this table are for a scanner with "
         "noise only.** With every error of the LMS-221, on the same seeds at dynamism "
         f"{full.dynamisms[0]:g} to {full.dynamisms[-1]:g}: {_against_grid(full)}. With noise only: "
         f"{_against_grid(noise)}; the grid is then {_factors(noise)} times as far off, with every "
-        f"error {_factors(full)} times. Differences are `shunting` less `occupancy`, each seed's "
-        f"median over the levels ({made(full.data)})."
+        f"error {_factors(full)} times. These are differences of `shunting` less `occupancy` over "
+        f"all levels; at dynamism {full.dynamisms[-1]:g} alone, with every error, "
+        f"{listed(highest)} ({made(full.data)}; [results](results))."
     )
 
 
@@ -272,8 +278,8 @@ def readme_comparison(full: Comparison, noise: Comparison) -> str:
             ends.append(f"`{slam}` {100.0 * medians[0]:.1f} and {100.0 * medians[-1]:.1f}")
         said.append(f"in the {scene} {', '.join(ends)}")
     return (
-        f"Median position error in cm at dynamism {full.dynamisms[0]:g} and "
-        f"{full.dynamisms[-1]:g}, every error of the scanner in: {'; '.join(said)}. Against an "
+        f"With every error of the scanner, the median position error in cm at dynamism "
+        f"{full.dynamisms[0]:g} and {full.dynamisms[-1]:g} is {'; '.join(said)}. Against an "
         "ordinary grid with the same matcher (`occupancy`), over all levels: "
         f"{_against_grid(full)}. With a scanner that has noise only the grid is {_factors(noise)} "
         f"times as far off. Who wins where, and where `shunting` does not: "
