@@ -67,6 +67,7 @@ def film(folder: Path, repeats: int) -> dict[str, dict[str, Any]]:
             rows[f"{of}, {name}"] = {
                 "s": (min(t[k] for t in long) - min(t[k] for t in short)) / (LONG_S - SHORT_S),
                 "of": f"a second of film: {LONG_S:g} s less {SHORT_S:g} s",
+                "seeds": [SEED],
                 "repeats": repeats,
             }
     return rows
@@ -76,7 +77,7 @@ def demo(folder: Path, repeats: int) -> dict[str, dict[str, Any]]:
     """Of ``mobilia demo``, compiled code kept from before."""
     words = ["demo", "--overwrite", "--out", str(folder / "demo")]
     spent = min(sum(called(words)) for _ in range(repeats))
-    return {"demo": {"s": spent, "of": "mobilia demo", "repeats": repeats}}
+    return {"demo": {"s": spent, "of": "mobilia demo", "seeds": [0], "repeats": repeats}}
 
 
 def compared(folder: Path, repeats: int) -> dict[str, dict[str, Any]]:
@@ -90,6 +91,7 @@ def compared(folder: Path, repeats: int) -> dict[str, dict[str, Any]]:
         "comparison": {
             "s": spent / 4.0,
             "of": "a run of a minute with its four SLAMs: arena and office, two seeds, by 4",
+            "seeds": [SEED, SEED + 1],
             "repeats": repeats,
         }
     }
@@ -108,7 +110,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "commit": commit(),
             "machine": machine(),
             "versions": versions(),
-            "seeds": [SEED, SEED + 1],
             "what": "s of processor time, the least of the repeats",
         }
         rows: dict[str, dict[str, Any]] = {}

@@ -187,7 +187,7 @@ def comparing_made(of: Comparison) -> str:
     return (
         f"Measured with the command at the top of this page: {len(of.data['seeds'])} runs of "
         f"{of.data['seconds']:g} s at each level, every error of the LMS-221, {rate:.1f} scans a "
-        f"second, Pioneer-class odometry ({made(of.data)}; all numbers: "
+        f"second, Pioneer-class odometry ({made(of.data, of.data['seeds'])}; all numbers: "
         "[results/comparison.json](results/comparison.json)). Median unaligned ATE in cm with its "
         "95 % interval, and the rank correlation of dynamism with the medians:"
     )
@@ -196,10 +196,11 @@ def comparing_made(of: Comparison) -> str:
 def comparing_cost(of: Comparison, costs: dict[str, Any]) -> str:
     """Of the whole comparison."""
     runs = len(of.scenes) * len(of.dynamisms) * len(of.data["seeds"])
-    each = costs["costs"]["comparison"]["s"]
+    row = costs["costs"]["comparison"]
+    each = row["s"]
     return (
-        f"A run with its four SLAMs takes {each:.0f} s of processor time ({made(costs)}); the "
-        f"whole comparison, {runs} simulations and {runs * len(of.slams)} runs, about "
+        f"A run with its four SLAMs takes {each:.0f} s of processor time "
+        f"({made(costs, row['seeds'])}); the whole comparison, {runs} simulations and {runs * len(of.slams)} runs, about "
         f"{round(runs * each / 60.0)} minutes."
     )
 
@@ -207,11 +208,12 @@ def comparing_cost(of: Comparison, costs: dict[str, Any]) -> str:
 def film(costs: dict[str, Any]) -> str:
     """Of a second of film."""
     s = {name: row["s"] for name, row in costs["costs"].items()}
+    measured = made(costs, costs["costs"]["film, with 3D"]["seeds"])
     return (
         "A second of film at 30 fps and 1280 × 720, simulation and SLAM included, takes "
         f"{s['film, without 3D']:.1f} s of processor time without the 3D view and "
         f"{s['film, with 3D']:.1f} s with it, drawn without a graphics card (480 × 300, ten times "
-        f"a second); the encoder takes {s['encoder, with 3D']:.1f} s more ({made(costs)})."
+        f"a second); the encoder takes {s['encoder, with 3D']:.1f} s more ({measured})."
     )
 
 
@@ -264,7 +266,7 @@ def tie(full: Comparison, noise: Comparison) -> str:
         f"{_against_grid(noise)}; the grid is then {_factors(noise)} times as far off, with every "
         f"error {_factors(full)} times. These are differences of `shunting` less `occupancy` over "
         f"all levels; at dynamism {full.dynamisms[-1]:g} alone, with every error, "
-        f"{listed(highest)} ({made(full.data)}; [results](results))."
+        f"{listed(highest)} ({made(full.data, full.data['seeds'])}; [results](results))."
     )
 
 
@@ -283,5 +285,5 @@ def readme_comparison(full: Comparison, noise: Comparison) -> str:
         "ordinary grid with the same matcher (`occupancy`), over all levels: "
         f"{_against_grid(full)}. With a scanner that has noise only the grid is {_factors(noise)} "
         f"times as far off. Who wins where, and where `shunting` does not: "
-        f"[docs/comparing.md](docs/comparing.md) ({made(full.data)})."
+        f"[docs/comparing.md](docs/comparing.md) ({made(full.data, full.data['seeds'])})."
     )

@@ -63,9 +63,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def made(data: dict[str, Any]) -> str:
+def made(data: dict[str, Any], seeds: Sequence[int]) -> str:
     """Commit, seeds and machine of a results file."""
-    seeds = data["seeds"]
     ran = f"seeds {seeds[0]} to {seeds[-1]}" if len(seeds) > 1 else f"seed {seeds[0]}"
     machine = data["machine"]
     return (
