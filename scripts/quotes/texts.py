@@ -200,8 +200,8 @@ def comparing_cost(of: Comparison, costs: dict[str, Any]) -> str:
     each = row["s"]
     return (
         f"A run with its four SLAMs takes {each:.0f} s of processor time "
-        f"({made(costs, row['seeds'])}); the whole comparison, {runs} simulations and {runs * len(of.slams)} runs, about "
-        f"{round(runs * each / 60.0)} minutes."
+        f"({made(costs, row['seeds'])}); the whole comparison, {runs} simulations and "
+        f"{runs * len(of.slams)} runs, about {round(runs * each / 60.0)} minutes."
     )
 
 
