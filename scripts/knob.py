@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FormatStrFormatter, NullLocator
 from scipy.stats import spearmanr
 
 from scripts.compare.folder import Compared, read
@@ -29,8 +30,11 @@ ATE, ALIGNED, LOST = "ate_unaligned_m", "ate_se2_m", "lost"
 MOVING = "moving_share_of_returns"
 CORRELATED = {"ATE": ATE, "aligned": ALIGNED, "lost": LOST, "moving": MOVING}
 LEAST_LEVELS = 3
-_BAND = 0.15
+SCANNERS = {"full": "every error of the scanner", "noise": "a scanner with noise only"}
+_BAND = 0.13
 _ASIDE = 0.015
+_MARKERS = "osD^vP"  # curves that lie on each other are told apart by them, too
+_TICKS_CM = (1, 2, 5, 10, 20, 50, 100, 200)
 
 
 class Curve:
@@ -86,38 +90,47 @@ def picture(compared: Compared, path: Path) -> None:
     for column, scene in enumerate(scenes):
         errors, losses = grid[0][column], grid[1][column]
         for k, slam in enumerate(slams):
-            color = color_of(slam, slams)
-            _draw_errors(errors, Curve(compared, scene, slam, ATE), color, slam)
+            color, marker = color_of(slam, slams), _MARKERS[k % len(_MARKERS)]
             aside = _ASIDE * (k - 0.5 * (len(slams) - 1))
-            _draw_shares(losses, Curve(compared, scene, slam, LOST), aside, color)
+            _draw_errors(errors, Curve(compared, scene, slam, ATE), aside, color, marker, slam)
+            _draw_shares(losses, Curve(compared, scene, slam, LOST), aside, color, marker)
         errors.set(title=scene, yscale="log")
+        errors.yaxis.set_major_locator(FixedLocator(_TICKS_CM))
+        errors.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+        errors.yaxis.set_minor_locator(NullLocator())
         _name_levels(losses, Curve(compared, scene, slams[0], MOVING))
     runs = len(settings["seeds"])
-    grid[0][0].set_ylabel("ATE in cm, unaligned\n(median, 95 % interval)")
-    grid[1][0].set_ylabel("runs lost in %\n(95 % interval)")
+    grid[0][0].set_ylabel("position error (ATE) in cm,\nunaligned: median, 95 % interval")
+    grid[1][0].set_ylabel("runs lost in %,\n95 % interval")
     grid[1][0].set_ylim(-4.0, 104.0)
     handles, labels = grid[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(slams), frameon=False)
     figure.supxlabel(
-        f"dynamism (below: share of returns from things that move); {runs} runs of "
-        f"{settings['seconds']:g} s a point",
+        "dynamism (below it: share of the scanner's returns that come from things that move)\n"
+        f"{runs} runs of {settings['seconds']:g} s a point, seeds {settings['seeds'][0]} to "
+        f"{settings['seeds'][-1]}; {SCANNERS.get(settings['scanner'], settings['scanner'])}",
         fontsize=9,
     )
     save(figure, path)
 
 
-def _draw_errors(ax: Axes, curve: Curve, color: str, label: str) -> None:
+def _draw_errors(ax: Axes, curve: Curve, aside: float, color: str, marker: str, label: str) -> None:
     top = np.where(np.isfinite(curve.high), curve.high, np.nan)
-    ax.fill_between(curve.levels, 100.0 * curve.low, 100.0 * top, color=color, alpha=_BAND, lw=0.0)
-    ax.plot(curve.levels, 100.0 * curve.values, "o-", color=color, lw=1.6, ms=4, label=label)
+    at = curve.levels + aside
+    ax.fill_between(at, 100.0 * curve.low, 100.0 * top, color=color, alpha=_BAND, lw=0.0)
+    ax.plot(
+        at, 100.0 * curve.values, "-", marker=marker, color=color, lw=1.4, ms=4.5, mec="white",
+        mew=0.5, label=label,
+    )  # fmt: skip
 
 
-def _draw_shares(ax: Axes, curve: Curve, aside: float, color: str) -> None:
+def _draw_shares(ax: Axes, curve: Curve, aside: float, color: str, marker: str) -> None:
     """Side by side, so that curves at zero are all seen."""
     below, above = curve.values - curve.low, curve.high - curve.values
     ax.errorbar(
         curve.levels + aside, 100.0 * curve.values, yerr=100.0 * np.stack([below, above]),
-        fmt="o-", color=color, lw=1.2, ms=4, elinewidth=0.8, capsize=2.0,
+        fmt="-", marker=marker, color=color, lw=1.2, ms=4.5, mec="white", mew=0.5, elinewidth=0.8,
+        capsize=2.0,
     )  # fmt: skip
 
 

@@ -17,8 +17,8 @@ from pathlib import Path
 
 from PIL import Image
 
+from scripts.marks import filled
 from scripts.reproduce.verb import EXPERIMENTS
-from slam.errors import InvalidValueError
 from slam.files import write_bytes, write_text
 
 PICTURES = "pictures/paper"
@@ -33,16 +33,10 @@ def quote(results: Path, page: Path) -> list[str]:
         summary = results / ("" if name == "all" else name) / "summary.md"
         if not summary.exists():
             continue
-        begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
-        if text.count(begin) != 1 or text.count(end) != 1:
-            raise InvalidValueError(f"{page} must have one {begin.strip()} and one {end}")
-        if text.index(end) < text.index(begin):
-            raise InvalidValueError(f"{page} must have {begin.strip()} before {end}")
         told = summary.read_text().strip()
         found[name] = _PICTURE.findall(told)
         told = _PICTURE.sub(rf"]({PICTURES}/{name}-\1)", told)
-        before, _, rest = text.partition(begin)
-        text = f"{before}{begin}\n{told}\n\n{end}{rest.partition(end)[2]}"
+        text = filled(text, name, told, page)
     for name, files in found.items():
         _take_pictures(results / name, files, page.parent / PICTURES, name)
     write_text(page, text)

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the README says that things cost: ``python -m scripts.quotes.costs``.
+
+Processor time of commands, each in a fresh process with everything that it starts, after a call
+that warms the caches of compiled code: the least of a few, since other work on a machine can only
+add. Writes ``docs/results/costs.json``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
+from typing import Any
+
+from scripts.output import machine, versions
+from scripts.quotes.results import RESULTS, SCHEMA, commit, write
+from slam.errors import MobiliaError
+
+REPEATS = 3
+SCENE, SEED, DYNAMISM = "office", 100, 0.5
+SHORT_S, LONG_S = 5.0, 15.0
+
+
+def called(words: Sequence[str]) -> tuple[float, float]:
+    """s of processor time of ``mobilia WORDS``: of its own process, and of those it started."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(_call, list(words)).result()
+
+
+def _call(words: list[str]) -> tuple[float, float]:
+    from sim import gl
+
+    gl.sanitise_environment()
+    from scripts.cli import app
+
+    before = _spent()
+    app(words, standalone_mode=False)
+    after = _spent()
+    return after[0] - before[0], after[1] - before[1]
+
+
+def _spent() -> tuple[float, float]:
+    own, others = getrusage(RUSAGE_SELF), getrusage(RUSAGE_CHILDREN)
+    return own.ru_utime + own.ru_stime, others.ru_utime + others.ru_stime
+
+
+def film(folder: Path, repeats: int) -> dict[str, dict[str, Any]]:
+    """Of a second of film, with simulation and SLAM: a long film less a short one."""
+    run = folder / "run"
+    called([
+        "run", "shunting", "--scene", SCENE, "--dynamism", str(DYNAMISM), "--seed", str(SEED),
+        "--seconds", str(LONG_S + 1.0), "--no-film", "--out", str(run),
+    ])  # fmt: skip
+    rows = {}
+    for name, how in (("with 3D", []), ("without 3D", ["--no-3d"])):
+        words = ["render", str(run), "--out", str(folder / "film.mp4"), *how, "--to"]
+        called([*words, str(SHORT_S)])
+        short = [called([*words, str(SHORT_S)]) for _ in range(repeats)]
+        long = [called([*words, str(LONG_S)]) for _ in range(repeats)]
+        for k, of in enumerate(("film", "encoder")):
+            rows[f"{of}, {name}"] = {
+                "s": (min(t[k] for t in long) - min(t[k] for t in short)) / (LONG_S - SHORT_S),
+                "of": f"a second of film: {LONG_S:g} s less {SHORT_S:g} s",
+                "seeds": [SEED],
+                "repeats": repeats,
+            }
+    return rows
+
+
+def demo(folder: Path, repeats: int) -> dict[str, dict[str, Any]]:
+    """Of ``mobilia demo``, compiled code kept from before."""
+    words = ["demo", "--overwrite", "--out", str(folder / "demo")]
+    spent = min(sum(called(words)) for _ in range(repeats))
+    return {"demo": {"s": spent, "of": "mobilia demo", "seeds": [0], "repeats": repeats}}
+
+
+def compared(folder: Path, repeats: int) -> dict[str, dict[str, Any]]:
+    """Of a run of a comparison with the four SLAMs of ``docs/comparing.md``."""
+    words = [
+        "compare", "--slam", "shunting", "ekf", "occupancy", "odometry", "--scene", "arena",
+        "office", "--dynamism", str(DYNAMISM), "--seeds", "2", "--out",
+    ]  # fmt: skip
+    spent = min(sum(called([*words, str(folder / f"compare{k}")])) for k in range(repeats))
+    return {
+        "comparison": {
+            "s": spent / 4.0,
+            "of": "a run of a minute with its four SLAMs: arena and office, two seeds, by 4",
+            "seeds": [SEED, SEED + 1],
+            "repeats": repeats,
+        }
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeats", type=int, default=REPEATS)
+    parser.add_argument("--out", type=Path, default=RESULTS / "costs.json")
+    wanted = parser.parse_args(arguments)
+    try:
+        head = {
+            "schema": SCHEMA,
+            "command": "python -m scripts.quotes.costs",
+            "commit": commit(),
+            "machine": machine(),
+            "versions": versions(),
+            "what": "s of processor time, the least of the repeats",
+        }
+        rows: dict[str, dict[str, Any]] = {}
+        with tempfile.TemporaryDirectory() as folder:
+            for measure in (film, demo, compared):
+                rows |= measure(Path(folder), wanted.repeats)
+        write(wanted.out, head, {"costs": rows})
+    except MobiliaError as error:
+        print(error, file=sys.stderr)
+        return 1
+    for name, row in rows.items():
+        print(f"{name}: {row['s']:.3f} s of processor time, {row['of']}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

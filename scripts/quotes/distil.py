@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison's folder as a results file: ``python -m scripts.quotes.distil out/compare``.
+
+Writes ``docs/results/comparison.json``, or what ``--out`` names, with the metrics that pages quote.
+A folder that the code here would make anew is refused: then the results would name a commit that
+did not make them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from scripts.compare.folder import Compared, Row, read
+from scripts.compare.plan import ENTRIES, RECORDINGS, Plan
+from scripts.compare.statistics import paired, quantile
+from scripts.compare.tables import number
+from scripts.knob import Curve
+from scripts.quotes.results import RESULTS, SCHEMA, commit, write
+from slam.errors import InvalidValueError, MobiliaError
+
+OURS = "shunting"
+CODE = ("slam", "sim", "scenes", "scripts/compare")  # what decides the numbers
+LESS = (
+    "ate_unaligned_m", "ate_se2_m", "heading_rmse_rad", "lost", "ms_per_scan_p50", "ghost_rate",
+    "ghost_left_rate", "half_life_s", "half_life_observations",
+)  # fmt: skip
+MORE = ("new_object_recall", "door_accuracy")
+OTHER = ("moving_share_of_returns",)
+CORRELATED = ("ate_unaligned_m", "ate_se2_m", "lost", "moving_share_of_returns")
+PLANNED = ("slams", "scenes", "levels", "seeds", "seconds", "every", "scanner", "scan_limit_s")
+
+
+def distil(compared: Compared, command: str) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Head and tables of the results file."""
+    settings = compared.recipe["settings"]
+    head = {
+        "schema": SCHEMA,
+        "command": command,
+        "commit": commit(*CODE),
+        "machine": settings["machine"],
+        "versions": compared.recipe["versions"],
+        "scenes": settings["scenes"],
+        "slams": settings["slams"],
+        "dynamism": settings["levels"],
+        "seeds": settings["seeds"],
+        "seconds": settings["seconds"],
+        "every": settings["every"],
+        "scanner": settings["scanner"],
+        "columns": {
+            "levels": "for each dynamism: median (lost: share), low and high of its 95 % interval",
+            "paired": f"for each dynamism: median of {OURS} less the other, run by run, low and "
+            "high of its 95 % interval, runs won, tied and lost by it",
+            "over_levels": "the same of each seed's median difference over the dynamisms",
+            "rank_correlation": "Spearman's, of dynamism with the medians",
+        },
+    }
+    tables = {
+        "levels": _levels(compared),
+        **_paired(compared),
+        "rank_correlation": _correlations(compared),
+    }
+    return head, tables
+
+
+def _levels(compared: Compared) -> dict[str, Any]:
+    """A cell for each level, null where nothing was measured."""
+    settings = compared.recipe["settings"]
+    found = {
+        (row["scene"], row["slam"], row["metric"], row["dynamism"]): row for row in compared.levels
+    }
+    table = {}
+    for scene in settings["scenes"]:
+        for slam in settings["slams"]:
+            for metric in (*LESS, *MORE, *OTHER):
+                rows = [found.get((scene, slam, metric, level)) for level in settings["levels"]]
+                cells = [row and [row["value"], row["low"], row["high"]] for row in rows]
+                if any(cells):
+                    table[f"{scene} {slam} {metric}"] = cells
+    return table
+
+
+def _paired(compared: Compared) -> dict[str, dict[str, Any]]:
+    settings = compared.recipe["settings"]
+    by_level, over = {}, {}
+    for scene in settings["scenes"]:
+        for rival in settings["slams"]:
+            for metric in (*LESS, *MORE) if rival != OURS else ():
+                ours, theirs = (_table(compared, scene, slam, metric) for slam in (OURS, rival))
+                levels = [_differences(a, b) for a, b in zip(ours, theirs, strict=True)]
+                if not any(levels):
+                    continue
+                key, less = f"{scene} {rival} {metric}", metric in LESS
+                by_level[key] = [_cell(list(level.values()), less) for level in levels]
+                seeds = sorted({seed for level in levels for seed in level})
+                middles = [
+                    quantile([level[seed] for level in levels if seed in level], 0.5)
+                    for seed in seeds
+                ]
+                over[key] = _cell(middles, less)
+    return {"paired": by_level, "over_levels": over}
+
+
+def _table(compared: Compared, scene: str, slam: str, metric: str) -> list[dict[float, float]]:
+    """By level, by seed: what there is a number of."""
+    found: dict[float, dict[float, float]] = {}
+    for row in compared.runs:
+        if (row["scene"], row["slam"]) == (scene, slam):
+            value = number(row, metric)
+            if value is not None:
+                found.setdefault(row["dynamism"], {})[row["seed"]] = value
+    return [found.get(level, {}) for level in compared.recipe["settings"]["levels"]]
+
+
+def _differences(a: dict[float, float], b: dict[float, float]) -> dict[float, float]:
+    """By seed; two infinite numbers are a tie."""
+    return {
+        seed: 0.0 if a[seed] == b[seed] else a[seed] - b[seed]
+        for seed in sorted(a.keys() & b.keys())
+    }
+
+
+def _cell(differences: list[float], less: bool) -> list[Any] | None:
+    if not differences:
+        return None
+    row = paired(differences, [0.0] * len(differences), less_is_better=less)
+    return [row[key] for key in ("median_difference", "low", "high", "wins", "ties", "losses")]
+
+
+def _correlations(compared: Compared) -> dict[str, float]:
+    settings = compared.recipe["settings"]
+    return {
+        f"{scene} {slam} {metric}": Curve(compared, scene, slam, metric).correlation()
+        for scene in settings["scenes"]
+        for slam in settings["slams"]
+        for metric in CORRELATED
+    }
+
+
+def refuse_of_other_code(compared: Compared) -> None:
+    """Raise ``InvalidValueError`` where the code here would make a part of it anew."""
+    settings: Row = compared.recipe["settings"]
+    planned: dict[str, Any] = {
+        key: tuple(settings[key]) if isinstance(settings[key], list) else settings[key]
+        for key in PLANNED
+    }
+    plan = Plan(**planned)
+    recordings = [(RECORDINGS, job) for job in plan.recordings().values()]
+    for folder, job in [*recordings, *((ENTRIES, job) for _, _, job in plan.entries())]:
+        if not (compared.folder / folder / job.file_name()).exists():
+            raise InvalidValueError(
+                f"{compared.folder}: {job.name} in {folder} was not made by the code here: run the "
+                "comparison again"
+            )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the results file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="of mobilia compare")
+    parser.add_argument("--command", required=True, help="that made it, as the page prints it")
+    parser.add_argument("--out", type=Path, default=RESULTS / "comparison.json")
+    wanted = parser.parse_args(arguments)
+    try:
+        compared = read(wanted.folder)
+        refuse_of_other_code(compared)
+        write(wanted.out, *distil(compared, wanted.command))
+    except MobiliaError as error:
+        print(error, file=sys.stderr)
+        return 1
+    print(f"wrote {wanted.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

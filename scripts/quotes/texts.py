@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What stands at the marked places, by name, told from the results files alone."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+from typing import Any
+
+from scripts.quotes.results import Comparison, Interval, load
+from scripts.quotes.words import interval, made, shown, table, verdict, verdicts
+from scripts.report.metrics import METRICS
+from scripts.report.words import listed
+
+ATE, ALIGNED, LOST = "ate_unaligned_m", "ate_se2_m", "lost"
+MOVING = "moving_share_of_returns"
+OURS, GRID, EKF, NULL = "shunting", "occupancy", "ekf", "odometry"
+MAPS = {
+    "ghost_rate": ("ghosts, %", 2),
+    "new_object_recall": ("new things found, %", 1),
+    "half_life_s": ("half-life of an old place, s", 2),
+    "door_accuracy": ("doors right, %", 1),
+    "ms_per_scan_p50": ("processor time of a scan, ms", 1),
+}
+PAGE_COLUMNS = 120
+
+
+def texts(results: Path) -> dict[str, str]:
+    """By the name of the mark."""
+    full = Comparison(results / "comparison.json")
+    noise = Comparison(results / "comparison_noise.json")
+    costs = load(results / "costs.json")
+    return {
+        "readme.comparison": _wrapped(readme_comparison(full, noise)),
+        "readme.film": _wrapped(film(costs)),
+        "readme.demo": f"{costs['costs']['demo']['s']:.0f} s of processor time",
+        "comparing.made": _wrapped(comparing_made(full)),
+        "comparing.errors": errors(full),
+        "comparing.lost": _wrapped(lost(full)),
+        "comparing.differences": differences(full),
+        "comparing.verdicts": listing(full),
+        "comparing.grid": _wrapped(comparing_grid(full)),
+        "comparing.scanners": scanners(full, noise),
+        "comparing.maps": maps(full),
+        "comparing.cost": _wrapped(comparing_cost(full, costs)),
+        "comparison.tie": _wrapped(tie(full, noise)),
+    }
+
+
+def _wrapped(text: str) -> str:
+    return textwrap.fill(text, PAGE_COLUMNS, break_long_words=False, break_on_hyphens=False)
+
+
+def _medians(of: Comparison, scene: str, slam: str, metric: str = ATE) -> list[float]:
+    return [level.value for level in of.levels(scene, slam, metric) if level is not None]
+
+
+def _span(values: list[float], factor: float, places: int) -> str:
+    """``1.5 to 1.9``."""
+    low, high = shown(factor * min(values), places), shown(factor * max(values), places)
+    return low if low == high else f"{low} to {high}"
+
+
+def errors(of: Comparison) -> str:
+    """Median error with its interval, a table for each scene."""
+    head = [f"dynamism {level:g}" for level in of.dynamisms]
+    tables = []
+    for scene in of.scenes:
+        shares = [f"{100.0 * share:.1f}" for share in _medians(of, scene, OURS, MOVING)]
+        rho = shown(of.rank_correlation(scene, OURS, MOVING), 1)
+        rows = [["returns from what moves, %", *shares, rho, ""]]
+        for slam in of.slams:
+            places = 0 if slam == NULL else 1
+            cells = [_in_cm(level, places) for level in of.levels(scene, slam, ATE)]
+            gone = sum(_lost(of, scene, slam))
+            runs = len(of.dynamisms) * len(of.data["seeds"])
+            rho = shown(of.rank_correlation(scene, slam, ATE), 1)
+            rows.append([f"`{slam}`", *cells, rho, f"{gone} of {runs}"])
+        tables.append(table([scene, *head, "rank correlation", "runs lost"], rows))
+    return "\n\n".join(tables)
+
+
+def _in_cm(of: Interval | None, places: int) -> str:
+    return interval(of, ATE, places)
+
+
+def _lost(of: Comparison, scene: str, slam: str) -> list[int]:
+    """Runs at each level."""
+    return [round(share * len(of.data["seeds"])) for share in _medians(of, scene, slam, LOST)]
+
+
+def lost(of: Comparison) -> str:
+    """Who lost how many runs, where."""
+    runs, said, never = len(of.data["seeds"]), [], []
+    for slam in of.slams:
+        if not any(sum(_lost(of, scene, slam)) for scene in of.scenes):
+            never.append(f"`{slam}`")
+            continue
+        for scene in of.scenes:
+            counts = _lost(of, scene, slam)
+            at = [(n, level) for n, level in zip(counts, of.dynamisms, strict=True) if n]
+            if len(at) == len(counts):
+                said.append(f"`{slam}` {min(counts)} to {max(counts)} at each level in the {scene}")
+            elif at:
+                where = listed([f"{n} at {level:g}" for n, level in at])
+                said.append(f"`{slam}` {where} in the {scene}")
+    none = f" None of {listed(never)}." if never else ""
+    return f"Lost runs, of {runs} at a level: {'; '.join(said) or 'none'}.{none}"
+
+
+def differences(of: Comparison) -> str:
+    """Error of shunting less the others', run by run; bold where the interval excludes zero."""
+    head = ["cm", *(f"dynamism {level:g}" for level in of.dynamisms), "over all levels"]
+    rows = []
+    for scene in of.scenes:
+        for rival in _rivals(of):
+            pairs = [*of.pairs(scene, rival, ATE), of.over_levels(scene, rival, ATE)]
+            places = 0 if rival == NULL else 2
+            cells = []
+            for pair in pairs:
+                cell = interval(pair, ATE, places)
+                cells.append(f"**{cell}**" if verdict(pair, ATE) else cell)
+            rows.append([f"{scene}, less `{rival}`", *cells])
+    return table(head, rows)
+
+
+def _rivals(of: Comparison) -> list[str]:
+    return [slam for slam in of.slams if slam != OURS]
+
+
+def listing(of: Comparison) -> str:
+    """Who wins where, in words: position error."""
+    lines = []
+    for scene in of.scenes:
+        for rival in _rivals(of):
+            said = verdicts(of.pairs(scene, rival, ATE), of.dynamisms, ATE)
+            over = of.over_levels(scene, rival, ATE)
+            word = {1: "better", -1: "**beaten**", 0: "no clear difference"}[verdict(over, ATE)]
+            lines.append(
+                f"- {scene}, against `{rival}`: {said}; over all levels {word}, nearer on "
+                f"{over.wins} of {over.wins + over.ties + over.losses} seeds."
+            )
+    return "\n".join(lines)
+
+
+def scanners(full: Comparison, noise: Comparison) -> str:
+    """Shunting and the ordinary grid, with every error of the scanner and with noise only."""
+    head = ["", "`shunting`, cm", "`occupancy`, cm", "difference over all levels, cm", "seeds won"]
+    rows = []
+    for scene in full.scenes:
+        for name, of in (("noise only", noise), ("every error", full)):
+            over = of.over_levels(scene, GRID, ATE)
+            rows.append([
+                f"{scene}, {name}",
+                *(_span(_medians(of, scene, slam), 100.0, 2) for slam in (OURS, GRID)),
+                interval(over, ATE, 2),
+                f"{over.wins} of {over.wins + over.ties + over.losses}",
+            ])  # fmt: skip
+    return table(head, rows)
+
+
+def maps(of: Comparison) -> str:
+    """Medians of both maps over the levels, and the difference with its interval."""
+    head = ["", "`shunting`", "`occupancy`", "difference over all levels", "verdict"]
+    rows = []
+    for scene in of.scenes:
+        for metric, (name, places) in MAPS.items():
+            if not _medians_or_none(of, scene, metric):
+                continue
+            factor = METRICS[metric].factor
+            over = of.over_levels(scene, GRID, metric)
+            word = {1: "better", -1: "**beaten**", 0: "no clear difference"}[verdict(over, metric)]
+            spans = [
+                _span(_medians(of, scene, slam, metric), factor, places) for slam in (OURS, GRID)
+            ]
+            rows.append([f"{scene}: {name}", *spans, interval(over, metric, places), word])
+    return table(head, rows)
+
+
+def _medians_or_none(of: Comparison, scene: str, metric: str) -> bool:
+    return f"{scene} {OURS} {metric}" in of.data["levels"]
+
+
+def comparing_made(of: Comparison) -> str:
+    """What was run, where and by which code."""
+    rate = 37.5 / of.data["every"]
+    return (
+        f"Measured with the command at the top of this page: {len(of.data['seeds'])} runs of "
+        f"{of.data['seconds']:g} s at each level, every error of the LMS-221, {rate:.1f} scans a "
+        f"second, Pioneer-class odometry ({made(of.data, of.data['seeds'])}; all numbers: "
+        "[results/comparison.json](results/comparison.json)). Median unaligned ATE in cm with its "
+        "95 % interval, and the rank correlation of dynamism with the medians:"
+    )
+
+
+def comparing_cost(of: Comparison, costs: dict[str, Any]) -> str:
+    """Of the whole comparison."""
+    runs = len(of.scenes) * len(of.dynamisms) * len(of.data["seeds"])
+    row = costs["costs"]["comparison"]
+    each = row["s"]
+    return (
+        f"A run with its four SLAMs takes {each:.0f} s of processor time "
+        f"({made(costs, row['seeds'])}); the whole comparison, {runs} simulations and "
+        f"{runs * len(of.slams)} runs, about {round(runs * each / 60.0)} minutes."
+    )
+
+
+def film(costs: dict[str, Any]) -> str:
+    """Of a second of film."""
+    s = {name: row["s"] for name, row in costs["costs"].items()}
+    measured = made(costs, costs["costs"]["film, with 3D"]["seeds"])
+    return (
+        "A second of film at 30 fps and 1280 × 720, simulation and SLAM included, takes "
+        f"{s['film, without 3D']:.1f} s of processor time without the 3D view and "
+        f"{s['film, with 3D']:.1f} s with it, drawn without a graphics card (480 × 300, ten times "
+        f"a second); the encoder takes {s['encoder, with 3D']:.1f} s more ({measured})."
+    )
+
+
+def _factors(of: Comparison) -> str:
+    """How many times as far off the grid is, over scenes and levels."""
+    ratios = [
+        theirs / ours
+        for scene in of.scenes
+        for ours, theirs in zip(
+            _medians(of, scene, OURS), _medians(of, scene, GRID), strict=True
+        )
+    ]  # fmt: skip
+    return _span(ratios, 1.0, 1)
+
+
+def _against_grid(of: Comparison, metric: str = ATE) -> str:
+    """``in the arena the two tie (−0.22 cm, 95 % interval [−0.40, 0.01])``, scene by scene."""
+    said = []
+    for scene in of.scenes:
+        over = of.over_levels(scene, GRID, metric)
+        word = {1: "`shunting` is nearer", -1: "**`occupancy` is nearer**", 0: "the two tie"}
+        said.append(f"in the {scene} {word[verdict(over, metric)]} ({_cm(over)})")
+    return listed(said)
+
+
+def comparing_grid(of: Comparison) -> str:
+    """The ordinary grid, over all levels, unaligned and aligned."""
+    return (
+        "Over all levels, `shunting` less `occupancy`, the ordinary grid: "
+        f"{_against_grid(of)}. With the paths aligned: {_against_grid(of, ALIGNED)}."
+    )
+
+
+def _cm(pair: Interval) -> str:
+    value, low, high = (shown(100.0 * n, 2) for n in (pair.value, pair.low, pair.high))
+    return f"{value} cm, 95 % interval [{low}, {high}]"
+
+
+def tie(full: Comparison, noise: Comparison) -> str:
+    """Beside the table of the scanner with noise only."""
+    highest = [
+        f"{_cm(pair)} in the {scene}"
+        for scene in full.scenes
+        if (pair := full.pairs(scene, GRID, ATE)[-1]) is not None
+    ]
+    return (
+        "**The factors over the ordinary grid (`occupancy`) in this table are for a scanner with "
+        "noise only.** With every error of the LMS-221, on the same seeds at dynamism "
+        f"{full.dynamisms[0]:g} to {full.dynamisms[-1]:g}: {_against_grid(full)}. With noise only: "
+        f"{_against_grid(noise)}; the grid is then {_factors(noise)} times as far off, with every "
+        f"error {_factors(full)} times. These are differences of `shunting` less `occupancy` over "
+        f"all levels; at dynamism {full.dynamisms[-1]:g} alone, with every error, "
+        f"{listed(highest)} ({made(full.data, full.data['seeds'])}; [results](results))."
+    )
+
+
+def readme_comparison(full: Comparison, noise: Comparison) -> str:
+    """Under the picture of the README."""
+    said = []
+    for scene in full.scenes:
+        ends = []
+        for slam in (OURS, GRID, EKF):
+            medians = _medians(full, scene, slam)
+            ends.append(f"`{slam}` {100.0 * medians[0]:.1f} and {100.0 * medians[-1]:.1f}")
+        said.append(f"in the {scene} {', '.join(ends)}")
+    return (
+        f"With every error of the scanner, the median position error in cm at dynamism "
+        f"{full.dynamisms[0]:g} and {full.dynamisms[-1]:g} is {'; '.join(said)}. Against an "
+        "ordinary grid with the same matcher (`occupancy`), over all levels: "
+        f"{_against_grid(full)}. With a scanner that has noise only the grid is {_factors(noise)} "
+        f"times as far off. Who wins where, and where `shunting` does not: "
+        f"[docs/comparing.md](docs/comparing.md) ({made(full.data, full.data['seeds'])})."
+    )
