@@ -95,7 +95,6 @@ def locked_folder(out: Path) -> Iterator[None]:
         if others and not (out / RECIPE).exists():
             raise OutputError(f"{out} holds files that mobilia did not write: choose another --out")
         with locks.locked(out):
-            (out / SUMS).unlink(missing_ok=True)  # what follows changes files: whole at the end
             yield
             write_sums(out, GROWING)
     except OutputError:
@@ -139,6 +138,8 @@ def put_tables(folder: Path) -> None:
         return
     try:
         places = {folder}
+        (folder / SUMS).unlink(missing_ok=True)  # of the earlier files; not whole until it is anew
+        sync(folder)
         for file in sorted(file for file in ready.rglob("*") if file.is_file()):
             place = folder / file.relative_to(ready)
             make_folder(place.parent)

@@ -16,7 +16,7 @@ import typer
 from scripts import results
 from scripts.damage import Tally, damaged, damages, try_consumers, try_verify
 from scripts.footage import open_run
-from scripts.output import LOCK, locked_folder, whole_folder, write_recipe
+from scripts.output import locked_folder, whole_folder, write_recipe
 from scripts.report.page import REPORT
 from scripts.samples import COMPARED, SAMPLES
 from scripts.verify import verify
@@ -25,6 +25,7 @@ from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe
 from sim.recording.sums import SUMS, add_to_sums, check_vouched, read_sums, write_sums
 from sim.recording.verify import METADATA, STATUS, Finding, check_bag
+from slam import locks
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 
 EPISODES = ["arena-d0.5-s0000", "arena-d0.5-s0001"]
@@ -157,7 +158,7 @@ def in_other_words(change: Callable[[str], str], name: str = SUMS) -> Callable[[
         (linked, 3, "is no folder"),
         (append("notes.txt"), 4, "notes.txt is foreign"),
         (append(f"{EPISODES[0]}/.hidden"), 4, ".hidden is foreign"),
-        (append(LOCK), 4, ".lock is left of a run that was killed"),
+        (append(locks.LOCK), 4, ".lock is left of a run that was killed"),
         (lambda folder: (folder / ".a-d1.host.1.part").mkdir(), 4, "was killed"),
         (lambda folder: (folder / EPISODES[0] / "empty").mkdir(), 4, "empty is foreign"),
         (lambda folder: (folder / "l").symlink_to(folder / "dataset.json"), 4, "l is a link"),
