@@ -338,7 +338,7 @@ def main() -> None:
     parser.add_argument("--resumes", type=int, default=8, help="disks to go on from, of each case")
     parser.add_argument("--draws", type=int, default=5, help="of the third way, at each step")
     parser.add_argument("--pairs", type=int, default=5, help="of the runs that measure the cost")
-    parser.add_argument("--seconds", type=float, default=10.0, help="length of their episodes")
+    parser.add_argument("--seconds", type=float, default=60.0, help="length of their episodes")
     parser.add_argument("--only", default="", help="cases whose name begins so")
     wanted = parser.parse_args()
     outcomes: list[Outcome] = []
