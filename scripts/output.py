@@ -16,7 +16,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from sim.recording.sums import SUMS, check_vouched, write_sums
+from sim.recording.sums import check_vouched, write_sums
 from sim.versions import WORLD
 from slam import locks
 from slam.errors import LogFormatError, OutputError
@@ -96,7 +96,6 @@ def locked_folder(out: Path) -> Iterator[None]:
             raise OutputError(f"{out} holds files that mobilia did not write: choose another --out")
         with locks.locked(out):
             yield
-            write_sums(out, GROWING)
     except OutputError:
         raise
     except OSError as error:
@@ -121,6 +120,7 @@ def together(folder: Path) -> Iterator[Path]:
         remove(staged)
         staged.mkdir()
         yield staged
+        write_sums(staged, GROWING, over=folder)
         put(staged, folder / READY)
     except OutputError as error:
         raise OutputError(str(error).replace(str(staged), str(folder))) from error
@@ -138,8 +138,6 @@ def put_tables(folder: Path) -> None:
         return
     try:
         places = {folder}
-        (folder / SUMS).unlink(missing_ok=True)  # of the earlier files; not whole until it is anew
-        sync(folder)
         for file in sorted(file for file in ready.rglob("*") if file.is_file()):
             place = folder / file.relative_to(ready)
             make_folder(place.parent)

@@ -37,14 +37,15 @@ from scripts.generate import generate
 from scripts.live import on_scene
 from scripts.output import READY, machine
 from scripts.session import Outputs
-from slam import files
+from sim.recording.sums import BESIDE, SUMS
+from slam import files, locks
 from slam.maps import write_map
 from slam.shunting import ShuntingSlam
 from slam.system import Raster
 
 CLOCKS = ("milliseconds", "ms_per_scan_p50", "ms_per_scan_p99", "peak_memory_mb", "cpu_s")
-OF_CLOCKS = ("SHA256SUMS",)  # beside files that hold clock readings
-HIDDEN = (".lock", READY)
+OF_CLOCKS = (SUMS, BESIDE)  # hashes of files that hold clock readings
+HIDDEN = (*locks.NAMES, READY)
 _ASIDE = (".old", ".earlier.pgm")
 
 
@@ -196,7 +197,7 @@ def _difference(case: Case, state: State, wanted: State) -> str:
 
 def _timeless(name: str, data: bytes | None) -> object:
     """The content of a file without clock readings."""
-    if data is None or Path(name).name in OF_CLOCKS:
+    if data is None or name.endswith(OF_CLOCKS):
         return None
     if name.endswith("results.json"):
         return _without(json.loads(data))

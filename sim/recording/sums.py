@@ -56,20 +56,24 @@ def text_of(sums: Mapping[str, str]) -> str:
     return "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items()))
 
 
-def write_sums(folder: Path, ours: Sequence[str] = ("*",)) -> None:
+def write_sums(folder: Path, ours: Sequence[str] = ("*",), *, over: Path | None = None) -> None:
     """Of every file in the folder and below but hidden ones, by relative name.
 
     ours  patterns of the names that are listed; whatever else lies there stays foreign
+    over  folder into which all that lies here will be moved; what stays there is listed too
 
     One with its hash beside it gets that hash: it may have been damaged since.
     """
-    files, _ = tree(folder)
-    shown = [
-        name
-        for name in files - {SUMS}
-        if not _hidden(name) and name.isprintable() and any(fnmatchcase(name, p) for p in ours)
-    ]
-    write_text(folder / SUMS, text_of({name: _digest(folder / name) for name in shown}))
+    found = {name: place for place in (over, folder) if place for name in tree(place)[0]}
+    shown = {
+        name: _digest(place / name)
+        for name, place in found.items()
+        if name != SUMS
+        and not _hidden(name)
+        and name.isprintable()
+        and any(fnmatchcase(name, pattern) for pattern in ours)
+    }
+    write_text(folder / SUMS, text_of(shown))
 
 
 def add_to_sums(path: Path) -> None:

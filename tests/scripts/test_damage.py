@@ -16,7 +16,7 @@ import typer
 from scripts import results
 from scripts.damage import Tally, damaged, damages, try_consumers, try_verify
 from scripts.footage import open_run
-from scripts.output import locked_folder, whole_folder, write_recipe
+from scripts.output import locked_folder, together, whole_folder, write_recipe
 from scripts.report.page import REPORT
 from scripts.samples import COMPARED, SAMPLES
 from scripts.verify import verify
@@ -284,14 +284,20 @@ def test_a_flipped_recording_and_a_torn_entry_are_made_again(comparison, tmp_pat
     assert REPORT in read_sums(folder)
 
 
-def test_a_folder_that_grows_is_vouched_for_only_when_it_is_done(tmp_path):
+def test_a_folder_that_grows_is_vouched_for_when_its_tables_are_in_place(tmp_path):
     out = tmp_path / "out"
     with locked_folder(out):
         write_recipe(out, "compare", {})
-    assert SUMS in {path.name for path in out.iterdir()}
-    with pytest.raises(KeyboardInterrupt), locked_folder(out):
-        raise KeyboardInterrupt
-    assert "incomplete" in verdicts(out)
+        assert "incomplete" in verdicts(out)
+        (out / "kept.npz").write_bytes(b"a job's result")
+        with together(out) as staged:
+            write_recipe(staged, "compare", {"more": 1})
+    assert set(read_sums(out)) == {RECIPE, "kept.npz"}
+    before = (out / SUMS).read_bytes()
+    with pytest.raises(TypeError), locked_folder(out), together(out) as staged:
+        write_recipe(staged, "compare", {"more": object()})
+    assert (out / SUMS).read_bytes() == before  # and all that it lists is as it was
+    assert check_vouched(out / RECIPE) is None
 
 
 def test_a_drive_within_a_comparison_is_a_result_of_its_own(comparison, tmp_path):

@@ -96,7 +96,8 @@ def test_finished_things_are_synced_once(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "fsync", counted)
     a_folder("text")(tmp_path)
     part = f".run.{os.getpid()}.part"
-    assert sorted(seen) == sorted([f"{part}/a.txt", f"{part}/recipe.json", part, str(tmp_path)])
+    whole = ["a.txt", "recipe.json", "SHA256SUMS"]
+    assert sorted(seen) == sorted([*(f"{part}/{name}" for name in whole), part, str(tmp_path)])
     seen.clear()
     write_text(tmp_path / "b.txt", "text")
     assert seen == [f".b.{os.getpid()}.part.txt", str(tmp_path)]
