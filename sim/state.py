@@ -45,7 +45,7 @@ def unpack(block: bytes) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
             arrays[name] = array.reshape(shape).copy()
             at += array.nbytes
         words: dict[str, Any] = dict(header["words"])
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise InvalidValueError(f"this saved world is damaged: {error}") from error
     if at != len(block):
         raise InvalidValueError(f"this saved world is damaged: {len(block) - at} bytes too many")

@@ -12,6 +12,7 @@ from slam.errors import InvalidValueError
 from slam.frames import Float, Odometry
 
 MOST_STEP_M = 1000.0  # between two frames: farther, the stream is broken or of another run
+MOST_POSE = 1e9  # m and rad from the origin: there a double still tells 0.1 micrometres
 MOST_STD = 1e4  # m and rad, of an increment; with more, rounding would eat what is known beside
 HUGE = 1.0  # m^2 or rad^2: from there on,
 MOST_CORRELATION = 1.0 - 1e-6  # exact correlations would leave nothing of what is known beside
@@ -57,4 +58,11 @@ def increment(before: Odometry, now: Odometry) -> Float:
             f"Odometry.T_odom_robot must move by at most {MOST_STEP_M:g} m from frame to frame, "
             f"got {distance:g} m from {before.stamp_ns} ns to {now.stamp_ns} ns"
         )
+    for odometry in (before, now):
+        farthest = max(map(abs, odometry.T_odom_robot.tolist()))
+        if farthest > MOST_POSE:
+            raise InvalidValueError(
+                f"Odometry.T_odom_robot must lie within {MOST_POSE:g} m and rad, got {farthest:g} "
+                f"at {odometry.stamp_ns} ns"
+            )
     return se2.between(before.T_odom_robot, now.T_odom_robot)

@@ -10,12 +10,17 @@ from types import ModuleType
 import numpy as np
 
 from slam import steps
-from slam.errors import InvalidValueError, MissingDependencyError, SlamFailedError
+from slam.errors import (
+    InvalidValueError,
+    MissingDependencyError,
+    MobiliaError,
+    SlamFailedError,
+)
 from slam.frames import Float, Frame, LaserSpec, Odometry
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.impressions import from_scan
 from slam.shunting.motion import Prediction, predict
-from slam.system import Estimate, Raster
+from slam.system import Estimate, Raster, told
 from slam.trajectory import Trajectory
 
 _BEAMS = ShuntingConfig()  # guests get the very points that "shunting" sees
@@ -63,7 +68,12 @@ class Guest(ABC):
         else:
             twist = prediction.twist
         points_robot = from_scan(frame.scan, np.asarray(twist), _BEAMS).points_robot
-        T_map_robot, diagnostics = self._locate(points_robot, prediction)
+        try:
+            T_map_robot, diagnostics = self._locate(points_robot, prediction)
+        except MobiliaError:
+            raise
+        except Exception as error:  # somebody else's code raises whatever it likes
+            raise SlamFailedError(f"{type(self).__name__}: {told(error)}") from error
         if not np.isfinite(T_map_robot).all():
             raise SlamFailedError(f"{type(self).__name__} ended at {T_map_robot.tolist()}", "nan")
         self._before, self._T_map_robot = frame.odometry, T_map_robot

@@ -65,6 +65,8 @@ def _overlap(
     """
     a, b, d = cov
     det = a * d - b * b
+    if det <= 0.0:  # rounding has left nothing across
+        b, det = 0.0, a * d
     pa, pb, pd = d / det, -b / det, a / det
     wide, high = max(3.0, 3.3 / math.sqrt(pa)), max(3.0, 3.3 * math.sqrt(d))
     lean = b / d  # each row's Gaussian is centred at u + lean * dv, with precision pa,

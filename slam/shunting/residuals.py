@@ -95,6 +95,8 @@ def _partner(
     n = len(points)
     ax, ay = points[first, 0] - laser[0], points[first, 1] - laser[1]
     away = math.sqrt(ax * ax + ay * ay)
+    if away == 0.0:  # at the laser itself
+        return -1
     k, aside, onward, dx, dy = first, 0.0, 0.0, 0.0, 0.0
     # Across the beams: along the wall, the noise of the two would decide which are paired.
     while k + 1 < n and joined[k] and aside < APART_CELLS * cell:

@@ -93,7 +93,7 @@ class ShuntingSlam:
             prediction = replace(prediction, carried=self._belief.odometry_part(motion))
         evidence = None
         if self._recovery is None:
-            match = self._match(observations, prediction)
+            match = _near(self._match(observations, prediction), prediction)
             if match.slipped:
                 prediction = replace(prediction, covariance=SLIPPED)
             evidence = self._look(observations, match, prediction.elapsed)
@@ -296,3 +296,11 @@ class ShuntingSlam:
             stamps_ns=np.array(self._stamps, dtype=np.int64),
             poses=self._loops.corrected(np.array(self._poses).reshape(-1, 3)),
         )
+
+
+def _near(match: Match, prediction: Prediction) -> Match:
+    """The match, or odometry alone where rounding has carried it past all places and numbers."""
+    off = np.abs(match.T_map_robot - prediction.T_map_robot)
+    if off.max() <= steps.MOST_STEP_M and np.isfinite(match.information).all():
+        return match
+    return unmatched(prediction.T_map_robot, matched=0.0, score=0.0)

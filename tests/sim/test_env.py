@@ -198,3 +198,99 @@ def test_wrong_settings_are_refused():
         MobiliaEnv("arena", render_mode="human3000")
     with pytest.raises(InvalidValueError, match="time_limit_s"):
         make("mobilia/Arena-v1", time_limit_s=0.0)
+
+
+ODD_ACTIONS = [
+    np.array([np.nan, 0.0]),
+    np.array([0.0, np.inf]),
+    np.array([-np.inf, 0.0]),
+    np.zeros(3),
+    np.zeros((1, 2)),
+    0.5,
+    None,
+    "go",
+    ["0.1", "0.2"],
+    [None, 1.0],
+    [True, False],
+    [1j, 0.0],
+    [[0.0], [0.0, 1.0]],
+]
+
+
+@pytest.mark.parametrize("action", ODD_ACTIONS, ids=repr)
+def test_what_is_no_action_is_refused_and_nothing_moves(action):
+    env = MobiliaEnv("arena")
+    env.reset(seed=0, options={"n_chairs": 0})
+    before = env.simulation.world.time_ns
+    with pytest.raises(InvalidValueError, match="two finite numbers"):
+        env.step(action)
+    assert env.simulation.world.time_ns == before
+
+
+def test_finite_actions_beyond_the_space_are_clipped():
+    def after(action) -> dict:
+        env = MobiliaEnv("arena")
+        env.reset(seed=0, options={"n_chairs": 0})
+        return env.step(action)[0]
+
+    assert data_equivalence(after([1e30, -7]), after(np.array([1.0, -1.0], np.float32)), exact=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"options": 5}, "reset options must be a dictionary or None, got 5"),
+        ({"options": {3: 1}}, "words as keys"),
+        ({"options": {"goal": (1e9, 0.0)}}, "option goal must lie within 10000 m"),
+        ({"options": {"goal": "ab"}}, "option goal must be"),
+        ({"seed": -1}, "seed must be a whole number >= 0"),
+        ({"seed": "a"}, "seed must be a whole number"),
+        ({"seed": 3.5}, "seed must be a whole number"),
+        ({"seed": True}, "seed must be a whole number"),
+    ],
+)
+def test_an_odd_reset_is_refused_and_the_episode_goes_on(arguments, message):
+    env = MobiliaEnv("arena")
+    env.reset(seed=0, options={"n_chairs": 0})
+    with pytest.raises(InvalidValueError, match=message):
+        env.reset(**arguments)
+    env.step(np.zeros(2))
+
+
+def test_numpy_s_and_huge_seeds_are_seeds():
+    env = MobiliaEnv("arena")
+    same = [env.reset(seed=s, options={"n_chairs": 1})[0] for s in (7, np.int64(7), np.uint8(7))]
+    assert data_equivalence(same[0], same[1], exact=True)
+    assert data_equivalence(same[0], same[2], exact=True)
+    env.reset(seed=2**70, options={"n_chairs": 1})
+
+
+def test_a_step_before_the_first_reset_is_an_error_of_ours_and_of_gymnasium():
+    with pytest.raises(MobiliaError, match="reset") as caught:
+        MobiliaEnv("arena").step(np.zeros(2))
+    assert isinstance(caught.value, gymnasium.error.ResetNeeded)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"time_limit_s": [1]},
+        {"time_limit_s": math.nan},
+        {"terminate_on_collision": "no"},
+        {"labels": 1},
+        {"laser": 5},
+        {"laser": np.zeros(2)},
+        {"scene": None},
+        {"odometry": 3},
+        {"render_mode": np.zeros(2)},
+        {"view": "x"},
+        {"render_size": (0, 5)},
+        {"render_size": (10**6, 5)},
+        {"render_size": 5},
+    ],
+    ids=repr,
+)
+def test_odd_arguments_are_refused_by_name(settings):
+    (name,) = settings
+    with pytest.raises(InvalidValueError, match=name):
+        MobiliaEnv(**({"scene": "arena"} | settings))

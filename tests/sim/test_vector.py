@@ -9,7 +9,8 @@ import pytest
 from gymnasium.utils.env_checker import data_equivalence
 
 import sim  # noqa: F401  (registers the environments)
-from slam.errors import InvalidValueError
+from sim.vector import MobiliaVectorEnv
+from slam.errors import InvalidValueError, MobiliaError
 
 N, STEPS = 3, 14
 SETTINGS = {"time_limit_s": 0.25, "dynamism": 0.8}
@@ -88,9 +89,30 @@ def test_wrong_settings_are_refused():
         make(n_threads=0)
     with pytest.raises(InvalidValueError, match="autoreset_mode"):
         make(autoreset_mode="soon")
-    with pytest.raises(InvalidValueError, match="2 seeds for 3"):
+    with pytest.raises(InvalidValueError, match="seed must be 3 seeds"):
         make().reset(seed=[1, 2])
     with pytest.raises(InvalidValueError, match="when making the environments"):
         make().reset(seed=1, options={"resolution_deg": 1.0})
     with pytest.raises(InvalidValueError, match="unknown reset option 'gaol'"):
         make().reset(seed=1, options={"gaol": 1})
+
+
+def test_odd_actions_seeds_and_masks_are_refused_before_any_room_moves():
+    rooms = MobiliaVectorEnv(2, scene="arena")
+    with pytest.raises(InvalidValueError, match="seed must be 2 seeds"):
+        rooms.reset(seed=[1, 2, 3])
+    with pytest.raises(MobiliaError, match="reset"):
+        rooms.step(np.zeros((2, 2)))
+    rooms.reset(seed=[1, np.int64(2)], options={"n_chairs": 0, "reset_mask": [True, True]})
+    for odd in ([[0.0, 0.0], [0.0, np.nan]], np.zeros(2), np.zeros((3, 2)), None, "go", 0.0):
+        with pytest.raises(InvalidValueError, match=r"\(2, 2\) finite numbers"):
+            rooms.step(odd)
+    assert [env.simulation.world.time_ns for env in rooms.envs] == [
+        rooms.envs[0].simulation.world.time_ns
+    ] * 2
+    for options in (5, {"reset_mask": [1, 0]}, {"reset_mask": "ab"}):
+        with pytest.raises(InvalidValueError, match="option"):
+            rooms.reset(options=options)
+    with pytest.raises(InvalidValueError, match="seed must be a whole number"):
+        rooms.reset(seed=3.5)
+    rooms.close()

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from slam import Frame, Odometry, create, se2, steps
+from slam import Frame, LaserSpec, Odometry, Scan, create, se2, steps
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S
 from slam.points import PointWorld, PointWorldConfig
@@ -101,3 +102,25 @@ def test_steps_are_those_of_se2_and_their_limit_is_told():
 def test_a_twist_that_would_tear_a_scan_apart_is_refused(twist):
     with pytest.raises(InvalidValueError, match=r"Odometry\.twist must lie within 1000 m/s"):
         Odometry(stamp_ns=0, T_odom_robot=np.zeros(3), twist=twist)
+
+
+@pytest.mark.parametrize("name", ["odometry", "shunting", "occupancy", "ekf", "kiss-icp", "karto"])
+def test_every_slam_refuses_frames_out_of_order_at_once(name):
+    """And goes on with the next one that is in order."""
+    spec = LaserSpec(n_beams=181, angle_min=-1.57, angle_increment=math.radians(1.0))
+
+    def frame(stamp_ns: int) -> Frame:
+        ranges = 3.0 + np.sin(np.arange(181) * 0.1)
+        return Frame(
+            stamp_ns=stamp_ns,
+            odometry=Odometry(stamp_ns=stamp_ns, T_odom_robot=np.zeros(3)),
+            scan=Scan(stamp_ns=stamp_ns, ranges=ranges, spec=spec),
+        )
+
+    slam = create(name)
+    slam.update(frame(10**9))
+    for stamp_ns in (10**9, 10**9 - 1, -(2**63)):
+        with pytest.raises(InvalidValueError, match="frames must come in order"):
+            slam.update(frame(stamp_ns))
+    slam.update(frame(2 * 10**9))
+    assert slam.trajectory().stamps_ns.tolist() == [10**9, 2 * 10**9]
