@@ -13,7 +13,7 @@ def main() -> None:
     interrupt.install()
     try:
         folder.leave_out()
-        from sim import gl
+        from sim.view import gl
 
         warning = gl.sanitise_environment()  # before anything imports mujoco, as verbs do
         from scripts.cli import main as command_line

@@ -11,22 +11,22 @@ import typer
 from rich.logging import RichHandler
 
 from scripts import interrupt
-from scripts.bench import bench
-from scripts.blame.verb import blame
-from scripts.closed_loop.verb import drive
-from scripts.compare.verb import compare
 from scripts.console import console, fail, note
-from scripts.demo import demo
-from scripts.export import export
-from scripts.generate import generate
-from scripts.listing import listing
 from scripts.many import ManyValues
-from scripts.render import render
-from scripts.report.verb import report
-from scripts.reproduce.verb import reproduce
-from scripts.run import run
-from scripts.sensor_card import sensor_card
-from scripts.verify import verify
+from scripts.verbs.bench import bench
+from scripts.verbs.blame import blame
+from scripts.verbs.compare import compare
+from scripts.verbs.demo import demo
+from scripts.verbs.drive import drive
+from scripts.verbs.export import export
+from scripts.verbs.generate import generate
+from scripts.verbs.listing import listing
+from scripts.verbs.render import render
+from scripts.verbs.report import report
+from scripts.verbs.reproduce import reproduce
+from scripts.verbs.run import run
+from scripts.verbs.sensor_card import sensor_card
+from scripts.verbs.verify import verify
 from slam.errors import MobiliaError
 from slam.names import look_in
 

@@ -18,7 +18,7 @@ from scipy.ndimage import maximum_filter
 from slam import se2
 from slam.files import replacing
 from slam.frames import NS_PER_S, Float
-from slam.shunting.layers import Changes
+from slam.shunting.map.export import Changes
 from slam.system import Raster
 from slam.trajectory import Trajectory
 

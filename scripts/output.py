@@ -16,8 +16,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from sim.core.versions import WORLD
 from sim.recording.sums import check_vouched, write_sums
-from sim.versions import WORLD
 from slam import locks
 from slam.errors import LogFormatError, OutputError
 from slam.files import (

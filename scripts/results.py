@@ -9,17 +9,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from scripts.compare import folder as compared
-from scripts.compare.again import is_run
-from scripts.compare.plan import Run
+from scripts.comparison import folder as compared
+from scripts.comparison.again import is_run
+from scripts.comparison.plan import Run
 from scripts.output import MAX_RECIPE_BYTES, RECIPE
-from scripts.session import file_name
+from scripts.single_run.session import file_name
 from sim.recording.dataset import PLAN, check_dataset
 from sim.recording.sums import SUMS, Fault, check_vouched, faults
 from sim.recording.verify import METADATA, Finding, check_hashes, finding, listed_in
 from slam.errors import LogFormatError
 from slam.maps import read_map
-from slam.shunting import memory
+from slam.shunting.map import io as memory
 
 _TABLES = ("runs.csv", "runs.json", "levels.csv")
 # What a verb always leaves, by the command in the recipe: a lost line is no way out.

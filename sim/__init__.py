@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The moving world: importing it registers an environment ``mobilia/<Scene>-v1`` for each scene.
 
-The number is the version of the world (``sim.versions``); ids of older ones say what became of it.
+The number is the version of the world (``sim.core.versions``); ids of older ones say what became
+of it.
 """
 
 from functools import partial
 
 from gymnasium.envs.registration import register, registry
 
-from sim.versions import WORLD, gone
+from sim.core.versions import WORLD, gone
 
 _SCENES = {
     "Arena": "arena",
@@ -30,7 +31,7 @@ for _name, _scene in _SCENES.items():
             continue
         register(
             id=_id,
-            entry_point="sim.env:MobiliaEnv",
-            vector_entry_point="sim.vector:MobiliaVectorEnv",
+            entry_point="sim.gym.env:MobiliaEnv",
+            vector_entry_point="sim.gym.vector:MobiliaVectorEnv",
             kwargs={"scene": _scene},
         )

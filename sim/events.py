@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.moments import Moment
-from sim.world import World
+from sim.world.world import World
 from slam import se2
 from slam.frames import NS_PER_S, BeamLabels, Float, Frame
 

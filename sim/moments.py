@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.drive import TourConfig
-from sim.pilot import Pilot
+from sim.driving.drive import TourConfig
+from sim.driving.pilot import Pilot
 from sim.simulation import Simulation, n_frames
 from slam.frames import Float, Frame
 

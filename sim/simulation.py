@@ -10,20 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from sim import state
-from sim.contacts import Contact
-from sim.drive import TourConfig
-from sim.dynamism import Dynamism
-from sim.labels import BeamLabeller
-from sim.lidar import Lms221, Lms221Config, ScanResult
-from sim.lidar_link import SerialLink, over_link
-from sim.odometry import WheelOdometry
-from sim.pilot import Pilot
-from sim.robot import DriveConfig
-from sim.seeds import Seeds
-from sim.substeps import plain
-from sim.tag_cameras import TagCameras, TagReading
-from sim.world import SUBSTEPS_PER_S, World
+from sim.actors.robot import DriveConfig
+from sim.core import state
+from sim.core.contacts import Contact
+from sim.core.dynamism import Dynamism
+from sim.core.seeds import Seeds
+from sim.driving.drive import TourConfig
+from sim.driving.pilot import Pilot
+from sim.sensors.lidar.link import SerialLink, over_link
+from sim.sensors.lidar.lms221 import Lms221, Lms221Config, ScanResult
+from sim.sensors.odometry.encoders import WheelOdometry
+from sim.sensors.tag_cameras import TagCameras, TagReading
+from sim.world.labels import BeamLabeller
+from sim.world.substeps import plain
+from sim.world.world import SUBSTEPS_PER_S, World
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import BeamLabels, Float, Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata
@@ -76,14 +76,14 @@ class Simulation:
     scene      name of a registered scene, or ``module:function``
     seed       whole number or ``Seeds``; every part draws from its own stream
     dynamism   0 (nothing moves) to 1, or the rates themselves
-    moving_share  in [0, 1]: of the chairs, on the move at any time (``sim.rolling``)
+    moving_share  in [0, 1]: of the chairs, on the move at any time (``sim.actors.rolling``)
     laser      how the scanner is set; default ``Lms221Config()``
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
     drive      limits of the robot
     start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted
-    chairs     their physics: "planar" or "free" (``sim.castors``)
+    chairs     their physics: "planar" or "free" (``sim.actors.castors``)
     tags       "truth", or "camera": beside the truth, ``tag_reading`` is what a ceiling camera
-               would know of the robot by now (``sim.tag_cameras``)
+               would know of the robot by now (``sim.sensors.tag_cameras``)
     labels     whether frames carry truth per beam
     options    passed on to ``scenes.build``: ``scan_height_m`` of the robot's scanner above the
                floor (0.36), and the scene's own, e.g. ``n_chairs=10``
@@ -281,8 +281,8 @@ def stream(
 ) -> Stream:
     """A stream that simulates a tour anew each time it is iterated, byte for byte the same.
 
-    baud      of the scanner's serial line: most scans are lost at 38400 (``sim.lidar_link``); None:
-              all arrive
+    baud      of the scanner's serial line: most scans are lost at 38400
+              (``sim.sensors.lidar.link``); None: all arrive
     settings  as for ``Simulation``
     """
     probe = Simulation(scene, **settings)

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from slam import se2, steps
+from slam import se2
 from slam.frames import Float, Frame, Odometry
+from slam.frontend import odometry_steps
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
 
@@ -35,13 +36,13 @@ class OdometrySlam:
         """The odometry pose relative to the first frame.
 
         Raises ``InvalidValueError`` for a frame that does not come after the last one and where a
-        step is none (``slam.steps``), as all SLAMs here do.
+        step is none (``slam.frontend.odometry_steps``), as all SLAMs here do.
         """
-        steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
+        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         now = frame.odometry
         if self._first is None or self._before is None:
             self._first = self._before = now
-        steps.increment(self._before, now)
+        odometry_steps.increment(self._before, now)
         self._before = now
         T_map_robot = se2.between(self._first.T_odom_robot, now.T_odom_robot)
         increment_covariance = now.increment_covariance
@@ -51,7 +52,7 @@ class OdometrySlam:
                 self._covariance,
                 self._T_map_robot,
                 T_before_now,
-                steps.known(increment_covariance),
+                odometry_steps.known(increment_covariance),
             )
         self._T_map_robot = T_map_robot
         self._stamps.append(frame.stamp_ns)

@@ -16,9 +16,9 @@ import scenes
 from scenes.scene import Scene
 from scripts.closed_loop.runs import Driven
 from scripts.figures import COLORS, color_of, save, styled
-from sim.floorplan import FloorPlan
-from sim.mapview import MapView
-from sim.world import World
+from sim.view.floorplan import FloorPlan
+from sim.view.mapview import MapView
+from sim.world.world import World
 
 Row = dict[str, Any]
 PX_PER_M = 40

@@ -11,9 +11,9 @@ import scenes
 import sim
 import slam
 from scripts.closed_loop import runs
-from scripts.compare.plan import scripts_of, source_of, sources
+from scripts.comparison.plan import scripts_of, source_of, sources
 from scripts.jobs import Job
-from scripts.session import file_name
+from scripts.single_run.session import file_name
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError
 

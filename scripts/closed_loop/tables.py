@@ -11,7 +11,7 @@ import numpy as np
 
 from scripts.closed_loop.plan import IDENTITY
 from scripts.closed_loop.runs import Driven
-from scripts.compare.statistics import median_interval, quantile, share_interval
+from slam.evaluation.statistics import median_interval, quantile, share_interval
 
 Row = dict[str, Any]
 OUTCOMES = ("reached", "wrong", "given up", "failed")

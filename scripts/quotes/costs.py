@@ -34,7 +34,7 @@ def called(words: Sequence[str]) -> tuple[float, float]:
 
 
 def _call(words: list[str]) -> tuple[float, float]:
-    from sim import gl
+    from sim.view import gl
 
     gl.sanitise_environment()
     from scripts.cli import app

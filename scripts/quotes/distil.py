@@ -14,13 +14,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from scripts.compare.folder import Compared, Row, read
-from scripts.compare.plan import ENTRIES, RECORDINGS, Plan
-from scripts.compare.statistics import paired, quantile
-from scripts.compare.tables import number
-from scripts.knob import Curve
+from scripts.comparison.folder import Compared, Row, read
+from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
+from scripts.comparison.tables import number
+from scripts.experiments.dynamism_curve import Curve
 from scripts.quotes.results import RESULTS, SCHEMA, commit, write
 from slam.errors import InvalidValueError, MobiliaError
+from slam.evaluation.statistics import paired, quantile
 
 OURS = "shunting"
 CODE = ("slam", "sim", "scenes", "scripts/compare")  # what decides the numbers

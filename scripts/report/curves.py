@@ -8,7 +8,7 @@ import math
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from scripts.compare.tables import number
+from scripts.comparison.tables import number
 from scripts.report import style
 from scripts.report.metrics import METRICS, Metric
 from scripts.report.study import Study

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scripts.compare.columns import LESS_IS_BETTER, MORE_IS_BETTER
+from scripts.comparison.columns import LESS_IS_BETTER, MORE_IS_BETTER
 
 DEG = 180.0 / math.pi
 

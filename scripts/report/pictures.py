@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.transforms import Affine2D
 
-from scripts.compare.folder import RunFile
+from scripts.comparison.folder import RunFile
 from scripts.figures import error_series, in_first_frame
 from scripts.report import style
 from slam import se2
+from slam.evaluation.lost import LOST_M
 from slam.frames import Float
-from slam.lost import LOST_M
 from slam.system import Raster
 from slam.trajectory import Trajectory
 

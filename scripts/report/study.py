@@ -9,9 +9,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from scripts.compare import tables
-from scripts.compare.columns import COLUMNS
-from scripts.compare.folder import LEVELS, PAIRED, RUNS, Compared, RunFile, read
+from scripts.comparison import tables
+from scripts.comparison.columns import COLUMNS
+from scripts.comparison.folder import LEVELS, PAIRED, RUNS, Compared, RunFile, read
 from slam.errors import LogFormatError
 
 Row = dict[str, Any]

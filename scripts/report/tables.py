@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from scripts.compare.tables import FAILED
+from scripts.comparison.tables import FAILED
 from scripts.report.metrics import METRICS, Metric, digits
 from scripts.report.study import Row, Study, verdict
 

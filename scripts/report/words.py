@@ -7,8 +7,8 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 
-from scripts.compare.columns import LESS_IS_BETTER, MORE_IS_BETTER
-from scripts.compare.tables import FAILED
+from scripts.comparison.columns import LESS_IS_BETTER, MORE_IS_BETTER
+from scripts.comparison.tables import FAILED
 from scripts.report.metrics import METRICS, Metric
 from scripts.report.study import LEAST_RUNS, Study, verdict
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sim.checks import check_types
+from sim.core.checks import check_types
 from slam.errors import InvalidValueError
 
 PLANS = ("layout", "map")

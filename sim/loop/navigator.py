@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """From what a SLAM believes to the next command; knows goals, plan, scans and wheels, no truth.
 
-The way is the grid's (``sim.navgrid``), the steering the driver's (``sim.drive``): the same two
-that drive recorded episodes, there by truth.
+The way is the grid's (``sim.driving.navgrid``), the steering the driver's (``sim.driving.drive``):
+the same two that drive recorded episodes, there by truth.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenes.scene import Scene
-from sim.drive import LOOK_AHEAD_M, Driver, TourConfig
+from sim.driving.drive import LOOK_AHEAD_M, Driver, TourConfig
+from sim.driving.navgrid import NavGrid
 from sim.loop.config import LoopConfig
 from sim.loop.planner import LayoutPlanner, MapPlanner
 from sim.loop.sight import Sight
-from sim.navgrid import NavGrid
 from slam import se2
 from slam.frames import NS_PER_S, Float, Frame
 from slam.system import Estimate, Raster

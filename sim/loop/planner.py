@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from scenes.scene import Scene
-from sim.drive import TourConfig
-from sim.navgrid import NavGrid
+from sim.driving.drive import TourConfig
+from sim.driving.navgrid import NavGrid
 from slam import se2
 from slam.frames import Float
 from slam.system import Raster

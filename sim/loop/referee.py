@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sim.contacts import Contact
-from sim.world import World
+from sim.core.contacts import Contact
+from sim.world.world import World
 from slam.frames import NS_PER_S, Float
 
 APART_S = 1.0  # touching the same thing again within this is the same collision

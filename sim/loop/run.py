@@ -14,9 +14,10 @@ from sim.loop.config import LoopConfig
 from sim.loop.navigator import Decision, Navigator
 from sim.loop.referee import Referee, Tally
 from sim.simulation import Simulation
-from sim.world import World
-from slam import lost, se2
+from sim.world.world import World
+from slam import se2
 from slam.errors import SlamFailedError, UnknownNameError
+from slam.evaluation import lost
 from slam.frames import NS_PER_S, Float, Frame
 from slam.replay import Track, judged
 from slam.system import SlamSystem
@@ -58,7 +59,7 @@ class LoopRun:
     commands        (n, 2) m/s, rad/s from then on
     trusted         (n,) whether the SLAM trusted itself
     goal_of         (n,) index into ``goals``
-    lost_s          when the estimate was lost first (``slam.lost``), s; None: never
+    lost_s          when the estimate was lost first (``slam.evaluation.lost``), s; None: never
     found_s         when it was found again after that
     failure         how the SLAM failed (``SlamFailedError.outcome``) and in words, "" if it did not
     """

@@ -12,11 +12,11 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from sim.core.versions import check_world
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
 from sim.recording.verify import Finding, check_hashes, finding, listed_in
-from sim.twins import TWINS
-from sim.versions import check_world
+from sim.twins.twins import TWINS
 from slam import locks
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import PART, is_part, make_folder, reason, write_text

@@ -21,7 +21,7 @@ from sim.recording.recipe import RECIPE, Recipe, write_recipe
 from sim.recording.relations import write_relations
 from sim.recording.sums import write_sums
 from sim.simulation import Simulation
-from sim.twins import TWINS, Twins
+from sim.twins.twins import TWINS, Twins
 from slam.errors import OutputError
 from slam.files import PART, put, reason
 from slam.frames import BeamClass, Frame

@@ -17,14 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from sim.dynamism import Dynamism
-from sim.lidar_config import Lms221Config
-from sim.odometry_config import PRESETS
-from sim.seeds import Seeds
+from sim.core.dynamism import Dynamism
+from sim.core.seeds import Seeds
+from sim.core.versions import WORLD, world_of
+from sim.sensors.lidar.config import Lms221Config
+from sim.sensors.odometry.config import PRESETS
 from sim.simulation import Simulation
-from sim.twins import TWINS
-from sim.versions import WORLD, world_of
-from sim.world import World
+from sim.twins.twins import TWINS
+from sim.world.world import World
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import write_text
 from slam.names import NameFromFile
@@ -49,7 +49,7 @@ class Recipe:
     scanner     "full" (every effect), "noise" (the statistical error alone) or "ideal"
     resolution_deg, range_mode  of the scanner (``Lms221Config``)
     odometry    preset of the wheel encoders
-    twin        "", or which one of a drive's three versions (``sim.twins``)
+    twin        "", or which one of a drive's three versions (``sim.twins.twins``)
     """
 
     scene: str
@@ -198,7 +198,7 @@ def read_recipe(path: Path) -> Made:
     """Inverse of ``write_recipe``; ``LogFormatError`` that names the file for anything else.
 
     The scene's name is one from a file: no code runs by it (``slam.names``). The recipe may be of
-    another version of the world: ``sim.versions.check_world`` before it is simulated.
+    another version of the world: ``sim.core.versions.check_world`` before it is simulated.
     """
     try:
         with path.open("rb") as file:

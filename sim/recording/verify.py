@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast
 
+from sim.core.versions import not_this_world
 from sim.recording.bag import MessageHash
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Made, Recipe, read_recipe
 from sim.recording.sums import SUMS, Fault, check_vouched, faults, read_sums
-from sim.versions import not_this_world
 from slam.errors import LogFormatError, OutputError
 from slam.logs.bag_topics import Bag
 

@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from slam.ekf.hypotheses import Gates
 from slam.errors import InvalidValueError
+from slam.landmarks.hypotheses import Gates
 
 Association = Literal["ipjc", "jcbb", "individual"]
 

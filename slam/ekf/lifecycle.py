@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.ekf.config import EkfConfig
-from slam.ekf.corners import answered
-from slam.ekf.polar import hidden, polar
 from slam.frames import Float, Scan
+from slam.frontend.corners import answered
+from slam.frontend.polar import hidden, polar
 
 CHANCE = 0.05  # probability that something else is seen where the landmark was
 WITHIN = 0.95  # share of range and field of view within which a landmark is surely in view

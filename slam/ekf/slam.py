@@ -11,11 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slam import se2, steps
-from slam.ekf.association import METHODS
+from slam import se2
 from slam.ekf.config import EkfConfig
-from slam.ekf.corners import CornerConfig, corners
-from slam.ekf.filter import MOST_STD_M, EkfFilter
 from slam.ekf.lifecycle import (
     WITHOUT,
     Lifecycle,
@@ -23,10 +20,14 @@ from slam.ekf.lifecycle import (
     unhidden_by_beams,
     unhidden_by_features,
 )
-from slam.ekf.polar import polar
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, Odometry
-from slam.shunting.motion import assumed_covariance
+from slam.frontend import odometry_steps
+from slam.frontend.corners import CornerConfig, corners
+from slam.frontend.odometry_prior import assumed_covariance
+from slam.frontend.polar import polar
+from slam.landmarks.association import METHODS
+from slam.landmarks.filter import MOST_STD_M, EkfFilter
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
 
@@ -109,7 +110,7 @@ class EkfSlam:
 
     def update(self, frame: Frame) -> Estimate:
         """Predict, associate with landmarks, then with candidates, judge all, add what is new."""
-        steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
+        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         if not self._stamps and not self._told:
             name = "points" if frame.features is not None else "corners"
             self._configure(PRESETS[name](**self._options))
@@ -152,7 +153,7 @@ class EkfSlam:
 
     def _predict(self, odometry: Odometry) -> None:
         if self._before is not None:
-            increment = steps.increment(self._before, odometry)
+            increment = odometry_steps.increment(self._before, odometry)
             covariance = odometry.increment_covariance
             if covariance is None:
                 covariance = assumed_covariance(increment)

@@ -9,7 +9,6 @@ from types import ModuleType
 
 import numpy as np
 
-from slam import steps
 from slam.errors import (
     InvalidValueError,
     MissingDependencyError,
@@ -17,9 +16,10 @@ from slam.errors import (
     SlamFailedError,
 )
 from slam.frames import Float, Frame, LaserSpec, Odometry
+from slam.frontend import odometry_steps
+from slam.frontend.observations import from_scan
+from slam.frontend.odometry_prior import Prediction, predict
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import from_scan
-from slam.shunting.motion import Prediction, predict
 from slam.system import Estimate, Raster, told
 from slam.trajectory import Trajectory
 
@@ -59,7 +59,7 @@ class Guest(ABC):
         """Guess by odometry, let the guest match."""
         if frame.scan is None:
             raise InvalidValueError(f"{type(self).__name__} needs a laser scan in every frame")
-        steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
+        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         before = frame.odometry if self._before is None else self._before
         prediction = predict(self._T_map_robot, before, frame.odometry)
         if self._before is None:

@@ -16,8 +16,8 @@ import numpy as np
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, LaserSpec
+from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, needed
-from slam.shunting.motion import Prediction
 from slam.system import register
 
 KEEP_M, KEEP_RAD = 0.2, math.radians(10.0)  # Karto's minimum travel distance and heading

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from slam.frames import Float, LaserSpec
+from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, needed
-from slam.shunting.motion import Prediction
 from slam.system import register
 
 SPACING_AT_M = 10.0  # a voxel is as wide as the beams' spacing there,

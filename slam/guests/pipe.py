@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from slam import steps
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Float, Frame, LaserSpec
+from slam.frontend import odometry_steps
 from slam.guests import protocol
 from slam.guests.wire import Wire
 from slam.names import child_environment, join_folders, refuse_code
@@ -128,7 +128,7 @@ class PipeSlam:
 
         Raises ``InvalidValueError`` for a frame that does not come after the last one.
         """
-        steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
+        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         request = protocol.frame_line(frame, self._laser)
         limit_s = self.limits.scan_s if self._stamps else self.limits.first_s
         with self._over_if_it_fails():

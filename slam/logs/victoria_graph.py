@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from slam import se2
-from slam.ekf.filter import EkfFilter
 from slam.errors import LogFormatError
 from slam.frames import Float, Frame
+from slam.landmarks.filter import EkfFilter
 from slam.logs.text import numbered_lines
 from slam.logs.victoria_park import LASER_AHEAD_M, LASER_LEFT_M
 from slam.posegraph import Edge, optimise

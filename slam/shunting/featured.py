@@ -26,22 +26,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
-from slam.ekf.association import ipjc
 from slam.ekf.config import EkfConfig
-from slam.ekf.corners import corners
-from slam.ekf.filter import EkfFilter
-from slam.ekf.hypotheses import Gates
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame
-from slam.shunting.belief import Belief
+from slam.frontend.corners import corners
+from slam.frontend.observations import SIGMA_CELLS, Observations
+from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.landmarks.association import ipjc
+from slam.landmarks.filter import EkfFilter
+from slam.landmarks.hypotheses import Gates
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.impressions import SIGMA_CELLS, Observations
-from slam.shunting.increments import Increments
-from slam.shunting.matching import Match, seen_by
-from slam.shunting.motion import Prediction, inverted, turned
-from slam.shunting.overlap import evaluate
-from slam.shunting.peaks import Peaks, peaks
+from slam.shunting.map.peaks import Peaks, peaks
+from slam.shunting.matching.matcher import Match, seen_by
+from slam.shunting.matching.score import evaluate
 from slam.shunting.slam import FIRST_LOOK_S, LONGEST_LOOK_S, ShuntingSlam
+from slam.shunting.uncertainty.odometry_noise import Increments
+from slam.shunting.uncertainty.pose_covariance import Belief
 from slam.system import Estimate, register
 
 LEAST_PEAK = 0.1  # lower activities are no landmark to associate with

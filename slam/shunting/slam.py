@@ -11,23 +11,25 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from slam import se2, steps
+from slam import se2
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import Float, Frame, Odometry
-from slam.shunting import layers, memory
-from slam.shunting.belief import Belief
+from slam.frontend import odometry_steps
+from slam.frontend.observations import Observations, observe
+from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.doubt import LOST_AFTER, PATIENCE, Doubt
-from slam.shunting.impressions import Observations, observe
-from slam.shunting.increments import Increments
-from slam.shunting.loops import Loops
-from slam.shunting.matching import Match, Matcher, unmatched
-from slam.shunting.motion import Prediction, inverted, turned
-from slam.shunting.network import Network
-from slam.shunting.recovery import COARSE, SLIPPED, TELLING, Recovery, slipped
-from slam.shunting.residuals import Evidence, look
-from slam.shunting.search import WIDEST, SearchWindow
-from slam.shunting.stamping import stamp
+from slam.shunting.map import export
+from slam.shunting.map import io as memory
+from slam.shunting.map.network import Network
+from slam.shunting.map.rasterise import stamp
+from slam.shunting.matching.local_search import WIDEST, SearchWindow
+from slam.shunting.matching.matcher import Match, Matcher, unmatched
+from slam.shunting.tracking.loops import Loops
+from slam.shunting.tracking.quality import LOST_AFTER, PATIENCE, Doubt
+from slam.shunting.tracking.relocalise import COARSE, SLIPPED, TELLING, Recovery, slipped
+from slam.shunting.uncertainty.odometry_noise import Increments
+from slam.shunting.uncertainty.pose_covariance import Belief
+from slam.shunting.uncertainty.residuals import Evidence, look
 from slam.shunting.warmup import warm_up
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
@@ -85,7 +87,7 @@ class ShuntingSlam:
         """
         if self._before is None and self._resumed is None:
             return self._first(frame)
-        steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
+        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         prediction = self._predict(frame.odometry)
         observations = observe(frame, prediction.twist, self.config)
         if float(observations.weights.sum()) >= TELLING:
@@ -241,11 +243,11 @@ class ShuntingSlam:
         """What exists, from either memory; NaN where no neuron lives (never seen, or seen empty:
         the network does not tell these apart).
         """
-        return layers.existence(self.network)
+        return export.existence(self.network)
 
-    def changes(self) -> layers.Changes | None:
+    def changes(self) -> export.Changes | None:
         """What appeared and what is gone lately; None without a map or a long-term memory."""
-        return layers.changes(self.network)
+        return export.changes(self.network)
 
     def window(
         self, xmin: float, ymin: float, xmax: float, ymax: float
@@ -301,6 +303,6 @@ class ShuntingSlam:
 def _near(match: Match, prediction: Prediction) -> Match:
     """The match, or odometry alone where rounding has carried it past all places and numbers."""
     off = np.abs(match.T_map_robot - prediction.T_map_robot)
-    if off.max() <= steps.MOST_STEP_M and np.isfinite(match.information).all():
+    if off.max() <= odometry_steps.MOST_STEP_M and np.isfinite(match.information).all():
         return match
     return unmatched(prediction.T_map_robot, matched=0.0, score=0.0)

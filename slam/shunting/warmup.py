@@ -15,13 +15,13 @@ import numpy as np
 
 from slam.compiling import announced
 from slam.frames import LaserSpec, Scan
+from slam.frontend.observations import from_scan
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.covariances import advance, carried, innovation, observable
-from slam.shunting.impressions import from_scan
-from slam.shunting.matching import Matcher
-from slam.shunting.network import Network
-from slam.shunting.residuals import look
-from slam.shunting.stamping import stamp
+from slam.shunting.map.network import Network
+from slam.shunting.map.rasterise import stamp
+from slam.shunting.matching.matcher import Matcher
+from slam.shunting.uncertainty.covariances import advance, carried, innovation, observable
+from slam.shunting.uncertainty.residuals import look
 
 
 @functools.cache

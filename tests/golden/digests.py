@@ -26,18 +26,18 @@ from typing import Any
 
 import numpy as np
 
-from scripts.compare.plan import Plan
-from scripts.compare.verb import carry_out
-from scripts.footage import of_scene
-from scripts.shoot import pictures_at
+from scripts.comparison.plan import Plan
+from scripts.film.footage import of_scene
+from scripts.film.render import pictures_at
+from scripts.verbs.compare import carry_out
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe, made_with
 from sim.recording.sums import read_sums
 from sim.simulation import stream
 from slam import create, se2
+from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import Frame
 from slam.logs import open_log
-from slam.points import PointWorld, PointWorldConfig
 
 FILE = Path(__file__).with_name("golden.json")
 TOLERANCE = 1e-6  # m and rad: beyond rounding, below anything that a figure shows

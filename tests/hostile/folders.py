@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from scripts.closed_loop.plan import Plan as DrivePlan
-from scripts.compare.plan import ENTRIES, RECORDINGS, Plan
+from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.output import write_recipe
 from sim.recording import recipe as recipes
 from sim.recording.dataset import Plan as DatasetPlan

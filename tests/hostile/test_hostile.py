@@ -19,10 +19,11 @@ import numpy as np
 import pytest
 
 from scripts.cli import app, main
-from sim import gl, state
+from sim.core import state
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe, read_recipe
 from sim.simulation import Simulation
+from sim.view import gl
 from slam import create
 from slam.errors import InvalidValueError, LogFormatError, UntrustedNameError
 from slam.maps import read_map

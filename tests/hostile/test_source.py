@@ -18,17 +18,17 @@ IMPORTERS = {
     "slam/system.py": "module:Class, refused for names from files",
     "scenes/registry.py": "module:function, the same",
     "slam/guests/guest.py": "the two guests, by constants",
-    "sim/camera.py": "the GL libraries, by constants",
+    "sim/view/camera.py": "the GL libraries, by constants",
     "scripts/workers.py": "Dask",
-    "scripts/rerun_log.py": "Rerun",
-    "scripts/reproduce/verb.py": "experiments of ours",
-    "scripts/reproduce/runs.py": "jobs of ours",
+    "scripts/film/rerun_log.py": "Rerun",
+    "scripts/verbs/reproduce.py": "experiments of ours",
+    "scripts/paper/runs.py": "jobs of ours",
 }
 STARTERS = {
     "slam/guests/wire.py": "pipe:COMMAND, refused for names from files; our own Python",
-    "sim/gl.py": "our own Python, without the working folder",
-    "scripts/film.py": "ffmpeg",
-    "scripts/compare_irsim.py": "an interpreter that the user names",
+    "sim/view/gl.py": "our own Python, without the working folder",
+    "scripts/film/encode.py": "ffmpeg",
+    "scripts/experiments/compare_irsim.py": "an interpreter that the user names",
 }
 
 

@@ -13,10 +13,10 @@ import pytest
 import scenes
 from scenes.mounting import FOOT, LASER
 from scenes.scene import Scene
-from sim.env import MobiliaEnv
-from sim.lidar import Lms221Config
+from sim.gym.env import MobiliaEnv
+from sim.sensors.lidar.lms221 import Lms221Config
 from sim.simulation import Simulation
-from sim.world import World
+from sim.world.world import World
 from slam.errors import InvalidValueError
 from tests.built_scenes import built
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from scripts.compare import folder as compared
-from scripts.compare.again import run_of
+from scripts.comparison import folder as compared
+from scripts.comparison.again import run_of
 from scripts.output import (
     check_whole,
     locked_folder,

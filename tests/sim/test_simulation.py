@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import pytest
 
-from sim.lidar import Lms221Config
-from sim.seeds import Seeds
+from sim.core.seeds import Seeds
+from sim.sensors.lidar.lms221 import Lms221Config
 from sim.simulation import Simulation, stream, tour
 from slam import create, se2
 from slam.errors import InvalidValueError, UnknownNameError

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim import doors, manners
-from sim.lidar import Lms221Config
-from sim.pilot import Pilot
-from sim.seeds import Seeds
+from sim.actors import doors
+from sim.actors.people import right_of_way
+from sim.core.seeds import Seeds
+from sim.driving.pilot import Pilot
+from sim.sensors.lidar.lms221 import Lms221Config
 from sim.simulation import Simulation
 
 PARTS = ("layout", "chairs", "bins", "doors", "people", "lidar", "odometry", "driving", "tags")
@@ -42,7 +43,9 @@ def draws(seeds: Seeds) -> dict[str, Any]:
         noise.update(_state(*simulation.laser.streams).encode())
         simulation.observe()
         for i in np.flatnonzero(people.draws[: len(trips)] != before[: len(trips)]).tolist():
-            trips[i].append((people.state[i, manners.ARRIVE], float(people.task[i, manners.GOAL])))
+            trips[i].append(
+                (people.state[i, right_of_way.ARRIVE], float(people.task[i, right_of_way.GOAL]))
+            )
         for d in np.flatnonzero(angle != world._doors.schedule[:, doors.ANGLE]).tolist():
             angles[d].append(float(world._doors.schedule[d, doors.ANGLE]))
     return {
@@ -50,7 +53,7 @@ def draws(seeds: Seeds) -> dict[str, Any]:
         "chairs": world._shoves["chair"].schedule[:, 0].tolist(),
         "bins": world._shoves["bin"].schedule[:, 0].tolist(),
         "doors": (angles, world._doors.schedule[:, doors.NEXT].tolist()),
-        "people": (people.state[:, manners.SPEED].tolist(), trips),
+        "people": (people.state[:, right_of_way.SPEED].tolist(), trips),
         "lidar": noise.hexdigest(),
         "odometry": (_state(simulation.encoders._rng), simulation.encoders.errors),
         "driving": tour.tolist(),

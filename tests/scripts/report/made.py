@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from scripts.closed_loop import tables as closed_loop
-from scripts.compare import folder as files
-from scripts.compare import tables
-from scripts.compare.columns import COLUMNS
+from scripts.comparison import folder as files
+from scripts.comparison import tables
+from scripts.comparison.columns import COLUMNS
 from scripts.output import write_recipe
-from slam.lost import LOST_RULE
+from slam.evaluation.lost import LOST_RULE
 
 OURS, EKF, OWN = "shunting", "ekf", "own:Hanging"
 SCENE, LEVELS, SEEDS = "room", (0.0, 1.0), tuple(range(100, 106))

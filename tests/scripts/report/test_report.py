@@ -15,8 +15,8 @@ import pytest
 from typer.testing import CliRunner
 
 from scripts import cli
-from scripts.compare import folder as files
-from scripts.compare.columns import COLUMNS
+from scripts.comparison import folder as files
+from scripts.comparison.columns import COLUMNS
 from scripts.report import closed, page, pictures, tables, words
 from scripts.report.closed import driven
 from scripts.report.metrics import METRICS, digits

@@ -17,14 +17,15 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from sim.lidar import Lms221Config
 from sim.moments import Moment, toured
 from sim.recording.bag import BagWriter, _accumulate
 from sim.recording.messages import turns_of
 from sim.recording.relations import pairs
+from sim.sensors.lidar.lms221 import Lms221Config
 from sim.simulation import Simulation
-from slam import create, metrics, se2
+from slam import create, se2
 from slam.errors import InvalidValueError
+from slam.evaluation import metrics
 from slam.frames import NS_PER_S, BeamClass, Frame, LaserSpec, Odometry, Scan
 from slam.logs import read_bag
 from slam.maps import read_map

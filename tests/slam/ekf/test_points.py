@@ -10,7 +10,7 @@ import pytest
 
 from slam import se2
 from slam.errors import InvalidValueError
-from slam.points import PointWorld, PointWorldConfig
+from slam.evaluation.points import PointWorld, PointWorldConfig
 
 
 def test_noise_is_the_one_configured():

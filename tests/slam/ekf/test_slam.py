@@ -20,8 +20,8 @@ from slam import Frame, Odometry, SlamSystem, se2
 from slam.ekf.config import EkfConfig
 from slam.ekf.slam import EkfSlam
 from slam.errors import InvalidValueError
+from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import Features
-from slam.points import PointWorld, PointWorldConfig
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import world2d

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from slam import create, metrics
+from slam import create
+from slam.evaluation import metrics
 from slam.logs import open_log
 from slam.replay import Replay, Track
 from slam.trajectory import Trajectory

@@ -14,9 +14,9 @@ from scipy.io import savemat
 from slam import Stream, se2
 from slam.ekf import EkfSlam
 from slam.errors import LogFormatError
+from slam.evaluation.metrics import fit_se2
 from slam.logs import open_log, read_victoria_park
 from slam.logs.victoria_park import read_gps, twist_of
-from slam.metrics import fit_se2
 
 DT = 0.025
 START_S = 10.0

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rows of ``mobilia bench`` about the world, and what all rows need.
+
+Figures are medians of ``REPEATS`` repeats of processor time.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+
+import sim  # noqa: F401  (registers the environments)
+from sim.sensors.lidar.lms221 import Lms221, Lms221Config
+from sim.sensors.lidar.windows import note
+from sim.simulation import Simulation, n_frames, tour
+from sim.view import gl
+from sim.view.pictures import CameraPicture
+from sim.world.substeps import SUBSTEPS_PER_S, unseen
+from sim.world.world import World
+from slam._jit import njit
+from slam.frames import Frame
+
+SEED = 100
+DYNAMISM = 0.5
+REPEATS = 7
+N_ENVS = 4
+Row = dict[str, Any]
+
+
+def row(what: str, figure: float, unit: str, target: str, how: str) -> Row:
+    """One line of the table."""
+    return {"what": what, "figure": float(figure), "unit": unit, "target": target, "how": how}
+
+
+def timed(work: Callable[[], object]) -> float:
+    """s of processor time, all threads."""
+    start = time.process_time()
+    work()
+    return time.process_time() - start
+
+
+def median(work: Callable[[], object], repeats: int = REPEATS) -> float:
+    """s, of ``repeats`` calls of ``work``."""
+    return float(np.median([timed(work) for _ in range(repeats)]))
+
+
+def simulation(seconds: float) -> Iterator[Row]:
+    """Everything there is, at its defaults."""
+    for scene, target in (("office", "≥ 20"), ("arena", "")):
+        room = Simulation(scene, seed=SEED, dynamism=DYNAMISM)
+        part = n_frames(seconds / REPEATS, room.scan_period_s)
+        frames = tour(room, seconds + 10.0)
+
+        def take(frames: Iterator[Frame] = frames, part: int = part) -> None:
+            for _ in range(part):
+                next(frames)
+
+        take()
+        figure = part * room.scan_period_s / median(take)
+        how = f"{scene}: world, actors, scans with every effect, odometry, tour driving"
+        yield row(f"simulation, {scene}", figure, "× real time", target, how)
+
+
+@njit
+def _note(noted: Any, times: int) -> None:
+    """Note all poses, in compiled code as ``sim.world.substeps.advance`` does."""
+    for _ in range(times):
+        note(noted)
+
+
+def scanner(seconds: float) -> Iterator[Row]:
+    """Scans of a world at rest."""
+    world = World("office", seed=SEED, dynamism=DYNAMISM)
+    crowded = World("office", seed=SEED, dynamism=DYNAMISM, n_chairs=200)
+    cases = (
+        ("ideal", Lms221Config.ideal(), world, "≤ 60"),
+        ("noise only", Lms221Config.noise_only(), world, ""),
+        ("every effect (default)", Lms221Config(), world, "≤ 350"),
+        ("ideal, 200 chairs", Lms221Config.ideal(), crowded, "≤ 150"),
+    )
+    scans = max(20, round(10 * seconds))
+    for name, config, room, target in cases:
+        laser = Lms221(room.model, config, np.random.default_rng(0))
+
+        def many(laser: Lms221 = laser, room: World = room) -> None:
+            for _ in range(scans):
+                _note(laser.begin(room.data), int(laser.marks[1:].sum()))
+                laser.finish()
+
+        many()
+        how = f"361 beams in {room.scene.name}, world at rest, called as a simulation does"
+        yield row(f"scan, {name}", median(many) / scans * 1e6, "µs", target, how)
+
+
+def physics(seconds: float) -> Iterator[Row]:
+    """Substeps without a scanner."""
+    cases: tuple[tuple[str, dict[str, Any], str], ...] = (
+        ("office", {}, ""),
+        ("50 chairs, 10 people", {"n_chairs": 50, "n_people": 10}, "≥ 9000"),
+    )
+    for name, options, target in cases:
+        world = World("office", seed=SEED, dynamism=DYNAMISM, **options)
+        scans = max(40, round(seconds / REPEATS * SUBSTEPS_PER_S / 8))
+        watch = unseen(9)
+
+        def run(world: World = world, scans: int = scans, watch: Any = watch) -> None:
+            for _ in range(scans):
+                world.advance(0, 8, watch)
+
+        run()
+        how = "office, 1/300 s each, people and doors in, eight in a call"
+        yield row(f"physics steps, {name}", 8 * scans / median(run), "1/s", target, how)
+
+
+def environments(seconds: float) -> Iterator[Row]:
+    """Steps of one scan under a new random command each second, and resets."""
+    steps = max(20, round(37.5 * seconds / REPEATS))
+    ideal = Lms221Config.ideal()
+    for scene, least in (("Arena", 2000), ("Office", 1000)):
+        id_ = f"mobilia/{scene}-v1"
+        for name, laser in (("ideal scan", ideal), ("every effect", None)):
+            env: Any = gymnasium.make(id_, disable_env_checker=True, time_limit_s=1e6, laser=laser)
+            many = gymnasium.make_vec(
+                id_, num_envs=N_ENVS, vectorization_mode="vector_entry_point",
+                time_limit_s=1e6, laser=laser,
+            )  # fmt: skip
+            for what, room, n, target in (
+                ("single", env.unwrapped, 1, least),
+                (f"vector of {N_ENVS}", many, N_ENVS, 1.5 * least),
+            ):
+                room.reset(seed=SEED)
+                figure = n * steps / _stepping(room, steps, n)
+                wanted = f"≥ {target:.0f}" if laser is ideal else ""
+                how = f"{scene.lower()}, one 0.5° scan a step, one core"
+                yield row(f"env steps, {what}, {name}", figure, "1/s", wanted, how)
+        if scene == "Office":
+            yield _ceiling(env.unwrapped.simulation.world)
+        resets = [timed(lambda env=env, k=k: env.reset(seed=k)) for k in range(9)]  # type: ignore[misc]
+        wanted = "≤ 50" if scene == "Office" else ""
+        how = f"{scene.lower()}, every effect, another seed each time"
+        yield row("env reset", float(np.median(resets)) * 1e3, "ms", wanted, how)
+
+
+def _stepping(room: Any, steps: int, n: int) -> float:
+    """s for ``steps`` steps of ``n`` environments."""
+    rng = np.random.default_rng(SEED)
+
+    def run() -> None:
+        for k in range(steps):
+            if k % 37 == 0:
+                action = rng.uniform(-1.0, 1.0, (n, 2)).astype(np.float32)
+            room.step(action if n > 1 else action[0])
+
+    run()
+    return median(run)
+
+
+def _ceiling(world: World) -> Row:
+    """What no environment can beat: the eight ``mj_step`` of a scan and nothing else."""
+
+    def run() -> None:
+        for _ in range(800):
+            mujoco.mj_step(world.model, world.data)
+
+    how = "office: MuJoCo's own 8 steps a scan, no actors, no scan"
+    return row("ceiling of env steps by physics", 100 / median(run), "1/s", "", how)
+
+
+def pictures(seconds: float) -> Iterator[Row]:
+    """The 3D picture of a film."""
+    if gl.find().backend is None:
+        return
+    room = Simulation("office", seed=SEED, dynamism=DYNAMISM)
+    for shadows, target in ((True, "≤ 110"), (False, "")):
+        with CameraPicture(room, (1280, 720), "persp", shadows=shadows) as picture:
+            picture(room)
+            spent = [timed(lambda picture=picture: picture(room)) for _ in range(10)]  # type: ignore[misc]
+        what = "picture 1280 × 720, office, " + ("with shadows" if shadows else "no shadows")
+        yield row(what, float(np.median(spent)) * 1e3, "ms", target, "all threads; software GL")

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sensor card: the simulated scanner beside its data sheet."""

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rows of the sensor card: what our scanner does, beside what its data sheet says.
+
+TD is the manufacturer's technical description (8008970/06-2003), TL his telegram listing
+(8007954/2006-08-01), STW the ROS driver sicktoolbox_wrapper.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scripts.card.bench import NONE, Bench, box, only, plate
+from sim.sensors.lidar.config import RANGE_MODES, Lms221Config
+from sim.sensors.lidar.effects import DISC_WEIGHTS, LMS221_SPOT, NEEDED, NEEDED_RANGE_M
+from sim.sensors.lidar.link import SerialLink
+from sim.sensors.lidar.receiver import SignalModel
+from slam.frames import Float
+
+NOISE_AT_M = (1.0, 5.0, 10.0, 20.0)
+SPOT_AT_M = (1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 20.0)
+SPOT_CM = (3.0, 4.0, 6.0, 8.0, 12.0, 14.0, 26.0)  # TL table 10-1
+
+
+NOTHING_MIRRORED = (np.empty(0), np.empty(0, dtype=np.int64), np.empty(0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One line of the card; ``kept`` whether what was measured agrees with the data sheet."""
+
+    what: str
+    datasheet: str
+    measured: str
+    source: str
+    kept: bool
+
+
+def rows() -> list[Row]:
+    """All rows, measured anew; about ten seconds."""
+    parts = (modes(), timing(), noise(), systematic(), spot(), reflectivity(), codes(), link())
+    return [row for part in parts for row in part]
+
+
+def modes() -> Iterator[Row]:
+    """Beams and scan rates of every mode."""
+    known = {
+        (1.0, 180): (181, 75.0),
+        (0.5, 180): (361, 37.5),
+        (0.25, 180): (721, 18.75),
+        (1.0, 100): (101, 75.0),
+        (0.5, 100): (201, 37.5),
+        (0.25, 100): (401, 18.75),
+    }
+    for (resolution, fov), (beams, rate) in known.items():
+        config = Lms221Config.ideal(resolution_deg=resolution, fov_deg=fov)
+        bench = Bench(plate(3.0), config)
+        seen = bench.scan().ranges.size
+        hertz = 300.0 / bench.steps
+        yield Row(
+            what=f"{resolution:g}° over {fov}°: values, scans per second",
+            datasheet=f"{beams}, {rate:g}",
+            measured=f"{seen}, {hertz:g}",
+            source="TD p10, TL p19, p47",
+            kept=seen == beams and hertz == rate,
+        )
+
+
+def timing() -> Iterator[Row]:
+    """The mirror."""
+    spec = Lms221Config(resolution_deg=0.5).spec()
+    offsets = spec.beam_time_offsets
+    per_degree, gap = float(offsets[2] - offsets[0]), float(offsets[1] - offsets[0])
+    yield Row(
+        what="time per degree of the mirror",
+        datasheet="37.0 µs (13.32 ms / 360)",
+        measured=f"{per_degree * 1e6:.2f} µs",
+        source="TD p10; STW",
+        kept=abs(per_degree - 37.0e-6) < 0.1e-6,
+    )
+    yield Row(
+        what="neighbours in a 0.5° scan lie apart",
+        datasheet="13.32 ms + 18.5 µs",
+        measured=f"{gap * 1e3:.2f} ms",
+        source="TL p19, p47",
+        kept=abs(gap - 13.34e-3) < 0.03e-3,
+    )
+
+
+def noise_std(distance: float, mode: str) -> float:
+    """Deviation of what is sent, m, every effect on, white wall, beams near its normal."""
+    bench = Bench(plate(distance), Lms221Config(range_mode=mode), seed=int(distance))
+    middle = bench.ranges(250)[:, 172:189]
+    return float(np.sqrt(middle.var(axis=0, ddof=1).mean()))
+
+
+def noise() -> Iterator[Row]:
+    """Statistical error."""
+    for mode in ("32m", "80m"):
+        for distance in NOISE_AT_M:
+            std = noise_std(distance, mode)
+            yield Row(
+                what=f"statistical error at {distance:g} m, {mode} mode, one sigma",
+                datasheet="10 mm",
+                measured=f"{std * 1e3:.1f} mm",
+                source="TD p34",
+                kept=abs(std - 0.010) < 0.0008,
+            )
+
+
+def systematic_curves(mode: str, units: int) -> tuple[Float, Float]:
+    """((n,) ranges m, (units, n) errors m): each unit looks along a wall, 1 to 20 m away."""
+    config = only({"systematic": True}, range_mode=mode, resolution_deg=0.25)
+    curves, true = [], np.zeros(0)
+    for seed in range(units):
+        result = Bench(box(0.0, 1.05, 40.0, 0.05), config, seed).scan()
+        inside = (result.true_ranges >= 1.0) & (result.true_ranges <= 20.0)
+        true = result.true_ranges[inside]
+        order = np.argsort(true)
+        true = true[order]
+        curves.append((result.ranges[inside].astype(np.float64))[order] - true)
+    return true, np.array(curves)
+
+
+def systematic() -> Iterator[Row]:
+    """The part that averaging does not remove."""
+    for mode, bound in (("32m", 0.035), ("80m", 0.05)):
+        worst = float(np.abs(systematic_curves(mode, 100)[1]).max())
+        yield Row(
+            what=f"systematic error, {mode} mode, worst of 100 units, 1 to 20 m",
+            datasheet=f"± {bound * 1e3:g} mm",
+            measured=f"{worst * 1e3:.1f} mm",
+            source="TD p34",
+            kept=0.5 * bound < worst <= bound + 1e-6,
+        )
+
+
+def spot_diameter(distance: float) -> float:
+    """Diameter m of the disc that has the rays' second moment (four deviations, as ISO 11146)."""
+    weights, offsets = np.array(DISC_WEIGHTS), np.array(LMS221_SPOT.offsets)
+    radius = LMS221_SPOT.aperture + LMS221_SPOT.divergence * distance
+    return 4.0 * math.sqrt(float((weights * (radius * offsets[:, 0]) ** 2).sum()))
+
+
+def spot() -> Iterator[Row]:
+    """What a beam lights."""
+    for distance, centimetres in zip(SPOT_AT_M, SPOT_CM, strict=True):
+        diameter = 100.0 * spot_diameter(distance)
+        yield Row(
+            what=f"spot at {distance:g} m",
+            datasheet=f"{centimetres:g} cm (16 mm + 11.9 mrad, rounded up)",
+            measured=f"{diameter:.1f} cm",
+            source="TL table 10-1, p114",
+            kept=abs(diameter - centimetres) < 0.95,
+        )
+
+
+def least_reflectivity(distance: float) -> float:
+    """Of a full target square to the beam, by bisection on the scanner itself."""
+    config = only({"spot": True, "reflectivity": True})
+    bench = Bench(plate(distance), config)
+    bench.scan()
+    ranges, found, cosines = bench.laser.caster.hits
+    ahead = (ranges[:, 180:181].copy(), found[:, 180:181].copy(), cosines[:, 180:181].copy())
+    low, high = 1e-3, 3.0
+    for _ in range(30):
+        middle = math.sqrt(low * high)
+        surface = (np.array([middle]), np.array([False]), np.zeros(1, int), np.zeros(1, int))
+        receiver = SignalModel(config, surface, np.random.default_rng(0))
+        sent = receiver.scan(ahead, NOTHING_MIRRORED).ranges[0]
+        low, high = (low, middle) if np.isfinite(sent) else (middle, high)
+    return high
+
+
+def reflectivity() -> Iterator[Row]:
+    """What is needed for a return."""
+    for distance, needed in zip(NEEDED_RANGE_M, NEEDED, strict=True):
+        found = least_reflectivity(distance)
+        yield Row(
+            what=f"needed reflectivity at {distance:g} m",
+            datasheet=f"{100 * needed:.1f} %",
+            measured=f"{100 * found:.1f} %",
+            source="TD fig. 4-2",
+            kept=abs(found / needed - 1.0) < 0.05,
+        )
+    reach = next(d for d in np.arange(20.0, 40.0, 0.25).tolist() if least_reflectivity(d) > 0.10)
+    yield Row(
+        what="range at 10 % reflectivity",
+        datasheet="30 m",
+        measured=f"{reach:.1f} m",
+        source="TD p33",
+        kept=abs(reach - 30.0) < 2.0,
+    )
+
+
+def codes() -> Iterator[Row]:
+    """Steps and codes of the range modes."""
+    for mode, limits in RANGE_MODES.items():
+        config = replace(
+            Lms221Config.noise_only(range_mode=mode), effects=replace(NONE, error_codes=True)
+        )
+        top = limits.range_max_m
+        sent = Bench(plate(0.9 * top, 200.0), config).ranges(3)[:, 175:186]
+        unit = limits.unit_m
+        on_grid = bool(np.allclose(sent / unit, np.rint(sent / unit), atol=2e-3))
+        beyond = Bench(plate(top + 0.5, 200.0), config).scan().ranges[180]
+        nothing = Bench("", config).scan().ranges[180]
+        yield Row(
+            what=f"{mode} mode: step; beyond {top:g} m; no return",
+            datasheet=f"{1e3 * unit:g} mm; +inf; NaN",
+            measured=f"{f'{1e3 * unit:g} mm' if on_grid else 'off the grid'}; "
+            f"{beyond:+f}; {'NaN' if np.isnan(nothing) else nothing}",
+            source="TL table 3-7, 10.8; STW",
+            kept=on_grid and beyond == np.inf and bool(np.isnan(nothing)),
+        )
+
+
+def link() -> Iterator[Row]:
+    """Scans lost on the serial link."""
+    for baud, lost in ((9_600, (16, 29, 30)), (38_400, (4, 8, 8)), (500_000, (0, 0, 0))):
+        ours = tuple(
+            SerialLink(
+                baud=baud, config=Lms221Config(resolution_deg=r, fov_deg=100 if r == 0.25 else 180)
+            ).lost_scans
+            for r in (0.25, 0.5, 1.0)
+        )
+        yield Row(
+            what=f"scans lost between two at {baud / 1000:g} kBd: 0.25°, 0.5°, 1°",
+            datasheet=", ".join(map(str, lost)),
+            measured=", ".join(map(str, ours)),
+            source="TL table 10-17",
+            kept=ours == lost,
+        )

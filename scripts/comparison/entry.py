@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One SLAM on one recorded run: what it believed, and the row that scores it."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scripts.comparison.columns import scored
+from scripts.comparison.maps import MapJudge
+from scripts.comparison.memory import PeakMemory
+from scripts.comparison.recording import Recording, load
+from slam.errors import SlamFailedError
+from slam.frames import Float, Frame
+from slam.guests import Limits, PipeSlam, limited
+from slam.replay import Track
+from slam.system import Raster, create
+
+WARM_SCANS = 12  # of a throw-away instance, so that no figure holds the loading of code
+UNKNOWN = 255  # of a map on file; else 0 (free) to 254 (occupied)
+_warm: set[str] = set()
+
+
+def enter(path: Path, *, recording: str, slam: str, scan_limit_s: float = Limits.scan_s) -> None:
+    """A job: run ``slam`` over the file ``recording`` (beside ``path``'s folder), write ``path``.
+
+    A SLAM that fails, even at its start, is scored as such. Whatever is not ours runs in a process
+    of its own, which it may crash or hang for ``scan_limit_s`` at a scan.
+    """
+    drive = load(path.parent.parent / recording)
+    frames = [frame.without_truth() for frame in drive.frames]
+    limits = Limits(scan_s=scan_limit_s)
+    _warm_up(slam, frames, limits)
+    run = Entry(slam, drive, limits)
+    run.over(frames)
+    np.savez_compressed(path, **run.arrays())
+
+
+def _warm_up(slam: str, frames: list[Frame], limits: Limits) -> None:
+    if slam in _warm or ":" in slam:  # the latter begin anew with each run
+        return
+    with suppress(SlamFailedError):  # the run itself will tell
+        track = Track(name=slam, system=limited(slam, limits))
+        for frame in frames[:WARM_SCANS]:
+            track.take(frame)
+        track.map()
+    _warm.add(slam)
+
+
+class Entry:
+    """A SLAM's run, scan by scan, with its maps judged on the way."""
+
+    def __init__(self, slam: str, drive: Recording, limits: Limits) -> None:
+        self.drive = drive
+        self.judge = MapJudge(drive)
+        self.memory = PeakMemory()
+        self.failure: SlamFailedError | None = None
+        self.track = Track(name=slam, system=create("odometry"))  # if it cannot be made
+        try:
+            self.track.system = limited(slam, limits)
+        except SlamFailedError as error:
+            self.failure = error
+        self.raster: Raster | None = None
+        self.final: Any = None
+
+    def over(self, frames: list[Frame]) -> None:
+        """All scans, or those up to its failure."""
+        if self.failure is not None:
+            return
+        try:
+            for k, frame in enumerate(frames):
+                self.memory.begin()
+                self.track.take(frame)
+                self.memory.end()
+                self.judge.look(k)
+                if self.judge.wants(k):
+                    self.raster = self.track.map()
+                    self.judge.judge(k, self.raster)
+            self.raster = self.track.map()
+            self.final = self.track.final()
+        except SlamFailedError as error:
+            self.failure = error
+
+    def arrays(self) -> dict[str, Any]:
+        """What the file holds: arrays, and the row of ``runs.csv`` as JSON."""
+        track, raster = self.track, self.raster
+        online = track.online()
+        row = scored(track, self.final, self.failure, self.drive.truth())
+        row |= {"peak_memory_mb": self._peak_memory_mb(), **self.judge.scores()}
+        arrays: dict[str, Any] = {
+            "stamps_ns": online.stamps_ns,
+            "poses": online.poses,
+            "covariances": track.covariances(),
+            "converged": np.array([e.converged for e in track.estimates], dtype=np.bool_),
+            "milliseconds": np.array(track.durations_s) * 1e3,
+            "row": json.dumps(row),
+        }
+        if raster is not None:
+            arrays |= {
+                "map": _bytes(raster.values),
+                "map_resolution_m": raster.resolution_m,
+                "T_map_origin": raster.T_map_origin,
+            }
+        return arrays
+
+    def _peak_memory_mb(self) -> float | None:
+        if not isinstance(self.track.system, PipeSlam):
+            return self.memory.growth_mb
+        grown = self.track.system.memory_growth_bytes()
+        return None if grown is None else grown / 1e6
+
+
+def _bytes(values: Float | Any) -> Any:
+    """A raster's values in 0..254, ``UNKNOWN`` for NaN."""
+    known = np.nan_to_num(values) * 254.0
+    return np.where(np.isnan(values), UNKNOWN, np.round(known)).astype(np.uint8)

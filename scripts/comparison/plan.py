@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is to be compared, and the jobs that it takes: one a run, and one for each SLAM on it."""
+
+from __future__ import annotations
+
+import importlib.util
+import shlex
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import scenes
+import sim
+import slam
+from scripts.comparison import entry, recording
+from scripts.imports import with_imports
+from scripts.jobs import Job
+from scripts.single_run.session import file_name
+from sim.recording.recipe import Recipe
+from sim.simulation import n_frames
+from slam.errors import InvalidValueError
+from slam.guests import Limits
+from slam.guests.pipe import PREFIX
+from slam.names import join_folders
+
+RECORDINGS, ENTRIES = "recordings", "entries"
+MAX_RUNS = 100_000
+SCAN_PERIOD_S = 1.0 / 37.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One simulated run; ``name`` as in the files: ``office_d0.25_s100``."""
+
+    scene: str
+    dynamism: float
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Letters, digits, - _ . only."""
+        return f"{file_name(self.scene)}_d{self.dynamism:g}_s{self.seed}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Every SLAM on every scene at every level with every seed.
+
+    slams, scenes  by name or as module:Class, module:function
+    levels    of dynamism, each in [0, 1]
+    seeds     whole numbers >= 0, the same at every level
+    seconds   of driving
+    every     one scan in so many is kept (of 37.5 a second)
+    scanner   "full", "noise" or "ideal"
+    scan_limit_s  that module:Class and pipe:COMMAND may take for a scan before they count as hung
+    """
+
+    slams: tuple[str, ...]
+    scenes: tuple[str, ...]
+    levels: tuple[float, ...]
+    seeds: tuple[int, ...]
+    seconds: float = 60.0
+    every: int = 8
+    scanner: str = "full"
+    scan_limit_s: float = Limits.scan_s
+
+    def __post_init__(self) -> None:
+        Limits(scan_s=self.scan_limit_s)
+        for name in ("slams", "scenes", "levels", "seeds"):
+            values = getattr(self, name)
+            if not values or len(set(values)) != len(values):
+                raise InvalidValueError(f"Plan.{name} must be one or more, each once, got {values}")
+        if isinstance(self.every, bool) or not 1 <= self.every <= 1000:
+            raise InvalidValueError(f"Plan.every must be 1 to 1000, got {self.every}")
+        if len(self.scenes) * len(self.levels) * len(self.seeds) > MAX_RUNS:
+            raise InvalidValueError(f"a comparison has at most {MAX_RUNS} runs")
+        for run in self.runs():
+            self.recipe(run)  # complains of values that cannot be
+        if n_frames(self.seconds, SCAN_PERIOD_S) <= self.every:
+            raise InvalidValueError(
+                f"a comparison needs 2 scans a run: {self.seconds:g} s with one scan in "
+                f"{self.every} of 37.5 a second has 1"
+            )
+
+    def runs(self) -> list[Run]:
+        """Every simulated run, scene by scene, level by level."""
+        return [
+            Run(scene=scene, dynamism=level, seed=seed)
+            for scene in self.scenes
+            for level in self.levels
+            for seed in self.seeds
+        ]
+
+    def recipe(self, run: Run) -> Recipe:
+        """Of a run's simulation."""
+        return Recipe(**asdict(run), seconds=self.seconds, scanner=self.scanner)
+
+    def recordings(self) -> dict[str, Job]:
+        """The jobs that simulate, by the names of the runs."""
+        code = (*sources(sim, scenes), *scripts_of(recording.__file__, recording.__name__))
+        return {
+            run.name: Job(
+                name=run.name,
+                call=recording.record,
+                arguments={**asdict(self.recipe(run)), "every": self.every},
+                code=code,
+            )
+            for run in self.runs()
+        }
+
+    def entries(self) -> Iterator[tuple[Run, str, Job]]:
+        """The jobs that run a SLAM over a recording: run, SLAM, job."""
+        recordings = {name: job.file_name() for name, job in self.recordings().items()}
+        own = (*sources(slam), *scripts_of(entry.__file__, entry.__name__))
+        for name in self.slams:
+            code = (*own, *source_of(name))
+            for run in self.runs():
+                file = f"{RECORDINGS}/{recordings[run.name]}"
+                arguments: dict[str, Any] = {"recording": file, "slam": name}
+                if ":" in name:  # ours are not limited
+                    arguments["scan_limit_s"] = self.scan_limit_s
+                job = Job(
+                    name=f"{run.name}_{file_name(name)}",
+                    call=entry.enter,
+                    arguments=arguments,
+                    code=code,
+                )
+                yield run, name, job
+
+
+def sources(*packages: Any) -> tuple[Path, ...]:
+    """The folders of packages, for ``Job.code``."""
+    return tuple(Path(package.__file__).parent for package in packages)
+
+
+@cache
+def scripts_of(file: str, module: str) -> tuple[Path, ...]:
+    """A script and those that it imports, for ``Job.code`` beside the packages that it calls."""
+    folder = Path(__file__).resolve().parents[1]
+    return tuple(path for path in with_imports(Path(file), module) if folder in path.parents)
+
+
+def source_of(slam: str) -> tuple[Path, ...]:
+    """The file of a SLAM's own module, or those that a command names, and what Python files among
+    them import from beside them: with any of it changed, its runs are made again."""
+    kind, _, command = slam.partition(":")
+    if not command:
+        return ()
+    if slam.startswith(PREFIX):
+        named = [path for path in map(Path, shlex.split(command)) if path.is_file()]
+        return tuple(file for path in named for file in _whole(path, path.stem))
+    join_folders()
+    spec = importlib.util.find_spec(kind)
+    return _whole(Path(spec.origin), kind) if spec and spec.origin and spec.has_location else ()
+
+
+def _whole(file: Path, module: str) -> tuple[Path, ...]:
+    return with_imports(file, module) if file.suffix == ".py" else (file,)

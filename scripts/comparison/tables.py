@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the rows of runs to ``levels.csv`` and ``paired.csv``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+from scripts.comparison.columns import LESS_IS_BETTER, MORE_IS_BETTER, WORST_WHEN_FAILED
+from slam.evaluation.statistics import median_interval, paired, quantile, share_interval
+
+Row = dict[str, Any]
+FAILED = ("raised", "hung", "nan", "bad")
+SHARES = ("lost",)
+MEDIANS = (
+    *(m for m in (*LESS_IS_BETTER, *MORE_IS_BETTER) if m not in SHARES),
+    "nees_over_3", "not_trusted_share", "distance_m", "moving_share_of_returns",
+    "semi_static_share_of_returns",
+)  # fmt: skip
+LEVEL_COLUMNS = (
+    "scene", "dynamism", "slam", "metric", "statistic", "n", "value", "low", "high", "q25", "q75",
+)  # fmt: skip
+PAIRED_COLUMNS = (
+    "scene", "dynamism", "metric", "slam_a", "slam_b", "n", "median_difference", "low", "high",
+    "wins", "ties", "losses", "p_sign",
+)  # fmt: skip
+
+
+def number(row: Row, metric: str) -> float | None:
+    """A cell as a number: infinite for the error of a SLAM that failed, None where it is empty."""
+    value = row.get(metric)
+    if value is None and metric in WORST_WHEN_FAILED and row["outcome"] in FAILED:
+        return math.inf
+    return None if value is None or math.isnan(value) else float(value)
+
+
+def levels(rows: Sequence[Row]) -> list[Row]:
+    """Median, interval and quartiles of each metric; of losses the share."""
+    out = []
+    for (scene, dynamism, slam), group in _grouped(rows, ("scene", "dynamism", "slam")).items():
+        for metric in (*SHARES, *MEDIANS):
+            values = [v for v in (number(row, metric) for row in group) if v is not None]
+            if values:
+                head = {"scene": scene, "dynamism": dynamism, "slam": slam, "metric": metric}
+                out.append(head | _summary(values, metric in SHARES))
+    return out
+
+
+def _summary(values: list[float], is_share: bool) -> Row:
+    if is_share:
+        low, high = share_interval(round(sum(values)), len(values))
+        middle: Row = {"statistic": "share", "value": sum(values) / len(values)}
+    else:
+        low, high = median_interval(values)
+        middle = {"statistic": "median", "value": quantile(values, 0.5)}
+        middle |= {"q25": quantile(values, 0.25), "q75": quantile(values, 0.75)}
+    return {"n": len(values), "low": low, "high": high, **middle}
+
+
+def pairs(rows: Sequence[Row]) -> list[Row]:
+    """Every two SLAMs on the runs where both have the number."""
+    out = []
+    slams = list(dict.fromkeys(row["slam"] for row in rows))
+    for (scene, dynamism), group in _grouped(rows, ("scene", "dynamism")).items():
+        for metric in (*LESS_IS_BETTER, *MORE_IS_BETTER):
+            for slam_a, slam_b in combinations(slams, 2):
+                a, b = (_by_seed(group, slam, metric) for slam in (slam_a, slam_b))
+                seeds = sorted(a.keys() & b.keys())
+                if not seeds:
+                    continue
+                both = ([a[seed] for seed in seeds], [b[seed] for seed in seeds])
+                head = {"scene": scene, "dynamism": dynamism, "metric": metric}
+                head |= {"slam_a": slam_a, "slam_b": slam_b}
+                out.append(head | paired(*both, less_is_better=metric in LESS_IS_BETTER))
+    return out
+
+
+def _by_seed(rows: Sequence[Row], slam: str, metric: str) -> dict[int, float]:
+    pairs = ((row["seed"], number(row, metric)) for row in rows if row["slam"] == slam)
+    return {seed: value for seed, value in pairs if value is not None}
+
+
+def _grouped(rows: Sequence[Row], keys: Sequence[str]) -> dict[tuple[Any, ...], list[Row]]:
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[key] for key in keys), []).append(row)
+    return groups

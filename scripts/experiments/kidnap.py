@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Kidnap test: does the SLAM notice, and find itself again?
+
+``python -m scripts.experiments.kidnap``.
+
+The robot maps the office on one tour. Then it is put, between two scans, to where it stands at some
+moment of another tour through the same office at another time (other people, other noise, chairs
+elsewhere), at least 3 m or 90 degrees away, near a place it has mapped. The odometry knows nothing
+of it. What counts: scans until the estimate is not trusted, seconds until it is again, and where.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+import math
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sim.core.seeds import Seeds
+from sim.simulation import stream
+from slam import SlamSystem, create, se2
+from slam.files import write_text
+from slam.frames import Float, Frame, Odometry, Scan
+
+FAR_M, FAR_RAD = 3.0, math.pi / 2.0
+KNOWN_M, KNOWN_RAD = 1.0, 1.0  # the new place is that near to one of the mapping tour
+RIGHT_M, RIGHT_RAD = 0.3, 0.2
+AFTER_S = 10.0
+DETECTED_WITHIN = 3  # scans
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """One kidnap. ``detected`` scans until not trusted, ``recovered_s`` until trusted again."""
+
+    seed: int
+    moved_m: float
+    detected: int | None
+    recovered_s: float | None
+    error_m: float | None  # when it trusts itself again
+    right: bool  # trusted at the end, and where it truly is
+    wrong: bool  # ever trusted elsewhere after having been lost, or never suspicious
+
+
+def recording(seed: int, seconds: float, dynamism: float, *, again: bool) -> list[Frame]:
+    """A tour through the office of ``seed``; ``again``: at another time."""
+    other = seed + 1000
+    seeds = Seeds(seed)
+    if again:
+        seeds = Seeds(seed, lidar=other, odometry=other, people=other, driving=other)
+    return list(stream("office", seed=seeds, dynamism=dynamism, seconds=seconds))
+
+
+def targets(mapped: list[Frame], later: list[Frame], scans: int, count: int) -> Iterator[int]:
+    """Moments of ``later`` to be put to."""
+    tour = np.array([frame.truth for frame in mapped])
+    end = tour[-1]
+    rng = np.random.default_rng(len(later))
+    found = 0
+    for k in rng.permutation(np.arange(1, len(later) - scans)).tolist():
+        place = later[k].truth
+        assert place is not None
+        jump = place - end
+        far = math.hypot(jump[0], jump[1]) >= FAR_M or abs(se2.wrap(float(jump[2]))) >= FAR_RAD
+        near = ((tour[:, :2] - place[:2]) ** 2).sum(axis=1) < KNOWN_M**2
+        known = near & (np.abs(se2.wrap_array(tour[:, 2] - place[2])) < KNOWN_RAD)
+        if far and known.any():
+            yield k
+            found += 1
+            if found == count:
+                return
+
+
+def kidnapped(mapped: list[Frame], later: list[Frame], start: int, scans: int) -> Iterator[Frame]:
+    """Frames of ``later`` from ``start`` on as they follow the last of ``mapped`` unawares."""
+    T_odom_robot: Float = mapped[-1].odometry.T_odom_robot
+    stamp_ns, period_ns = mapped[-1].stamp_ns, mapped[1].stamp_ns - mapped[0].stamp_ns
+    for before, now in zip(later[start - 1 :], later[start : start + scans], strict=False):
+        increment = se2.between(before.odometry.T_odom_robot, now.odometry.T_odom_robot)
+        T_odom_robot = se2.compose(T_odom_robot, increment)
+        stamp_ns += period_ns
+        assert now.scan is not None
+        yield Frame(
+            stamp_ns=stamp_ns,
+            odometry=Odometry(
+                stamp_ns=stamp_ns,
+                T_odom_robot=T_odom_robot,
+                increment_covariance=now.odometry.increment_covariance,
+                twist=now.odometry.twist,
+            ),
+            scan=Scan(stamp_ns=stamp_ns, ranges=now.scan.ranges, spec=now.scan.spec),
+            truth=now.truth,
+        )
+
+
+def follow(
+    slam: SlamSystem, frames: list[Frame], T_world_map: Float, moved_m: float, seed: int
+) -> Outcome:
+    """Let a copy of ``slam`` live through it."""
+    slam = copy.deepcopy(slam)
+    detected: int | None = None
+    recovered_s, error_m, wrong, right = None, None, False, False
+    first = frames[0]
+    for k, frame in enumerate(frames):
+        estimate = slam.update(frame.without_truth())
+        assert frame.truth is not None
+        error = estimate.T_map_robot - se2.between(T_world_map, frame.truth)
+        away = math.hypot(error[0], error[1])
+        right = away < RIGHT_M and abs(se2.wrap(float(error[2]))) < RIGHT_RAD
+        if not estimate.converged:
+            right = False
+            if detected is None:
+                detected = k + 1
+        elif detected is not None:
+            wrong = wrong or not right
+            if recovered_s is None:
+                recovered_s, error_m = (frame.stamp_ns - first.stamp_ns) * 1e-9, away
+    return Outcome(
+        seed=seed, moved_m=moved_m, detected=detected, recovered_s=recovered_s, error_m=error_m,
+        right=right, wrong=wrong or detected is None,
+    )  # fmt: skip
+
+
+def kidnap(name: str, seed: int, count: int, seconds: float, dynamism: float) -> Iterator[Outcome]:
+    """``count`` kidnaps in one office."""
+    mapped = recording(seed, seconds, dynamism, again=False)
+    later = recording(seed, seconds, dynamism, again=True)
+    slam = create(name)
+    for frame in mapped:
+        slam.update(frame.without_truth())
+    T_world_map = mapped[0].truth
+    assert T_world_map is not None
+    scans = round(AFTER_S * 1e9 / (mapped[1].stamp_ns - mapped[0].stamp_ns))
+    for start in targets(mapped, later, scans, count):
+        frames = list(kidnapped(mapped, later, start, scans))
+        from_, to = mapped[-1].truth, frames[0].truth
+        assert from_ is not None
+        assert to is not None
+        moved_m = math.hypot(*(to - from_)[:2].tolist())
+        yield follow(slam, frames, T_world_map, moved_m, seed)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Print one line for each kidnap, then the summary."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--slam", default="shunting")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[100, 101, 102, 103, 104])
+    parser.add_argument("--each", type=int, default=6, help="kidnaps for each seed")
+    parser.add_argument("--seconds", type=float, default=90.0, help="of mapping, simulated")
+    parser.add_argument("--dynamism", type=float, default=0.5)
+    parser.add_argument("--json", type=Path, help="also write the outcomes here")
+    wanted = parser.parse_args(arguments)
+    outcomes: list[Outcome] = []
+    for seed in wanted.seeds:
+        for one in kidnap(wanted.slam, seed, wanted.each, wanted.seconds, wanted.dynamism):
+            outcomes.append(one)
+            print(one, flush=True)
+    soon = sum(o.detected is not None and o.detected <= DETECTED_WITHIN for o in outcomes)
+    times = sorted(o.recovered_s for o in outcomes if o.recovered_s is not None)
+    print(
+        f"{len(outcomes)} kidnaps: {soon} detected within {DETECTED_WITHIN} scans, "
+        f"{sum(o.right for o in outcomes)} at the right place after {AFTER_S:g} s, "
+        f"{sum(o.wrong for o in outcomes)} accepted at a wrong one; "
+        f"time to recover: median {np.median(times) if times else math.nan:.2f} s, "
+        f"worst {times[-1] if times else math.nan:.2f} s"
+    )
+    if wanted.json is not None:
+        write_text(wanted.json, json.dumps([asdict(o) for o in outcomes], indent=2) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UMBmark (Borenstein and Feng): squares both ways round tell systematic from random errors.
+
+    python -m scripts.experiments.umbmark --out docs
+
+drives the wheel odometry of ``sim.sensors.odometry.encoders`` round a 4 m square five times each
+way for several
+robots, estimates each robot's Eb and Ed from the mean end errors by the method's own formulas, and
+writes ``odometry.md`` and its picture.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from scripts.figures import save
+from sim.sensors.odometry.encoders import OdometryConfig, WheelOdometry
+from slam.files import write_text
+from slam.frames import Float
+
+SIDE, TRACK = 4.0, 0.33  # m
+SPEED, TURNING, RATE = 0.5, 0.8, 15.0  # m/s, rad/s, 1/s
+RUNS, ROBOTS = 5, 30
+PRESETS = ("pioneer3dx", "probabilistic_robotics", "ideal")
+BLUE, RED, INK = "#1f61be", "#ce2c3c", "#222222"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unit:
+    """One robot: its true errors, and what UMBmark makes of its runs.
+
+    errors    Es, Eb, Ed
+    ends      (2, runs, 2) true minus reported end, m; counter-clockwise runs first
+    """
+
+    errors: tuple[float, float, float]
+    ends: Float
+
+    @property
+    def centres(self) -> Float:
+        """(2, 2) mean end errors m: the systematic part."""
+        centres: Float = self.ends.mean(axis=1)
+        return centres
+
+    @property
+    def worst(self) -> float:
+        """UMBmark's measure of accuracy: the farther of the two centres, m."""
+        return max(math.hypot(*centre) for centre in self.centres.tolist())
+
+    @property
+    def estimate(self) -> tuple[float, float]:
+        """(Eb, Ed) by Borenstein and Feng's formulas, from the x coordinates of the centres."""
+        (x_ccw, _), (x_cw, _) = self.centres.tolist()
+        alpha, beta = (x_cw + x_ccw) / (-4.0 * SIDE), (x_cw - x_ccw) / (-4.0 * SIDE)
+        ratio = 1.0
+        if beta != 0.0:
+            radius = 0.5 * SIDE / math.sin(0.5 * beta)
+            ratio = (radius + 0.5 * TRACK) / (radius - 0.5 * TRACK)
+        return 0.5 * math.pi / (0.5 * math.pi - alpha), ratio
+
+
+def square(direction: float) -> Float:
+    """(n, 2) true rim travel m, left and right, along a square; ``direction`` 1 to the left."""
+    straight = round(SIDE / SPEED * RATE)
+    corner = round(0.5 * math.pi / TURNING * RATE)
+    half = 0.25 * math.pi * TRACK / corner
+    leg = np.full((straight, 2), SIDE / straight)
+    turn = np.tile((-direction * half, direction * half), (corner, 1))
+    return np.cumsum(np.concatenate([leg, turn] * 4), axis=0)
+
+
+def drive(
+    config: OdometryConfig | str, errors: tuple[float, float, float] | None, seed: int, way: float
+) -> Float:
+    """(2,) true minus reported end of one run, m."""
+    odometry = WheelOdometry(config, np.random.default_rng(seed), track=TRACK, errors=errors)
+    for rims in square(way):
+        odometry.update(rims)
+    return -odometry.pose[:2]
+
+
+def measure_unit(config: OdometryConfig | str, seed: int, runs: int = RUNS) -> Unit:
+    """Drive one robot round the square, ``runs`` times each way."""
+    errors = WheelOdometry(config, np.random.default_rng(seed), track=TRACK).errors
+    ends = [
+        [drive(config, errors, 10_000 * seed + k, way) for k in range(first, first + runs)]
+        for first, way in ((1, 1.0), (5_001, -1.0))
+    ]
+    return Unit(errors=errors, ends=np.array(ends))
+
+
+def figure(units: Sequence[Unit]) -> Figure:
+    """End errors of some robots: clouds are random, their distance from (0, 0) is systematic."""
+    out = Figure(figsize=(9.0, 2.7), layout="constrained")
+    for ax, unit in zip(out.subplots(1, len(units), sharex=True, sharey=True), units, strict=True):
+        for ends, color, name in zip(
+            unit.ends, (BLUE, RED), ("to the left", "to the right"), strict=True
+        ):
+            ax.plot(*(1e3 * ends.T), ".", ms=7, color=color, alpha=0.6, label=f"squares {name}")
+            ax.plot(*(1e3 * ends.mean(axis=0)), "+", ms=13, mew=2, color=color)
+        ax.plot(0, 0, "o", ms=5, mfc="none", color=INK)
+        scale, track, ratio = unit.errors
+        ax.set_title(f"Eb {track:.3f}   Ed {ratio:.4f}   Es {scale:.3f}", fontsize=9)
+        ax.set_xlabel("x error [mm]", fontsize=8)
+        ax.tick_params(labelsize=8)
+        ax.set_aspect("equal")
+        ax.grid(alpha=0.3)
+    out.axes[0].set_ylabel("y error [mm]", fontsize=8)
+    out.axes[0].legend(fontsize=8, loc="best")
+    return out
+
+
+def page(units: Sequence[Unit]) -> str:
+    """The page as Markdown."""
+    lines = [
+        *HEAD,
+        "| robot | Eb true | Eb by UMBmark | Ed true | Ed by UMBmark | farther centre |",
+        "|---|---|---|---|---|---|",
+    ]
+    for k, unit in enumerate(units):
+        _, track, ratio = unit.errors
+        eb, ed = unit.estimate
+        lines.append(
+            f"| {k + 1} | {track:.4f} | {eb:.4f} | {ratio:.4f} | {ed:.4f} | "
+            f"{1e3 * unit.worst:.0f} mm |"
+        )
+    lines += ["", "Median over 30 robots of each preset, five squares each way:", ""]
+    lines += [
+        "| preset | farther centre (systematic) | spread of one way's ends (random) |",
+        "|---|---|---|",
+    ]
+    for name in PRESETS:
+        many = [measure_unit(name, seed) for seed in range(ROBOTS)]
+        worst = float(np.median([u.worst for u in many]))
+        spread = float(np.median([u.ends.std(axis=1).mean() for u in many]))
+        lines.append(f"| `{name}` | {1e3 * worst:.0f} mm | {1e3 * spread:.0f} mm |")
+    return "\n".join([*lines, "", *TAIL])
+
+
+HEAD = (
+    "# Wheel odometry",
+    "",
+    "Two kinds of error, kept apart because they behave differently: systematic ones, drawn once",
+    "per run (Ed right over left wheel diameter, Eb true over nominal track, Es true over reported",
+    "distance), and random ones, whose variance grows with metres and radians. Presets and their",
+    "sources are in `sim/sensors/odometry/config.py`.",
+    "",
+    "## UMBmark",
+    "",
+    "Made by `python -m scripts.experiments.umbmark --out docs`: robots of the preset "
+    "`pioneer3dx` drive a 4 m",
+    "square five times each way; shown are the quartiles of 30 robots. Dots are true minus",
+    "reported ends, crosses their means. The size of the clouds is the random part; what the means",
+    "keep is systematic: a wrong track shows alike in both directions, unequal wheels oppositely.",
+    "From the two means the formulas of Borenstein and Feng give Eb and Ed back, as well as five",
+    "runs can; Es shows in neither.",
+    "",
+    "![UMBmark](pictures/umbmark.png)",
+    "",
+)
+TAIL = (
+    "The systematic part of `pioneer3dx` is inferred in size (design note, fidelity 2.4): the",
+    "published UMBmark figures could not be read. `probabilistic_robotics` has no systematic part:",
+    "its centres lie off zero only by the mean of five random runs.",
+    "",
+    "## Covariance",
+    "",
+    "Each frame carries the covariance of its motion increment over the ensemble of runs. The mean",
+    "of the normalised squared error (NEES) over 100 runs lies within its bounds for both noisy",
+    "presets, at increments of 27 ms and of 0.53 s (`tests/sim/sensors/test_odometry.py`). Between",
+    "increments the systematic part is fully correlated, which independent covariances cannot say:",
+    "who chains increments over many metres must add to it (`WheelOdometry.systematic_std`).",
+    "",
+)
+
+
+def main() -> None:
+    """Write the page and its picture."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
+    parser.add_argument("--out", type=Path, default=Path("docs"))
+    out = parser.parse_args().out
+    (out / "pictures").mkdir(parents=True, exist_ok=True)
+    robots = sorted((measure_unit("pioneer3dx", k) for k in range(ROBOTS)), key=lambda u: u.worst)
+    units = [robots[round(ROBOTS * part)] for part in (0.25, 0.5, 0.75)]
+    save(figure(units), out / "pictures" / "umbmark.png")
+    write_text(out / "odometry.md", page(units))
+    print(f"wrote {out / 'odometry.md'}")
+
+
+if __name__ == "__main__":
+    main()

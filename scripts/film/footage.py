@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What can be filmed: a run's folder, a dataset's episode, a log, or a simulation at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scripts.comparison.again import is_run, run_of, why_no_run
+from scripts.film.encode import SIZE, Pace, Size
+from scripts.film.show import Show
+from scripts.film.view import LogStage, Stage
+from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
+from scripts.single_run.session import primary_of, systems_named
+from scripts.trust import admitted
+from sim.core.versions import check_world, world_of
+from sim.recording.sums import check_vouched
+from slam.errors import InvalidValueError, LogFormatError
+from slam.frames import NS_PER_S, Stream
+from slam.logs import open_log
+from slam.logs.bag import read_bag
+from slam.logs.bag_topics import is_bag
+from slam.replay import Replay
+
+if TYPE_CHECKING:
+    from sim.moments import Moment
+    from sim.simulation import Simulation
+
+SIMULATED = ("scene", "seconds", "seed", "dynamism", "scan_height_m")  # of a run's settings
+
+
+@dataclass(eq=False, kw_only=True)
+class Footage:
+    """Frames, and what a film of them shows beside the SLAM.
+
+    title    scene, dynamism and seed, or the log's name
+    truth_name  what the film calls the truth
+    slam     the SLAM that the run was about, "" where nobody says
+    made_with  what the simulation was made with, for a recipe
+    no_camera  why there is no 3D view although one was wanted; empty otherwise
+    """
+
+    stream: Stream
+    stage: Stage
+    title: str
+    duration_s: float
+    truth_name: str = "truth"
+    slam: str = ""
+    no_camera: str = ""
+    made_with: Mapping[str, Any] = field(default_factory=dict)
+
+    def show(self, slams: Sequence[str], *, pace: Pace | None = None, size: Size = SIZE) -> Show:
+        """A show of the first of ``slams``, with the others and odometry beside it."""
+        replay = Replay.of(systems_named(slams))
+        return Show(
+            replay=replay,
+            primary=primary_of(replay),
+            stage=self.stage,
+            title=self.title,
+            duration_s=self.duration_s,
+            truth_name=self.truth_name,
+            pace=pace or Pace.within_a_minute(self.duration_s),
+            size=size,
+        )
+
+    def close(self) -> None:
+        """Give back what the stage holds."""
+        closing = getattr(self.stage, "close", None)
+        if closing is not None:
+            closing()
+
+    def __enter__(self) -> Footage:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def open_run(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
+    """What lies at ``path``: the folder of a run or an episode, a run of a comparison, or a log of
+    any known format.
+
+    view   of the 3D camera, None for none
+    trust  whether a scene that is code, by the name that a file there has, is run; its SLAM's name
+           stays one from a file
+    Raises ``LogFormatError`` that says what is missing or wrong there, ``UntrustedNameError``
+    without ``trust``, ``WorldVersionError`` for a run of another version of the world.
+    """
+    if is_run(path):
+        return of_compared(path, view=view, trust=trust)
+    recipe = path / RECIPE
+    if not recipe.exists():
+        check_vouched(recipe)  # one that is listed is lost: not what a log is
+        return of_log(path)
+    words = read_recipe_words(recipe)
+    if "recipe" in words:
+        return of_episode(path, view=view, trust=trust)
+    settings = words.get("settings")
+    if not isinstance(settings, dict):
+        raise LogFormatError(recipe, "no recipe of a run: it has no settings")
+    slams = [name for name in slams_of(recipe, settings) if name != "odometry"]
+    slam = slams[0] if slams else ""
+    if "log" in settings:
+        raise LogFormatError(
+            path, f"a run on a log, which is not kept in it: render '{settings['log']}' itself"
+            + (f" with --slam {slam}" if slam else "")
+        )  # fmt: skip
+    if "scene" not in settings or "seconds" not in settings:
+        raise LogFormatError(path, why_no_run(path, words.get("command", "?")))
+    check_world(recipe, world_of(recipe, words))
+    known = {key: settings[key] for key in SIMULATED if key in settings}
+    known["scene"] = admitted(scenes_of(recipe, {"scene": settings["scene"]})[0], "scene", trust)
+    try:
+        return replace(of_scene(known, view=view), slam=slam)
+    except (TypeError, ValueError) as error:
+        raise LogFormatError(recipe, f"no recipe of a run: {error}") from error
+
+
+def of_scene(settings: Mapping[str, Any], *, view: str | None = "follow") -> Footage:
+    """A simulated tour: scene, seconds, and what ``Simulation`` takes."""
+    from sim.moments import toured
+    from sim.simulation import Simulation
+
+    seconds = settings["seconds"]
+    simulation = Simulation(**{k: v for k, v in settings.items() if k != "seconds"}, labels=True)
+    return of_simulation(
+        simulation,
+        lambda: toured(simulation, seconds),
+        seconds=seconds,
+        title=title_of(settings),
+        view=view,
+    )
+
+
+def of_simulation(
+    simulation: Simulation,
+    moments: Callable[[], Iterator[Moment]],
+    *,
+    seconds: float,
+    title: str,
+    view: str | None = "follow",
+    every: int = 1,
+) -> Footage:
+    """A simulation at hand and the moments that it goes through, one in ``every`` of them shown."""
+    from scripts.film.live_view import LiveStage
+    from sim.moments import thinned
+    from sim.simulation import n_frames
+
+    shown = moments if every == 1 else lambda: thinned(moments(), every)
+    stage = LiveStage(simulation, shown, view=view)
+    stream = Stream(
+        metadata=simulation.metadata(),
+        frames=stage.frames,
+        length=-(-n_frames(seconds, simulation.scan_period_s) // every),
+    )
+    return Footage(
+        stream=stream,
+        stage=stage,
+        title=title,
+        duration_s=float(seconds),
+        no_camera=stage.why_no_camera(),
+        made_with={
+            "simulation": {"odometry": simulation.odometry_preset, **simulation.metadata().extra}
+        },
+    )
+
+
+def of_episode(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
+    """An episode of a dataset, made again from its recipe."""
+    from sim.moments import toured
+    from sim.recording.recipe import read_recipe
+    from sim.simulation import Simulation
+    from sim.twins.twins import Twins
+
+    made = read_recipe(path / RECIPE)
+    check_world(path / RECIPE, made.world)
+    recipe = replace(made.recipe, scene=admitted(made.recipe.scene, "scene", trust))
+    settings = {"scene": recipe.scene, "dynamism": recipe.dynamism, "seed": recipe.seed}
+    if not recipe.twin:
+        simulation = Simulation(**recipe.simulation())
+        moments = lambda: toured(simulation, recipe.seconds)  # noqa: E731
+    else:  # the room of a twin is another one than its drive's: no 3D view of it
+        twins = Twins(**recipe.simulation(), seconds=recipe.seconds)
+        simulation, settings["twin"] = twins.simulation, recipe.twin
+        moments = lambda: twins.moments(recipe.twin)  # noqa: E731
+    footage = of_simulation(
+        simulation,
+        moments,
+        seconds=recipe.seconds,
+        title=title_of(settings),
+        view=None if recipe.twin else view,
+    )
+    if recipe.twin and view is not None:
+        footage.no_camera = "this episode is one of three twins, whose rooms only the plan shows"
+    return footage
+
+
+def of_compared(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
+    """A run of a comparison, made again with the scans that its SLAMs got."""
+    from sim.moments import toured
+    from sim.simulation import Simulation
+
+    again = run_of(path)
+    recipe = replace(again.recipe, scene=admitted(again.recipe.scene, "scene", trust))
+    simulation = Simulation(**recipe.simulation())
+    footage = of_simulation(
+        simulation,
+        lambda: toured(simulation, recipe.seconds),
+        seconds=recipe.seconds,
+        title=title_of(asdict(recipe)),
+        view=view,
+        every=again.every,
+    )
+    footage.slam = next((name for name in again.slams if name != "odometry"), "")
+    return footage
+
+
+def of_log(path: Path) -> Footage:
+    """A log: its scans are all that is known of the world."""
+    from sim.recording.verify import check_bag
+
+    check_bag(path)
+    stream = read_bag(path, labels=True) if is_bag(path) else open_log(path)
+    first_ns = last_ns = None
+    labelled, frames = False, 0
+    for frame in stream:
+        first_ns = frame.stamp_ns if first_ns is None else first_ns
+        last_ns, frames = frame.stamp_ns, frames + 1
+        labelled = labelled or frame.labels is not None
+    if first_ns is None or last_ns is None:
+        raise InvalidValueError(f"{path}: holds no frame to film")
+    return Footage(
+        stream=stream,
+        stage=LogStage(labelled=labelled),
+        title=path.resolve().name,
+        duration_s=(last_ns - first_ns) / NS_PER_S,
+        truth_name=stream.metadata.truth or "truth",
+    )
+
+
+def title_of(settings: Mapping[str, Any]) -> str:
+    """``office · dynamism 0.5 · seed 4``."""
+    twin = f" · {settings['twin']} twin" if settings.get("twin") else ""
+    return (
+        f"{settings['scene']} · dynamism {settings.get('dynamism', 0.5)} · "
+        f"seed {settings.get('seed', 0)}{twin}"
+    )

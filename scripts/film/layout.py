@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the panes of a film frame lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scripts.film.encode import Size
+
+MARGIN, TOP, TITLE, GUTTER = 16, 66, 20, 16  # of a 1280 x 720 frame, px
+CHART, LEFT, CLOSE = 240, 480, 150
+
+
+@dataclass(frozen=True)
+class Box:
+    """One pane: its left upper corner and its size, px."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def size(self) -> Size:
+        """(width, height)."""
+        return self.width, self.height
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """The panes of a frame; ``camera`` is None without a 3D view, whose place the others take.
+
+    unit  px that stand for one of 1280 x 720: what fonts and lines scale with
+    """
+
+    size: Size
+    unit: float
+    scan: Box
+    map: Box
+    chart: Box
+    close: Box
+    camera: Box | None = None
+
+    @classmethod
+    def of(cls, size: Size, *, camera: bool) -> Layout:
+        """For a frame of (width, height); the panes grow with it."""
+        unit = min(size[0] / 1280.0, size[1] / 720.0)
+        width, height = size[0] / unit, size[1] / unit
+
+        def box(x: float, y: float, w: float, h: float) -> Box:
+            left, top = round(x * unit), round(y * unit)
+            return Box(left, top, round((x + w) * unit) - left, round((y + h) * unit) - top)
+
+        chart_top = height - 14 - CHART
+        upper = chart_top - 26 - TOP
+        if camera:
+            left = MARGIN + LEFT + GUTTER
+            lower = TOP + 300 + 28
+            scan = box(MARGIN, lower, LEFT, height - 14 - lower)
+            view = box(MARGIN, TOP, LEFT, 300)
+        else:
+            left = MARGIN
+            half = (width - 2 * MARGIN - GUTTER) / 2.0
+            scan, view = box(MARGIN, TOP, half, upper), None
+        map_left = left if camera else MARGIN + half + GUTTER
+        return cls(
+            size=size,
+            unit=unit,
+            camera=view,
+            scan=scan,
+            map=box(map_left, TOP, width - MARGIN - map_left, upper),
+            chart=box(left, chart_top, width - MARGIN - CLOSE - GUTTER - left, CHART),
+            close=box(width - MARGIN - CLOSE, chart_top + TITLE, CLOSE, CLOSE),
+        )

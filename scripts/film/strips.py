@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Film strips: a few moments of a run side by side in one PNG, each labelled with its time.
+
+strip(pictures, seconds, Path("strip.png"))
+strips({"as it was": pictures, "without chair 3": others}, seconds, Path("both.png"))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from scripts.film import draw
+from scripts.film.draw import Picture
+from slam.errors import InvalidValueError
+from slam.files import replacing
+
+CELL_WIDTH = 400  # px
+GAP, MARGIN = 10, 14
+LABEL = 22  # px above a picture for its time
+HEADING = 30  # px above a row for its name
+
+
+def evenly(n: int, start_s: float, end_s: float) -> list[float]:
+    """``n`` moments from ``start_s`` to ``end_s``, ends included; one alone is the end."""
+    if n < 1:
+        raise InvalidValueError(f"a strip needs at least 1 moment, got {n}")
+    if n == 1:
+        return [end_s]
+    return [start_s + (end_s - start_s) * k / (n - 1) for k in range(n)]
+
+
+def strip(
+    pictures: Sequence[Picture],
+    seconds: Sequence[float],
+    path: Path | None = None,
+    *,
+    columns: int | None = None,
+    cell_width: int = CELL_WIDTH,
+) -> Picture:
+    """One row of pictures (or several of ``columns`` each) with their times; written to ``path``.
+
+    pictures  (height, width, 3) uint8 RGB, all of one size
+    seconds   of each, written above it
+    Raises ``InvalidValueError`` where these do not fit together.
+    """
+    return strips({"": pictures}, seconds, path, columns=columns, cell_width=cell_width)
+
+
+def strips(
+    rows: Mapping[str, Sequence[Picture]],
+    seconds: Sequence[float],
+    path: Path | None = None,
+    *,
+    columns: int | None = None,
+    cell_width: int = CELL_WIDTH,
+) -> Picture:
+    """Strips under one another, each under its name: the same moments of several runs."""
+    columns = min(columns or len(seconds), len(seconds))
+    shape = _cell(rows, seconds, cell_width)
+    blocks = [_block(name, parts, seconds, columns, shape) for name, parts in rows.items()]
+    inner = np.vstack(blocks)
+    whole: Picture = np.full(
+        (inner.shape[0] + MARGIN, inner.shape[1] + 2 * MARGIN, 3), draw.PAPER, np.uint8
+    )
+    whole[: inner.shape[0], MARGIN : MARGIN + inner.shape[1]] = inner
+    if path is not None:
+        with replacing(path) as temporary:
+            Image.fromarray(whole).save(temporary, format="PNG", optimize=True)
+    return whole
+
+
+def _cell(
+    rows: Mapping[str, Sequence[Picture]], seconds: Sequence[float], cell_width: int
+) -> tuple[int, int]:
+    """(height, width) px of each picture in the strip."""
+    if not seconds or not rows:
+        raise InvalidValueError("a strip needs at least 1 moment, got 0")
+    for name, parts in rows.items():
+        if len(parts) != len(seconds):
+            raise InvalidValueError(
+                f"strip '{name}' has {len(parts)} pictures for {len(seconds)} moments"
+            )
+    shapes = sorted({part.shape for parts in rows.values() for part in parts})
+    if len(shapes) != 1 or len(shapes[0]) != 3 or shapes[0][2] != 3:
+        raise InvalidValueError(f"pictures of a strip must be RGB of one size, got {shapes}")
+    height, width, _ = shapes[0]
+    return max(1, round(height * cell_width / width)), cell_width
+
+
+def _block(
+    name: str,
+    parts: Sequence[Picture],
+    seconds: Sequence[float],
+    columns: int,
+    cell: tuple[int, int],
+) -> Picture:
+    """One run: its name and its pictures, ``columns`` a line."""
+    (height, width), lines = cell, -(-len(parts) // columns)
+    top = HEADING if name else 6
+    shape = (top + lines * (LABEL + height + GAP) - GAP, columns * (width + GAP) - GAP, 3)
+    block: Picture = np.full(shape, draw.PAPER, np.uint8)
+    if name:
+        draw.text(block, name, (0, 9), 15, draw.INK, bold=True)
+    for k, (part, at_s) in enumerate(zip(parts, seconds, strict=True)):
+        line, column = divmod(k, columns)
+        x, y = column * (width + GAP), top + line * (LABEL + height + GAP)
+        draw.text(block, f"{at_s:.1f} s", (x, y + 3), 13, draw.MUTED, bold=True)
+        draw.paste(block, part, (x, y + LABEL), (width, height))
+    return block

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an experiment leaves: figures as PNG and SVG, a Markdown table, the recipe."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+
+from scripts.jobs import Job, run_jobs
+from scripts.output import machine, write_recipe
+from scripts.paper.depends import checksums
+from scripts.paper.runs import Plan, Run, load_run
+from scripts.paper.times import duration
+from slam import create
+from slam.files import replacing, write_text
+from slam.frames import Float
+
+COLORS = {
+    "truth": "#168c5a", "odometry": "#de6e18", "occupancy": "#7a3fb0", "EKF": "#1f61be",
+    "shunting": "#ce2c3c", "shunting, features": "#e377c2", "shunting, paper preset": "#12a3b4",
+    "shunting, paper preset, beams": "#d4a017",
+    "known associations": "#5b6472", "graph": "#111111", "GPS": "#168c5a",
+}  # fmt: skip
+
+
+@dataclass(eq=False)
+class Report:
+    """One experiment's folder."""
+
+    name: str
+    plan: Plan
+    started: float = field(default_factory=time.perf_counter)
+    cpu_started: float = field(default_factory=time.process_time)
+    lines: list[str] = field(default_factory=list)
+    quoted: list[str] = field(default_factory=list)  # what the page of all experiments repeats
+    made: tuple[int, int] = (0, 0)  # runs made in this call, and of how many
+    cpu_s: float = 0.0  # processor time of the runs, whenever they were made
+    recipe: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> Any:
+        """Where it all goes."""
+        return self.plan.out / self.name
+
+    def run(self, jobs: Iterable[Job]) -> dict[str, Run]:
+        """Make the runs that are missing; all of them."""
+        listed, runs = list(jobs), self.folder / "runs"
+        missing = sum(not (runs / job.file_name()).exists() for job in listed)
+        self.made = (missing, len(listed))
+        before = time.process_time()
+        files = run_jobs(listed, runs, processes=self.plan.processes, title=self.name)
+        self.cpu_started += time.process_time() - before  # the runs have their own
+        self.recipe["runs"] = {job.name: dict(job.arguments) for job in listed}
+        done = {name: load_run(file) for name, file in files.items()}
+        self.cpu_s += sum(run.cpu_s for run in done.values())
+        return done
+
+    def systems(self, systems: Mapping[str, tuple[str, Mapping[str, Any]]]) -> None:
+        """Into the recipe: kind, options and whole configuration of each SLAM."""
+        told = self.recipe.setdefault("systems", {})
+        for name, (kind, options) in systems.items():
+            config = getattr(create(kind, **options), "config", None)
+            whole = {} if config is None else {"config": asdict(config)}
+            told[name] = {"slam": kind, "options": dict(options), **whole}
+
+    def heading(self, text: str) -> None:
+        """A section of the page."""
+        self.lines += ["", f"## {text}", ""]
+
+    def say(self, text: str, *, quote: bool = False) -> None:
+        """A paragraph; with ``quote`` in the summary too."""
+        self._add([text, ""], quote)
+
+    def table(
+        self, head: Sequence[str], rows: Iterable[Sequence[str]], *, quote: bool = False
+    ) -> None:
+        """A table; the first column is words, the others are numbers."""
+        lines = ["| " + " | ".join(head) + " |", "|" + "---|" + "---:|" * (len(head) - 1)]
+        lines += ["| " + " | ".join(row) + " |" for row in rows]
+        self._add([*lines, ""], quote)
+
+    def _add(self, lines: list[str], quote: bool) -> None:
+        self.lines += lines
+        if quote:
+            self.quoted += lines
+
+    def figure(self, name: str, figure: Figure, caption: str) -> None:
+        """``name``.png and ``name``.svg, and the picture in the page and in the summary."""
+        for suffix in ("png", "svg"):
+            metadata = {"Software": None} if suffix == "png" else {"Date": None}
+            with (
+                replacing(self.folder / f"{name}.{suffix}") as temporary,
+                mpl.rc_context({"svg.hashsalt": "mobilia"}),
+            ):
+                figure.savefig(temporary, dpi=130, metadata=metadata)
+        self._add([f"![{caption}]({name}.png)", "", f"*{caption}*", ""], quote=True)
+
+    def finish(self, title: str) -> None:
+        """Write the page and the recipe; the page says on which machine and how long."""
+        wall_s = time.perf_counter() - self.started
+        page_cpu_s = time.process_time() - self.cpu_started
+        self.cpu_s += page_cpu_s
+        made_on = machine()
+        made, whole = self.made
+        kept = f" ({whole - made} of {whole} runs were there already)" if made < whole else ""
+        said = (
+            f"Processor time of all this {duration(self.cpu_s)}, wall time of this call "
+            f"{duration(wall_s)}{kept}; {self.plan.processes} at a time on "
+            f"{made_on['processor']}, {made_on['cores']} cores"
+            + (" (quick: too short and too few to conclude from)." if self.plan.quick else ".")
+        )
+        page = [f"# {title}", "", said, "", *self.lines]
+        write_text(self.folder / "README.md", "\n".join(page).rstrip() + "\n")
+        summary = [*self.quoted, said]
+        write_text(self.folder / "summary.md", "\n".join(summary).rstrip() + "\n")
+        times = {"wall_s": wall_s, "cpu_s": self.cpu_s, "page_cpu_s": page_cpu_s}
+        self._write_recipe({"machine": made_on, **times})
+
+    def _write_recipe(self, measured: Mapping[str, Any]) -> None:
+        plan = self.plan
+        settings = asdict(plan) | {"out": str(plan.out), "seeds": plan.seed_list()}
+        if plan.data is not None:
+            settings["data"] = {"folder": str(plan.data), "sha256": checksums(plan.data)}
+        told = {"plan": settings, **measured, **self.recipe}
+        write_recipe(self.folder, f"reproduce {self.name}", told)
+
+
+def new_figure(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> Any:
+    """A figure and its axes (always an array, row by row); for experiments that are ``styled``."""
+    figure = Figure(figsize=(width, height))
+    return figure, np.atleast_1d(figure.subplots(rows, columns, **options)).ravel()
+
+
+def draw_ellipses(ax: Axes, ellipses: Float, *, label: str = "", dot: float = 2.5) -> None:
+    """(n, 5) centre, half axes, direction; a dot in each so that tiny ones are seen."""
+    if len(ellipses):
+        ax.add_collection(
+            EllipseCollection(
+                2.0 * ellipses[:, 2], 2.0 * ellipses[:, 3], np.degrees(ellipses[:, 4]),
+                units="xy", offsets=ellipses[:, :2], offset_transform=ax.transData,
+                facecolors="none", edgecolors="black", linewidths=0.9,
+            )
+        )  # fmt: skip
+    ax.plot(ellipses[:, 0], ellipses[:, 1], ".", color="black", ms=dot, label=label)
+
+
+def draw_activities(
+    ax: Axes, values: NDArray[Any], origin: Float, cell: float, cmap: str, *, swell: bool = False
+) -> Any:
+    """A map's activities (rows from the lowest y) as an image; ``swell`` makes blobs of few
+    neurons, which would be less than a pixel, a 150th of the picture."""
+    height, width = values.shape
+    x, y = float(origin[0]), float(origin[1])
+    size = 1 + 2 * (max(height, width) // 300) if swell else 1
+    swollen = maximum_filter(values.astype(np.float32), size=size)
+    shown = np.where(swollen > 0.02, swollen, np.nan)
+    return ax.imshow(
+        shown, origin="lower", extent=(x, x + width * cell, y, y + height * cell), cmap=cmap,
+        vmin=0.0, vmax=1.0, interpolation="nearest",
+    )  # fmt: skip
+
+
+def error_axes(seconds: Float, errors: Mapping[str, Float], title: str) -> Figure:
+    """The paper's Figs. 7, 9, 12: errors in x, y and heading over time, one line for each SLAM.
+
+    Linear, unless one SLAM's errors dwarf another's: then linear near zero, logarithmic beyond.
+    """
+    figure: Figure
+    figure, axes = new_figure(9.0, 7.0, rows=3, sharex=True)
+    for ax, k, unit in zip(axes, range(3), ("x in m", "y in m", "heading in rad"), strict=True):
+        for name, e in errors.items():
+            ax.plot(seconds, e[:, k], color=COLORS[name], lw=1.2, label=name)
+        ax.axhline(0.0, color="black", lw=0.5)
+        ax.set(ylabel=f"error of {unit}")
+        sizes = [float(np.nanmax(np.abs(e[:, k]))) for e in errors.values()]
+        sizes = [size for size in sizes if size > 0.0]
+        if sizes and max(sizes) > 15.0 * min(sizes):
+            # a power of ten: else the first tick lies within the linear part, on that of zero
+            ax.set_yscale("symlog", linthresh=10.0 ** round(math.log10(min(sizes))))
+    axes[0].set(title=title)
+    axes[0].legend(frameon=False, ncols=4, fontsize=8)
+    axes[2].set(xlabel="time in s")
+    return figure

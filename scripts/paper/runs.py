@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every experiment does: SLAMs over frames, results in one file, numbers over seeds."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import time
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scripts.jobs import Job
+from scripts.paper.depends import depends_on
+from slam import se2
+from slam.archives import read_arrays
+from slam.errors import InvalidValueError, LogFormatError
+from slam.evaluation import metrics
+from slam.frames import Float, Frame
+from slam.replay import Track
+from slam.system import SlamSystem
+from slam.trajectory import Trajectory
+
+QUANTITIES = ("x", "y", "θ")
+FIRST_SEED = 200  # of the simulated runs: nothing was tuned or tested on it and those after it
+SEEDS, QUICK_SEEDS = 20, 1
+_CPU = "cpu_s"  # its name in a run's file
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What was asked for.
+
+    out        folder; each experiment writes into a folder of its own in it
+    seeds      simulated runs of each kind; None is 20, with ``quick`` 1
+    quick      short runs, to see that all works
+    data       folder of the Victoria Park dataset
+    processes  that work at the same time
+    """
+
+    out: Path
+    seeds: int | None = None
+    quick: bool = False
+    data: Path | None = None
+    processes: int = 1
+
+    def __post_init__(self) -> None:
+        if self.seeds is not None and self.seeds < 1:
+            raise InvalidValueError(f"--seeds must be >= 1, got {self.seeds}")
+        if self.processes < 1:
+            raise InvalidValueError(f"--jobs must be >= 1, got {self.processes}")
+        if self.data is not None and not self.data.is_dir():
+            raise InvalidValueError(
+                f"--data must be the folder of the Victoria Park dataset, got {self.data}"
+            )
+
+    def seed_list(self) -> list[int]:
+        """The seeds of the simulated runs; the first is the single run shown as the paper's."""
+        n = self.seeds or (QUICK_SEEDS if self.quick else SEEDS)
+        return list(range(FIRST_SEED, FIRST_SEED + n))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run:
+    """One job's file: ``numbers`` (JSON), ``arrays``, and the processor time that it took."""
+
+    numbers: Mapping[str, Any]
+    arrays: Mapping[str, NDArray[Any]]
+    cpu_s: float = math.nan
+
+
+def save_run(path: Path, numbers: Mapping[str, Any], arrays: Mapping[str, ArrayLike]) -> None:
+    """Write a ``Run``; NaN and infinities stay what they are."""
+    everything: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
+    everything["numbers"] = np.array(json.dumps(numbers, sort_keys=True))
+    with path.open("wb") as file:
+        np.savez_compressed(file, **everything)
+
+
+def load_run(path: Path) -> Run:
+    """Read it back; ``LogFormatError`` for anything else."""
+    arrays = read_arrays(path)
+    try:
+        numbers, cpu_s = json.loads(str(arrays.pop("numbers"))), arrays.pop(_CPU, math.nan)
+        return Run(numbers=numbers, arrays=arrays, cpu_s=float(cpu_s))
+    except (ValueError, TypeError, KeyError) as error:
+        raise LogFormatError(path, f"no run of an experiment: {error}") from error
+
+
+def job(name: str, call: Any, /, **arguments: Any) -> Job:
+    """A job that is made again when anything it depends on changes; its processor time is kept."""
+    if "data" in arguments:
+        arguments["data"] = str(Path(arguments["data"]).resolve())
+    return Job(
+        name=name,
+        call=timed,
+        arguments={"call": f"{call.__module__}:{call.__qualname__}", **arguments},
+        code=depends_on(call, arguments),
+    )
+
+
+def timed(path: Path, *, call: str, **arguments: Any) -> None:
+    """Let ``call`` ("module:function") write its run, and add the processor time that it took."""
+    started = time.process_time()
+    module, _, name = call.partition(":")
+    getattr(importlib.import_module(module), name)(path, **arguments)
+    with zipfile.ZipFile(path, "a") as file, file.open(f"{_CPU}.npy", "w") as member:
+        np.lib.format.write_array(member, np.array(time.process_time() - started))
+
+
+def truth_of(frames: Sequence[Frame]) -> Trajectory:
+    """The true poses, in the frame of the first."""
+    poses = np.array([frame.truth for frame in frames])
+    first = se2.inverse(poses[0])
+    return Trajectory(
+        stamps_ns=np.array([frame.stamp_ns for frame in frames]),
+        poses=np.array([se2.compose(first, pose) for pose in poses]),
+    )
+
+
+def follow(system: SlamSystem, frames: Iterable[Frame], name: str) -> Track:
+    """One SLAM over the frames, without their truth."""
+    track = Track(name=name, system=system)
+    for frame in frames:
+        track.take(frame.without_truth())
+    return track
+
+
+def pose_numbers(estimate: Trajectory, truth: Trajectory) -> dict[str, Any]:
+    """RMSE, and the paper's mean(e), var(e), var(p) of x, y and heading."""
+    e = metrics.pose_errors(estimate, truth)
+    return {
+        "rmse_m": metrics.ate(estimate, truth).value,
+        "heading_rmse_rad": metrics.heading_rmse(estimate, truth).value,
+        **statistics(e.errors, QUANTITIES),
+    }
+
+
+def statistics(errors: Float, names: Sequence[str]) -> dict[str, Any]:
+    """mean(e), var(e) and var(p) of each column; NaN of fewer than two errors."""
+    out: dict[str, Any] = {}
+    n = len(errors)
+    for k, name in enumerate(names):
+        e = errors[:, k] if n >= 2 else np.full(2, np.nan)
+        mean = float(e.mean())
+        out[f"mean {name}"] = mean
+        out[f"var_e {name}"] = float(((e - mean) ** 2).sum() / (len(e) - 1))
+        out[f"var_p {name}"] = float((e**2).sum() / (len(e) - 1))
+    return out
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """Median and quartiles over the ``n`` seeds of ``of`` that gave a number."""
+
+    median: float
+    low: float
+    high: float
+    n: int
+    of: int
+
+    def text(self, form: str = "{:.3g}") -> str:
+        """``median [low, high]``, and of how many when not of all."""
+        if not self.n:
+            return "–"
+        middle, low, high = (form.format(v) for v in (self.median, self.low, self.high))
+        told = f"{middle} [{low}, {high}]" if self.n > 1 else middle
+        return told if self.n == self.of else f"{told} ({self.n} of {self.of})"
+
+
+def spread(values: Iterable[float]) -> Spread:
+    """Of finite values, ``n`` of them; NaN where there is none."""
+    listed = list(values)
+    finite = np.array([v for v in listed if v is not None and math.isfinite(v)])
+    if len(finite) == 0:
+        return Spread(median=math.nan, low=math.nan, high=math.nan, n=0, of=len(listed))
+    low, median, high = (float(v) for v in np.percentile(finite, [25, 50, 75]))
+    return Spread(median=median, low=low, high=high, n=len(finite), of=len(listed))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignTest:
+    """How often the first of a pair was the smaller, and the two-sided probability of that or
+    more by chance."""
+
+    wins: int
+    losses: int
+    p: float
+
+    def text(self) -> str:
+        """One cell of a table."""
+        return f"{self.wins} : {self.losses}, p = {self.p:.2g}"
+
+
+def sign_test(first: Sequence[float], second: Sequence[float]) -> SignTest:
+    """Paired by seed; ties count for neither, no number (NaN) loses against any."""
+    pairs = [
+        (math.inf if math.isnan(a) else a, math.inf if math.isnan(b) else b)
+        for a, b in zip(first, second, strict=True)
+    ]
+    wins, losses = sum(a < b for a, b in pairs), sum(b < a for a, b in pairs)
+    n, k = wins + losses, max(wins, losses)
+    tail = sum(math.comb(n, i) for i in range(k, n + 1)) / 2.0**n
+    return SignTest(wins=wins, losses=losses, p=min(1.0, 2.0 * tail) if n else 1.0)

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One run from a stream to a folder: replay, film, figures, map, trajectories, scores, recipe."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import imageio.v2 as imageio
+from rich.markup import escape
+
+from scripts import figures
+from scripts.console import console
+from scripts.film.encode import FPS, Pace, film, require_ffmpeg
+from scripts.film.render import shoot, watched
+from scripts.film.show import Show
+from scripts.output import machine, whole_folder, write_recipe
+from scripts.single_run import score
+from slam.errors import InvalidValueError
+from slam.files import write_text
+from slam.frames import Stream
+from slam.maps import write_map
+from slam.replay import Replay
+from slam.shunting import ShuntingSlam
+from slam.system import SlamSystem, create
+from slam.trajectory import write_tum
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outputs:
+    """Where a run goes and what it leaves."""
+
+    folder: Path
+    command: str
+    settings: Mapping[str, Any]
+    overwrite: bool = False
+    film: bool = True
+    film_fps: float = FPS
+
+
+def systems_named(names: Sequence[str]) -> dict[str, SlamSystem]:
+    """Fresh systems by name, odometry among them as the null system."""
+    if not names:
+        raise InvalidValueError("name at least one SLAM")
+    wanted = dict.fromkeys([*names, "odometry"])
+    return {name: create(name) for name in wanted}
+
+
+def primary_of(replay: Replay) -> str:
+    """The system a run is about: the first that is not odometry."""
+    return next((n for n in replay.tracks if n != "odometry"), "odometry")
+
+
+def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
+    """Replay ``stream``, write everything into ``outputs.folder``, print the table.
+
+    The folder appears when it is whole. Returns what ``results.json`` holds.
+    """
+    replay = show.replay
+    if outputs.film:
+        require_ffmpeg()
+    with whole_folder(outputs.folder, overwrite=outputs.overwrite) as folder:
+        show.pace = Pace.within_a_minute(show.duration_s, outputs.film_fps)
+        reel = film(folder / "film.mp4", show.pace.fps) if outputs.film else nullcontext()
+        started = time.perf_counter()
+        with reel as opened:
+            for _ in watched(shoot(stream, show, opened), stream, show.title):
+                pass
+        wall_s = time.perf_counter() - started
+        results = score.results(replay, wall_s, machine())
+        _write(folder, replay, show, results)
+        if opened is not None and opened.last is not None:
+            imageio.imwrite(folder / "poster.png", opened.last)
+        write_recipe(folder, outputs.command, outputs.settings)
+    score.print_table(results, show.title)
+    _tell(outputs)
+    return results
+
+
+def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any]) -> None:
+    online = {name: track.online() for name, track in replay.tracks.items()}
+    world_truth = replay.truth()
+    truth = figures.in_first_frame(world_truth) if world_truth is not None else None
+    raster = replay.tracks[show.primary].map()
+    truth_name = show.truth_name
+    for name, track in online.items():
+        write_tum(folder / f"trajectory_{file_name(name)}.tum", track)
+        final = replay.tracks[name].final()
+        if final is not None:
+            write_tum(folder / f"trajectory_{file_name(name)}_final.tum", final)
+    if truth is not None:
+        write_tum(folder / "trajectory_truth.tum", truth)
+        figures.errors(folder / "errors.png", online, truth)
+    figures.trajectories(folder / "trajectories.png", online, truth, raster, truth_name)
+    if raster is not None:
+        write_map(folder / "map", show.seen.merge(raster))
+        figures.map_picture(folder / "map.png", raster, online[show.primary], show.last_points_map)
+    system = replay.tracks[show.primary].system
+    if isinstance(system, ShuntingSlam):
+        system.save(folder / "map.npz")
+        changes = system.changes()
+        if raster is not None and changes is not None:
+            figures.changes_picture(folder / "changes.png", raster, changes, online[show.primary])
+    write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
+
+
+def file_name(name: str) -> str:
+    """A system's name as part of a file name: ``my_pkg:MySlam`` becomes ``my_pkg-MySlam``."""
+    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
+
+
+_WORTH_OPENING = ("film.mp4", "map.png", "changes.png", "trajectories.png", "errors.png")
+
+
+def _tell(outputs: Outputs) -> None:
+    """What to open first, of what is really there."""
+    there = [name for name in _WORTH_OPENING if (outputs.folder / name).exists()]
+    others = ["results.json has every number", "trajectory_*.tum is for evo"]
+    if (outputs.folder / "map.yaml").exists():
+        others.append("map.yaml for map_server")
+    if (outputs.folder / "map.npz").exists():
+        others.append("map.npz for ShuntingSlam.load")
+    first = escape(str(outputs.folder / there[0]))
+    then = f", then {', '.join(there[1:])} beside it" if there[1:] else ""
+    console.print(
+        f"Open [bold]{first}[/bold] first{then}; {', '.join(others)}.",
+        soft_wrap=True,
+    )

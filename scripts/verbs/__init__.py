@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One module a verb of the console command: parse, call, print."""

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia reproduce``: each experiment of the paper by one command."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from scripts.console import console, note
+from scripts.paper.runs import Plan
+from scripts.paper.times import total
+from slam.errors import UnknownNameError
+from slam.files import write_text
+
+EXPERIMENTS = ("victoria-park", "landmarks", "chairs", "office", "theory")
+
+
+def reproduce(
+    what: Annotated[
+        list[str], typer.Argument(help=f"Of {', '.join(EXPERIMENTS)}, or all.", metavar="WHAT...")
+    ],
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Short runs, of one seed: three minutes for all.")
+    ] = False,
+    seeds: Annotated[
+        int | None, typer.Option(help="Runs of each simulated experiment.", show_default="20")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder; each experiment gets one in it.")] = Path(
+        "out/reproduce"
+    ),
+    data: Annotated[Path | None, typer.Option(help="Folder of the Victoria Park dataset.")] = None,
+    jobs: Annotated[int, typer.Option(help="Processes; 0: one for each core.")] = 0,
+) -> None:
+    """Reproduce the paper's experiments: figures, tables with its numbers beside ours, recipes.
+
+    Runs that are whole are kept: killed and called again, it goes on where it was.
+
+    [bold]mobilia reproduce landmarks[/bold]
+    """
+    plan = Plan(out=out, seeds=seeds, quick=quick, data=data, processes=jobs or os.cpu_count() or 1)
+    names, started = _named(what), time.perf_counter()
+    left_out = "all" in what and plan.data is None
+    if left_out:
+        names.remove("victoria-park")
+    for name in names:
+        experiment(name)(plan)
+        page = escape(str(plan.out / name / "README.md"))
+        console.print(f"[bold]{name}[/bold]: open {page}", soft_wrap=True)
+    if "all" in what:
+        told = total(plan, names, time.perf_counter() - started)
+        write_text(plan.out / "summary.md", told + "\n")
+        console.print(escape(told), soft_wrap=True)
+    if left_out:
+        note("victoria-park is left out: pass --data with the folder of the dataset")
+
+
+def experiment(name: str) -> Callable[[Plan], None]:
+    """The function that runs it."""
+    module = importlib.import_module(f"scripts.paper.{name.replace('-', '_')}")
+    function: Callable[[Plan], None] = module.reproduce
+    return function
+
+
+def _named(what: list[str]) -> list[str]:
+    for name in what:
+        if name != "all" and name not in EXPERIMENTS:
+            raise UnknownNameError(
+                f"no experiment is called '{name}'. Known: {', '.join(EXPERIMENTS)}, all."
+            )
+    return list(EXPERIMENTS) if "all" in what else list(dict.fromkeys(what))

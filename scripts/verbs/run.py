@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia run``: SLAMs on a recorded log or a simulated tour, scored, mapped and filmed."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from scripts.film.footage import of_log
+from scripts.single_run.session import Outputs, run_session
+from slam.errors import InvalidValueError
+
+
+def run(
+    slam: Annotated[
+        list[str],
+        typer.Argument(
+            help="SLAMs to run, by name (see [bold]mobilia list[/bold]) or as module:Class. "
+            "Odometry always runs beside them.",
+            metavar="SLAM...",
+        ),
+    ],
+    log: Annotated[
+        Path | None,
+        typer.Option(help="A log: a bag of ROS 1 or 2, CARMEN or the folder of Victoria Park."),
+    ] = None,
+    scene: Annotated[
+        str | None, typer.Option(help="Or a simulated scene, driven on a tour of its rooms.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="Length of the simulated tour, s.")] = 60.0,
+    dynamism: Annotated[
+        float, typer.Option(help="How much the simulated room moves: 0 nothing, 1 most.")
+    ] = 0.5,
+    seed: Annotated[int, typer.Option(help="Seed of the simulated run, whole number >= 0.")] = 0,
+    scan_height: Annotated[
+        float, typer.Option(help="Of the simulated scanner above the floor, m.")
+    ] = 0.36,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write; default out/run-<log or scene>.")
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
+    ] = False,
+    film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
+) -> None:
+    """Run SLAMs on a log or on a simulated scene and write the same files as the demo.
+
+    [bold]mobilia run shunting --log intel.log.xz[/bold]
+
+    [bold]mobilia run shunting my_package.my_slam:MySlam --scene arena --dynamism 1[/bold]
+    """
+    if (log is None) == (scene is None):
+        raise InvalidValueError("name exactly one of --log and --scene")
+    if log is not None:
+        on_log(slam, log, out or Path("out") / f"run-{log.name.split('.')[0]}", overwrite, film)
+    elif scene is not None:
+        from scripts.single_run.live import on_scene
+
+        on_scene(
+            slam,
+            settings={
+                "scene": scene,
+                "seconds": seconds,
+                "dynamism": dynamism,
+                "seed": seed,
+                "scan_height_m": scan_height,
+            },
+            outputs=Outputs(
+                folder=out or Path("out") / f"run-{scene.replace(':', '-')}",
+                command="run",
+                settings={},
+                overwrite=overwrite,
+                film=film,
+            ),
+        )
+
+
+def on_log(names: list[str], path: Path, out: Path, overwrite: bool, film: bool) -> dict[str, Any]:
+    """Run SLAMs on a recorded log."""
+    footage = of_log(path)
+    show = footage.show(names)
+    settings = {
+        "slams": list(show.replay.tracks),
+        "log": path.name,
+        "log_sha256": hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None,
+        "log_facts": dict(footage.stream.metadata.extra),
+    }
+    return run_session(
+        footage.stream,
+        show,
+        Outputs(folder=out, command="run", settings=settings, overwrite=overwrite, film=film),
+    )

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Doors with closers: opened for whoever comes, blown or pushed about at the dynamism rate.
+
+The closer (spring to the angle of rest, damper) is in the model. A hand, a draught or the opener
+for the robot adds a torque through ``qfrc_applied``; at all other times that is exactly zero, so a
+door at rest sleeps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.core.bodies import Bodies
+from sim.core.draws import between, waiting
+from slam._jit import njit
+
+Float = NDArray[np.float64]
+
+# columns of the schedule, (m, 4): next event s, end of the present one s, its angle rad, and
+# until when the door is kept open for someone s
+NEXT, UNTIL, ANGLE, KEPT = 0, 1, 2, 3
+OPENED = 1.5  # rad, where a hand opens to
+PASSABLE = 1.15  # rad, as ``sim.actors.people.right_of_way.OPEN``
+RATE_MAX = 1.4  # rad/s, a door pushed open takes a little more than a second
+TORQUE_MAX = 40.0  # N m, against spring and damper too; about 45 N at the handle
+NEAR, FACING = 1.6, 0.3  # m, cosine: a robot this near and facing the doorway is let through
+REST_STEP = 0.75  # rad: closed, ajar, open
+CLEAR = 0.95  # m, a door is not let go of while someone is this near its middle
+
+
+@njit
+def robot_asks(robot: Float, middle: Float) -> bool:
+    """Whether the robot (x, y, yaw) comes to, or is in, the doorway around ``middle`` (x, y)."""
+    dx, dy = middle[0] - robot[0], middle[1] - robot[1]
+    distance = math.sqrt(dx * dx + dy * dy)
+    ahead = dx * math.cos(robot[2]) + dy * math.sin(robot[2])
+    return distance < CLEAR or (distance < NEAR and ahead > FACING * distance)
+
+
+@njit
+def torque_to(target: float, q: float, qd: float, closer: Float) -> float:
+    """N m that turns the leaf to ``target`` at a hand's pace.
+
+    closer  (5,) stiffness N m/rad, damping N m s/rad, friction N m, inertia kg m2, rest rad
+    """
+    rate = min(max(3.0 * (target - q), -RATE_MAX), RATE_MAX)
+    friction = math.copysign(closer[2], rate) if abs(rate) > 0.02 else 0.0
+    push = closer[0] * (q - closer[4]) + closer[1] * rate + friction
+    torque = push + 8.0 * closer[3] * (rate - qd)
+    return float(min(max(torque, -TORQUE_MAX), TORQUE_MAX) + 0.0)
+
+
+class Leaves(NamedTuple):
+    """The doors of a model, m of them.
+
+    rates      (m,) events that nobody in sight causes, 1/s
+    addresses  (m, 2) in qpos and dof; middles (m, 2) m; closers (m, 5); limits (m, 2) rad
+    passage    (m, 3) of ``sim.actors.people.right_of_way``: columns 1 asked for by a person, 2 a
+               person is in the way
+    schedule   (m, 4) in the columns named above; draws (m,) generators
+    """
+
+    rates: Float
+    addresses: NDArray[np.int64]
+    middles: Float
+    closers: Float
+    limits: Float
+    passage: Float
+    schedule: Float
+    draws: NDArray[np.uint64]
+
+
+@njit
+def swing(time: float, robot: Float, leaves: Leaves, physics: tuple[Float, Float, Float]) -> None:
+    """One tick of all doors.
+
+    robot    (3,) pose
+    physics  qpos and qvel (read), qfrc_applied (written)
+    """
+    rates, addresses, middles, closers, limits, passage, schedule, draws = leaves
+    qpos, qvel, qfrc = physics
+    for d in range(len(addresses)):
+        at, dof = addresses[d]
+        row, closer = schedule[d], closers[d]
+        low, high = limits[d]
+        if time >= row[NEXT]:  # always three draws
+            row[NEXT] = time + waiting(draws, d, rates[d])
+            row[ANGLE] = between(draws, d, low, high)
+            row[UNTIL] = time + between(draws, d, 3.0, 9.0)
+        if (
+            passage[d, 1] > 0.0
+            or robot_asks(robot, middles[d])
+            or (passage[d, 2] > 0.0 and time < row[KEPT])
+        ):
+            row[KEPT] = time + 0.5
+        if time < row[KEPT]:
+            disturbed = time < row[UNTIL] or closer[4] < PASSABLE or qpos[at] < PASSABLE
+            target = min(max(OPENED, closer[4]), high)
+        elif time < row[UNTIL]:
+            # an angle is not forced upon someone who stands in the doorway
+            disturbed, target = True, qpos[at] if passage[d, 2] > 0.0 else row[ANGLE]
+        else:
+            disturbed, target = False, 0.0
+        qfrc[dof] = torque_to(target, qpos[at], qvel[dof], closer) if disturbed else 0.0
+
+
+class Doors:
+    """The doors of a model, as ``leaves``.
+
+    ``passage`` is shared with the people, who write what they want.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        bodies: Bodies,
+        names: Sequence[str],
+        *,
+        rate: float,
+        counters: NDArray[np.uint64],
+    ) -> None:
+        """``rate``: events of each door that nobody in sight causes, 1/s."""
+        self.names = list(names)
+        m = len(self.names)
+        self.passage = np.zeros((m, 3))
+        self.schedule = np.full((m, 4), -math.inf)
+        self._draws = counters.copy()
+        qpos, dof = bodies.addresses(self.names)
+        self.addresses = np.column_stack([qpos, dof])
+        self.hinges = bodies.hinges(self.names)
+        self.widths = bodies.radii(self.names)
+        heading = self.hinges[:, 2].tolist()
+        self.along = np.array([[math.cos(a), math.sin(a)] for a in heading]).reshape(m, 2)
+        self.middles = self.hinges[:, :2] + 0.5 * self.widths[:, None] * self.along
+        self._closers, self._limits = np.zeros((m, 5)), np.zeros((m, 2))
+        for d, name in enumerate(self.names):
+            self._closers[d], self._limits[d] = _closer(model, model.joint(f"{name}/hinge"))
+            self.schedule[d, NEXT] = waiting(self._draws, d, rate)
+        self.leaves = Leaves(
+            np.full(m, rate), self.addresses, self.middles, self._closers, self._limits,
+            self.passage, self.schedule, self._draws,
+        )  # fmt: skip
+
+    def boxes_at_rest(self) -> Float:
+        """(m, 5) leaves at about their angle of rest: centre x, y, half sizes m, yaw rad.
+
+        To the nearest ``REST_STEP``, so that rooms that differ only in how wide their doors stand
+        open have the same ways through them, which are costly to find.
+        """
+        boxes = np.zeros((len(self.names), 5))
+        for d, (x, y, closed, sign) in enumerate(self.hinges.tolist()):
+            rest = REST_STEP * round(float(self._closers[d, 4]) / REST_STEP)
+            yaw, half = closed + sign * rest, 0.5 * float(self.widths[d])
+            boxes[d] = x + half * math.cos(yaw), y + half * math.sin(yaw), half, 0.03, yaw
+        return boxes
+
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        """The live arrays that are the state."""
+        return {"passage": self.passage, "schedule": self.schedule, "draws": self._draws}
+
+
+def _closer(model: mujoco.MjModel, joint: object) -> tuple[Float, Float]:
+    """(stiffness, damping, friction, inertia, rest) and (low, high) of a hinge."""
+    j = joint.id  # type: ignore[attr-defined]
+    dof, at = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
+    low, high = model.jnt_range[j] if model.jnt_limited[j] else (0.0, math.pi / 2.0)
+    rest = min(max(float(model.qpos_spring[at]), float(low)), float(high))
+    values = (
+        np.ravel(model.jnt_stiffness[j])[0],
+        np.ravel(model.dof_damping[dof])[0],
+        model.dof_frictionloss[dof],
+        model.dof_M0[dof],
+        rest,
+    )
+    return np.array(values, dtype=np.float64), np.array([low, high], dtype=np.float64)

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The velocity a person picks: nearest to the wanted one among those that hit nothing soon.
+
+Reciprocal velocity obstacles by sampling (van den Berg, Lin, Manocha, ICRA 2008), with walls read
+from the clearance field.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.actors.people.right_of_way import (
+    BLOCKED,
+    BODY,
+    KIND,
+    PERSON,
+    ROBOT,
+    VX,
+    VY,
+    Crowd,
+    Float,
+    Int,
+    R,
+    U,
+    V,
+    X,
+    Y,
+)
+from sim.core.flow import Field, clearance_at
+from slam._jit import njit
+
+HORIZON = 2.5  # s, collisions later than this do not matter
+ACCEL = 3.0  # m/s2
+SPARE = 0.05  # m that people leave between themselves and the robot
+
+
+@njit
+def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> float:
+    """s until a point moving at (wx, wy) is within ``reach`` of (dx, dy); HORIZON if later."""
+    c = dx * dx + dy * dy - reach * reach
+    b = dx * wx + dy * wy
+    if c <= 0.0:
+        return 0.0 if b > 0.0 else HORIZON
+    a = wx * wx + wy * wy
+    root = b * b - a * c
+    if b <= 0.0 or root <= 0.0:
+        return HORIZON
+    return min(c / (b + math.sqrt(root)), HORIZON)
+
+
+@njit
+def danger(i: int, vx: float, vy: float, near: Int, discs: Float, fade: float) -> float:
+    """Cost of what person ``i`` would run into at velocity (vx, vy)."""
+    x, y, r, ux, uy = discs[i, X], discs[i, Y], discs[i, R], discs[i, U], discs[i, V]
+    cost = 0.0
+    for k in range(len(near)):
+        other = discs[near[k]]
+        weight = 1.0 if other[KIND] == PERSON or other[KIND] == ROBOT else fade
+        if weight <= 0.0:
+            continue
+        dx, dy, reach = other[X] - x, other[Y] - y, r + other[R] + 0.06
+        if other[KIND] == PERSON:  # each takes half of the evasion
+            wx, wy = 2.0 * vx - ux - other[U], 2.0 * vy - uy - other[V]
+        else:
+            wx, wy = vx - other[U], vy - other[V]
+        gap2 = dx * dx + dy * dy
+        if gap2 < reach * reach:
+            closing = (dx * vx + dy * vy) / math.sqrt(max(gap2, 1e-6))
+            cost += weight * 4.0 * max(closing, 0.0)
+        else:
+            when = impact_time(dx, dy, wx, wy, reach)
+            cost += weight * (1.0 / (when + 0.1) - 1.0 / (HORIZON + 0.1))
+    return cost
+
+
+@njit
+def choose(
+    i: int,
+    wanted: tuple[float, float],
+    near: Int,
+    fade: float,
+    field: Field,
+    crowd: Crowd,
+) -> tuple[float, float]:
+    """The best of 35 velocities for person ``i`` who would like to walk at ``wanted``."""
+    discs, state = crowd.discs, crowd.state
+    wx, wy = wanted
+    x, y = discs[i, X], discs[i, Y]
+    heading = math.atan2(wy, wx)
+    here = min(clearance_at(field, x, y), BODY)
+    wish = math.sqrt(wx * wx + wy * wy)
+    pace = max(wish, 0.5)
+    hurry = min(1.5 * state[i, BLOCKED], 3.0) if wish > 0.3 else 0.0
+    best, best_x, best_y = math.inf, 0.0, 0.0
+    for k in range(35):
+        if k == 0:
+            vx, vy = wx, wy
+        elif k == 1:
+            vx, vy = 0.0, 0.0
+        elif k == 2:
+            vx, vy = state[i, VX], state[i, VY]
+        else:
+            angle = heading + (k - 3) // 2 * (math.pi / 8.0)
+            speed = pace if k % 2 == 0 else 0.5 * pace
+            vx, vy = speed * math.cos(angle), speed * math.sin(angle)
+        speed = math.sqrt(vx * vx + vy * vy)
+        cost = math.sqrt((vx - wx) ** 2 + (vy - wy) ** 2)
+        cost += 0.15 * math.sqrt((vx - state[i, VX]) ** 2 + (vy - state[i, VY]) ** 2)
+        cost += 0.06 * max(0.0, wx * vy - wy * vx)  # people keep right
+        if speed < 0.9 * pace:  # who has been held up steps aside rather than stand
+            cost += hurry * (1.0 - speed / pace)
+        for step in range(1, 3):
+            c = clearance_at(field, x + 0.3 * step * vx, y + 0.3 * step * vy)
+            if c < here:
+                cost += 25.0 * (here - c)
+        if cost < best:
+            cost += danger(i, vx, vy, near, discs, fade)
+        if cost < best:
+            best, best_x, best_y = cost, vx, vy
+    return best_x, best_y
+
+
+@njit
+def spare_robot(
+    i: int, wanted: tuple[float, float], near: Int, discs: Float
+) -> tuple[float, float]:
+    """The velocity less what would run into the robot: nobody pushes it, not even when held up."""
+    vx, vy = wanted
+    for k in range(len(near)):
+        robot = discs[near[k]]
+        if robot[KIND] != ROBOT:
+            continue
+        dx, dy = robot[X] - discs[i, X], robot[Y] - discs[i, Y]
+        far = math.sqrt(max(dx * dx + dy * dy, 1e-6))
+        ux, uy = dx / far, dy / far
+        gap = far - discs[i, R] - robot[R] - SPARE
+        # A person stops at ACCEL; what the robot itself comes nearer is stepped back from.
+        approach = vx * ux + vy * uy - (robot[U] * ux + robot[V] * uy)
+        allowed = math.sqrt(2.0 * ACCEL * gap) if gap > 0.0 else 4.0 * gap
+        excess = min(max(approach - allowed, 0.0), 2.0)
+        vx, vy = vx - excess * ux, vy - excess * uy
+    return vx, vy

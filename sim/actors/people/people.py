@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The people of a scene: arrays for the compiled kernels of ``crowd`` and ``gait``."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.scene import Scene
+from sim.actors.doors import Doors
+from sim.actors.people import crowd, gait, right_of_way, sitting
+from sim.actors.people.right_of_way import Addresses, Crowd
+from sim.core.bodies import Bodies
+from sim.core.draws import between, normal, uniform
+from sim.core.flow import Field, FlowMap, nowhere
+
+Float = NDArray[np.float64]
+_LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
+_LOOKS = np.uint64(0xD1342543DE82EF95)  # sets the second generator of each person apart
+_FIRST_STAY_MAX = 8.0  # s, so that a short run of a calm room sees someone set off
+
+
+@functools.lru_cache(maxsize=8)
+def _flow(
+    bounds: tuple[float, float, float, float], boxes: bytes, leaves: bytes, goals: bytes
+) -> FlowMap:
+    """Flow maps are the costly part of a reset and depend on the floor plan alone."""
+    return FlowMap(
+        bounds,
+        np.frombuffer(boxes, dtype=np.float64).reshape(-1, 5),
+        np.frombuffer(goals, dtype=np.float64).reshape(-1, 2),
+        leaves=np.frombuffer(leaves, dtype=np.float64).reshape(-1, 5),
+    )
+
+
+def floor_field(scene: Scene, leaves: Float) -> Field:
+    """Clearance and ways to all goals of a scene, in the order of its ``goals``."""
+    goals = np.array([scene.goals[name] for name in scene.goals], dtype=np.float64)
+    xmin, ymin, xmax, ymax = (float(b) for b in scene.bounds)
+    boxes = np.ascontiguousarray(scene.obstacles, dtype=np.float64)
+    bounds = (xmin, ymin, xmax, ymax)
+    return _flow(bounds, boxes.tobytes(), leaves.tobytes(), goals.tobytes()).field
+
+
+def _hulls(model: mujoco.MjModel, names: Sequence[str]) -> sitting.Hulls:
+    geoms = np.array([model.geom(f"{name}/hull").id for name in names], dtype=np.int64)
+    body = mujoco.mjtObj.mjOBJ_BODY
+    looks = np.array([mujoco.mj_name2id(model, body, f"{p}/look") for p in names], dtype=np.int64)
+    bits = np.column_stack([model.geom_contype[geoms], model.geom_conaffinity[geoms]])
+    heights = model.body_pos[looks, 2].copy()
+    own = (model.geom_contype, model.geom_conaffinity, model.body_pos)
+    return sitting.Hulls(geoms, bits, looks, heights, *own)
+
+
+class People:
+    """Everybody in a room, as ``table`` for the kernels.
+
+    stay_mean  s at a goal; infinite: nobody moves at all
+    pace       factor on the preferred speeds, N(1.34, 0.26) m/s clipped to 0.8..1.9 (PedSim)
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        bodies: Bodies,
+        doors: Doors,
+        *,
+        stay_mean: float,
+        pace: float,
+        counters: NDArray[np.uint64],
+    ) -> None:
+        scene = bodies.scene
+        self.names = [m.name for m in scene.movers if m.kind == "person"]
+        n = len(self.names)
+        self._rates = (stay_mean, pace)
+        self.feet = np.zeros((n, gait.N_COLUMNS))
+        at = _addresses(bodies, doors, self.names)
+        self.crowd = Crowd(
+            discs=_discs(bodies, doors, self.names),
+            yaws=np.zeros(len(at.discs)),
+            state=np.zeros((n, right_of_way.N_STATE)),
+            task=np.zeros((n, 3), dtype=np.int64),
+            draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
+        )
+        self.crowd.task[:, right_of_way.SEAT] = -1
+        alive = n > 0 and math.isfinite(stay_mean) and len(scene.goals) > 0
+        servos = [model.actuator(f"{p}/vx").id for p in self.names]
+        limbs = [[model.body(f"{p}/{limb}").mocapid[0] for limb in _LIMBS] for p in self.names]
+        self.table = crowd.People(
+            alive=alive,
+            rates=self._rates,
+            at=at,
+            field=floor_field(scene, doors.boxes_at_rest()) if alive else nowhere(),
+            ways=_ways(doors, n),
+            crowd=self.crowd,
+            servos=np.array(servos, dtype=np.int64),
+            torsos=np.ascontiguousarray(at.discs[:n]),
+            limbs=np.array(limbs, dtype=np.int64).reshape(n, 4),
+            feet=self.feet,
+            sitting=self.crowd.state[:, right_of_way.SIT],
+            hulls=_hulls(model, self.names),
+        )
+
+    def start(self, data: mujoco.MjData) -> None:
+        """Draw who everyone is, and put their feet under them where ``data`` says they stand."""
+        state, task, draws = self.crowd.state, self.crowd.task, self.crowd.draws
+        for i in range(len(self.names)):
+            speed = 1.34 + 0.26 * normal(draws, i)
+            state[i, right_of_way.SPEED] = min(max(speed, 0.8), 1.9)
+            first = min(self._rates[0], _FIRST_STAY_MAX)
+            state[i, right_of_way.STAY_UNTIL] = first * uniform(draws, i)
+            state[i, right_of_way.LOOK] = data.qpos[self.table.torsos[i, 0] + 2]
+            state[i, right_of_way.LOOK_UNTIL] = between(draws, i, 4.0, 15.0)
+            n_goals = max(len(self.table.field.times), 1)
+            task[i, right_of_way.GOAL] = int(uniform(draws, i) * n_goals)
+        self.stand(data)
+
+    def dress(self) -> None:
+        """Let the model follow who sits: hulls that meet no chair, torsos lowered."""
+        sitting.dress(self.crowd, self.table.hulls)
+
+    def stand(self, data: mujoco.MjData) -> None:
+        """Put everybody's feet under them where ``data`` says they are."""
+        if self.names:
+            t = self.table
+            gait.stand(data.qpos, t.torsos, self.feet)
+            physics, mocap = (data.qpos, data.qvel), (data.mocap_pos, data.mocap_quat)
+            gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.sitting, mocap)
+
+    def swinging(self) -> NDArray[np.bool_]:
+        """(n,) True for those with a foot in the air."""
+        return self.feet[:, gait.SWING] >= 0.0
+
+    def walked_s(self) -> tuple[Float, Float]:
+        """(n,) s each has been on the way so far, and (n,) s of these standing still, blocked."""
+        state = self.crowd.state
+        return state[:, right_of_way.WALKED_S].copy(), state[:, right_of_way.BLOCKED_S].copy()
+
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        """The live arrays that are the state."""
+        c = self.crowd
+        return {"feet": self.feet, "state": c.state, "task": c.task, "draws": c.draws}
+
+
+def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:
+    m = len(doors.names)
+    table = np.zeros((m, 8))
+    table[:, [right_of_way.CX, right_of_way.CY]] = doors.middles
+    table[:, [right_of_way.EX, right_of_way.EY]] = doors.along
+    sign = doors.hinges[:, 3]
+    table[:, right_of_way.NX], table[:, right_of_way.NY] = (
+        -sign * doors.along[:, 1],
+        sign * doors.along[:, 0],
+    )
+    table[:, right_of_way.WIDTH] = doors.widths
+    sides = np.zeros((n_people, m), dtype=np.int64)
+    return right_of_way.Doors(doors=table, passage=doors.passage, sides=sides)
+
+
+def _planar(bodies: Bodies, people: Sequence[str]) -> list[str]:
+    """Names in the order of the disc rows: people first."""
+    kinds = ("person", "door")
+    return [*people, *(m.name for m in bodies.scene.movers if m.kind not in kinds)]
+
+
+def _addresses(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Addresses:
+    qpos, dof = bodies.addresses(_planar(bodies, people))
+    return Addresses(discs=np.column_stack([qpos, dof]), doors=doors.addresses, hinges=doors.hinges)
+
+
+def _discs(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Float:
+    planar = _planar(bodies, people)
+    discs = np.zeros((len(planar) + 3 * len(doors.names), 6))
+    discs[: len(planar), right_of_way.KIND] = right_of_way.THING
+    discs[: len(people), right_of_way.KIND] = right_of_way.PERSON
+    for mover in bodies.scene.movers:
+        if mover.kind == "robot":
+            discs[planar.index(mover.name), right_of_way.KIND] = right_of_way.ROBOT
+        elif mover.kind.startswith("chair"):
+            discs[planar.index(mover.name), right_of_way.KIND] = right_of_way.CHAIR
+    discs[: len(planar), right_of_way.R] = bodies.radii(planar)
+    for row in range(len(planar), len(discs)):
+        discs[row, right_of_way.KIND] = right_of_way.LEAF + (row - len(planar)) // 3
+        discs[row, right_of_way.R] = 0.06
+    return discs

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""People and doors: whose turn it is, where the others wait, how near one comes to a closed leaf.
+
+Also the tables that all kernels of the crowd share, one row for each person, disc or door.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.core.flow import Field, clearance_at, time_at, way_at
+from slam._jit import njit
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+# columns of the people's state, (n, 14) float64
+SPEED, STAY_UNTIL, BLOCKED, ARRIVE, LOOK, LOOK_UNTIL = 0, 1, 2, 3, 4, 5
+VX, VY, BEST, BEST_AT, WALKED_S, BLOCKED_S = 6, 7, 8, 9, 10, 11
+SIT, LUCK = 12, 13  # 0 stands to 1 sits; drawn for each trip: whether to look for a chair
+N_STATE = 14
+# columns of their task, (n, 3) int64: what one does, where to, disc row of one's chair (-1 none)
+WALKING, GOAL, SEAT = 0, 1, 2
+STANDS, WALKS, TO_SEAT, SEATED = 0, 1, 2, 3
+# columns of a disc: everything with a round hull, people first, then (k, 6)
+X, Y, R, U, V, KIND = 0, 1, 2, 3, 4, 5
+PERSON, THING, ROBOT, CHAIR, LEAF = 0.0, 1.0, 2.0, 3.0, 10.0  # LEAF + d: of the leaf of door d
+# columns of a door, (m, 8) float64: centre, normal to the side it swings to, along the leaf when
+# closed, width, angle; and of its passage, (m, 3): whose turn (side +1, -1, 0 none), asked for,
+# someone in it
+CX, CY, NX, NY, EX, EY, WIDTH, ANGLE = 0, 1, 2, 3, 4, 5, 6, 7
+TURN, ASKED, INSIDE = 0, 1, 2
+
+BODY = 0.27  # m of clearance a person keeps to walls
+OPEN = 1.15  # rad, a leaf this far open lets a person through
+
+
+class Crowd(NamedTuple):
+    """The people and what is around them, in the columns named above.
+
+    discs (k, 6) people first; yaws rad of people and things; state (n, 14);
+    task (n, 3); draws (2 n,) generators:
+    of each one's trips, then of each one's looking about while standing, which happens as often as
+    time allows. So the trips of a person are the same, however long each takes.
+    """
+
+    discs: Float
+    yaws: Float
+    state: Float
+    task: Int
+    draws: NDArray[np.uint64]
+
+
+class Doors(NamedTuple):
+    """doors (m, 8), passage (m, 3), and from which side each person wants through, sides (n, m)."""
+
+    doors: Float
+    passage: Float
+    sides: Int
+
+
+class Addresses(NamedTuple):
+    """Where things stand in qpos and qvel.
+
+    discs (k, 2) first qpos and dof of each planar mover in the order of the disc rows;
+    doors (m, 2) of each hinge; hinges (m, 4) hinge x, y m, heading closed rad, sign of opening
+    """
+
+    discs: Int
+    doors: Int
+    hinges: Float
+
+
+@njit
+def wants_through(i: int, door: Float, field: Field, crowd: Crowd) -> int:
+    """Side (+1 where the leaf swings to, -1) from which person ``i`` wants to pass; 0: none."""
+    discs, task = crowd.discs, crowd.task
+    dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+    distance = math.sqrt(dx * dx + dy * dy)
+    if task[i, WALKING] != WALKS or distance > 2.2:
+        return 0
+    goal = task[i, GOAL]
+    normal = dx * door[NX] + dy * door[NY]
+    if distance < 0.35:
+        wx, wy = way_at(field, goal, discs[i, X], discs[i, Y])
+        return -1 if wx * door[NX] + wy * door[NY] > 0.0 else 1
+    there = time_at(field, goal, door[CX], door[CY])
+    if time_at(field, goal, discs[i, X], discs[i, Y]) - there < 0.8 * distance:
+        return 0
+    return 1 if normal > 0.0 else -1
+
+
+@njit
+def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:
+    """Who may pass each door, and whether it shall open. Fills ``ways.sides``."""
+    doors, passage, sides, discs = ways.doors, ways.passage, ways.sides, crowd.discs
+    for d in range(doors.shape[0]):
+        door = doors[d]
+        inside, nearest, turn = 0, math.inf, 0
+        kept, asked = False, False
+        passage[d, INSIDE] = 0.0
+        for i in range(sides.shape[0]):
+            side = wants_through(i, door, field, crowd)
+            sides[i, d] = side
+            dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+            distance = math.sqrt(dx * dx + dy * dy)
+            hx = dx + 0.5 * door[WIDTH] * door[EX]
+            hy = dy + 0.5 * door[WIDTH] * door[EY]
+            swept = dx * door[NX] + dy * door[NY] > 0.0 and hx * hx + hy * hy < 1.6
+            if distance < 0.95 or swept:  # nobody is hit by a leaf that moves by itself
+                passage[d, INSIDE] = 1.0
+            if side == 0:
+                continue
+            across, along = dx * door[NX] + dy * door[NY], dx * door[EX] + dy * door[EY]
+            in_frame = abs(across) < 0.4 and abs(along) < 0.5 * door[WIDTH]
+            if in_frame and (inside == 0 or side == int(passage[d, TURN])):
+                inside = side
+            if side == int(passage[d, TURN]) and distance < 1.4:
+                kept = True
+            if distance < nearest:
+                nearest, turn = distance, side
+        if inside != 0:
+            turn = inside
+        elif kept:
+            turn = int(passage[d, TURN])
+        passage[d, TURN] = turn
+        for i in range(sides.shape[0]):
+            if turn != 0 and sides[i, d] == turn:
+                dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+                reach = 2.1 if turn > 0 else 1.5  # who pulls a door starts earlier
+                asked = asked or dx * dx + dy * dy < reach * reach
+        passage[d, ASKED] = 1.0 if asked else 0.0
+
+
+@njit
+def wait_beside(i: int, door: Float, side: int, field: Field, discs: Float) -> tuple[float, float]:
+    """Velocity to a place on one's own side, out of the way of those who come through."""
+    dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+    beside = 0.8 if dx * door[EX] + dy * door[EY] >= 0.0 else -0.8
+    for _ in range(2):
+        tx = door[CX] + 1.2 * side * door[NX] + beside * door[EX]
+        ty = door[CY] + 1.2 * side * door[NY] + beside * door[EY]
+        if clearance_at(field, tx, ty) > BODY:
+            break
+        beside = -beside
+    tx, ty = tx - discs[i, X], ty - discs[i, Y]
+    gap = math.sqrt(tx * tx + ty * ty)
+    speed = min(1.0, 1.5 * gap) / max(gap, 1e-6)
+    return speed * tx, speed * ty
+
+
+@njit
+def hold_off(
+    i: int, d: int, wanted: tuple[float, float], ways: Doors, discs: Float
+) -> tuple[float, float]:
+    """The wanted velocity less what would run into a leaf that is not open yet.
+
+    Who pushes comes up to the leaf; who pulls stays out of the circle it sweeps; who comes second
+    leaves room to the one in front.
+    """
+    door, side = ways.doors[d], ways.sides[i, d]
+    dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+    first = 0
+    for k in range(len(ways.sides)):
+        if k != i and ways.sides[k, d] == side:
+            kx, ky = discs[k, X] - door[CX], discs[k, Y] - door[CY]
+            first += kx * kx + ky * ky < dx * dx + dy * dy
+    if side > 0:
+        rx = dx + 0.5 * door[WIDTH] * door[EX]
+        ry = dy + 0.5 * door[WIDTH] * door[EY]
+        gap = math.sqrt(rx * rx + ry * ry)
+        rx, ry, stop = rx / gap, ry / gap, door[WIDTH] + 0.32
+    else:
+        rx, ry, stop = -door[NX], -door[NY], 0.45
+        gap = dx * rx + dy * ry
+    excess = -(wanted[0] * rx + wanted[1] * ry) - 2.0 * (gap - stop - 0.65 * first)
+    excess = min(max(excess, 0.0), 2.0)
+    return wanted[0] + excess * rx, wanted[1] + excess * ry

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Now and then somebody sits down: goes to a free chair, sits, gets up and leaves.
+
+What a scanner below the knee sees of it: two shanks that stand still in front of a chair's column,
+and a chair that comes along when its sitter shifts. Sitter and chair do not collide with each other
+from the moment one sits down until they are apart again (``dress``).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.actors.people.gait import HIP, SEAT_HEIGHT
+from sim.actors.people.right_of_way import (
+    BLOCKED,
+    CHAIR,
+    KIND,
+    LOOK,
+    LUCK,
+    SEAT,
+    SEATED,
+    SIT,
+    STANDS,
+    STAY_UNTIL,
+    TO_SEAT,
+    WALKING,
+    WALKS,
+    Crowd,
+    Float,
+    Int,
+    R,
+    U,
+    V,
+    X,
+    Y,
+)
+from sim.core.flow import Field, clearance_at
+from slam._jit import njit
+
+SHARE = 0.2  # of all arrivals with a free chair at hand end on it
+HAND = 2.5  # m, a chair this near is at hand
+STAY = 3.0  # times longer than who stands
+DOWN_S = 0.8  # s to sit down, and to get up
+NEAR = 0.08  # m between hulls from where one turns and sits down
+ROOM = 0.18  # m of clearance a chair needs, else it is tucked under a desk
+PACE = 0.7  # m/s to the chair
+GIVE_UP_S = 1.5
+PLANAR_BIT = 2  # contype of chairs, bins and the robot
+
+
+class Hulls(NamedTuple):
+    """The parts of the model that follow who sits; derived from the state, so never saved.
+
+    geoms (n,) hull of each person; bits (n, 2) its contype and conaffinity; looks (n,) body that is
+    seen, -1 none; heights (n,) m of that; then the model's own arrays, which are written
+    """
+
+    geoms: Int
+    bits: NDArray[np.int32]
+    looks: Int
+    heights: Float
+    contype: NDArray[np.int32]
+    affinity: NDArray[np.int32]
+    body_pos: Float
+
+
+@njit
+def dress(crowd: Crowd, hulls: Hulls) -> None:
+    """Who has a chair, and no longer walks to it, meets walls, people and doors only; and sinks."""
+    for i in range(len(hulls.geoms)):
+        geom, look = hulls.geoms[i], hulls.looks[i]
+        off = crowd.task[i, SEAT] >= 0 and crowd.task[i, WALKING] != TO_SEAT
+        hulls.contype[geom] = 0 if off else hulls.bits[i, 0]
+        hulls.affinity[geom] = hulls.bits[i, 1] & ~PLANAR_BIT if off else hulls.bits[i, 1]
+        if look >= 0:
+            sunk = (HIP - SEAT_HEIGHT) * crowd.state[i, SIT]
+            hulls.body_pos[look, 2] = hulls.heights[i] - sunk
+
+
+@njit
+def free_seat(i: int, field: Field, crowd: Crowd) -> int:
+    """Row of the nearest chair at hand that nobody else has and the way to which is free; -1."""
+    discs, task = crowd.discs, crowd.task
+    best, found = HAND * HAND, -1
+    for k in range(discs.shape[0]):
+        dx, dy = discs[k, X] - discs[i, X], discs[k, Y] - discs[i, Y]
+        far = dx * dx + dy * dy
+        if discs[k, KIND] != CHAIR or far >= best:
+            continue
+        if discs[k, U] ** 2 + discs[k, V] ** 2 > 0.01:
+            continue
+        taken = False
+        for other in range(len(task)):
+            taken = taken or task[other, SEAT] == k
+        open_way = clearance_at(field, discs[k, X], discs[k, Y]) > ROOM
+        for part in range(1, 5):
+            x, y = discs[i, X] + 0.2 * part * dx, discs[i, Y] + 0.2 * part * dy
+            open_way = open_way and clearance_at(field, x, y) > 0.25
+        if open_way and not taken:
+            best, found = far, k
+    return found
+
+
+@njit
+def may_sit(i: int, field: Field, crowd: Crowd) -> None:
+    """On arrival: perhaps go on to a chair."""
+    if crowd.state[i, LUCK] < SHARE:
+        seat = free_seat(i, field, crowd)
+        if seat >= 0:
+            crowd.task[i, WALKING], crowd.task[i, SEAT] = TO_SEAT, seat
+            crowd.state[i, BLOCKED] = 0.0
+
+
+@njit
+def sit(i: int, time: float, tick: float, crowd: Crowd) -> None:
+    """Come to the chair, sit down, get up; call it at every tick."""
+    discs, state, task = crowd.discs, crowd.state, crowd.task
+    seat = task[i, SEAT]
+    if seat < 0:
+        return
+    dx, dy = discs[seat, X] - discs[i, X], discs[seat, Y] - discs[i, Y]
+    far = math.sqrt(dx * dx + dy * dy)
+    apart = far - discs[i, R] - discs[seat, R]
+    if task[i, WALKING] == TO_SEAT:
+        slow = discs[i, U] ** 2 + discs[i, V] ** 2 < 0.01
+        state[i, BLOCKED] += tick if slow else 0.0
+        if apart < NEAR:
+            task[i, WALKING] = SEATED
+            state[i, STAY_UNTIL] += (STAY - 1.0) * max(state[i, STAY_UNTIL] - time, 0.0) + 2.0
+        elif state[i, BLOCKED] > GIVE_UP_S or far > HAND + 1.0:
+            task[i, WALKING], task[i, SEAT] = STANDS, -1
+    elif task[i, WALKING] == SEATED:
+        state[i, LOOK] = crowd.yaws[seat]
+        if far < 0.15:
+            state[i, SIT] = min(state[i, SIT] + tick / DOWN_S, 1.0)
+    else:
+        state[i, SIT] = max(state[i, SIT] - tick / DOWN_S, 0.0)
+        if state[i, SIT] == 0.0 and apart > 0.03:
+            task[i, SEAT] = -1
+
+
+@njit
+def on_chair(i: int, crowd: Crowd) -> bool:
+    """Sitting, sitting down or getting up: moves with the chair."""
+    seated = crowd.task[i, WALKING] == SEATED
+    return bool(seated or (crowd.task[i, WALKING] == WALKS and crowd.state[i, SIT] > 0.0))
+
+
+@njit
+def to_chair(i: int, crowd: Crowd) -> tuple[float, float]:
+    """Velocity to the middle of the chair."""
+    discs, seat = crowd.discs, crowd.task[i, SEAT]
+    dx, dy = discs[seat, X] - discs[i, X], discs[seat, Y] - discs[i, Y]
+    far = math.sqrt(dx * dx + dy * dy)
+    speed = min(PACE, 3.0 * far) / max(far, 1e-6)
+    return speed * dx + 0.0, speed * dy + 0.0

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The differential drive: commanded twist, ramped wheel speeds, true rolled wheel travel.
+
+Wheels turn exactly as commanded (a stiff motor loop) and pull the robot through tyre servos whose
+force is limited by grip. So ``travel_m`` is what a perfect encoder counts, and it parts from the
+true path when the robot pushes something or slips, as on a real floor. Encoder errors are the
+business of ``sim.sensors.odometry.encoders``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.core.checks import check_types
+from slam._jit import njit
+from slam.errors import InvalidValueError
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveConfig:
+    """Limits of a Pioneer 3-DX class robot indoors (design range: usual speed below 1.2 m/s).
+
+    v_max, omega_max  m/s, rad/s; commands beyond are clipped
+    accel, alpha      m/s2, rad/s2 of the ramp
+    track             m between the wheels
+    """
+
+    v_max: float = 1.0
+    omega_max: float = 1.5
+    accel: float = 1.0
+    alpha: float = 3.0
+    track: float = 0.33
+
+    def __post_init__(self) -> None:
+        check_types(self)
+        for name in ("v_max", "omega_max", "accel", "alpha", "track"):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise InvalidValueError(f"DriveConfig.{name} must be > 0, got {value}")
+
+
+@njit
+def toward(value: float, target: float, step: float) -> float:
+    """``value`` moved by at most ``step`` towards ``target``."""
+    return value + min(max(target - value, -step), step)
+
+
+@njit
+def ramp(state: NDArray[np.float64], limits: NDArray[np.float64]) -> None:
+    """One tick of the ramp, and the wheel speeds that follow; ``limits`` as ``Drive.limits``."""
+    speed_step, turn_step, half = limits
+    state[2] = toward(state[2], state[0], speed_step)
+    state[3] = toward(state[3], state[1], turn_step)
+    state[6], state[7] = state[2] - half * state[3], state[2] + half * state[3]
+
+
+@njit
+def roll(state: NDArray[np.float64], duration: float) -> None:
+    """Let the wheels turn at their present speed."""
+    state[4] += state[6] * duration
+    state[5] += state[7] * duration
+
+
+class Drive:
+    """Ramp and wheels of the body ``robot/base``, moved on by ``sim.world.substeps``.
+
+    state   (8,) commanded v, omega; ramped v, omega; travel left, right m; speed left, right m/s
+    tyres   (2,) actuators left, right, which take the wheels' surface speeds
+    limits  (3,) change of v and omega in a tick of ``tick`` s at most, half the track m
+    """
+
+    def __init__(self, model: mujoco.MjModel, config: DriveConfig, tick: float) -> None:
+        self.config = config
+        self.state = np.zeros(8)
+        names = ("robot/tyre_l", "robot/tyre_r")
+        self.tyres = np.array([model.actuator(name).id for name in names], dtype=np.int64)
+        self.limits = np.array([config.accel * tick, config.alpha * tick, 0.5 * config.track])
+
+    def command(self, v: float, omega: float) -> None:
+        """Ask for a twist, m/s and rad/s; clipped to the limits, reached by the ramp."""
+        if not (math.isfinite(v) and math.isfinite(omega)):
+            raise InvalidValueError(f"the drive command must be finite, got v={v}, omega={omega}")
+        c = self.config
+        self.state[0] = min(max(v, -c.v_max), c.v_max)
+        self.state[1] = min(max(omega, -c.omega_max), c.omega_max)
+
+    @property
+    def travel_m(self) -> NDArray[np.float64]:
+        """(2,) m rolled by the left and the right wheel since the start, backwards negative."""
+        return self.state[4:6].copy()

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One number in [0, 1] for how much a room moves, and the table of what it means.
+
+| rate                                | at knob d        | d = 0 | 0.25  | 0.5   | 0.75  | 1     |
+|-------------------------------------|------------------|-------|-------|-------|-------|-------|
+| shoves of each chair, 1/s           | 0.15 d           | 0     | 0.038 | 0.075 | 0.113 | 0.15  |
+| kicks of each bin, 1/s              | 0.06 d           | 0     | 0.015 | 0.03  | 0.045 | 0.06  |
+| moves of each trolley, pallet, 1/s  | 0.06 d           | 0     | 0.015 | 0.03  | 0.045 | 0.06  |
+| each door moved by nobody, 1/s      | 0.04 d           | 0     | 0.01  | 0.02  | 0.03  | 0.04  |
+| mean stay of a person at a goal, s  | 12 / d - 10      | never | 38    | 14    | 6     | 2     |
+| walking pace, times a person's own  | 0.7 + 0.3 d      | -     | 0.775 | 0.85  | 0.925 | 1     |
+
+The rates are set so that what is on the move rises in proportion to the knob: a shove keeps a
+chair rolling for about a second, so at 1 one office chair in seven moves at any time; a way
+between two goals takes a person about ten seconds, so at 1 five in six are walking, and a stay of
+12 / d - 10 seconds makes that (5 / 6) d. ``scripts.experiments.dynamism_curve`` shows what the
+scanner sees of it.
+
+At 0 nothing moves by itself: people are present and stand perfectly still, chairs and bins are
+never pushed and doors stay at their angle of rest (a door still gives way to the robot). How hard
+a shove is does not depend on the knob: 0.25 to 1.5 m/s, which for a 13 kg chair is 3 to 20 N s
+(design range for invisible shoves; a person at a desk rolls a chair at walking speed at most).
+Heavier things get the speed that 45 N s give them.
+
+For experiments that ask "how many may move?", ``moving_share`` replaces the shoves of chairs and
+loads by a set share of them on the move at any time (``sim.actors.rolling``).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from sim.core.checks import check_types
+from slam.errors import InvalidValueError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dynamism:
+    """All rates of a moving room. ``Dynamism.from_knob`` fills them from the table above.
+
+    chair_push_rate  1/s for each chair          bin_kick_rate  1/s for each bin
+    load_push_rate   1/s for each trolley, pallet or whatever else rolls in the plane
+    moving_share     in [0, 1]: of all chairs and loads, on the move at any time; replaces their
+                     shoves unless it is None
+    door_rate        1/s for each door           stay_mean      s, infinite: nobody ever leaves
+    pace             factor on each person's preferred speed
+    push_speed_min/max  m/s a shove gives a chair
+    kick_speed_min/max  m/s a kick gives a bin
+    push_spin_max       rad/s a shove adds in yaw, either way
+    """
+
+    chair_push_rate: float = 0.0
+    bin_kick_rate: float = 0.0
+    load_push_rate: float = 0.0
+    moving_share: float | None = None
+    door_rate: float = 0.0
+    stay_mean: float = math.inf
+    pace: float = 1.0
+    push_speed_min: float = 0.25
+    push_speed_max: float = 1.5
+    kick_speed_min: float = 0.4
+    kick_speed_max: float = 2.0
+    push_spin_max: float = math.pi
+
+    def __post_init__(self) -> None:
+        check_types(self)
+        rates = ("chair_push_rate", "bin_kick_rate", "load_push_rate", "door_rate", "push_spin_max")
+        for name in rates:
+            value = getattr(self, name)
+            if not 0.0 <= value < math.inf:
+                raise InvalidValueError(f"Dynamism.{name} must be >= 0 and finite, got {value}")
+        for name in ("stay_mean", "pace"):
+            if not getattr(self, name) > 0.0:
+                raise InvalidValueError(f"Dynamism.{name} must be > 0, got {getattr(self, name)}")
+        share = self.moving_share
+        if share is not None and not 0.0 <= share <= 1.0:
+            raise InvalidValueError(f"Dynamism.moving_share must lie in [0, 1], got {share}")
+        for what in ("push", "kick"):
+            low, high = getattr(self, f"{what}_speed_min"), getattr(self, f"{what}_speed_max")
+            if not 0.0 <= low <= high < math.inf:
+                raise InvalidValueError(
+                    f"Dynamism.{what}_speed_min/max must satisfy 0 <= min <= max, got {low}, {high}"
+                )
+
+    @classmethod
+    def from_knob(cls, dynamism: float) -> Dynamism:
+        """Rates at a knob in [0, 1]; ``InvalidValueError`` outside."""
+        if isinstance(dynamism, bool) or not isinstance(dynamism, (int, float)):
+            raise InvalidValueError(f"dynamism must be a number in [0, 1], got {dynamism!r}")
+        d = float(dynamism)
+        if not 0.0 <= d <= 1.0:
+            raise InvalidValueError(f"dynamism must lie in [0, 1], got {dynamism}")
+        return cls(
+            chair_push_rate=0.15 * d,
+            bin_kick_rate=0.06 * d,
+            load_push_rate=0.06 * d,
+            door_rate=0.04 * d,
+            stay_mean=12.0 / d - 10.0 if d > 0.0 else math.inf,
+            pace=0.7 + 0.3 * d,
+        )
+
+    @classmethod
+    def of(cls, dynamism: float | Dynamism, moving_share: float | None = None) -> Dynamism:
+        """A knob or the rates themselves, with ``moving_share`` put in if it is not None."""
+        rates = dynamism if isinstance(dynamism, Dynamism) else cls.from_knob(dynamism)
+        return rates if moving_share is None else replace(rates, moving_share=moving_share)

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The version of the world: when one seed comes to give another world, the number goes up.
+
+A world is all that a seed gives: the layout, what moves when, the scans and the wheels' ticks.
+Environment ids end in the number (``mobilia/Office-v1``), recipes hold it as ``world``; a recipe
+without was written before that, by world ``UNSAID``. What was made in another version cannot be
+made again in this one: that is refused with a ``WorldVersionError``, never silently other.
+
+To change the world: raise ``WORLD``, say in ``CHANGES`` what became of the old one, and give
+``tests/sim/core/test_versions.py`` the new digest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+from slam.errors import LogFormatError, MobiliaError
+
+WORLD = 1
+UNSAID = 1
+CHANGES: Mapping[int, str] = {
+    0: (
+        "v0 was the world before the table of dynamism was set anew: the same seed gives another "
+        "one now. At dynamism d of v0 chairs, bins and loads were pushed as at d / 3 now, doors "
+        "moved as at d / 2, and people stayed as long as at 3 d / (1 + 2 d)"
+    ),
+    1: "v1 has the table of sim.core.dynamism: what is on the move rises in proportion to the knob",
+}
+
+
+class WorldVersionError(MobiliaError):
+    """Something is of another version of the world than this one."""
+
+
+def not_this_world(version: int) -> str:
+    """Why a world of that version cannot be made here, in words; empty for the one of here."""
+    if version == WORLD:
+        return ""
+    if version > WORLD:
+        return f"it is of world version {version}, this mobilia has {WORLD}: a newer one made it"
+    changes = "; ".join(CHANGES[k] for k in range(version, WORLD) if k in CHANGES)
+    return f"it is of world version {version}, this mobilia has {WORLD}: {changes}"
+
+
+def world_of(path: Path, recipe: Mapping[str, Any]) -> int:
+    """The version that the recipe in the file ``path`` holds; ``LogFormatError`` for no number."""
+    version = recipe.get("world", UNSAID)
+    if isinstance(version, bool) or not isinstance(version, int) or not 0 <= version < 2**31:
+        raise LogFormatError(path, f"world must be a whole number >= 0, got {version!r:.40}")
+    return version
+
+
+def check_world(path: Path, version: int) -> None:
+    """Raise ``WorldVersionError`` that names the file unless this world can be made again here."""
+    why = not_this_world(version)
+    if why:
+        raise WorldVersionError(f"{path}: cannot be made again, {why}")
+
+
+def gone(name: str, version: int, **_: Any) -> NoReturn:
+    """What the environment id of an old version makes: a ``WorldVersionError``."""
+    raise WorldVersionError(f"{name}-v{version} is gone, use {name}-v{WORLD}. {CHANGES[version]}.")

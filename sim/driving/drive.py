@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Driving: a tour of a scene's rooms, local avoidance by the dynamic window approach.
+
+(Fox, Burgard, Thrun 1997.) The planner sees what it is given: a static layout, a pose and the discs
+around it. Recorded episodes give it the truth, a closed loop gives it a SLAM's estimate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.core.checks import check_types
+from sim.driving.navgrid import NavGrid
+from slam._jit import njit
+from slam.errors import InvalidValueError
+from slam.frames import Float
+
+_FAR = 1e6
+_STEP_S = 0.15  # step of the rollout
+LOOK_AHEAD_M = 0.35  # where the cost-to-go is asked for beside where the robot would be
+_ACCEL, _ALPHA = (
+    1.0,
+    3.0,
+)  # m/s2, rad/s2: what the drive's ramp does (``sim.actors.robot.DriveConfig``)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TourConfig:
+    """Limits of a tour.
+
+    v_max_mps, omega_max_radps  speed limits; an indoor Pioneer's usual pace, not its maximum
+    robot_radius_m              clearance kept to walls and discs (Pioneer 3-DX: 0.26 m + margin)
+    goal_radius_m               a goal counts as visited within this distance
+    patience_s                  without progress for this long, the next goal is tried
+    """
+
+    v_max_mps: float = 0.7
+    omega_max_radps: float = 1.4
+    robot_radius_m: float = 0.285
+    goal_radius_m: float = 0.5
+    patience_s: float = 6.0
+
+    def __post_init__(self) -> None:
+        check_types(self)
+        for name in self.__dataclass_fields__:
+            if not getattr(self, name) > 0.0:
+                raise InvalidValueError(f"TourConfig.{name} must be > 0, got {getattr(self, name)}")
+
+
+@njit
+def _field_at(
+    field: NDArray[np.float64], x0: float, y0: float, cell: float, x: float, y: float
+) -> float:
+    i = math.floor((y - y0) / cell)
+    j = math.floor((x - x0) / cell)
+    if i < 0 or j < 0 or i >= field.shape[0] or j >= field.shape[1]:
+        return _FAR
+    return float(field[i, j])
+
+
+@njit
+def _between(
+    field: NDArray[np.float64], x0: float, y0: float, cell: float, x: float, y: float
+) -> float:
+    """``field`` at (x, y), bilinear between cell centres; 0 outside."""
+    u, v = (x - x0) / cell - 0.5, (y - y0) / cell - 0.5
+    j, i = math.floor(u), math.floor(v)
+    if i < 0 or j < 0 or i + 1 >= field.shape[0] or j + 1 >= field.shape[1]:
+        return 0.0
+    a, b = u - j, v - i
+    low = (1.0 - a) * field[i, j] + a * field[i, j + 1]
+    high = (1.0 - a) * field[i + 1, j] + a * field[i + 1, j + 1]
+    return float((1.0 - b) * low + b * high)
+
+
+@njit
+def _nearest_disc(discs: NDArray[np.float64], x: float, y: float, t: float) -> float:
+    """Distance to the edge of the nearest disc, each moved on by its velocity for ``t`` s."""
+    nearest = _FAR
+    for k in range(discs.shape[0]):
+        dx = discs[k, 0] + t * discs[k, 3] - x
+        dy = discs[k, 1] + t * discs[k, 4] - y
+        nearest = min(nearest, math.sqrt(dx * dx + dy * dy) - discs[k, 2])
+    return nearest
+
+
+@njit
+def _score(
+    pose: NDArray[np.float64],
+    now: NDArray[np.float64],
+    v_asked: float,
+    omega_asked: float,
+    discs: NDArray[np.float64],
+    grid: tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, float, float],
+) -> float:
+    """How good 2.1 s under a command would be; minus ``_FAR`` when it would collide.
+
+    The speeds are ramped from what the robot does ``now``, as the drive will.
+    """
+    clearance, cost_to_go, x0, y0, cell, radius, look = grid
+    x, y, theta = pose[0], pose[1], pose[2]
+    v, omega, run_over = now[0], now[1], 0.0
+    start = min(_between(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, 0.0)) - radius
+    closest = _FAR
+    for step in range(1, 15):
+        t = _STEP_S * step
+        v += min(max(v_asked - v, -_ACCEL * _STEP_S), _ACCEL * _STEP_S)
+        omega += min(max(omega_asked - omega, -_ALPHA * _STEP_S), _ALPHA * _STEP_S)
+        x += _STEP_S * v * math.cos(theta + 0.5 * _STEP_S * omega)
+        y += _STEP_S * v * math.sin(theta + 0.5 * _STEP_S * omega)
+        theta += _STEP_S * omega
+        free = min(_between(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, t)) - radius
+        if free < 0.0 and free <= start + 0.02:  # an overlap at the start may be driven out of
+            if v_asked != 0.0:
+                return -_FAR
+            run_over = 3.0
+        closest = min(closest, free)
+    here = _field_at(cost_to_go, x0, y0, cell, x, y)
+    ahead = _field_at(
+        cost_to_go, x0, y0, cell, x + look * math.cos(theta), y + look * math.sin(theta)
+    )
+    if here >= _FAR:
+        here = 50.0
+    ahead = min(ahead, here + 0.5)
+    return -here - 1.5 * ahead + 0.5 * min(closest, 0.35) - 0.02 * abs(omega_asked) - run_over
+
+
+@njit
+def _choose(
+    pose: NDArray[np.float64],
+    now: NDArray[np.float64],
+    limits: tuple[float, float],
+    discs: NDArray[np.float64],
+    grid: tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, float, float],
+) -> tuple[float, float, float]:
+    """The best (v, omega) of the window, and its score."""
+    v_max, omega_max = limits
+    best_v, best_omega, best = 0.0, 0.0, -_FAR
+    for a in range(-1, 7):
+        v = v_max * a / 6.0
+        if a < 0:
+            v = -0.3 * v_max
+        for b in range(-6, 7):
+            omega = omega_max * b / 6.0
+            if a < 0 and abs(b) > 3:
+                continue
+            score = _score(pose, now, v, omega, discs, grid)
+            if a <= 0:
+                score -= 0.25
+            if score > best:
+                best_v, best_omega, best = v, omega, score
+    return best_v, best_omega, best
+
+
+class Driver:
+    """Steers to one goal after another; remembers only its own progress.
+
+    goals  (n, 2) m, visited in order and again from the start
+    """
+
+    def __init__(self, grid: NavGrid, goals: NDArray[np.float64], config: TourConfig) -> None:
+        if len(goals) == 0:
+            raise InvalidValueError("a tour needs at least one goal")
+        self.config = config
+        self.goals = np.asarray(goals, dtype=np.float64)
+        self.visited = 0
+        self.look_ahead_m = LOOK_AHEAD_M  # a robot that is to stop on its goal looks less far
+        self._grid = self._walls = grid
+        self._index = 0
+        self._best = math.inf
+        self._idle_s = 0.0
+
+    @property
+    def goal(self) -> Float:
+        """(2,) m, where it is driving now."""
+        goal: Float = self.goals[self._index % len(self.goals)]
+        return goal
+
+    def command(
+        self, T_world_robot: Float, velocity: Sequence[float], discs: Float, dt: float
+    ) -> tuple[float, float]:
+        """(v m/s, omega rad/s) for the next ``dt`` s.
+
+        velocity  (v, omega) the robot has now
+        discs     (k, 5): x, y, radius (m) and velocity (m/s) of what must not be hit
+        """
+        offset = T_world_robot[:2] - self.goal
+        distance = math.hypot(offset[0], offset[1])
+        if distance < self.config.goal_radius_m:
+            self.visited += 1
+            self._next()
+        to_go = self._grid.cost_to(self.goal)
+        left = self._grid.cost_near(to_go, T_world_robot[0], T_world_robot[1])
+        if left >= _FAR and self._idle_s > 1.0:
+            self._next()  # there is no way at present: somewhere else meanwhile
+        elif left < self._best - 0.1:
+            self._best, self._idle_s = left, 0.0
+        else:
+            self._idle_s += dt
+            if self._idle_s > self.config.patience_s:
+                self._next()
+        grid, radius = self._grid, self.config.robot_radius_m
+        if self._idle_s > 1.5:
+            radius *= 0.93  # squeeze past rather than stand before a gap that is just wide enough
+        if 2.5 < self._idle_s < 4.5:
+            to_go = np.zeros_like(to_go)  # make room first: away from whatever is in the way
+        v, omega, _ = _choose(
+            np.asarray(T_world_robot, dtype=np.float64),
+            np.asarray(velocity, dtype=np.float64),
+            (self.config.v_max_mps, self.config.omega_max_radps),
+            np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 5),
+            (self._walls.clearance, to_go, grid.x0, grid.y0, grid.cell, radius, self.look_ahead_m),
+        )
+        return v, omega
+
+    def use(self, grid: NavGrid, *, walls: NavGrid | None = None, afresh: bool = True) -> None:
+        """Plan on this layout from now on (a door has opened, say).
+
+        What must not be touched is still the first layout, or ``walls`` of the same extent, and the
+        discs of each ``command``. ``afresh`` False: a plan that is made anew all the time is no
+        progress by itself.
+        """
+        self._grid = grid
+        if walls is not None:
+            self._walls = walls
+        if afresh:
+            self._best = math.inf
+
+    def _next(self) -> None:
+        self._index += 1
+        self._best, self._idle_s = math.inf, 0.0
+
+
+def tour(goals: Mapping[str, tuple[float, float]], rng: np.random.Generator) -> NDArray[np.float64]:
+    """All goals in an order drawn from ``rng``: (n, 2) m."""
+    named = sorted(goals.items())
+    order = rng.permutation(len(named))
+    return np.array([named[k][1] for k in order], dtype=np.float64)

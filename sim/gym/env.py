@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The moving rooms as a Gymnasium environment."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from scenes.scene import SCAN_HEIGHT
+from sim.core.checks import instance, number, one_of, whole_numbers
+from sim.core.seeds import Seeds
+from sim.gym.actions import clipped
+from sim.gym.options import checked_seed, episode
+from sim.gym.pose_source import PoseSource
+from sim.sensors.lidar.lms221 import Lms221Config, ScanResult
+from sim.simulation import Simulation
+from slam._jit import njit
+from slam.errors import InvalidValueError, MobiliaError
+from slam.frames import LaserSpec
+from slam.system import SlamSystem
+
+V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
+GOAL_RADIUS_M = 0.4
+_MAX_TICKS = 2**40
+VIEWS = ("top", "follow", "persp")  # as in ``sim.view.pictures``, which needs OpenGL to import
+MAX_PX = 8192  # edge of a picture
+
+Observation = dict[str, Any]  # arrays by name; Gymnasium types Dict spaces so
+
+
+def _observation_space(spec: LaserSpec, *, believing: bool) -> spaces.Dict:
+    n = spec.n_beams
+    believed = PoseSource.space() if believing else {}
+    return spaces.Dict(
+        {
+            "ranges": spaces.Box(0.0, np.float32(spec.range_max), (n,), np.float32),
+            "valid": spaces.Box(0, 1, (n,), np.uint8),
+            "encoders": spaces.Box(-_MAX_TICKS, _MAX_TICKS, (2,), np.int64),
+            "time": spaces.Box(0.0, 1e9, (), np.float64),
+            **believed,
+        }
+    )
+
+
+@njit
+def _told(
+    ranges: NDArray[np.float32], least: float, most: float
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Finite ranges, and which are measurements, as ``Scan.valid``."""
+    out, valid = np.empty(ranges.size, np.float32), np.empty(ranges.size, np.uint8)
+    for i in range(ranges.size):
+        fits = least <= ranges[i] <= most
+        valid[i] = fits
+        out[i] = ranges[i] if fits else most
+    return out, valid
+
+
+class ResetNeededError(MobiliaError, gymnasium.error.ResetNeeded):
+    """The environment must be reset first."""
+
+
+class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
+    """A robot with an LMS-221 in a room that does not sit still; a step is one whole scan.
+
+    ### Action space
+    ``Box(-1, 1, (2,), float32)``: forward speed (times 0.8 m/s) and turn rate (times 1.2 rad/s,
+    counter-clockwise), ramped by the robot. Finite numbers beyond [-1, 1] are clipped; NaN,
+    infinities and anything that is not two numbers are refused with ``InvalidValueError``, and the
+    room stays as it was.
+
+    ### Observation space
+    ``Dict`` of what the robot itself knows:
+
+    | key        | shape | type    | meaning                                                     |
+    |------------|-------|---------|-------------------------------------------------------------|
+    | `ranges`   | (n,)  | float32 | m, right to left; no return and error codes are `range_max` |
+    | `valid`    | (n,)  | uint8   | 1 where the range is a measurement                          |
+    | `encoders` | (2,)  | int64   | ticks of the left and the right wheel since the reset       |
+    | `time`     | ()    | float64 | s since the reset                                           |
+
+    With ``pose_source`` also what it believes:
+
+    | key        | shape | type    | meaning                                                     |
+    |------------|-------|---------|-------------------------------------------------------------|
+    | `pose`     | (3,)  | float64 | x m, y m, heading rad, in the frame of the start            |
+    | `trusted`  | ()    | uint8   | 0 while the SLAM does not trust its own estimate            |
+    | `goal`     | (2,)  | float64 | m, the goal as seen from `pose` (x ahead, y left); 0 if none |
+
+    ### Info
+    Truth, only here (but for ``pose_source="truth"``): `pose` (3,) m, m, rad of the robot in the
+    world; `frame`, the ``slam`` frame of the scan (with truth; give a SLAM
+    ``frame.without_truth()``); `contacts`, names of what the robot touched during the step;
+    `hard_collision`; `beam_time` (n,) s of each beam since the reset; `movers` name -> (x, y,
+    heading) of everything that can move; `goal_distance` m or None.
+
+    ### Reward
+    Metres of progress towards the goal during the step when ``options["goal"]`` gave one, else 0.
+
+    ### Episode end
+    ``terminated`` within 0.4 m of the goal, or (``terminate_on_collision``) on a hard collision;
+    ``truncated`` after ``time_limit_s``. A step after the end goes on in the same room; one before
+    the first reset raises ``ResetNeededError``.
+
+    ### Arguments
+    ``scene``, ``dynamism``, ``laser``, ``scan_height_m``, ``odometry``, ``labels`` as in
+    ``sim.Simulation``;
+    ``pose_source``: None, "odometry", "shunting", any other SLAM's name, "module:Class", a
+    ``SlamSystem``, or "truth"; it takes every scan and is reset with the environment, a failure of
+    it is a ``SlamFailedError``. Reward and the end of an episode go by the truth in any case;
+    ``render_mode`` "rgb_array" (3D, needs OpenGL), "map" (2D, needs nothing) or None; ``view``
+    "top", "follow" or "persp" for the former; ``render_size`` (width, height) px.
+
+    ### Reset options
+    They hold for one episode. An unknown key or a value of the wrong kind is refused by name with
+    ``InvalidValueError``, as is a seed that is no whole number >= 0; the episode before goes on.
+
+    | key                       | meaning                                                       |
+    |---------------------------|---------------------------------------------------------------|
+    | `goal`                    | (x, y) m within 10 km: reward and end of the episode          |
+    | `start`                   | (x, y, heading) of the robot; refused where it does not fit   |
+    | `n_chairs`, `n_people`    | counts, for scenes that have them                             |
+    | `scene`                   | any options of the scene recipe, e.g. ``{"n_chairs": 8}``     |
+    | `dynamism`                | the knob, or a ``sim.core.dynamism.Dynamism`` |
+    | `moving_share`            | share of chairs on the move at any time                       |
+    | `rates`                   | single rates of ``Dynamism``, e.g. ``{"door_rate": 0.1}``     |
+    | `scan_height_m`           | of the scanner above the floor                                |
+    | `resolution_deg`          | 1, 0.5 or 0.25; changes the observation space (give ``laser`` |
+    |                           | to the constructor where a wrapper holds on to the space)     |
+    | `noise_std_m`             | statistical error of the ranges                               |
+    | `laser`                   | a whole ``Lms221Config``, e.g. ``Lms221Config.ideal()``       |
+    | `seeds`                   | stream name -> seed (``sim.core.seeds``) |
+
+    ### Version history
+    The number is that of the world (``sim.core.versions``).
+    v1: the table of ``sim.core.dynamism`` was set anew; the same seed gives another world than in
+    v0. v0: first version; making it raises ``WorldVersionError``.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012  (Gymnasium's own class attribute)
+        "render_modes": ["rgb_array", "map"],
+        "render_fps": 37,
+    }
+
+    def __init__(
+        self,
+        scene: str = "office",
+        *,
+        dynamism: float = 0.5,
+        laser: Lms221Config | None = None,
+        scan_height_m: float = SCAN_HEIGHT,
+        odometry: str = "pioneer3dx",
+        time_limit_s: float = 60.0,
+        terminate_on_collision: bool = False,
+        labels: bool = False,
+        pose_source: str | SlamSystem | None = None,
+        render_mode: str | None = None,
+        view: str = "top",
+        render_size: tuple[int, int] = (640, 480),
+    ) -> None:
+        if render_mode is not None:
+            one_of("render_mode", render_mode, self.metadata["render_modes"])
+        one_of("view", view, VIEWS)
+        number("time_limit_s", time_limit_s)
+        if not time_limit_s > 0.0:
+            raise InvalidValueError(f"time_limit_s must be > 0, got {time_limit_s}")
+        for name, value in (("terminate_on_collision", terminate_on_collision), ("labels", labels)):
+            if not isinstance(value, (bool, np.bool_)):
+                raise InvalidValueError(f"{name} must be True or False, got {value!r}")
+        for name, word in (("scene", scene), ("odometry", odometry)):
+            instance(name, word, str)
+        if laser is not None:
+            instance("laser", laser, Lms221Config)
+        width, height = whole_numbers("render_size", render_size, "(width, height) in px", MAX_PX)
+        self.render_mode = render_mode
+        self.time_limit_s = time_limit_s
+        self.terminate_on_collision = terminate_on_collision
+        self._settings: dict[str, Any] = {
+            "scene": scene,
+            "dynamism": dynamism,
+            "laser": laser or Lms221Config(),
+            "scan_height_m": scan_height_m,
+            "odometry": odometry,
+            "labels": labels,
+        }
+        self._pose_source = None if pose_source is None else PoseSource(pose_source)
+        self._view, self._size = view, (width, height)
+        self._renderer: Any = None
+        self._simulation: Simulation | None = None
+        self._goal: tuple[float, float] | None = None
+        self.goal_distance: float | None = None  # m, if this episode has a goal
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self._set_space(self._settings["laser"].spec())
+
+    def _set_space(self, spec: LaserSpec) -> None:
+        self._n_beams = spec.n_beams
+        self.observation_space = _observation_space(spec, believing=self._pose_source is not None)
+
+    @property
+    def simulation(self) -> Simulation:
+        """The running simulation; raises ``ResetNeededError`` before the first reset."""
+        if self._simulation is None:
+            raise ResetNeededError("call reset() before using the environment")
+        return self._simulation
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Build the scene anew and take a first scan standing still."""
+        plan = episode(self._settings, options)
+        super().reset(seed=checked_seed(seed))
+        own = Seeds(int(self.np_random.integers(2**31)), **plan.seeds)
+        simulation = Simulation(seed=own, **plan.settings)
+        self._close_renderer()
+        self._simulation, self._goal = simulation, plan.goal
+        if self._simulation.spec.n_beams != self._n_beams:
+            self._set_space(self._simulation.spec)
+        if self._pose_source is not None:
+            self._pose_source.reset(self._simulation.world.robot_pose())
+        scan = self._simulation.sense()
+        self.goal_distance = self._goal_distance()
+        return self._observation(scan), self._info()
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """One scan under the given command."""
+        observation, reward, terminated, truncated = self.act(action)
+        return observation, reward, terminated, truncated, self._info()
+
+    def act(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool]:
+        """``step`` without the info."""
+        v, omega = clipped(action)
+        simulation = self.simulation
+        simulation.world.set_command(v * V_MAX_MPS, omega * OMEGA_MAX_RADPS)
+        scan = simulation.sense()
+        before, self.goal_distance = self.goal_distance, self._goal_distance()
+        reward, terminated = 0.0, False
+        if before is not None and self.goal_distance is not None:
+            reward = before - self.goal_distance
+            terminated = self.goal_distance < GOAL_RADIUS_M
+        if self.terminate_on_collision and any(c.hard for c in simulation.contacts):
+            terminated = True
+        truncated = simulation.world.time_ns * 1e-9 >= self.time_limit_s
+        return self._observation(scan), reward, terminated, truncated
+
+    def _goal_distance(self) -> float | None:
+        if self._goal is None:
+            return None
+        x, y, _ = self.simulation.world.robot_pose().tolist()
+        return math.hypot(x - self._goal[0], y - self._goal[1])
+
+    def _observation(self, scan: ScanResult) -> Observation:
+        """What the robot knows by the scan that was just taken."""
+        simulation = self.simulation
+        spec = simulation.spec
+        ranges, valid = _told(scan.ranges, spec.range_min, spec.range_max)
+        observation = {
+            "ranges": ranges,
+            "valid": valid,
+            "encoders": simulation.encoders.ticks,
+            "time": np.array(simulation.world.time_ns * 1e-9),
+        }
+        if self._pose_source is not None:
+            frame = simulation.frame
+            assert frame is not None  # a scan was just taken
+            self._pose_source.take(frame)
+            observation |= self._pose_source.observation(self._goal)
+        return observation
+
+    def _info(self) -> dict[str, Any]:
+        world, frame = self.simulation.world, self.simulation.frame
+        assert frame is not None  # a scan was just taken
+        contacts = self.simulation.contacts
+        return {
+            "pose": world.robot_pose(),
+            "frame": frame,
+            "beam_time": frame.stamp + self.simulation.spec.beam_time_offsets,
+            "contacts": tuple(contact.name for contact in contacts),
+            "hard_collision": any(contact.hard for contact in contacts),
+            "movers": dict(zip(world.mover_names, world.mover_poses(), strict=True)),
+            "goal_distance": self.goal_distance,
+        }
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """The picture of ``render_mode``, (height, width, 3) uint8 RGB; None without a mode."""
+        if self.render_mode is None:
+            return None
+        if self._renderer is None:
+            self._renderer = self._make_renderer()
+        picture: NDArray[np.uint8] = self._renderer(self.simulation)
+        return picture
+
+    def _make_renderer(self) -> Any:
+        if self.render_mode == "map":
+            from sim.view.pictures import MapPicture
+
+            return MapPicture(self.simulation, self._size)
+        from sim.view.pictures import CameraPicture
+
+        return CameraPicture(self.simulation, self._size, self._view)
+
+    def _close_renderer(self) -> None:
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def close(self) -> None:
+        """Free the renderer; the environment can be reset again."""
+        self._close_renderer()

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one episode may have different: the ``options`` of ``reset``, checked by name."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from sim.core.checks import numbers
+from sim.core.dynamism import Dynamism
+from sim.sensors.lidar.lms221 import Lms221Config
+from slam.errors import InvalidValueError
+
+OPTIONS = (
+    "goal", "start", "seeds", "scene", "n_chairs", "n_people", "dynamism", "moving_share", "rates",
+    "scan_height_m", "resolution_deg", "noise_std_m", "laser",
+)  # fmt: skip
+
+FAR_M = 1e4  # of a goal from the world's origin: the observation space tells no more
+
+
+@dataclass(frozen=True, kw_only=True)
+class Episode:
+    """One episode: arguments of ``Simulation`` but the seed, overrides of streams, the goal."""
+
+    settings: dict[str, Any]
+    seeds: dict[str, int]
+    goal: tuple[float, float] | None
+
+
+def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> Episode:
+    """``settings`` of the environment with the ``options`` of one reset put in.
+
+    Raises ``InvalidValueError`` naming the option that is unknown or has a value it cannot have.
+    """
+    if not isinstance(options, Mapping | None):
+        raise InvalidValueError(f"reset options must be a dictionary or None, got {options!r:.200}")
+    if not all(isinstance(name, str) for name in options or {}):
+        raise InvalidValueError(f"reset options have words as keys, got {options!r:.200}")
+    given = {k: v for k, v in (options or {}).items() if v is not None or k not in OPTIONS}
+    for name in sorted(given):
+        if name not in OPTIONS:
+            near = difflib.get_close_matches(name, OPTIONS, n=1)
+            hint = f", did you mean {near[0]!r}?" if near else "."
+            raise InvalidValueError(
+                f"unknown reset option {name!r}{hint} Known: {', '.join(sorted(OPTIONS))}"
+            )
+    merged = dict(settings)
+    merged |= _scene_options(given, settings)
+    passed_on = ("n_chairs", "n_people", "scan_height_m")
+    merged |= {name: given[name] for name in passed_on if name in given}
+    merged["dynamism"] = _rates(merged["dynamism"], given)
+    merged["laser"] = _laser(merged["laser"], given)
+    if "start" in given:
+        merged["start"] = _finite("start", given["start"], 3, "(x m, y m, heading rad)")
+    goal = _finite("goal", given["goal"], 2, "(x, y) in m") if "goal" in given else None
+    if goal is not None and max(map(abs, goal)) > FAR_M:
+        raise InvalidValueError(f"option goal must lie within {FAR_M:g} m, got {given['goal']!r}")
+    return Episode(
+        settings=merged,
+        seeds=mapping("seeds", given.get("seeds")),
+        goal=None if goal is None else (goal[0], goal[1]),
+    )
+
+
+def checked_seed(seed: Any) -> int | None:
+    """None or a whole number >= 0, of NumPy's or Python's; else ``InvalidValueError``."""
+    if seed is None:
+        return None
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InvalidValueError(f"seed must be a whole number >= 0 or None, got {seed!r:.200}")
+    return int(seed)
+
+
+def mapping(name: str, value: Any) -> dict[str, Any]:
+    """A plain dictionary with words as keys; empty for None."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise InvalidValueError(f"option {name} must be a dictionary, got {value!r}")
+    return dict(value)
+
+
+def _scene_options(given: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of the scene's recipe; the simulation's own settings are not among them."""
+    options = mapping("scene", given.get("scene"))
+    for name in sorted(set(options) & {"seed", "drive", *settings}):
+        raise InvalidValueError(
+            f"option scene takes options of the scene's recipe, and {name!r} is none of them"
+        )
+    return options
+
+
+def _finite(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
+    out = numbers(f"option {name}", value, n, meaning)
+    if not all(math.isfinite(v) for v in out):
+        raise InvalidValueError(f"option {name} must be finite, got {value!r}")
+    return out
+
+
+def _rates(dynamism: float | Dynamism, given: Mapping[str, Any]) -> Dynamism:
+    rates = Dynamism.of(given.get("dynamism", dynamism), given.get("moving_share"))
+    changes = mapping("rates", given.get("rates"))
+    known = {f.name for f in fields(Dynamism)}
+    for name in sorted(set(changes) - known):
+        raise InvalidValueError(
+            f"option rates: unknown rate {name!r}; known: {', '.join(sorted(known))}"
+        )
+    return replace(rates, **changes)
+
+
+def _laser(laser: Lms221Config, given: Mapping[str, Any]) -> Lms221Config:
+    chosen = given.get("laser", laser)
+    if not isinstance(chosen, Lms221Config):
+        raise InvalidValueError(f"option laser must be a Lms221Config, got {chosen!r}")
+    changes = {k: given[k] for k in ("resolution_deg", "noise_std_m") if k in given}
+    return replace(chosen, **changes)

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scanner's beams cast on the geoms of one model, each at its own time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.sensors.lidar import raycast, windows
+from sim.sensors.lidar.candidates import candidates
+
+Float = NDArray[np.float64]
+Hits = tuple[Float, NDArray[np.int64], Float]
+
+MAX_SLOTS = 12  # the ends of the two physics steps of each of four sweeps
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spot:
+    """The disc a beam lights: ``aperture`` radius m at the window, ``divergence`` half angle rad.
+
+    ``offsets`` (k, 2): places of the k rays on the unit disc, (left, up). An ideal beam is the
+    default: one ray in the middle.
+    """
+
+    aperture: float = 0.0
+    divergence: float = 0.0
+    offsets: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+
+    def rays(self) -> Float:
+        """(k, 6): left, up, unit direction (forward, left, up), way up per metre forward."""
+        out = np.empty((len(self.offsets), 6))
+        for k, (u, v) in enumerate(self.offsets):
+            left, up = self.divergence * u, self.divergence * v
+            length = math.sqrt(1.0 + left * left + up * up)
+            out[k] = u, v, 1.0 / length, left / length, up / length, up
+        return out
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FanPlan:
+    """The beams of a scan, fan by fan.
+
+    beams  (m,) number of each beam
+    ends   (fans + 1,) where each fan's rows begin, and the last one's end
+    rows   (m, 5) angle rad in the laser frame, ascending by even steps within a fan, its cosine
+           and sine; slot of the last ``note`` before the beam and part of the way to the next
+    """
+
+    beams: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    rows: Float
+
+    @classmethod
+    def of(cls, fans: Sequence[tuple[NDArray[np.int64], Float, Float, Float]]) -> FanPlan:
+        """From (beams, angles, slots, parts) of each fan."""
+        beams, angles, slots, parts = (np.concatenate(column) for column in zip(*fans, strict=True))
+        cos, sin = ([f(a) for a in angles.tolist()] for f in (math.cos, math.sin))
+        return cls(
+            beams=beams.astype(np.int64),
+            ends=np.cumsum([0, *(fan[0].size for fan in fans)]).astype(np.int64),
+            rows=np.ascontiguousarray(np.column_stack((angles, cos, sin, slots, parts))),
+        )
+
+
+class Raycaster:
+    """Casts scans, fans of beams, on the geoms of one model.
+
+    height     m, of the scan plane
+    robot      name of the scanner's own body; it and its children are not seen
+    spot       the rays of each beam
+    range_max  m, bounds how far the spot spreads up and down
+    panes      optional (ngeom,) True for what beams may pass: cast apart, as a second layer
+    site       id of the laser's site, whose poses are then noted too
+
+    Raises ``InvalidValueError`` for a mesh, height field or SDF that could meet the scan plane:
+    the formulas cover primitives only.
+
+    Attributes: ``ids`` (n,) geom ids of the candidates; ``lasers`` (slots, 3) x, y, yaw of the
+    laser at each ``note`` of the scan; after ``cast``, ``hits`` (ranges m, candidates, |cos| of
+    the incidence), each (layers, beams, rays): inf, -1 and NaN for a miss, and ``fan`` (m, 7) the
+    beams in the world; after ``start``, ``noted``, the fields of ``windows.Noted``.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        *,
+        height: float,
+        robot: str | None = "robot/base",
+        spot: Spot | None = None,
+        range_max: float = 80.0,
+        panes: NDArray[np.bool_] | None = None,
+        site: int = -1,
+    ) -> None:
+        self.spot = Spot() if spot is None else spot
+        self.height = height
+        passed = np.zeros(model.ngeom, dtype=np.bool_) if panes is None else panes
+        reach = self.spot.aperture + self.spot.divergence * range_max
+        self.ids, self.table = candidates(model, height, reach, robot, passed)
+        self.layers = 2 if bool(passed[self.ids].any()) else 1
+        n = self.ids.size
+        self._rays = self.spot.rays()
+        self._optics = (height, self.spot.aperture, self.spot.divergence)
+        self.poses = np.zeros((MAX_SLOTS, n, 12))
+        self.bounds = np.zeros((n, 6))
+        self.lasers = np.zeros((MAX_SLOTS, 3))
+        self._all = np.arange(n)
+        self._movable = np.flatnonzero(
+            np.isin(model.geom_bodyid[self.ids], np.flatnonzero(model.body_weldid != 0))
+        )
+        self._site = site
+        self._filled = np.zeros(1, dtype=np.int64)
+        self._seen: mujoco.MjData | None = None
+        self._plan: FanPlan | None = None
+
+    @property
+    def rays_per_beam(self) -> int:
+        """Number of rays cast for each beam."""
+        return len(self.spot.offsets)
+
+    def start(self, data: mujoco.MjData) -> None:
+        """Forget the last scan, and note where everything is; needs fresh kinematics."""
+        self._filled[0] = 0
+        if data is not self._seen:
+            self._seen = data
+            views = (data.geom_xpos, data.geom_xmat, data.site_xpos, data.site_xmat)
+            where = (*views, self._site, self.poses, self.lasers, self._filled)
+            windows.note((self.ids, self._all, *where))
+            self.poses[1:] = self.poses[0]  # what cannot move is never noted again
+            windows.enclose(self.table, self._all, self.poses, 1, self.bounds)
+            self.noted = (self.ids, self._movable, *where)
+            self._filled[0] = 0
+        self.note()
+
+    def note(self) -> None:
+        """Note where everything is now, in the next slot."""
+        windows.note(self.noted)
+
+    def cast(self, plan: FanPlan) -> None:
+        """Cast the beams of the scan that has just ended, into ``hits``."""
+        if plan is not self._plan:
+            self._prepare(plan)
+        raycast.sweep(
+            self.table, self._movable, self.poses, self.lasers, int(self._filled[0]), self.bounds,
+            plan.rows, plan.ends, plan.beams, self._rays, self._optics, self._work, self.hits,
+        )  # fmt: skip
+
+    def _prepare(self, plan: FanPlan) -> None:
+        """Room for the beams of a plan."""
+        self._plan, m, n = plan, plan.beams.size, 3 * self.ids.size
+        shape = (self.layers, m, self.rays_per_beam)
+        self.hits = (np.zeros(shape), np.zeros(shape, dtype=np.int64), np.zeros(shape))
+        self.fan = np.zeros((m, 7))
+        self._work = (
+            self.fan, np.zeros((plan.ends.size - 1, 4)), np.zeros(shape[:2]),
+            np.zeros((n, 4)), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64),
+        )  # fmt: skip
+
+    def mirror(self, polished: NDArray[np.bool_], out: Hits) -> None:
+        """Follow the middle rays off panes and off ``polished`` candidates.
+
+        out  (all beams,) each: length of the way m, inf for none; candidate; |cos| there
+        """
+        assert self._plan is not None
+        raycast.reflect(
+            self.table, polished, self.poses, self.bounds, self.fan, self._plan.beams,
+            self.height, self.hits, out,
+        )  # fmt: skip

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Exact tests of one ray against MuJoCo's primitive geoms.
+
+The intersection formulas are those of MuJoCo's ``engine_ray.c``, evaluated in the same order, so
+that ranges agree with ``mj_multiRay`` to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.sensors.lidar.fan import BOX, CAPSULE, CYLINDER, ELLIPSOID, SPHERE, Vec3
+from slam._jit import njit
+
+MINVAL = 1e-15  # mjMINVAL
+# Position, then matrix by rows.
+Pose = tuple[
+    float, float, float, float, float, float, float, float, float, float, float, float
+]  # fmt: skip
+Hit = tuple[float, float]  # distance, -1 for a miss; |cos| of the angle to the surface normal
+MISS = (-1.0, 0.0)
+
+
+@njit
+def _quadratic(a: float, b: float, c: float) -> tuple[float, float]:
+    """Both roots of a x^2 + 2 b x + c in ascending order, (-1, -1) without real ones."""
+    det = b * b - a * c
+    if det < MINVAL:
+        return -1.0, -1.0
+    det = math.sqrt(det)
+    return (-b - det) / a, (-b + det) / a
+
+
+@njit
+def _first(low: float, high: float) -> float:
+    """The nearest root in front, -1 when both lie behind."""
+    if low >= 0.0:
+        return low
+    return high if high >= 0.0 else -1.0
+
+
+@njit
+def _sphere(dif: Vec3, vec: Vec3, radius_squared: float) -> float:
+    a = vec[0] * vec[0] + vec[1] * vec[1] + vec[2] * vec[2]
+    b = vec[0] * dif[0] + vec[1] * dif[1] + vec[2] * dif[2]
+    c = dif[0] * dif[0] + dif[1] * dif[1] + dif[2] * dif[2] - radius_squared
+    low, high = _quadratic(a, b, c)
+    return _first(low, high)
+
+
+@njit
+def _passes(dif: Vec3, vec: Vec3, radius_squared: float) -> bool:
+    """Whether ``_sphere`` misses; the sign of its roots needs no division."""
+    a = vec[0] * vec[0] + vec[1] * vec[1] + vec[2] * vec[2]
+    b = vec[0] * dif[0] + vec[1] * dif[1] + vec[2] * dif[2]
+    c = dif[0] * dif[0] + dif[1] * dif[1] + dif[2] * dif[2] - radius_squared
+    det = b * b - a * c
+    return det < MINVAL or (b > 0.0 and math.sqrt(det) < b)
+
+
+@njit
+def _tube(pnt: Vec3, vec: Vec3, radius: float, half: float) -> float:
+    """Round side of a cylinder or capsule along local z, between its flat ends."""
+    a = vec[0] * vec[0] + vec[1] * vec[1]
+    b = vec[0] * pnt[0] + vec[1] * pnt[1]
+    c = pnt[0] * pnt[0] + pnt[1] * pnt[1] - radius * radius
+    low, high = _quadratic(a, b, c)
+    x = _first(low, high)
+    return x if x >= 0.0 and abs(pnt[2] + x * vec[2]) <= half else -1.0
+
+
+@njit
+def _nearer(x: float, candidate: float) -> float:
+    return candidate if candidate >= 0.0 and (x < 0.0 or candidate < x) else x
+
+
+@njit
+def _capsule(pnt: Vec3, vec: Vec3, radius: float, half: float) -> float:
+    x = _tube(pnt, vec, radius, half)
+    a = vec[0] * vec[0] + vec[1] * vec[1] + vec[2] * vec[2]
+    for side in (1.0, -1.0):
+        z = pnt[2] - side * half
+        b = vec[0] * pnt[0] + vec[1] * pnt[1] + vec[2] * z
+        c = pnt[0] * pnt[0] + pnt[1] * pnt[1] + z * z - radius * radius
+        for root in _quadratic(a, b, c):
+            if root >= 0.0 and side * (pnt[2] + root * vec[2]) >= half:
+                x = _nearer(x, root)
+    return x
+
+
+@njit
+def _cylinder(pnt: Vec3, vec: Vec3, radius: float, half: float) -> float:
+    x = -1.0
+    if abs(vec[2]) > MINVAL:
+        for side in (-1.0, 1.0):
+            root = (side * half - pnt[2]) / vec[2]
+            if root >= 0.0:
+                p0 = pnt[0] + root * vec[0]
+                p1 = pnt[1] + root * vec[1]
+                if p0 * p0 + p1 * p1 <= radius * radius:
+                    x = _nearer(x, root)
+    return _nearer(x, _tube(pnt, vec, radius, half))
+
+
+@njit
+def _ellipsoid(pnt: Vec3, vec: Vec3, size: Vec3) -> float:
+    s0, s1, s2 = 1.0 / (size[0] * size[0]), 1.0 / (size[1] * size[1]), 1.0 / (size[2] * size[2])
+    a = s0 * vec[0] * vec[0] + s1 * vec[1] * vec[1] + s2 * vec[2] * vec[2]
+    b = s0 * vec[0] * pnt[0] + s1 * vec[1] * pnt[1] + s2 * vec[2] * pnt[2]
+    c = s0 * pnt[0] * pnt[0] + s1 * pnt[1] * pnt[1] + s2 * pnt[2] * pnt[2] - 1.0
+    low, high = _quadratic(a, b, c)
+    return _first(low, high)
+
+
+@njit
+def _slab(pnt: Vec3, vec: Vec3, size: Vec3) -> float:
+    """Nearest face of a box whose axis 0 is the face normal (callers permute the axes)."""
+    x = -1.0
+    if abs(vec[0]) > MINVAL:
+        for side in (-1.0, 1.0):
+            root = (side * size[0] - pnt[0]) / vec[0]
+            if (
+                root >= 0.0
+                and abs(pnt[1] + root * vec[1]) <= size[1]
+                and abs(pnt[2] + root * vec[2]) <= size[2]
+            ):
+                x = _nearer(x, root)
+    return x
+
+
+@njit
+def _box(pnt: Vec3, vec: Vec3, size: Vec3) -> Hit:
+    best, cos = _slab(pnt, vec, size), abs(vec[0])
+    x = _slab((pnt[1], pnt[0], pnt[2]), (vec[1], vec[0], vec[2]), (size[1], size[0], size[2]))
+    if x >= 0.0 and (best < 0.0 or x < best):
+        best, cos = x, abs(vec[1])
+    x = _slab((pnt[2], pnt[0], pnt[1]), (vec[2], vec[0], vec[1]), (size[2], size[0], size[1]))
+    if x >= 0.0 and (best < 0.0 or x < best):
+        best, cos = x, abs(vec[2])
+    return best, min(cos, 1.0)
+
+
+@njit
+def _plane(pnt: Vec3, vec: Vec3, size: Vec3) -> float:
+    if vec[2] > -MINVAL:
+        return -1.0
+    x = -pnt[2] / vec[2]
+    if x < 0.0:
+        return -1.0
+    if size[0] > 0.0 and abs(pnt[0] + x * vec[0]) > size[0]:
+        return -1.0
+    if size[1] > 0.0 and abs(pnt[1] + x * vec[1]) > size[1]:
+        return -1.0
+    return x
+
+
+@njit
+def _to_local(pose: Pose, dif: Vec3) -> Vec3:
+    """A world difference in the frame of a geom."""
+    return (
+        pose[3] * dif[0] + pose[6] * dif[1] + pose[9] * dif[2],
+        pose[4] * dif[0] + pose[7] * dif[1] + pose[10] * dif[2],
+        pose[5] * dif[0] + pose[8] * dif[1] + pose[11] * dif[2],
+    )
+
+
+@njit
+def _round_cos(kind: int, pnt: Vec3, ray: Vec3, size: Vec3, x: float) -> float:
+    """|cos| between a unit ray and the surface of anything but a box or plane, where it hit."""
+    n0, n1, n2 = pnt[0] + x * ray[0], pnt[1] + x * ray[1], pnt[2] + x * ray[2]
+    if kind == CAPSULE:
+        n2 -= min(max(n2, -size[1]), size[1])
+    elif kind == CYLINDER:
+        if abs(abs(n2) - size[1]) < abs(math.sqrt(n0 * n0 + n1 * n1) - size[0]):
+            return min(abs(ray[2]), 1.0)
+        n2 = 0.0
+    elif kind == ELLIPSOID:
+        n0, n1, n2 = n0 / (size[0] * size[0]), n1 / (size[1] * size[1]), n2 / (size[2] * size[2])
+    length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+    if length < MINVAL:
+        return 1.0
+    return min(abs(n0 * ray[0] + n1 * ray[1] + n2 * ray[2]) / length, 1.0)
+
+
+@njit
+def meet(kind: int, size: Vec3, pose: Pose, origin: Vec3, vec: Vec3, limit: float) -> Hit:
+    """Where a ray meets a geom, by MuJoCo's formulas; beyond ``limit`` the cosine is not made.
+
+    Numbers, not arrays: to pass arrays costs more than the whole calculation.
+    """
+    dif = (origin[0] - pose[0], origin[1] - pose[1], origin[2] - pose[2])
+    if kind == SPHERE:
+        x = _sphere(dif, vec, size[0] * size[0])
+        return x, _round_cos(kind, dif, vec, size, x) if 0.0 <= x <= limit else 0.0
+    # MuJoCo tests a bounding sphere first; at a corner it decides, so it is part of the formula.
+    if kind == BOX:
+        if _passes(dif, vec, size[0] * size[0] + size[1] * size[1] + size[2] * size[2]):
+            return MISS
+        return _box(_to_local(pose, dif), _to_local(pose, vec), size)
+    if kind == CAPSULE:
+        if _passes(dif, vec, (size[0] + size[1]) * (size[0] + size[1])):
+            return MISS
+    elif kind == CYLINDER and _passes(dif, vec, size[0] * size[0] + size[1] * size[1]):
+        return MISS
+    pnt, ray = _to_local(pose, dif), _to_local(pose, vec)
+    if kind == CAPSULE:
+        x = _capsule(pnt, ray, size[0], size[1])
+    elif kind == CYLINDER:
+        x = _cylinder(pnt, ray, size[0], size[1])
+    elif kind == ELLIPSOID:
+        x = _ellipsoid(pnt, ray, size)
+    else:
+        return _plane(pnt, ray, size), min(abs(ray[2]), 1.0)
+    return x, _round_cos(kind, pnt, ray, size, x) if 0.0 <= x <= limit else 0.0
+
+
+@njit
+def face_normal(size: Vec3, pose: Pose, at: Vec3) -> Vec3:
+    """Axis, in the world, of the face of a box that a point on it is nearest to."""
+    pnt = _to_local(pose, (at[0] - pose[0], at[1] - pose[1], at[2] - pose[2]))
+    gap0, gap1 = abs(abs(pnt[0]) - size[0]), abs(abs(pnt[1]) - size[1])
+    gap2 = abs(abs(pnt[2]) - size[2])
+    if gap0 <= gap1 and gap0 <= gap2:
+        return pose[3], pose[6], pose[9]
+    if gap1 <= gap2:
+        return pose[4], pose[7], pose[10]
+    return pose[5], pose[8], pose[11]

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One scan of the LMS-221 from what its rays hit; every scan takes the same number of draws."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.sensors.lidar.caster import Hits, Spot
+from sim.sensors.lidar.config import Lms221Config
+from sim.sensors.lidar.effects import (
+    DISC_WEIGHTS,
+    LMS221_SPOT,
+    TIMER_UNIT,
+    RangeEffects,
+    error_function,
+    needed_table,
+)
+from sim.sensors.lidar.signal import Bool, Float, Int, measure, receive, send
+from slam._jit import njit
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScanResult:
+    """One scan, and the truth about it that only a simulator has.
+
+    ranges       (n,) float32 m, as sent: inf beyond what the mode can say, NaN an error code
+                 (REP 117); no return is NaN with ``RangeEffects.error_codes``, else inf
+    true_ranges  (n,) float64 m, inf where nothing was hit
+    geoms        (n,) int32 geom id, -1 where nothing was hit or nothing came back
+    bodies       (n,) int32 body id, -1 likewise
+    cosines      (n,) |cos| of the angle between beam and surface normal, NaN likewise
+    mixed        (n,) bool, the range blends two surfaces
+    ghost        (n,) bool, the range is that of something seen in a pane or polished face
+
+    Where the beam is a spot of several rays, ``true_ranges`` is that of the middle ray, and geoms,
+    bodies and cosines are those of the strongest ray of the pulse that was measured.
+    """
+
+    ranges: NDArray[np.float32]
+    true_ranges: Float
+    geoms: NDArray[np.int32]
+    bodies: NDArray[np.int32]
+    cosines: Float
+    mixed: Bool
+    ghost: Bool
+
+    @property
+    def incidence(self) -> NDArray[np.float32]:
+        """(n,) rad between beam and surface normal, NaN where nothing was hit."""
+        return arccos(self.cosines).astype(np.float32)
+
+
+@njit
+def arccos(cosines: Float) -> Float:
+    """Elementwise, by libm: NumPy's own changes its last bit with the CPU."""
+    out = np.empty(cosines.size)
+    for i in range(cosines.size):
+        out[i] = math.acos(cosines[i])
+    return out
+
+
+class SignalModel:
+    """The receiver of one scanner: hits in, what is sent out.
+
+    config   which effects, which range mode
+    surface  (candidates,) each: reflectivity; polished; geom id; body id
+    rng      drawn from once, to seed a stream for each effect: what is off draws nothing, and
+             neither that nor what is hit changes the draws of the others
+
+    Attribute ``streams``: the generators, for who saves the state of a run.
+    """
+
+    def __init__(
+        self,
+        config: Lms221Config,
+        surface: tuple[Float, Bool, Int, Int],
+        rng: np.random.Generator,
+    ) -> None:
+        effects = config.effects
+        seeds = rng.integers(0, 2**63, size=4)
+        unit_of_run, *rest = (np.random.default_rng(seed) for seed in seeds)
+        self.streams = tuple(rest)  # noise, mixed pixels, lost values
+        self._weights = np.array(DISC_WEIGHTS if effects.spot else (1.0,))
+        self._surface = (np.append(surface[0], 0.0), np.append(surface[1], False))
+        self._owner = np.stack([np.append(ids, -1) for ids in surface[2:]])
+        self._needed = needed_table() if effects.reflectivity else np.zeros(1)
+        self._error: tuple[Float, float] = (np.zeros(0), 0.0)
+        if effects.systematic:
+            self._error = error_function(config.systematic_bound_m, unit_of_run)
+        shaping = ("spot", "reflectivity", "incidence", "mixed_pixels", "glass", "bounce")
+        self._ruler = not any(getattr(effects, name) for name in shaping)
+        self._switches = (effects.reflectivity, effects.incidence, effects.mixed_pixels)
+        unit = config.mode.unit_m if config.quantise else 0.0
+        counter = TIMER_UNIT if effects.timer else 0.0
+        self._steps = (counter, unit, config.mode.range_max_m)
+        noise = analog_noise(config.noise_std_m, counter, unit, effects)
+        none = math.nan if effects.error_codes else math.inf
+        self._errors = (noise, effects.dropout_rate, none)
+        self._nothing = np.zeros(0)
+
+    def scan(self, hits: Hits, mirrored: tuple[Float, Int, Float]) -> ScanResult:
+        """One scan from the caster's ``hits`` and what was mirrored, (n,) or (0,) each."""
+        n = hits[0].shape[1]
+        places, seen, marks = np.empty((3, n)), np.empty(n, np.int64), np.empty((2, n), np.bool_)
+        if self._ruler:
+            measure(hits, (places, seen, marks))
+        else:
+            chances = self.streams[1].random((n,)) if self._switches[2] else self._nothing
+            receive(
+                hits, mirrored, self._surface, self._weights, self._switches, self._needed,
+                chances, (places, seen, marks),
+            )  # fmt: skip
+        normal = self.streams[0].standard_normal((n,)) if self._errors[0] > 0.0 else self._nothing
+        lost = self.streams[2].random((n,)) if self._errors[1] > 0.0 else self._nothing
+        ranges, whose = np.empty(n, dtype=np.float32), np.empty((2, n), dtype=np.int32)
+        send(
+            (places, seen), self._surface[0], self._owner, self._error, (normal, lost),
+            self._steps, self._errors, (ranges, whose),
+        )  # fmt: skip
+        return ScanResult(
+            ranges=ranges, true_ranges=places[1], geoms=whose[0], bodies=whose[1],
+            cosines=places[2], mixed=marks[0], ghost=marks[1],
+        )  # fmt: skip
+
+
+def analog_noise(std: float, counter: float, unit: float, effects: RangeEffects) -> float:
+    """Deviation before rounding, so that what is sent has ``std``.
+
+    Rounding to u adds u^2 / 12 of its own; the second rounding adds nothing where it finds only
+    multiples of its unit, that is without corrections in between.
+    """
+    again = unit if effects.systematic or unit > counter else 0.0
+    return math.sqrt(max(std**2 - (counter**2 + again**2) / 12.0, 0.0))
+
+
+def spot_of(effects: RangeEffects) -> Spot:
+    """The rays of a beam."""
+    return LMS221_SPOT if effects.spot else Spot()

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which beams of a scan can meet which geom: the bounds that make the caster fast.
+
+Each geom is turned into the interval of azimuth in which beams can meet it and the distance from
+which on it can be met (design note, world section 1.2), so a beam is left with one or two exact
+tests instead of one for every geom. Bounds are generous by ``SLACK``; the exact tests are in
+``sim.sensors.lidar.ray_shapes``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sim.sensors.lidar.fan import (
+    BODY,
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    DISC_HALF,
+    DISC_RADIUS,
+    DISC_X,
+    DISC_Y,
+    DISC_Z,
+    ELLIPSOID,
+    FAR,
+    HALF_HEIGHT,
+    HIGH,
+    KIND,
+    LOW,
+    MOVED,
+    NEAR,
+    ORIGIN_X,
+    ORIGIN_Y,
+    PLANE,
+    SIZE_X,
+    SIZE_Y,
+    SIZE_Z,
+    SLACK,
+    SPHERE,
+    UPRIGHT,
+    Float,
+    Int,
+    Vec3,
+)
+from slam._jit import njit
+
+BUCKETS = 64
+
+
+class Noted(NamedTuple):
+    """Where things were at some moments of a scan.
+
+    ids, rows  geoms of the caster, and which of these are noted
+    xpos...    ``geom_xpos``, ``geom_xmat``, ``site_xpos``, ``site_xmat`` of the model's data
+    site       of the laser, -1 for none
+    poses      (slots, n, 12): position, then matrix by rows; ``lasers`` (slots, 3): x, y, yaw
+    filled     (1,) number of slots
+    """
+
+    ids: Int
+    rows: Int
+    xpos: Float
+    xmat: Float
+    site_xpos: Float
+    site_xmat: Float
+    site: int
+    poses: Float
+    lasers: Float
+    filled: Int
+
+
+@njit
+def note(noted: tuple[Any, ...]) -> None:
+    """Take over where geoms and laser are now, into the next slot.
+
+    noted  ``Noted``, from Python as a plain tuple: a named one costs more than the work
+    """
+    ids, rows, xpos, xmat, site_xpos, site_xmat, site, poses, lasers, filled = noted
+    slot = filled[0]
+    filled[0] += 1
+    for row in range(rows.size):
+        j = rows[row]
+        g = ids[j]
+        for i in range(3):
+            poses[slot, j, i] = xpos[g, i]
+        for i in range(9):
+            poses[slot, j, 3 + i] = xmat[g, i]
+    if site >= 0:
+        lasers[slot, 0], lasers[slot, 1] = site_xpos[site, 0], site_xpos[site, 1]
+        lasers[slot, 2] = math.atan2(site_xmat[site, 3], site_xmat[site, 0])
+
+
+@njit
+def _horizontal_bound(table: Float, j: int, poses: Float, slot: int) -> float:
+    """Radius of a vertical cylinder about the geom's centre that contains it."""
+    kind = int(table[j, KIND])
+    s0, s1, s2 = table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z]
+    if kind == SPHERE:
+        return float(s0)
+    if kind in (CAPSULE, CYLINDER):
+        lean_x, lean_y = poses[slot, j, 5], poses[slot, j, 8]
+        return float(s0 + s1 * math.sqrt(lean_x * lean_x + lean_y * lean_y))
+    if kind == ELLIPSOID:
+        return float(max(s0, s1, s2))
+    if kind == PLANE:
+        return math.inf
+    if table[j, UPRIGHT] > 0.0:
+        return math.sqrt(s0 * s0 + s1 * s1)
+    return math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
+
+
+@njit
+def enclose(table: Float, rows: Int, poses: Float, slots: int, bounds: Float) -> None:
+    """Renew the bounds of the geoms ``rows`` from their poses in the first ``slots`` slots."""
+    last, body, moved = slots - 1, -1.0, False
+    for row in range(rows.size):
+        j = rows[row]
+        if table[j, BODY] != body:  # else it moved as the last one did
+            body, moved = table[j, BODY], False
+            for s in range(last):
+                # First row and column of a rotation that changes little tell all of it.
+                for i in (0, 1, 2, 3, 4, 6):
+                    moved = moved or poses[s, j, i] != poses[last, j, i]
+        radius, half = _horizontal_bound(table, j, poses, last), table[j, HALF_HEIGHT]
+        x, y, z = poses[last, j, 0], poses[last, j, 1], poses[last, j, 2]
+        if moved:
+            x, y = 0.5 * (x + poses[0, j, 0]), 0.5 * (y + poses[0, j, 1])
+            radius, lift = 0.0, 0.0
+            for s in range(slots):
+                dx, dy = poses[s, j, 0] - x, poses[s, j, 1] - y
+                reach = _horizontal_bound(table, j, poses, s) + math.sqrt(dx * dx + dy * dy)
+                radius, lift = max(radius, reach), max(lift, abs(poses[s, j, 2] - z))
+            half += lift
+        bounds[j, DISC_X], bounds[j, DISC_Y], bounds[j, DISC_Z] = x, y, z
+        bounds[j, DISC_RADIUS], bounds[j, DISC_HALF] = radius, half
+        bounds[j, MOVED] = 1.0 if moved else 0.0
+
+
+@njit
+def _azimuth(y: float, x: float) -> float:
+    """atan2 to 1.2e-5 rad (Abramowitz and Stegun 4.4.49), four times faster; only for bounds."""
+    ax, ay = abs(x), abs(y)
+    t = min(ax, ay) / max(ax, ay) if ax > 0.0 or ay > 0.0 else 0.0
+    u = t * t
+    angle = t * (0.9998660 + u * (-0.3302995 + u * (0.1801410 + u * (-0.0851330 + u * 0.0208351))))
+    if ay > ax:
+        angle = 0.5 * math.pi - angle
+    if x < 0.0:
+        angle = math.pi - angle
+    return angle if y >= 0.0 else -angle
+
+
+@njit
+def _half_angle(radius: float, distance: float) -> float:
+    """Half the angle a disc fills from ``distance`` > ``radius``, or a little more."""
+    ratio = radius / distance
+    if ratio < 0.3:
+        return ratio + 0.19 * ratio * ratio * ratio  # above the arc sine, by 4e-4 at most
+    return _azimuth(radius, math.sqrt((distance - radius) * (distance + radius)))
+
+
+@njit
+def _box_extent(table: Float, poses: Float, j: int, dx: float, dy: float, spread: float) -> Vec3:
+    """(nearest distance, lowest, highest azimuth) of an upright box whose centre is at (dx, dy).
+
+    Azimuths are in (-pi, 2 pi), high above low; both widened for origins up to ``spread`` away.
+    All around when the box may contain such an origin.
+    """
+    ux, uy, wx, wy = poses[0, j, 3], poses[0, j, 6], poses[0, j, 4], poses[0, j, 7]
+    half_x, half_y = table[j, SIZE_X], table[j, SIZE_Y]
+    across = max(abs(dx * ux + dy * uy) - half_x, 0.0)
+    along = max(abs(dx * wx + dy * wy) - half_y, 0.0)
+    clear = math.sqrt(across * across + along * along)
+    if clear <= spread + SLACK:
+        return 0.0, -math.pi, math.pi
+    sx, sy = half_x, half_y
+    low_x, low_y = dx + sx * ux + sy * wx, dy + sx * uy + sy * wy
+    high_x, high_y = low_x, low_y
+    for i in range(3):
+        if i == 1:
+            sx = -sx
+        else:
+            sy = -sy
+        x, y = dx + sx * ux + sy * wx, dy + sx * uy + sy * wy
+        if low_x * y - low_y * x < 0.0:
+            low_x, low_y = x, y
+        if high_x * y - high_y * x > 0.0:
+            high_x, high_y = x, y
+    low, high = _azimuth(low_y, low_x), _azimuth(high_y, high_x)
+    if high < low:
+        high += math.tau
+    # Every corner is at least ``clear`` away, so this is the largest shift of any of them.
+    widen = _half_angle(spread, clear) if spread > 0.0 else 0.0
+    return clear - spread, low - widen, high + widen
+
+
+@njit
+def _origins(fan: Float) -> Vec3:
+    """(mid x, mid y, largest distance of any beam's origin from there)."""
+    last, spread = fan.shape[0] - 1, 0.0
+    mid_x = 0.5 * (fan[0, ORIGIN_X] + fan[last, ORIGIN_X])
+    mid_y = 0.5 * (fan[0, ORIGIN_Y] + fan[last, ORIGIN_Y])
+    for i in range(last + 1):
+        x, y = fan[i, ORIGIN_X] - mid_x, fan[i, ORIGIN_Y] - mid_y
+        spread = max(spread, x * x + y * y)
+    return mid_x, mid_y, math.sqrt(spread)
+
+
+@njit
+def find_windows(
+    table: Float,
+    poses: Float,
+    bounds: Float,
+    fan: Float,
+    wedge: tuple[float, float],
+    optics: Vec3,
+    windows: Float,
+    owners: Int,
+) -> int:
+    """Where the beams of a scan can meet which geom.
+
+    wedge    lowest and highest azimuth of any ray
+    optics   height of the scan plane m, aperture radius m and half divergence rad of the spot
+    windows  (3 n, 4), filled; ``owners`` (3 n,) the geom of each
+
+    Returns how many.
+    """
+    height, aperture, slope = optics
+    mid_x, mid_y, spread = _origins(fan)
+    spread, found = spread + aperture + SLACK, 0
+    first, last = wedge
+    left_c, left_s = math.cos(last), math.sin(last)
+    right_c, right_s = math.cos(first), math.sin(first)
+    span = last - first
+    for j in range(bounds.shape[0]):
+        dx, dy = bounds[j, DISC_X] - mid_x, bounds[j, DISC_Y] - mid_y
+        reach = bounds[j, DISC_RADIUS] + spread
+        # Outside the wedge of the scan: no trigonometry needed to know it.
+        left, right = left_c * dy - left_s * dx > reach, right_s * dx - right_c * dy > reach
+        if (left or right) if span < math.pi else (left and right and span < math.tau):
+            continue
+        distance = math.sqrt(dx * dx + dy * dy)
+        gap = abs(bounds[j, DISC_Z] - height) - bounds[j, DISC_HALF] - aperture
+        if gap > slope * (distance + reach) + SLACK:
+            continue
+        if table[j, KIND] == BOX and table[j, UPRIGHT] > 0.0 and bounds[j, MOVED] == 0.0:
+            near, low, high = _box_extent(table, poses, j, dx, dy, spread)
+        elif distance <= reach:
+            near, low, high = 0.0, -math.pi, math.pi
+        else:
+            half, centre = _half_angle(reach, distance), _azimuth(dy, dx)
+            near, low, high = distance - reach, centre - half, centre + half
+        if gap > SLACK:
+            near = max(near, (gap - SLACK) / slope)  # a ray that leaves the plane needs that far
+        for lap in (-math.tau, 0.0, math.tau):
+            if low - slope + lap <= last and high + slope + lap >= first:
+                owners[found] = j
+                windows[found, NEAR], windows[found, FAR] = near, distance + reach
+                windows[found, LOW], windows[found, HIGH] = low + lap, high + lap
+                found += 1
+    return found
+
+
+@njit
+def nearest_first(windows: Float, found: int, order: Int) -> None:
+    """Order of the first ``found`` windows by distance, to 0.25 m: enough, and three times faster
+    than a sort."""
+    starts = np.zeros(BUCKETS + 1, dtype=np.int64)
+    for row in range(found):
+        starts[1 + min(int(4.0 * windows[row, NEAR]), BUCKETS - 1)] += 1
+    for k in range(BUCKETS):
+        starts[k + 1] += starts[k]
+    for row in range(found):
+        k = min(int(4.0 * windows[row, NEAR]), BUCKETS - 1)
+        order[starts[k]] = row
+        starts[k] += 1

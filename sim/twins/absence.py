@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The same room without one of its movers, or with one that has stopped: for counterfactuals.
+
+A mover that is **out** is parked beside the floor, held there, touches nothing and is met by no
+ray; a door, which cannot leave its hinge, stands wide open instead, unseen and untouchable (people
+still keep a hand's breadth off the open leaf). One that is **frozen** stays where it is, whatever
+pushes it: nobody shoves it, it does not walk (a foot in the air comes down), no closer pulls it.
+
+The model keeps its size, so a state saved without either fits a simulation with it and the other
+way round. Nobody else draws other numbers: every actor has a generator of its own. What the others
+do may differ all the same, because they meet, or no longer meet, what was changed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.actors.doors import OPENED
+from sim.actors.people import gait, right_of_way
+from sim.sensors.lidar.candidates import HULL_GROUP
+from sim.sensors.lidar.lms221 import Lms221
+from sim.simulation import Simulation
+from sim.world.substeps import Pinned
+from sim.world.world import World
+from slam.errors import InvalidValueError, UnknownNameError
+
+Int = NDArray[np.int64]
+BESIDE_M, APART_M = 20.0, 3.0  # from the floor to the first one parked, and between these
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """What is different: names of movers that are out, and of those that are frozen."""
+
+    out: tuple[str, ...] = ()
+    frozen: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [*self.out, *self.frozen]
+        if len(set(names)) < len(names):
+            raise InvalidValueError(f"Change: a mover is named twice in {', '.join(names)}")
+
+    def __str__(self) -> str:
+        named = (("out", self.out), ("frozen", self.frozen))
+        words = [f"{' + '.join(names)} {how}" for how, names in named if names]
+        return ", ".join(words) or "as it was"
+
+
+def apply(simulation: Simulation, change: Change) -> None:
+    """Take movers out of a simulation, or freeze them, from its present state on.
+
+    Once for a simulation, after ``load_state``. Raises ``UnknownNameError`` for a name that no
+    mover has and ``InvalidValueError`` for the robot.
+    """
+    world = simulation.world
+    for name in (*change.out, *change.frozen):
+        _check(world, name)
+    for name in change.out:
+        _hide(world, name)
+    if change.out:
+        _look_again(simulation)
+    for name in change.out:
+        _park(world, name)
+    for name in change.frozen:
+        _halt(world, name, seated=True)
+    world.people.dress()
+    world.pin(_pinned(world, (*change.out, *change.frozen)))
+
+
+def _check(world: World, name: str) -> None:
+    if name not in world.mover_names:
+        raise UnknownNameError(
+            f"no mover is called '{name}'. Known: {', '.join(world.mover_names)}."
+        )
+    if _kind(world, name) == "robot":
+        raise InvalidValueError("the robot cannot be taken out: it is who looks")
+
+
+def _kind(world: World, name: str) -> str:
+    return world.scene.movers[world.mover_names.index(name)].kind
+
+
+def _bodies(world: World, name: str) -> Int:
+    """Ids of the bodies of a mover, limbs included."""
+    found = np.flatnonzero(world.bodies.mover_of_body == world.mover_names.index(name))
+    return found.astype(np.int64)
+
+
+def _hide(world: World, name: str) -> None:
+    """No ray meets it, and nothing touches it."""
+    model = world.model
+    own = np.isin(model.geom_bodyid, _bodies(world, name))
+    model.geom_group[own] = HULL_GROUP
+    model.geom_contype[own] = 0
+    model.geom_conaffinity[own] = 0
+    if name in world.people.names:  # whose hulls follow who sits
+        world.people.table.hulls.bits[world.people.names.index(name)] = 0
+
+
+def _look_again(simulation: Simulation) -> None:
+    """A scanner that does not see what is hidden now, with the draws of the one before."""
+    before = simulation.laser
+    seeds = simulation.world.seeds
+    laser = Lms221(simulation.world.model, before.config, seeds.generator("lidar"))
+    for new, old in zip(laser.streams, before.streams, strict=True):
+        new.bit_generator.state = old.bit_generator.state
+    simulation.use_laser(laser)
+
+
+def _park(world: World, name: str) -> None:
+    row, qpos = world.mover_names.index(name), world.data.qpos
+    addresses = _qpos_of(world, name)
+    if _kind(world, name) == "door":
+        joint = world.model.joint(f"{name}/hinge")
+        qpos[addresses] = min(OPENED, float(joint.range[1]))
+        return
+    _, ymin, xmax, _ = world.scene.bounds
+    qpos[addresses] = 0.0
+    qpos[addresses[0]] = xmax + BESIDE_M + APART_M * row
+    qpos[addresses[1]] = ymin
+    _free_seat(world, name)
+    _halt(world, name, seated=False)
+    if name in world.people.names:
+        i, table = world.people.names.index(name), world.people.table
+        gait.stand(qpos, table.torsos[i : i + 1], world.people.feet[i : i + 1])
+        physics, mocap = (qpos, world.data.qvel), (world.data.mocap_pos, world.data.mocap_quat)
+        gait.walk(0.0, physics, table.torsos, table.limbs, world.people.feet, table.sitting, mocap)
+
+
+def _free_seat(world: World, name: str) -> None:
+    """Who sits on it, or is about to, stands there."""
+    at, task = world.people.table.at, world.people.crowd.task
+    rows = np.flatnonzero(at.discs[:, 0] == _qpos_of(world, name)[0])
+    sitters = np.flatnonzero(np.isin(task[:, right_of_way.SEAT], rows))
+    task[sitters, right_of_way.SEAT] = -1
+    walking = task[sitters, right_of_way.WALKING] == right_of_way.WALKS
+    task[sitters[~walking], right_of_way.WALKING] = right_of_way.STANDS
+    world.people.crowd.state[sitters, right_of_way.SIT] = 0.0
+
+
+def _halt(world: World, name: str, *, seated: bool) -> None:
+    """A person that goes nowhere any more; ``seated``: one that sits stays so."""
+    if name not in world.people.names:
+        return
+    i, crowd = world.people.names.index(name), world.people.crowd
+    state, task = crowd.state[i], crowd.task[i]
+    if not (seated and task[right_of_way.WALKING] == right_of_way.SEATED):
+        task[right_of_way.WALKING] = right_of_way.STANDS
+        if not seated or state[right_of_way.SIT] == 0.0:
+            task[right_of_way.SEAT] = -1
+            state[right_of_way.SIT] = 0.0
+    state[[right_of_way.STAY_UNTIL, right_of_way.LOOK_UNTIL]] = math.inf
+    state[[right_of_way.VX, right_of_way.VY, right_of_way.BLOCKED]] = 0.0
+
+
+def _joints(world: World, name: str) -> list[int]:
+    owners = world.model.jnt_bodyid
+    return np.flatnonzero(np.isin(owners, _bodies(world, name))).tolist()
+
+
+def _qpos_of(world: World, name: str) -> Int:
+    """Addresses in qpos of a mover's joints, all slides and hinges; x, y, yaw first."""
+    return np.array([world.model.jnt_qposadr[j] for j in _joints(world, name)], dtype=np.int64)
+
+
+def _pinned(world: World, names: Sequence[str]) -> Pinned:
+    model = world.model
+    at = [int(q) for name in names for q in _qpos_of(world, name)]
+    joints = [j for name in names for j in _joints(world, name)]
+    transmission = int(mujoco.mjtTrn.mjTRN_JOINT)
+    servos = np.flatnonzero(
+        (model.actuator_trntype == transmission) & np.isin(model.actuator_trnid[:, 0], joints)
+    )
+    return Pinned(
+        np.array(at, dtype=np.int64),
+        world.data.qpos[at].copy(),
+        np.array([model.jnt_dofadr[j] for j in joints], dtype=np.int64),
+        servos.astype(np.int64),
+    )

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The same drive three times: through a room that moves, one that has been moved, one at rest.
+
+How much of an error is due to motion? To answer that, everything else must be equal: the robot's
+path, its odometry, the noise of every beam. So the dynamic version is driven first; then the
+recorded path is replayed kinematically, the robot carried along it, in two twins of the room:
+
+- **static**: everything as laid out at the start, for the whole run;
+- **semi-static**: things stand still whenever they can be seen, and are found elsewhere later. A
+  mover takes the place it rests at in the dynamic version once it has been out of sight for
+  ``sim.twins.room.UNSEEN_S`` and that place is out of sight too. Same displacements, no motion.
+
+The driver of the dynamic version also keeps clear of the places at the start, and a path that
+crosses a mover of the static twin is rejected for one with another tour. In the semi-static twin
+nothing is put where the path crosses later. Slip is off: odometry follows from the path, so it is
+the same to the bit in all three, as are the numbers drawn for the beams' noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from sim.core.dynamism import Dynamism
+from sim.core.seeds import Seeds
+from sim.driving.drive import TourConfig
+from sim.moments import Moment, toured
+from sim.sensors.lidar.lms221 import Lms221
+from sim.sensors.odometry.encoders import WheelOdometry
+from sim.simulation import ScanTiming, Simulation
+from sim.twins.room import Drive, TwinRoom
+from sim.world.world import World
+from slam._jit import njit
+from slam.errors import InvalidValueError
+from slam.frames import Float, Frame, Odometry, Stream, StreamMetadata
+
+TWINS = ("dynamic", "semi_static", "static")
+
+
+@njit
+def rolled(path: Float, track: float) -> Float:
+    """(n, 2) m rolled by left and right wheel along poses (n, 3) without slip."""
+    out = np.zeros((path.shape[0], 2))
+    for k in range(1, path.shape[0]):
+        dx, dy = path[k, 0] - path[k - 1, 0], path[k, 1] - path[k - 1, 1]
+        turn = path[k, 2] - path[k - 1, 2]
+        middle = path[k - 1, 2] + 0.5 * turn
+        forward = dx * math.cos(middle) + dy * math.sin(middle)
+        out[k, 0] = out[k - 1, 0] + forward - 0.5 * track * turn
+        out[k, 1] = out[k - 1, 1] + forward + 0.5 * track * turn
+    return out
+
+
+class Twins:
+    """A drive and its three versions, by the names in ``TWINS``: one path, odometry and noise.
+
+    seconds   of driving                     tour  limits of the driver
+    tries     tours tried until one keeps clear of everything in the static twin
+    settings  as for ``Simulation``
+
+    The drive is remembered (1 to 2 KB a scan), frames are simulated anew at each ``moments``.
+    Raises ``InvalidValueError`` when every tour crosses a mover, naming those of the last one.
+    """
+
+    def __init__(
+        self,
+        scene: str = "office",
+        *,
+        seconds: float = 60.0,
+        seed: int | Seeds = 0,
+        dynamism: float | Dynamism = 0.5,
+        tour: TourConfig | None = None,
+        tries: int = 8,
+        **settings: Any,
+    ) -> None:
+        seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
+        self._labels = bool(settings.get("labels", False))
+        crossed: list[str] = []
+        for attempt in range(max(1, tries)):
+            own = seeds
+            if attempt > 0:
+                own = Seeds(**{**seeds.record(), "driving": seeds.integer("driving") + attempt})
+            self._again = partial(Simulation, scene, seed=own, dynamism=dynamism, **settings)
+            self._tour = partial(_toured, seconds=seconds, config=tour)
+            self.simulation = self._again()
+            self._drive = _driven(self.simulation, self._tour(self.simulation))
+            crossed = _twin(self.simulation, self._drive, labels=False).crosses()
+            if not crossed:
+                break
+        else:
+            raise InvalidValueError(
+                f"none of {tries} tours keeps clear of everything at the start; "
+                f"the last crosses {', '.join(crossed)}"
+            )
+        self._odometry = _odometry(self.simulation, self._drive)
+
+    def moments(self, name: str) -> Iterator[Moment]:
+        """One version of the drive."""
+        if name == "dynamic":
+            yield from self._dynamic()
+        else:
+            twin = _twin(self.simulation, self._drive, labels=self._labels)
+            yield from twin.moments(self._odometry, moved=name == "semi_static")
+
+    def _dynamic(self) -> Iterator[Moment]:
+        moments = self._tour(self._again())
+        for moment, odometry in zip(moments, self._odometry, strict=True):
+            yield replace(moment, frame=_with(moment.frame, odometry))
+
+
+def twins(scene: str = "office", **settings: Any) -> dict[str, Stream]:
+    """Three streams by name, held in memory; ``settings`` as for ``Twins``."""
+    made = Twins(scene, **settings)
+    metadata = made.simulation.metadata()
+    return {
+        name: _stream(metadata, name, [moment.frame for moment in made.moments(name)])
+        for name in TWINS
+    }
+
+
+def _toured(
+    simulation: Simulation, *, seconds: float, config: TourConfig | None
+) -> Iterator[Moment]:
+    """A tour that also keeps clear of the places at the start."""
+    return toured(simulation, seconds, config, keep_out=simulation.world.mover_poses())
+
+
+def _driven(simulation: Simulation, moments: Iterator[Moment]) -> Drive:
+    stamps_ns, truths, path, qpos, rests = [], [], [], [], []
+    before = simulation.world.data.qpos.copy()
+    for moment in moments:
+        if moment.frame.truth is not None:
+            truths.append(moment.frame.truth)
+        stamps_ns.append(moment.frame.stamp_ns)
+        qpos.append(before)
+        rests.append(~moment.moving)
+        path.append(simulation.path.copy())
+        before = simulation.world.data.qpos.copy()
+    return Drive(
+        stamps_ns=stamps_ns,
+        truths=truths,
+        path=np.array(path),
+        qpos=np.array(qpos),
+        rests=np.array(rests),
+    )
+
+
+def _twin(simulation: Simulation, drive: Drive, *, labels: bool) -> TwinRoom:
+    """The same room, at rest, with a scanner that draws the same noise."""
+    seeds, scene = simulation.world.seeds, simulation.world.scene
+    world = World(scene, seed=seeds, dynamism=0.0, drive=simulation.world.drive_config)
+    laser = Lms221(world.model, simulation.laser.config, seeds.generator("lidar"))
+    return TwinRoom(world, laser, drive, labels=labels)
+
+
+def _odometry(simulation: Simulation, drive: Drive) -> list[Odometry]:
+    """What the encoders say of the path if no wheel ever slips."""
+    track = simulation.world.drive_config.track
+    encoders = WheelOdometry(
+        simulation.odometry_preset, simulation.world.seeds.generator("odometry"), track=track
+    )
+    n, steps = len(drive.path), drive.path.shape[1] - 1
+    whole = np.concatenate([drive.path[0, :1], drive.path[:, 1:].reshape(-1, 3)])
+    travel = rolled(np.ascontiguousarray(whole), track)
+    timing = ScanTiming.of(simulation.laser)
+    return [
+        timing.odometry(
+            encoders, travel[k * steps : (k + 1) * steps + 1], drive.stamps_ns[k], False
+        )
+        for k in range(n)
+    ]
+
+
+def _with(frame: Frame, odometry: Odometry) -> Frame:
+    return Frame(
+        stamp_ns=frame.stamp_ns,
+        odometry=odometry,
+        scan=frame.scan,
+        truth=frame.truth,
+        labels=frame.labels,
+    )
+
+
+def _stream(metadata: StreamMetadata, name: str, frames: list[Frame]) -> Stream:
+    extra: Mapping[str, Any] = {**metadata.extra, "twin": name}
+    labelled = StreamMetadata(
+        source=metadata.source,
+        scene=metadata.scene,
+        seed=metadata.seed,
+        laser=metadata.laser,
+        robot=metadata.robot,
+        truth=metadata.truth,
+        extra=extra,
+    )
+    return Stream(metadata=labelled, frames=lambda: iter(frames), length=len(frames))

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of a world in 3-D, from its cameras "top", "follow" and "persp".
+
+    with Camera(model, 640, 480) as camera:
+        frame = camera.render(data, "follow")      # (480, 640, 3) uint8
+
+Made of MuJoCo's classic renderer calls, on a GL context of the library that ``sim.view.gl`` found,
+so that it works whatever ``MUJOCO_GL`` was when mujoco was imported. A camera belongs to the thread
+that made it.
+"""
+
+from __future__ import annotations
+
+import importlib
+from types import TracebackType
+from typing import Any, Self
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.view import gl
+from slam.errors import InvalidValueError, MissingDependencyError
+
+PAINT_GROUP = 5  # shadows painted under things
+HIDDEN_GROUPS = (3, 4)  # collision hulls, marks
+MAX_GEOMS = 20_000
+MAX_SIZE = 4096
+SMALL = 480  # px; up to this height, fewer facets do (a third of the cost)
+PEOPLE_GROUP = 2
+SHADOW_M = 0.25  # radius; smaller things throw no shadow, but for those that make up people
+EDGE = 24  # grey levels between neighbours that make an edge
+_CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+
+
+class Camera:
+    """A picture maker for one model; close it, or use ``with``.
+
+    width, height  px
+    shadows        of the sun; half the cost on a CPU
+    samples        per pixel against jagged edges, at up to three times the cost; with 0 edges are
+                   softened afterwards
+
+    Raises ``InvalidValueError`` for a size that cannot be, ``MissingDependencyError`` without GL.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        width: int,
+        height: int,
+        *,
+        shadows: bool = True,
+        samples: int = 0,
+    ) -> None:
+        for field, value in (("width", width), ("height", height)):
+            if not 1 <= value <= MAX_SIZE:
+                raise InvalidValueError(f"{field} must lie in 1..{MAX_SIZE} px, got {value}")
+        found = gl.find()
+        if found.backend is None:
+            raise MissingDependencyError(f"no 3-D pictures: {found.reason}")
+        self.width, self.height = width, height
+        self._model = model
+        self._context: Any = None
+        self._gl = importlib.import_module(f"mujoco.{found.backend}").GLContext(width, height)
+        self._gl.make_current()
+        self._context = _make_context(model, width, height, shadows, samples)
+        self._rect = mujoco.MjrRect(0, 0, width, height)
+        self._scene = mujoco.MjvScene(model, maxgeom=MAX_GEOMS)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+        self._option = mujoco.MjvOption()
+        for group in HIDDEN_GROUPS:
+            self._option.geomgroup[group] = 0
+            self._option.sitegroup[group] = 0
+        self._option.geomgroup[PAINT_GROUP] = 1
+        self._view = mujoco.MjvCamera()
+        self._view.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        self._soft = samples == 0
+        small = (model.geom_rbound > 0.0) & (model.geom_rbound < SHADOW_M)
+        self._shadeless = small & (model.geom_group != PEOPLE_GROUP)
+
+    def render(self, data: mujoco.MjData, camera: str = "persp") -> NDArray[np.uint8]:
+        """A fresh (height, width, 3) RGB picture of ``data``, whose kinematics must be up to date.
+
+        Raises ``InvalidValueError`` for a camera the model does not have.
+        """
+        if self._context is None:
+            raise InvalidValueError("this Camera is closed")
+        number = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_CAMERA, camera)
+        if number < 0:
+            known = [self._model.camera(i).name for i in range(self._model.ncam)]
+            raise InvalidValueError(f"camera must be one of {', '.join(known)}, got '{camera}'")
+        self._view.fixedcamid = number
+        self._update(data)
+        self._gl.make_current()
+        picture = np.empty((self.height, self.width, 3), dtype=np.uint8)
+        mujoco.mjr_render(self._rect, self._scene, self._context)
+        mujoco.mjr_readPixels(picture, None, self._rect, self._context)
+        upright = np.ascontiguousarray(picture[::-1])  # GL's first row is the lowest
+        return soften(upright) if self._soft else upright
+
+    def _update(self, data: mujoco.MjData) -> None:
+        """Fill the scene; the model is as before afterwards."""
+        model, before = self._model, self._model.geom_castshadow.copy()
+        model.geom_castshadow[self._shadeless] = 0
+        everything = mujoco.mjtCatBit.mjCAT_ALL
+        try:
+            mujoco.mjv_updateScene(
+                model, data, self._option, None, self._view, everything, self._scene
+            )
+        finally:
+            model.geom_castshadow[:] = before
+
+    def close(self) -> None:
+        """Give the GL context back; a second call does nothing."""
+        if self._gl is None:
+            return
+        self._gl.make_current()
+        if self._context is not None:
+            self._context.free()
+        self._gl.free()
+        self._gl = self._context = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def soften(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The picture with its edges, and only these, a little blurred; (h, w, 3) in and out."""
+    grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+    edge = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, _CROSS) > EDGE
+    blurred = cv2.GaussianBlur(picture, (3, 3), 0.6)
+    cv2.copyTo(blurred, edge.view(np.uint8), picture)
+    return picture
+
+
+def _make_context(
+    model: mujoco.MjModel, width: int, height: int, shadows: bool, samples: int
+) -> mujoco.MjrContext:
+    """A render context with these qualities; the model is as before afterwards."""
+    changed: list[tuple[Any, str, int]] = [
+        (model.vis.global_, "offwidth", width),
+        (model.vis.global_, "offheight", height),
+        (model.vis.quality, "offsamples", samples),
+    ]
+    if not shadows:
+        changed.append((model.vis.quality, "shadowsize", 0))
+    if height <= SMALL:
+        changed += [(model.vis.quality, "numslices", 8), (model.vis.quality, "numstacks", 5)]
+    before = [(owner, field, getattr(owner, field)) for owner, field, _ in changed]
+    for owner, field, value in changed:
+        setattr(owner, field, value)
+    try:
+        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+    finally:
+        for owner, field, value in before:
+            setattr(owner, field, value)
+    mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, context)
+    _sample_one_level(model, context)
+    return context
+
+
+def _sample_one_level(model: mujoco.MjModel, context: mujoco.MjrContext) -> None:
+    """Textures from the nearest of their levels, not blended from two: a tenth of the cost."""
+    GL: Any = importlib.import_module("OpenGL.GL")  # has no type hints
+    for k in range(model.ntex):
+        if model.tex_type[k] == mujoco.mjtTexture.mjTEXTURE_2D:
+            GL.glBindTexture(GL.GL_TEXTURE_2D, int(context.texture[k]))
+            GL.glTexParameteri(
+                GL.GL_TEXTURE_2D, GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR_MIPMAP_NEAREST
+            )

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Substeps of 1/300 s in one compiled call: physics, actors, the robot's drive, what is noted.
+
+Order of a substep: at every fourth one the drive ramps its wheels; MuJoCo moves everything; the
+limbs are posed; before every fourth one the actors decide (people, doors, shoves); then all poses
+are made fresh, so that whoever looks between two substeps (a scanner, a film, ``save_state``) sees
+poses of that very instant, and forces that will act from it on.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.actors.chairs import Shoved, shove
+from sim.actors.doors import Leaves, swing
+from sim.actors.people.crowd import People, decide
+from sim.actors.people.gait import walk
+from sim.actors.people.right_of_way import Addresses, Crowd, Doors
+from sim.actors.people.sitting import Hulls, dress
+from sim.actors.robot import ramp, roll
+from sim.actors.rolling import Rolled
+from sim.actors.rolling import roll as roll_chairs
+from sim.core.contacts import Touches, collect
+from sim.core.engine import Engine, call
+from sim.core.flow import Field
+from sim.sensors.lidar.windows import Noted, note
+from slam._jit import njit
+
+Float = NDArray[np.float64]
+SUBSTEPS_PER_S = 300
+SUBSTEPS_PER_TICK = 4  # one mirror turn of the LMS-221: 13.33 ms
+
+
+class Physics(NamedTuple):
+    """Arrays of the model's data: state, controls, applied forces, mocap poses."""
+
+    qpos: Float
+    qvel: Float
+    ctrl: Float
+    qfrc: Float
+    mocap: tuple[Float, Float]
+
+
+class Robot(NamedTuple):
+    """at      first qpos and first dof
+    push       ``qfrc_constraint``: anything but 0 at the robot's dofs is a touch
+    touches    where these are collected
+    drive      (8,) state, see ``sim.actors.robot.Drive``; tyres  (2,) actuators left, right
+    limits     (3,) largest change of speed m/s and turn rate rad/s in a tick, half the track m
+    """
+
+    at: tuple[int, int]
+    push: Float
+    touches: Touches
+    drive: Float
+    tyres: NDArray[np.int64]
+    limits: Float
+
+
+class Pinned(NamedTuple):
+    """What is held where it is whatever acts on it (``sim.twins.absence``); nothing in a plain run.
+
+    at, places  qpos addresses and what stands there; dofs; servos  actuators
+    """
+
+    at: NDArray[np.int64]
+    places: Float
+    dofs: NDArray[np.int64]
+    servos: NDArray[np.int64]
+
+
+class Actors(NamedTuple):
+    """Everybody who moves anything, and what may not."""
+
+    people: People
+    doors: Leaves
+    shoved: tuple[Shoved, Shoved, Shoved]
+    rolled: tuple[Rolled, Rolled, Rolled]
+    pinned: Pinned
+
+
+class Watch(NamedTuple):
+    """What is written down after each substep k: row k of all.
+
+    marks    (n,) whether the scanner notes all poses
+    scanner  where to
+    path     (n, 3) pose of the robot; travel (n, 2) m rolled by the wheels
+    """
+
+    marks: NDArray[np.bool_]
+    scanner: Noted
+    path: Float
+    travel: Float
+
+
+@njit
+def control(time: float, robot: Robot, physics: Physics, actors: Actors) -> None:
+    """Let everybody but the robot decide for the next tick."""
+    people, doors = actors.people, actors.doors
+    qpos, qvel, qfrc = physics.qpos, physics.qvel, physics.qfrc
+    tick = SUBSTEPS_PER_TICK / SUBSTEPS_PER_S
+    if people.alive:
+        decide((time, tick), (qpos, qvel, physics.ctrl), people)
+        dress(people.crowd, people.hulls)
+    pose = qpos[robot.at[0] : robot.at[0] + 3]
+    swing(time, pose, doors, (qpos, qvel, qfrc))
+    for shoved in actors.shoved:
+        shove(time, tick, shoved, qfrc)
+    for rolled in actors.rolled:
+        roll_chairs(time, tick, rolled, qvel, qfrc)
+
+
+@njit
+def pin(physics: Physics, pinned: Pinned) -> None:
+    """Undo what moved the pinned things, or would."""
+    for k in range(len(pinned.at)):
+        physics.qpos[pinned.at[k]] = pinned.places[k]
+    for dof in pinned.dofs:
+        physics.qvel[dof] = 0.0
+        physics.qfrc[dof] = 0.0
+    for servo in pinned.servos:
+        physics.ctrl[servo] = 0.0
+
+
+def plain(table: Any) -> Any:
+    """The same tables in plain tuples, which Numba takes over from Python three times faster."""
+    return tuple(map(plain, table)) if isinstance(table, tuple) else table
+
+
+@njit
+def _actors(parts: Any) -> Actors:
+    """Inverse of ``plain``."""
+    folk, doors, shoved, rolled, pinned = parts
+    alive, rates, at, field, ways, crowd, servos, torsos, limbs, feet, sitting, hulls = folk
+    people = People(
+        alive, rates, Addresses(*at), Field(*field), Doors(*ways), Crowd(*crowd),
+        servos, torsos, limbs, feet, sitting, Hulls(*hulls),
+    )  # fmt: skip
+    return Actors(
+        people,
+        Leaves(*doors),
+        (Shoved(*shoved[0]), Shoved(*shoved[1]), Shoved(*shoved[2])),
+        (Rolled(*rolled[0]), Rolled(*rolled[1]), Rolled(*rolled[2])),
+        Pinned(*pinned),
+    )
+
+
+@njit
+def _robot(parts: Any) -> Robot:
+    at, push, touches, drive, tyres, limits = parts
+    return Robot(at, push, Touches(*touches), drive, tyres, limits)
+
+
+@njit
+def decide_first(room: Any) -> None:
+    """Let everybody decide for the tick that begins the run; ``room`` as for ``advance``."""
+    _, _, robot, physics, actors = room
+    control(0.0, _robot(robot), Physics(*physics), _actors(actors))
+
+
+@njit
+def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:
+    """``_advance`` for ``plain`` tables; ``room``: clock, engine, robot, physics, actors."""
+    clock, engine, robot, physics, actors = room
+    marks, scanner, path, travel = watch
+    return _advance(
+        first, last, resumed, clock, Engine(*engine), _robot(robot), Physics(*physics),
+        _actors(actors), Watch(marks, Noted(*scanner), path, travel),
+    )  # fmt: skip
+
+
+@njit
+def _advance(
+    first: int,
+    last: int,
+    resumed: bool,
+    clock: NDArray[np.int64],
+    engine: Engine,
+    robot: Robot,
+    physics: Physics,
+    actors: Actors,
+    watch: Watch,
+) -> int:
+    """Make the substeps that end at rows ``first + 1`` to ``last`` of ``watch``.
+
+    Returns the last row. At the robot's first touch it returns early, with the row before, as it
+    does not know yet where contacts are: find out, then call it again from that row, ``resumed``.
+
+    clock  (1,) substeps made since the start
+    """
+    people, step = actors.people, 1.0 / SUBSTEPS_PER_S
+    for row in range(first, last):
+        if not (resumed and row == first):
+            if clock[0] % SUBSTEPS_PER_TICK == 0:
+                ramp(robot.drive, robot.limits)
+                physics.ctrl[robot.tyres[0]] = robot.drive[6]
+                physics.ctrl[robot.tyres[1]] = robot.drive[7]
+            call(engine.step2, engine.model, engine.data)
+            clock[0] += 1
+            roll(robot.drive, step)
+            pin(physics, actors.pinned)
+            if people.alive:
+                walk(
+                    step, (physics.qpos, physics.qvel), people.torsos, people.limbs, people.feet,
+                    people.sitting, physics.mocap,
+                )  # fmt: skip
+            if clock[0] % SUBSTEPS_PER_TICK == 0:
+                control(clock[0] / SUBSTEPS_PER_S, robot, physics, actors)
+                pin(physics, actors.pinned)
+        dof = robot.at[1]
+        if robot.push[dof] != 0.0 or robot.push[dof + 1] != 0.0 or robot.push[dof + 2] != 0.0:
+            if len(robot.touches.geoms) == 0 and not resumed:
+                return row
+            collect(engine, robot.touches)
+        call(engine.step1, engine.model, engine.data)
+        for k in range(3):
+            watch.path[row + 1, k] = physics.qpos[robot.at[0] + k]
+        watch.travel[row + 1, 0], watch.travel[row + 1, 1] = robot.drive[4], robot.drive[5]
+        if watch.marks[row + 1]:
+            note(watch.scanner)
+    return last
+
+
+def loose() -> Pinned:
+    """Nothing is pinned."""
+    none = np.zeros(0, dtype=np.int64)
+    return Pinned(none, np.zeros(0), none, none)
+
+
+def unseen(rows: int) -> Any:
+    """A ``plain`` watch over ``rows`` rows that notes the robot alone."""
+    none = np.zeros(0, dtype=np.int64)
+    flat = np.zeros((0, 3)), np.zeros((0, 9))
+    scanner = Noted(none, none, *flat, *flat, -1, np.zeros((0, 0, 12)), np.zeros((0, 3)), none)
+    marks = np.zeros(rows, dtype=np.bool_)
+    return plain(Watch(marks, scanner, np.zeros((rows, 3)), np.zeros((rows, 2))))

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The room that moves: one MuJoCo model and its actors, in substeps of 1/300 s.
+
+What a substep is, is in ``sim.world.substeps``. Whoever moves things by hand (``data.qpos``)
+between two of them calls ``mj_forward`` then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes import build
+from scenes.scene import Scene
+from sim.actors.castors import checked_level, stand_on_castors
+from sim.actors.chairs import pushers, tables
+from sim.actors.doors import Doors
+from sim.actors.people.people import People
+from sim.actors.robot import Drive, DriveConfig
+from sim.core import state
+from sim.core.bodies import Bodies
+from sim.core.checks import instance
+from sim.core.contacts import Contact, RobotContacts
+from sim.core.dynamism import Dynamism
+from sim.core.engine import engine
+from sim.core.seeds import Seeds
+from sim.world import substeps
+from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
+from slam.errors import InvalidValueError
+
+__all__ = ["SUBSTEPS_PER_S", "SUBSTEPS_PER_TICK", "World"]
+
+Float = NDArray[np.float64]
+MOVING_SPEED = 0.02  # m/s; a mover faster than this counts as moving
+
+
+class World:
+    """A scene brought to life.
+
+    scene     a built ``Scene``, or the name of one; a name is built from the "layout" stream
+    seed      whole number or ``Seeds``
+    dynamism  knob in [0, 1] (see ``sim.core.dynamism``), or the rates themselves
+    moving_share  in [0, 1]: keep that share of chairs and loads on the move, instead of shoves
+    drive     limits of the robot
+    start     (x m, y m, heading rad) of the robot instead of the scene's
+    chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.castors``)
+    options   passed on to ``scenes.build`` when the scene is given by name, e.g. ``n_chairs=10``;
+              ``scan_height_m`` is one that every scene has
+
+    Raises ``InvalidValueError`` for a dynamism outside [0, 1], ``UnknownNameError`` for a scene.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str,
+        *,
+        seed: int | Seeds = 0,
+        dynamism: float | Dynamism = 0.5,
+        moving_share: float | None = None,
+        drive: DriveConfig | None = None,
+        start: Sequence[float] | None = None,
+        chairs: str = "planar",
+        **options: Any,
+    ) -> None:
+        self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
+        self.rates = Dynamism.of(dynamism, moving_share)
+        built = self._built(scene, options)
+        self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
+        self.model: mujoco.MjModel = self.scene.compile()
+        self.data = mujoco.MjData(self.model)
+        self.mover_names = tuple(m.name for m in self.scene.movers)
+        self._clock = np.zeros(1, dtype=np.int64)
+        self.bodies = Bodies(self.model, self.scene)
+        self._contacts = RobotContacts(self.model, self.bodies)
+        self.drive_config = DriveConfig() if drive is None else drive
+        instance("drive", self.drive_config, DriveConfig)
+        self._drive = Drive(self.model, self.drive_config, SUBSTEPS_PER_TICK / SUBSTEPS_PER_S)
+        self._shoves = pushers(self.model, self.scene.movers, self.rates, self.seeds)
+        self._doors = Doors(
+            self.model,
+            self.bodies,
+            self._named("door"),
+            rate=self.rates.door_rate,
+            counters=self._counters("doors"),
+        )
+        self.people = People(
+            self.model,
+            self.bodies,
+            self._doors,
+            stay_mean=self.rates.stay_mean,
+            pace=self.rates.pace,
+            counters=self._counters("people"),
+        )
+        self._people_rows = self.bodies.rows(self.people.names)
+        self.scene.place(self.model, self.data)
+        if start is not None:
+            self.bodies.place_robot(self.data, start)
+        self.people.start(self.data)
+        mujoco.mj_forward(self.model, self.data)
+        self._pinned = substeps.loose()
+        self._room = self._tables()
+        self._unseen = substeps.unseen(2)
+        substeps.decide_first(self._room)
+        mujoco.mj_step1(self.model, self.data)
+
+    def _built(self, scene: Scene | str, options: dict[str, Any]) -> Scene:
+        if isinstance(scene, str):
+            return build(scene, seed=self.seeds.integer("layout"), **options)
+        if options:
+            raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")
+        instance("scene", scene, Scene)
+        return scene
+
+    def _named(self, kind: str) -> list[str]:
+        """Movers whose kind starts so: "chair" means both sorts."""
+        return [m.name for m in self.scene.movers if m.kind.startswith(kind)]
+
+    def _tables(self) -> Any:
+        """Clock, engine, robot, physics and actors, as the kernels of ``substeps`` take them.
+
+        All are views of the live arrays.
+        """
+        data, drive = self.data, self._drive
+        at, dof = (int(a[0]) for a in self.bodies.addresses(["robot"]))
+        robot = substeps.Robot(
+            (at, dof), data.qfrc_constraint, self._contacts.table,
+            drive.state, drive.tyres, drive.limits,
+        )  # fmt: skip
+        mocap = (data.mocap_pos, data.mocap_quat)
+        physics = substeps.Physics(data.qpos, data.qvel, data.ctrl, data.qfrc_applied, mocap)
+        shoved, rolled = tables(self.model, self._shoves)
+        actors = substeps.Actors(
+            self.people.table, self._doors.leaves, shoved, rolled, self._pinned
+        )
+        return substeps.plain((self._clock, engine(self.model, data), robot, physics, actors))
+
+    def pin(self, pinned: substeps.Pinned) -> None:
+        """Hold things at a place from now on, and bring all poses up to date."""
+        self._pinned = pinned
+        self.data.qpos[pinned.at] = pinned.places
+        self.data.qvel[pinned.dofs] = 0.0
+        self.bodies.restore_physics(self.data, self.bodies.physics_state(self.data))
+        self._room = self._tables()
+
+    def _counters(self, stream: str) -> NDArray[np.uint64]:
+        return self.seeds.counters(stream, len(self.scene.movers))
+
+    # -- time -------------------------------------------------------------------------------
+
+    @property
+    def time_ns(self) -> int:
+        """Time since the start, ns: step k is k * 1e9 / 300, rounded to the nearest."""
+        return (self.step_count * 10_000_000 + 1) // 3
+
+    @property
+    def step_count(self) -> int:
+        """Substeps made since the start."""
+        return int(self._clock[0])
+
+    def substep(self) -> None:
+        """Advance by 1/300 s and leave poses (``xpos``, ``geom_xpos``, ...) of the new instant."""
+        self.advance(0, 1, self._unseen)
+
+    def advance(self, first: int, last: int, watch: Any) -> None:
+        """Make the substeps that end at rows ``first + 1`` to ``last`` of a ``plain`` ``Watch``."""
+        row = substeps.advance(first, last, False, self._room, watch)
+        if row < last:  # the first touch
+            self._contacts.locate(self.data)
+            self._room = self._tables()
+            substeps.advance(row, last, True, self._room, watch)
+
+    # -- the robot --------------------------------------------------------------------------
+
+    def set_command(self, v: float, omega: float) -> None:
+        """Ask the robot for a twist, m/s and rad/s; it is clipped and ramped (``DriveConfig``)."""
+        self._drive.command(v, omega)
+
+    def robot_pose(self) -> Float:
+        """(3,) ``T_world_robot``: x m, y m, heading rad (not wrapped)."""
+        return self.bodies.robot_pose(self.data)
+
+    def read_robot(self, pose: Float, travel: Float) -> None:
+        """``robot_pose`` and ``wheel_angles`` into (3,) and (2,) arrays."""
+        self.bodies.read_robot(self.data, self._drive.state, pose, travel)
+
+    def wheel_angles(self) -> Float:
+        """(2,) m truly rolled by the left and the right wheel since the start."""
+        return self._drive.travel_m
+
+    def take_contacts(self) -> list[Contact]:
+        """What the robot has touched since the last call, hardest first (``Contact.hard``)."""
+        return self._contacts.take()
+
+    def robot_clearance(self) -> float:
+        """m from the robot's rim to the nearest static obstacle or floor edge; < 0: inside."""
+        return self.bodies.clearance(self.data)
+
+    # -- everything that moves --------------------------------------------------------------
+
+    def mover_poses(self) -> Float:
+        """(n, 3) x m, y m, heading rad of each of ``scene.movers``, in that order.
+
+        A door stands at its hinge and heads along its leaf.
+        """
+        return self.bodies.poses(self.data)
+
+    def mover_speeds(self) -> Float:
+        """(n,) m/s of each mover: its centre's speed or its rim's by turning, the greater."""
+        return self.bodies.speeds(self.data)
+
+    def movers_moving(self) -> NDArray[np.bool_]:
+        """(n,) True for each of ``scene.movers`` faster than ``MOVING_SPEED``.
+
+        A person with a foot in the air moves, however still the torso.
+        """
+        moving = self.mover_speeds() > MOVING_SPEED
+        moving[self._people_rows] |= self.people.swinging()
+        return moving
+
+    def moving_bodies(self) -> NDArray[np.bool_]:
+        """(nbody,) True for each body of the model that belongs to a moving mover."""
+        moving = np.append(self.movers_moving(), False)
+        return moving[self.bodies.mover_of_body]
+
+    def is_moving(self, body: int) -> bool:
+        """Whether body ``body`` of the model moves right now."""
+        return bool(self.moving_bodies()[body])
+
+    # -- state ------------------------------------------------------------------------------
+
+    def _actor_arrays(self) -> dict[str, NDArray[Any]]:
+        arrays: dict[str, NDArray[Any]] = {"drive": self._drive.state}
+        parts = {kind: shoves.arrays() for kind, shoves in self._shoves.items()}
+        parts |= {"doors": self._doors.arrays(), "people": self.people.arrays()}
+        for owner, own in parts.items():
+            arrays |= {f"{owner}.{name}": a for name, a in own.items()}
+        return arrays
+
+    def _fingerprint(self) -> dict[str, Any]:
+        m = self.model
+        size = [m.nq, m.nv, m.nu, m.nbody, m.ngeom]
+        return {"scene": self.scene.name, "scan_height_m": self.scene.scan_height_m, "size": size}
+
+    def save_state(self) -> bytes:
+        """Everything that decides the future of this world, bit for bit.
+
+        Load it into a world built with the same arguments, in this or another process.
+        """
+        physics = self.bodies.physics_state(self.data)
+        words = {"steps": self.step_count, **self._fingerprint()}
+        return state.pack({**physics, **self._actor_arrays()}, words)
+
+    def load_state(self, block: bytes) -> None:
+        """Go on from ``save_state``; ``InvalidValueError`` if it is of another kind of world."""
+        arrays, words = state.unpack(block)
+        steps = words.pop("steps", None)
+        if words != self._fingerprint():
+            raise InvalidValueError(f"the state is of {words}, this world is {self._fingerprint()}")
+        live = self._actor_arrays()
+        for name, array in live.items():
+            if name not in arrays or arrays[name].shape != array.shape:
+                raise InvalidValueError(f"the state has no '{name}' of shape {array.shape}")
+        for name, array in live.items():
+            array[...] = arrays[name]
+        self._clock[0] = steps
+        self.people.dress()
+        self.bodies.restore_physics(self.data, arrays)
+        self._contacts.take()

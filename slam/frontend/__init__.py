@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every SLAM may use: odometry prior, de-skewed observations, what is in view."""

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Observations as Gaussians: beams and point features enter through one type.
+
+What they give to neurons is written by ``stamping``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import njit
+from slam.errors import InvalidValueError
+from slam.frames import Features, Float, Frame, Scan
+from slam.frontend.seen_space import FREE_WITHOUT_RETURN_M
+from slam.frontend.surfaces import face, join, unveiled
+from slam.frontend.visibility import View, view_of_beams, view_of_features
+from slam.shunting.config import ShuntingConfig
+
+SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
+SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
+NEAR_JOIN_CELLS = 3.0
+MOST_SWEPT_M = 50.0  # during one sweep; beyond, the beams of a scan belong to no one place
+MOST_STD_M = 3.0  # of a feature; one known worse says nothing, and fills the map in saying it
+SPACING_M, LEAST_WEIGHT = 0.1, 0.3  # beams closer than this share one observation's weight
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Observations:
+    """What one frame shows, in the robot frame at the frame's stamp.
+
+    points_robot  (n, 2) m
+    covariances   (n, 3) m^2: xx, xy, yy; at least (0.8 cell)^2 along every axis
+    weights       (n,) share of a full observation
+    tangents      (n, 2) unit direction of the surface where it goes on both ways, else 0
+    joined        (n,) bool: the surface goes on to the next point. Without it the dots of a wall
+                  seen at a grazing angle match themselves where the robot stood before
+    facings       (n,) uint8: the way the surface faces, see ``surfaces.face``; 0: unknown
+    view          what is seen to be empty
+    T_robot_laser (3,) origin of ``view``
+    """
+
+    points_robot: Float
+    covariances: Float
+    weights: Float
+    tangents: Float
+    joined: NDArray[np.bool_]
+    facings: NDArray[np.uint8]
+    view: View
+    T_robot_laser: Float
+
+
+@njit
+def _deskew(
+    ranges: NDArray[np.float32],
+    angles: NDArray[np.float64],
+    offsets: NDArray[np.float64],
+    T_robot_laser: NDArray[np.float64],
+    twist: NDArray[np.float64],
+    limits: tuple[float, float, float, float],
+    points: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    bearings: NDArray[np.float64],
+    free: NDArray[np.float64],
+) -> int:
+    """End points in the robot frame of the stamp; bearings and free ranges about that laser.
+
+    ``limits``: range_min, range_max, range of use, free range without a return. Returns how many
+    points were written.
+    """
+    low, high, use, silent = limits
+    lx, ly = T_robot_laser[0], T_robot_laser[1]
+    lc, ls = math.cos(T_robot_laser[2]), math.sin(T_robot_laser[2])
+    count = 0
+    for k in range(len(ranges)):
+        r = float(ranges[k])
+        hit = low <= r <= high
+        free[k] = 0.0
+        bearings[k] = angles[k]
+        if math.isnan(r) or r < low or r == 0.0:
+            continue
+        reach = min(r, use) if hit else silent
+        px = lx + reach * math.cos(angles[k] + T_robot_laser[2])
+        py = ly + reach * math.sin(angles[k] + T_robot_laser[2])
+        turn = twist[2] * offsets[k]
+        if offsets[k] != 0.0:
+            # Motion since the stamp: mid-point rule, exact to third order in the turned angle.
+            c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
+            mx = (c * twist[0] - s * twist[1]) * offsets[k]
+            my = (s * twist[0] + c * twist[1]) * offsets[k]
+            c, s = math.cos(turn), math.sin(turn)
+            px, py = c * px - s * py + mx, s * px + c * py + my
+        dx, dy = px - lx, py - ly
+        bearings[k] = math.atan2(lc * dy - ls * dx, lc * dx + ls * dy)
+        free[k] = math.sqrt(dx * dx + dy * dy)
+        if hit and r <= use:
+            points[count, 0] = px
+            points[count, 1] = py
+            beams[count] = k
+            count += 1
+    return count
+
+
+def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
+    """Beams, moved to where the robot was at the scan's stamp.
+
+    ``twist`` is the body velocity (vx, vy, omega) over the sweep. Raises ``InvalidValueError``
+    where that drives more than ``MOST_SWEPT_M`` during it.
+    """
+    spec = scan.spec
+    swept = spec.sweep_duration * math.hypot(float(twist[0]), float(twist[1]))
+    if swept > MOST_SWEPT_M:
+        raise InvalidValueError(
+            f"Odometry.twist must drive at most {MOST_SWEPT_M:g} m during a scan's sweep, "
+            f"got {swept:g} m"
+        )
+    n = spec.n_beams
+    points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
+    beams = np.empty(n, np.int64)
+    use = min(config.range_m, spec.range_max)
+    count = _deskew(
+        scan.ranges,
+        spec.angles,
+        spec.beam_time_offsets,
+        spec.T_robot_laser,
+        twist,
+        (spec.range_min, spec.range_max, use, min(use, FREE_WITHOUT_RETURN_M)),
+        points,
+        beams,
+        bearings,
+        free,
+    )
+    points, beams = points[:count], beams[:count]
+    if spec.sweep_duration > 0.0 and (bearings[1:] < bearings[:-1]).any():
+        # An interlaced scanner that turns: neighbours are those by bearing, not by number.
+        rank = np.empty(n, np.int64)
+        rank[np.argsort(bearings, kind="stable")] = np.arange(n)
+        beams = rank[beams]
+        in_order = np.argsort(beams)
+        points, beams = points.take(in_order, axis=0), beams[in_order]
+    onward, tangents = np.zeros(count, np.bool_), np.zeros((count, 2))
+    near = NEAR_JOIN_CELLS * config.cell_m
+    join(points, beams, spec.T_robot_laser, near, onward, tangents)
+    clear = np.zeros(count, np.bool_)
+    if unveiled(points, beams, spec.T_robot_laser, onward, clear) < count:
+        kept = np.flatnonzero(clear)  # a mask of rows takes ten times as long
+        points, onward = points.take(kept, axis=0), onward.take(kept)
+        tangents = tangents.take(kept, axis=0)
+    facings = np.zeros(len(points), np.uint8)
+    face(points, spec.T_robot_laser, onward, facings)
+    variance = max(SIGMA_CELLS * config.cell_m, SENSOR_SIGMA_M) ** 2
+    covariances = np.zeros((len(points), 3))
+    covariances[:, 0] = covariances[:, 2] = variance
+    x, y = points[:, 0], points[:, 1]
+    shares = np.sqrt(x * x + y * y) * spec.angle_increment / SPACING_M
+    weights = np.minimum(np.maximum(shares, LEAST_WEIGHT), 1.0)
+    view = view_of_beams(bearings, free, spec.angle_increment, config.cell_m)
+    return Observations(
+        points_robot=points,
+        covariances=covariances,
+        weights=weights,
+        tangents=tangents,
+        joined=onward,
+        facings=facings,
+        view=view,
+        T_robot_laser=spec.T_robot_laser,
+    )
+
+
+def from_features(features: Features, config: ShuntingConfig) -> Observations:
+    """Point features within range; their covariance widened to what the lattice can carry.
+
+    Those with a standard deviation beyond ``MOST_STD_M`` are left out.
+    """
+    points = features.points_robot
+    near = (points * points).sum(axis=1) <= config.range_m**2
+    near &= (
+        features.covariances.diagonal(axis1=1, axis2=2).max(axis=1, initial=0.0) <= MOST_STD_M**2
+    )
+    floor = (SIGMA_CELLS * config.cell_m) ** 2
+    given = features.covariances[near]
+    covariances = np.stack([given[:, 0, 0] + floor, given[:, 0, 1], given[:, 1, 1] + floor], axis=1)
+    return Observations(
+        points_robot=points[near].copy(),
+        covariances=covariances,
+        weights=np.ones(len(covariances)),
+        tangents=np.zeros((len(covariances), 2)),
+        joined=np.zeros(len(covariances), np.bool_),
+        facings=np.zeros(len(covariances), np.uint8),
+        view=view_of_features(points[near], config.cell_m),
+        T_robot_laser=np.zeros(3),
+    )
+
+
+def observe(frame: Frame, twist: Float, config: ShuntingConfig) -> Observations:
+    """What a frame shows to a robot that moves with ``twist``: beams, features or both.
+
+    Raises ``InvalidValueError`` for a frame with neither.
+    """
+    if frame.scan is None and frame.features is None:
+        raise InvalidValueError("the shunting SLAM needs a scan or features in every frame")
+    if frame.scan is None:
+        return from_features(frame.features, config)  # type: ignore[arg-type]
+    beams = from_scan(frame.scan, twist, config)
+    if frame.features is None:
+        return beams
+    return joined(beams, from_features(frame.features, config))
+
+
+def joined(first: Observations, second: Observations) -> Observations:
+    """Both, seen with the view of the first."""
+    return Observations(
+        points_robot=np.concatenate([first.points_robot, second.points_robot]),
+        covariances=np.concatenate([first.covariances, second.covariances]),
+        weights=np.concatenate([first.weights, second.weights]),
+        tangents=np.concatenate([first.tangents, second.tangents]),
+        joined=np.concatenate([first.joined, second.joined]),
+        facings=np.concatenate([first.facings, second.facings]),
+        view=first.view,
+        T_robot_laser=first.T_robot_laser,
+    )

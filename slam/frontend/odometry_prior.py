@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the robot should be by its odometry, and how sure of that one may be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from slam import se2
+from slam.frames import MOST_TWIST, Float, Odometry
+from slam.frontend import odometry_steps
+from slam.frontend.odometry_bias import TurnBias
+
+FLOOR_M, FLOOR_RAD = 0.002, 0.0015  # standard deviation per sqrt(0.2 s): skew, a match's own
+# The matcher is given a stated covariance no tighter than this: else the map slips unnoticed.
+LEAST_SCALE, LEAST_M, LEAST_RAD = 2.25, 0.004, 0.003
+IDENTITY = np.eye(3)
+LEAST_VARIANCE = 1e-12  # of an increment, m^2 and rad^2
+# Without a covariance: a worn robot on a log, see ``assumed_covariance``.
+ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
+
+
+def turned(covariance: Float, theta: float) -> Float:
+    """A (3, 3) covariance of a motion in axes turned by -theta; products in a fixed order."""
+    c, s = math.cos(theta), math.sin(theta)
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = covariance.tolist()
+    a = c * c * xx - 2.0 * c * s * xy + s * s * yy
+    b = c * s * (xx - yy) + (c * c - s * s) * xy
+    d = s * s * xx + 2.0 * c * s * xy + c * c * yy
+    e, f = c * xt - s * yt, s * xt + c * yt
+    return np.array([[a, b, e], [b, d, f], [e, f, tt]])
+
+
+def inverted(matrix: Float) -> Float:
+    """Inverse of a symmetric positive definite (3, 3) matrix, in a fixed order of operations.
+
+    One that rounding has left singular is taken without its correlations.
+    """
+    (a, b, c), (_, d, e), (_, _, f) = matrix.tolist()
+    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
+    bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
+    det = a * aa + b * ab + c * ac
+    if det <= 0.0:
+        return np.diag([1.0 / max(v, LEAST_VARIANCE) for v in (a, d, f)])
+    adjugate = [[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]
+    return np.array([[entry / det for entry in row] for row in adjugate])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prediction:
+    """Prior of one frame.
+
+    T_map_robot  (3,) predicted pose
+    increment    (3,) T_before_now by odometry
+    covariance   (3, 3) of the increment, in the map frame, scaled and floored
+    twist        (3,) body velocity for de-skewing
+    elapsed      s since the previous frame
+    unscaled     (3, 3) as stated or assumed, in the previous robot frame; zero: nothing to learn
+    floor        m^2 and rad^2 that were added
+    loosened     (3, 3) that the matcher's prior of the increment has more than the covariance
+    carried      (3, 3) of the pose before, from odometry that no match has confirmed yet; zero
+                 where too little is in view: things that move would lead astray
+    """
+
+    T_map_robot: Float
+    increment: Float
+    covariance: Float
+    twist: Float
+    elapsed: float
+    unscaled: Float = field(default_factory=lambda: np.zeros((3, 3)))
+    floor: tuple[float, float] = (0.0, 0.0)
+    loosened: Float = field(default_factory=lambda: np.zeros((3, 3)))
+    carried: Float = field(default_factory=lambda: np.zeros((3, 3)))
+
+    @property
+    def step(self) -> Float:
+        """(3, 3) of the increment, as the matcher takes it."""
+        return self.covariance + self.loosened
+
+    @property
+    def prior(self) -> Float:
+        """(3, 3) of the pose, as the matcher takes it."""
+        return self.covariance + self.loosened + self.carried
+
+
+def assumed_covariance(increment: Float) -> Float:
+    """Covariance (3, 3) of an increment whose log says nothing, in the previous robot frame."""
+    distance = math.hypot(float(increment[0]), float(increment[1]))
+    turn = abs(float(increment[2]))
+    sd_xy = ASSUMED_SHARE * distance + ASSUMED_TURN_M * turn
+    sd_theta = ASSUMED_RAD_PER_SQRT_M * math.sqrt(distance) + ASSUMED_TURN * turn
+    return np.diag([sd_xy**2, sd_xy**2, sd_theta**2])
+
+
+def _widened(covariance: Float, widths: tuple[float, float], floor: tuple[float, float]) -> Float:
+    """Standard deviations of position and heading times ``widths``, variances plus ``floor``."""
+    (xx, xy, xt), (yx, yy, yt), (tx, ty, tt) = covariance.tolist()
+    (a, b), (m2, rad2) = widths, floor
+    return np.array(
+        [
+            [xx * a * a + m2, xy * a * a, xt * a * b],
+            [yx * a * a, yy * a * a + m2, yt * a * b],
+            [tx * b * a, ty * b * a, tt * b * b + rad2],
+        ]
+    )
+
+
+def predict(
+    T_map_before: Float,
+    before: Odometry,
+    now: Odometry,
+    scales: tuple[float, float] = (1.0, 1.0),
+    bias: TurnBias | None = None,
+) -> Prediction:
+    """Chain the odometry increment on the last pose; covariance from the frame's own.
+
+    ``scales`` multiply its variance of translation and of rotation; ``bias`` is taken out of the
+    increment.
+    """
+    increment = odometry_steps.increment(before, now)
+    if bias is not None:
+        increment = bias.corrected(increment)
+    elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
+    given = now.increment_covariance
+    unscaled = assumed_covariance(increment) if given is None else odometry_steps.invertible(given)
+    unscaled = unscaled + LEAST_VARIANCE * IDENTITY
+    share = min(max(elapsed, 1e-3), 1.0) / 0.2
+    floor = share * FLOOR_M**2, share * FLOOR_RAD**2
+    widths = math.sqrt(scales[0]), math.sqrt(scales[1])
+    in_robot = _widened(unscaled, widths, floor)
+    loosened = np.zeros((3, 3))
+    if given is not None:
+        more = (
+            math.sqrt(max(LEAST_SCALE - scales[0], 0.0)),
+            math.sqrt(max(LEAST_SCALE - scales[1], 0.0)),
+        )
+        rest = share * LEAST_M**2 - floor[0], share * LEAST_RAD**2 - floor[1]
+        loosened = _widened(unscaled, more, rest)
+    if now.twist is not None:
+        twist = np.asarray(now.twist)
+    elif 0.0 < elapsed < 0.5 and float(np.abs(increment).max()) <= MOST_TWIST * elapsed:
+        twist = se2.log(increment) / elapsed
+    else:
+        twist = np.zeros(3)
+    return Prediction(
+        T_map_robot=se2.compose(T_map_before, increment),
+        increment=increment,
+        covariance=turned(in_robot, float(T_map_before[2])),
+        unscaled=unscaled,
+        loosened=turned(loosened, float(T_map_before[2])),
+        floor=floor,
+        twist=twist,
+        elapsed=elapsed,
+    )

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An ordinary occupancy grid (log-odds) in the place of the network, everything else the same.
+
+It is there to compare with: what differs between "occupancy" and "shunting" on the same frames is
+the neural map alone, as matcher, prior, search and recovery are shared.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import njit
+from slam.frames import Float
+from slam.frontend.visibility import View, block_is_hidden, seen_empty
+from slam.shunting.config import ShuntingConfig
+from slam.shunting.map.grid import FREE_COUNT, MASK, SHIFT, SIDE, Cells
+from slam.shunting.map.network import Network
+from slam.shunting.map.update import in_reach
+from slam.shunting.slam import ShuntingSlam
+from slam.system import Raster, register
+
+# Inverse sensor model, log-odds per scan: p = 0.7 and 0.4, clamped to 0.97 (Hornung et al. 2013).
+HIT, MISS, MOST = 0.85, -0.4, 3.5
+STRUCK = 0.6  # impression of a cell that holds the end of a beam; fainter is only beside it
+
+
+@njit
+def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float) -> bool:
+    """Let every block in view live: a grid also remembers where it saw nothing. False: no room."""
+    ox, oy = T_map_laser[0], T_map_laser[1]
+    c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
+    size = SIDE * cell
+    first_row, last_row, first_column, last_column = in_reach(cells, view, ox, oy, size)
+    for row in range(first_row, last_row):
+        for column in range(first_column, last_column):
+            if cells.directory[row, column] >= 0:
+                continue
+            bx = (column + cells.corner[0] + 0.5) * size - ox
+            by = (row + cells.corner[1] + 0.5) * size - oy
+            if block_is_hidden(view, c * bx + s * by, c * by - s * bx, 0.71 * size):
+                continue
+            if cells.counts[FREE_COUNT] == 0:
+                return False
+            cells.counts[FREE_COUNT] -= 1
+            slot = cells.free[cells.counts[FREE_COUNT]]
+            cells.directory[row, column] = slot
+            cells.x[slot] = 0.0
+            cells.y[slot] = 0.0
+            cells.age[slot] = 0.0
+            cells.facing[slot] = 0
+            cells.scratch_of[slot] = -1
+    return True
+
+
+@njit
+def integrate(
+    cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, write: bool
+) -> tuple[float, float, int]:
+    """Add one scan to the log-odds, which live in ``cells.age``; ``cells.y`` is 2 p - 1 above 0.
+
+    Returns confirmed and contradicted evidence and the cells visited, as the network does.
+    """
+    confirmed, contradicted, visited = 0.0, 0.0, 0
+    ox, oy = T_map_laser[0], T_map_laser[1]
+    c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
+    size = SIDE * cell
+    half = 0.71 * size
+    first_row, last_row, first_column, last_column = in_reach(cells, view, ox, oy, size)
+    for row in range(first_row, last_row):
+        for column in range(first_column, last_column):
+            slot = cells.directory[row, column]
+            if slot < 0:
+                continue
+            scratch = cells.scratch_of[slot]
+            i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
+            bx, by = (i0 + 0.5 * SIDE) * cell - ox, (j0 + 0.5 * SIDE) * cell - oy
+            if scratch < 0 and block_is_hidden(view, c * bx + s * by, c * by - s * bx, half):
+                continue
+            for jj in range(SIDE):
+                for ii in range(SIDE):
+                    given = cells.impression[scratch, jj, ii] if scratch >= 0 else np.float32(0.0)
+                    y = cells.y[slot, jj, ii]
+                    if given == 0.0:
+                        px = (i0 + ii + 0.5) * cell - ox
+                        py = (j0 + jj + 0.5) * cell - oy
+                        if not seen_empty(view, c * px + s * py, c * py - s * px):
+                            continue
+                        contradicted += y
+                        more = MISS
+                    else:
+                        confirmed += y * given
+                        if given < STRUCK:
+                            continue
+                        more = HIT
+                    visited += 1
+                    if write:
+                        odds = min(max(float(cells.age[slot, jj, ii]) + more, -MOST), MOST)
+                        cells.age[slot, jj, ii] = odds
+                        cells.y[slot, jj, ii] = max(math.tanh(0.5 * odds), 0.0)
+    return confirmed, contradicted, visited
+
+
+@njit
+def _probabilities(cells: Cells, i0: int, j0: int, out: NDArray[np.float32]) -> None:
+    rows, columns = cells.directory.shape
+    for a in range(out.shape[0]):
+        for b in range(out.shape[1]):
+            i, j = i0 + b, j0 + a
+            row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
+            out[a, b] = np.nan
+            if 0 <= row < rows and 0 <= column < columns and cells.directory[row, column] >= 0:
+                odds = cells.age[cells.directory[row, column], j & MASK, i & MASK]
+                if odds != 0.0:
+                    out[a, b] = 0.5 + 0.5 * math.tanh(0.5 * odds)
+
+
+class Grid(Network):
+    """The same storage, filled with log-odds."""
+
+    def integrate(
+        self, view: View, T_map_laser: Float, step: float, *, write: bool
+    ) -> tuple[float, float, int]:
+        """As ``Network.integrate``; ``step`` does not matter to a grid that counts scans."""
+        if write:
+            reach = view.farthest
+            x, y = float(T_map_laser[0]), float(T_map_laser[1])
+            self.cover(x - reach, y - reach, x + reach, y + reach)
+            while not _open(self.cells, view, T_map_laser, self.cell):
+                self.grow()
+        result = integrate(self.cells, view, T_map_laser, self.cell, write)
+        if write:
+            self.release()
+        return result
+
+    def probabilities(self) -> Raster | None:
+        """p of every cell that was ever seen, NaN elsewhere."""
+        extent = self.raster_extent()
+        if extent is None:
+            return None
+        i0, j0, i1, j1 = extent
+        values = np.empty((j1 - j0, i1 - i0), np.float32)
+        _probabilities(self.cells, i0, j0, values)
+        origin = np.array([i0 * self.cell, j0 * self.cell, 0.0])
+        return Raster(values=values, resolution_m=self.cell, T_map_origin=origin)
+
+
+@register("occupancy")
+class OccupancySlam(ShuntingSlam):
+    """An ordinary log-odds occupancy grid, with the matcher of "shunting"."""
+
+    def __init__(self, cell_m: float = 0.03) -> None:
+        super().__init__(ShuntingConfig.robust(cell_m=cell_m))
+
+    def _new_network(self) -> Network:
+        return Grid(self.config)
+
+    def changes(self) -> None:
+        """A grid has but one memory."""
+
+    def map(self) -> Raster | None:
+        """Probability of being occupied; NaN where nothing was ever seen."""
+        grid = self.network
+        assert isinstance(grid, Grid)
+        return grid.probabilities()

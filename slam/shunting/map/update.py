@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The update of the network, Eq. (8): one semi-implicit Gauss-Seidel sweep over what is in view."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import inner, njit
+from slam.frontend.surfaces import opposite
+from slam.frontend.visibility import View, block_is_hidden, seen_empty
+from slam.shunting.map.grid import FREE_COUNT, MASK, SHIFT, SIDE, Cells
+
+
+class Law(NamedTuple):
+    """The constants of one update.
+
+    step        h, s: how long the present input acts on x
+    look        s: what this look adds to a trace's age
+    pace        s: prior age of a trace, so that its first looks do not count fully
+    oldest      s: age at which a trace stops growing stiffer
+    decay       A, 1/s
+    threshold   sigma
+    mu          w = mu / d
+    reach       r0, cells
+    trace       whether a long-term trace is kept
+    """
+
+    step: float
+    look: float
+    pace: float
+    oldest: float
+    decay: float
+    threshold: float
+    mu: float
+    reach: float
+    trace: bool
+
+
+def lateral_mu(total: float, reach: float) -> float:
+    """mu such that the weights mu / d over 0 < d < reach sum to ``total``."""
+    inverse_distances = 0.0
+    edge = math.ceil(reach)
+    for dj in range(-edge, edge + 1):
+        for di in range(-edge, edge + 1):
+            d = math.sqrt(di * di + dj * dj)
+            if 0.0 < d < reach:
+                inverse_distances += 1.0 / d
+    return total / inverse_distances if inverse_distances else 0.0
+
+
+@inner
+def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
+    """Sum of w_ij d(x_j) over the neighbours of neuron (i, j), d(x) = max(x - sigma, 0)."""
+    edge = math.ceil(law.reach)
+    rows, columns = cells.directory.shape
+    total = 0.0
+    for b in range(j - edge, j + edge + 1):
+        for a in range(i - edge, i + edge + 1):
+            d = math.sqrt((a - i) * (a - i) + (b - j) * (b - j))
+            row, column = (b >> SHIFT) - cells.corner[1], (a >> SHIFT) - cells.corner[0]
+            if 0.0 < d < law.reach and 0 <= row < rows and 0 <= column < columns:
+                slot = cells.directory[row, column]
+                above = cells.x[slot, b & MASK, a & MASK] - law.threshold if slot >= 0 else 0.0
+                if above > 0.0:
+                    total += law.mu / d * above
+    return total
+
+
+@inner
+def in_reach(
+    cells: Cells, view: View, ox: float, oy: float, size: float
+) -> tuple[int, int, int, int]:
+    """Directory rows and columns (first, past the last, each) that the view may reach."""
+    rows, columns = cells.directory.shape
+    return (
+        max(0, math.floor((oy - view.farthest) / size) - cells.corner[1] - 1),
+        min(rows, math.floor((oy + view.farthest) / size) - cells.corner[1] + 2),
+        max(0, math.floor((ox - view.farthest) / size) - cells.corner[0] - 1),
+        min(columns, math.floor((ox + view.farthest) / size) - cells.corner[0] + 2),
+    )
+
+
+@njit
+def integrate(
+    cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, law: Law, write: bool
+) -> tuple[float, float, int]:
+    """One semi-implicit Gauss-Seidel sweep of Eq. (8) over the neurons in view.
+
+    Returns the long-term trace confirmed by the present scan, that contradicted by it (its sums
+    over neurons) and the number of neurons visited. ``write`` False only looks. Impressions are
+    consumed (their scratch is released) when written.
+    """
+    confirmed, contradicted, visited = 0.0, 0.0, 0
+    ox, oy = T_map_laser[0], T_map_laser[1]
+    c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
+    size = SIDE * cell
+    half = 0.71 * size
+    first_row, last_row, first_column, last_column = in_reach(cells, view, ox, oy, size)
+    for row in range(first_row, last_row):
+        for column in range(first_column, last_column):
+            slot = cells.directory[row, column]
+            if slot < 0:
+                continue
+            scratch = cells.scratch_of[slot]
+            i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
+            bx, by = (i0 + 0.5 * SIDE) * cell - ox, (j0 + 0.5 * SIDE) * cell - oy
+            if scratch < 0 and block_is_hidden(view, c * bx + s * by, c * by - s * bx, half):
+                continue
+            alive = False
+            for jj in range(SIDE):
+                for ii in range(SIDE):
+                    x, y = cells.x[slot, jj, ii], cells.y[slot, jj, ii]
+                    given = cells.impression[scratch, jj, ii] if scratch >= 0 else np.float32(0.0)
+                    if x == 0.0 and y == 0.0 and given == 0.0:
+                        continue
+                    faced = cells.faced[scratch, jj, ii] if scratch >= 0 else 0
+                    behind = given > 0.0 and opposite(int(faced), cells.facing[slot, jj, ii])
+                    if behind and given <= y:  # the back of a known surface is hidden
+                        alive = True
+                        continue
+                    if given == 0.0:
+                        px = (i0 + ii + 0.5) * cell - ox
+                        py = (j0 + jj + 0.5) * cell - oy
+                        if not seen_empty(view, c * px + s * py, c * py - s * px):
+                            alive = True
+                            continue
+                        contradicted += y
+                    elif not behind:
+                        confirmed += y * given
+                    visited += 1
+                    if not write:
+                        continue
+                    # Eq. (8), implicit in x: stays in [0, 1) for any step
+                    E = float(given)
+                    if law.mu > 0.0:
+                        E += lateral(cells, law, i0 + ii, j0 + jj)
+                    x = np.float32((x + law.step * E) / (1.0 + law.step * (law.decay + E)))
+                    # Silent is what is small and does not rise: at 37.5 Hz one step is tiny.
+                    if x < law.threshold and law.threshold * (law.decay + E) > E:
+                        x = np.float32(0.0)
+                    cells.x[slot, jj, ii] = x
+                    if law.trace:
+                        age = cells.age[slot, jj, ii]
+                        y = np.float32(y + (given - y) * law.look / (age + law.look + law.pace))
+                        age = np.float32(min(age + law.look, law.oldest))
+                        if y < 0.004 and given < 0.01:
+                            y, age = np.float32(0.0), np.float32(0.0)
+                        cells.y[slot, jj, ii] = y
+                        cells.age[slot, jj, ii] = age
+                        if faced != 0 or y == 0.0:
+                            cells.facing[slot, jj, ii] = faced
+                    if x > 0.0 or y > 0.0:
+                        alive = True
+            if write and not alive:
+                cells.directory[row, column] = -1
+                cells.free[cells.counts[FREE_COUNT]] = slot
+                cells.counts[FREE_COUNT] += 1
+    return confirmed, contradicted, visited

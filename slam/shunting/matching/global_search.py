@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Search of the whole map for places that look like what is in view, by branch and bound.
+
+On a lattice of about 0.12 m, over every heading. Several answers, well apart: rooms look alike, and
+one scan seldom tells which it is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam.frames import Float
+from slam.shunting.map.grid import SIDE
+from slam.shunting.map.network import Network
+from slam.shunting.matching.branch_and_bound import Lattice, Search, levels_of
+from slam.shunting.matching.local_search import field_of, place
+
+PITCH_M = 0.12  # neurons are pooled up to this edge
+BESIDE = 0.7  # what a place beside structure is worth: poses are only tried every PITCH_M
+FAR_M = 20.0  # returns beyond turn too fast with the heading
+FEW = 120  # returns are enough
+APART_M, APART_RAD = 1.0, 0.5  # between two answers, at least one of them
+WORTH = 0.6  # answers worse than this share of the best are dropped
+STRIP = 16 * SIDE  # neurons pooled at a time, so that little of the map is ever laid out
+MAX_ACROSS = 40  # coarsest blocks along the map
+
+
+def _pooled(fine: NDArray[np.uint8], pool: int) -> NDArray[np.uint8]:
+    """The largest of ``pool`` x ``pool`` neighbouring values."""
+    rows, columns = fine.shape
+    blocks = fine.reshape(rows // pool, pool, columns // pool, pool)
+    largest: NDArray[np.uint8] = blocks.max(axis=(1, 3))
+    return largest
+
+
+def _spread(source: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The source, or ``BESIDE`` times the largest of the eight values around."""
+    padded = np.pad(source, 1)
+    wide = np.maximum(np.maximum(padded[:, :-2], padded[:, 1:-1]), padded[:, 2:])
+    around = np.maximum(np.maximum(wide[:-2], wide[1:-1]), wide[2:])
+    return np.maximum(source, (BESIDE * around).astype(np.uint8))
+
+
+def _pooling(cell: float) -> int:
+    pool = 1
+    while pool < SIDE and 2 * pool * cell <= 1.01 * PITCH_M:
+        pool *= 2
+    return pool
+
+
+def coarse_field(network: Network, short_term: float) -> NDArray[np.uint8]:
+    """The whole map, pooled; row 0, column 0 at the corner of ``network.extent()``."""
+    extent, pool = network.extent(), _pooling(network.cell)
+    if extent is None:
+        return np.zeros((0, 0), np.uint8)
+    i0, j0, i1, j1 = extent
+    coarse = np.zeros(((j1 - j0) // pool, (i1 - i0) // pool), np.uint8)
+    for row in range(0, j1 - j0, STRIP):
+        rows = min(STRIP, j1 - j0 - row)
+        fine = field_of(network, short_term, i0, j0 + row, rows, i1 - i0)
+        coarse[row // pool : (row + rows) // pool] = _pooled(fine, pool)
+    return _spread(coarse)
+
+
+def _headings(points: Float, pitch: float) -> Float:
+    distances = np.sort(np.sqrt((points * points).sum(axis=1)))
+    far = float(distances[(3 * len(distances)) // 4])
+    count = math.ceil(math.tau / min(max(pitch / max(far, pitch), 0.01), 0.1))
+    return np.asarray(np.arange(count) * (math.tau / count), dtype=np.float64)
+
+
+def places(
+    network: Network,
+    short_term: float,
+    points_robot: Float,
+    most: int,
+    about: tuple[Float, float, float] | None = None,
+    field: NDArray[np.uint8] | None = None,
+) -> list[Float]:
+    """Up to ``most`` poses T_map_robot, the best first, from which the points would fit the map.
+
+    ``about`` limits the search to a pose, so many m and so many rad around it; ``field`` is the
+    ``coarse_field`` of the network where that is at hand. Answers are good to
+    about 0.1 m and 1 degree; to be refined by climbing.
+    """
+    near = points_robot[(points_robot * points_robot).sum(axis=1) < FAR_M**2]
+    extent = network.extent()
+    if extent is None or len(near) == 0:
+        return []
+    chosen = np.ascontiguousarray(near[:: math.ceil(len(near) / FEW)])
+    pool = _pooling(network.cell)
+    pitch = pool * network.cell
+    if field is None:
+        field = coarse_field(network, short_term)
+    i0, j0, i1, j1 = extent
+    middle = np.array([0.5 * (i0 + i1) * network.cell, 0.5 * (j0 + j1) * network.cell, 0.0])
+    reach = math.ceil(0.5 * max(field.shape))
+    turns = _headings(chosen, pitch)
+    if about is not None:
+        middle, reach = np.array(about[0]), math.ceil(about[1] / pitch)
+        step = float(turns[1])
+        half = math.ceil(about[2] / step)
+        turns = np.asarray(np.arange(-half, half + 1) * step, dtype=np.float64)
+    depth = 2
+    while (2 * reach) >> depth > MAX_ACROSS:
+        depth += 1
+    # Cut out, or pad, so that no point falls outside wherever the robot is tried.
+    radius = math.ceil(math.sqrt(float((chosen * chosen).sum(axis=1).max())) / pitch)
+    edge = radius + reach + (1 << depth) + 2
+    column = math.floor(float(middle[0]) / pitch) - i0 // pool - edge
+    row = math.floor(float(middle[1]) / pitch) - j0 // pool - edge
+    levels = levels_of(_cut(field, row, column, 2 * edge), depth)
+    bases = np.empty((len(turns), len(chosen), 2), np.int32)
+    place(chosen, middle, turns, pitch, column + i0 // pool, row + j0 // pool, bases)
+    lattice = Lattice(
+        levels=levels,
+        bases=bases,
+        turns=turns,
+        reach=reach,
+        pitch=pitch,
+        precision=np.zeros((3, 3)),
+        gain=1.0 / (255.0 * len(chosen)),
+        apart=(APART_M / pitch, APART_RAD),
+    )
+    return _answers(Search(lattice), lattice, middle, most)
+
+
+def _cut(field: NDArray[np.uint8], row: int, column: int, side: int) -> NDArray[np.uint8]:
+    """(side, side) of the field from (row, column) on, 0 where it has nothing."""
+    out = np.zeros((side, side), np.uint8)
+    r0, r1 = max(row, 0), min(row + side, field.shape[0])
+    c0, c1 = max(column, 0), min(column + side, field.shape[1])
+    if r0 < r1 and c0 < c1:
+        out[r0 - row : r1 - row, c0 - column : c1 - column] = field[r0:r1, c0:c1]
+    return out
+
+
+def _answers(search: Search, lattice: Lattice, middle: Float, most: int) -> list[Float]:
+    found: list[Float] = []
+    floor, taken = -math.inf, np.zeros((0, 3))
+    for _ in range(most):
+        best = search.best(floor, taken)
+        if best.heading < 0:
+            break
+        floor = max(floor, WORTH * best.score)
+        turn = float(lattice.turns[best.heading])
+        taken = np.vstack([taken, [float(best.column), float(best.row), turn]])
+        pitch = lattice.pitch
+        found.append(middle + np.array([best.column * pitch, best.row * pitch, turn]))
+    return found

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Loops of long runs: key frames, little networks round them, and a pose graph over all.
+
+The online map is left as it is. What comes out is the corrected trajectory, made when it is asked
+for. Each key frame is matched to the few before it: matched to the whole map, as it was online, a
+step would hide the drift that a loop is to tell. Then it is matched to the little network of the
+nearest earlier stretch of the way; and when all are in place, to those of every other passage.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam import se2
+from slam.frames import Float
+from slam.frontend.observations import Observations
+from slam.frontend.odometry_prior import inverted
+from slam.posegraph import Edge, carried, optimise
+from slam.shunting.config import ShuntingConfig
+from slam.shunting.map.network import Network
+from slam.shunting.map.rasterise import stamp
+from slam.shunting.matching.global_search import coarse_field, places
+from slam.shunting.matching.matcher import Match, Matcher
+from slam.shunting.tracking.relocalise import COARSE, support
+
+_log = logging.getLogger(__name__)
+KEY_M, KEY_RAD = 1.0, 0.6  # between key frames
+LONG_M = 100.0  # way from which on loops are looked for
+AFTER_M = 15.0  # way between the ends of a loop
+GATE_M, GATE_SHARE, WIDEST_M = 1.5, 0.02, 6.0  # how far off a loop may be, + share of the way,
+GATE_RAD = 0.5  # and how far turned
+MOST = 4  # places looked at for one loop
+AGAIN_M, PASSAGES = 3.0, 3  # the second look: how far off, and to how many passages at most
+RECENT = 6  # key frames that a step is measured against,
+SLACK = np.diag([0.05**2, 0.05**2, 0.01**2])  # and how much better than online it may know
+SUBMAP, EVERY = 4, 4  # key frames on either side of a little network's middle; between two middles
+LOOK_S = 1.0
+GOOD_STEP, GOOD_MATCH, GOOD_SUPPORT, ALIAS = 0.5, 0.6, 0.5, 0.9
+CHAIN_M, CHAIN_RAD = 0.02, 0.0015  # standard deviation of a step from key frame to key frame, and
+LOOP_M, LOOP_RAD = 0.03, 0.003  # of a loop, beside what their matches say
+INFORMATION_SHARE = 0.3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class KeyFrame:
+    """One frame that is kept.
+
+    frame         its index among all frames
+    T_map_robot   (3,) online
+    step          (3,) motion since the previous key frame online, (3, 3) covariance in that frame
+    way_m         driven up to here
+    """
+
+    frame: int
+    T_map_robot: Float
+    observations: Observations
+    step: Float
+    covariance: Float
+    way_m: float
+
+
+class Loops:
+    """Collects key frames, closes loops between them when asked."""
+
+    def __init__(self, config: ShuntingConfig, matcher: Matcher) -> None:
+        self._config = config
+        self._matcher = matcher
+        self.keys: list[KeyFrame] = []
+        self.edges: list[Edge] = []  # loops found so far
+        self._tried = 0  # key frames that were looked at
+        self._poses: list[Float] = []  # corrected, of the key frames tried
+        self._chain: list[Edge] = []  # step by step, without loops; and where it leads
+        self._chained: list[Float] = []
+        self._submaps: dict[int, Network] = {}
+        self._fields: dict[int, NDArray[np.uint8]] = {}  # of those that were searched
+        self._step: Float = np.zeros(3)
+        self._covariance: Float = np.zeros((3, 3))
+        self._way_m = 0.0
+
+    def add(
+        self, frame: int, T_map_robot: Float, motion: Float, covariance: Float, seen: Observations
+    ) -> None:
+        """Take a frame: its ``motion`` (3,) since the one before, ``covariance`` in that frame."""
+        self._covariance = se2.propagate(self._covariance, self._step, motion, covariance)
+        self._step = se2.compose(self._step, motion)
+        self._way_m += math.hypot(float(motion[0]), float(motion[1]))
+        moved = math.hypot(float(self._step[0]), float(self._step[1]))
+        if self.keys and moved < KEY_M and abs(float(self._step[2])) < KEY_RAD:
+            return
+        self.keys.append(
+            KeyFrame(
+                frame=frame,
+                T_map_robot=T_map_robot,
+                observations=seen,
+                step=self._step,
+                covariance=self._covariance + SLACK,
+                way_m=self._way_m,
+            )
+        )
+        self._step, self._covariance = np.zeros(3), np.zeros((3, 3))
+
+    def corrected(self, poses: Float) -> Float:
+        """All (n, 3) online poses, moved with the graph; the same where no loop was found."""
+        if self._way_m < LONG_M or len(self.keys) < 3:
+            return poses
+        if self._tried < len(self.keys):
+            _log.info("closing loops over %d key frames", len(self.keys))
+            while self._tried < len(self.keys):
+                self._look(self._tried)
+                self._tried += 1
+            self._look_again()
+        if not self.edges:
+            return poses
+        keys = np.array([key.T_map_robot for key in self.keys])
+        frames = np.array([key.frame for key in self.keys])
+        at = np.interp(np.arange(len(poses)), frames, np.arange(len(frames)))
+        return carried(keys, np.array(self._poses), at, poses)
+
+    def _optimise(self) -> None:
+        self._poses = list(optimise(np.array(self._poses), self._chain + self.edges)[0])
+
+    def _look(self, j: int) -> None:
+        """Chain key frame ``j`` to those before, and close a loop if it is on one."""
+        if j == 0:
+            self._poses.append(self.keys[0].T_map_robot)
+            self._chained.append(self.keys[0].T_map_robot)
+            return
+        step = self._stepped(j)
+        self._chain.append(step)
+        self._chained.append(se2.compose(self._chained[-1], step.T_a_b))
+        self._poses.append(se2.compose(self._poses[-1], step.T_a_b))
+        middle = self._nearest(j)
+        if middle is None:
+            return
+        predicted = se2.between(self._poses[middle], self._poses[j])
+        edge = self._loop(middle, j, predicted, self._gate(j, middle))
+        if edge is None:
+            return
+        self.edges.append(edge)
+        off = edge.T_a_b - predicted
+        if math.hypot(off[0], off[1]) > LOOP_M or abs(se2.wrap(float(off[2]))) > LOOP_RAD:
+            self._optimise()
+
+    def _stepped(self, j: int) -> Edge:
+        """The step to key frame ``j``, matched to the few before it; as online where in doubt."""
+        key = self.keys[j]
+        step, covariance = key.step, key.covariance
+        network = self._network(range(max(0, j - RECENT), j), j - 1)
+        start = self._matcher.approach(network, key.observations, step, covariance)
+        precision = inverted(covariance)
+        match = self._matcher.climb(network, key.observations, start, step, precision)
+        if match.matched >= GOOD_STEP:
+            step = match.T_map_robot
+            information = INFORMATION_SHARE * match.tau * match.information
+            covariance = inverted(information + precision)
+        covariance = covariance + np.diag([CHAIN_M**2, CHAIN_M**2, CHAIN_RAD**2])
+        return Edge(a=j - 1, b=j, T_a_b=step, information=inverted(covariance))
+
+    def _look_again(self) -> None:
+        """With every pose near its place, tie each key frame to all passages along there."""
+        if not self.edges:
+            return
+        self._optimise()
+        poses = np.array(self._poses)
+        ways = np.array([key.way_m for key in self.keys])
+        edges = []
+        for j in range(len(self.keys)):
+            for middle in self._passages(j, poses, ways):
+                edge = self._tie(middle, j, se2.between(poses[middle], poses[j]))
+                if edge is not None:
+                    edges.append(edge)
+        self.edges = edges or self.edges
+        self._optimise()
+
+    def _passages(self, j: int, poses: Float, ways: Float) -> list[int]:
+        """Middles near key frame ``j``, one of each time the robot came along there."""
+        middles = np.arange(SUBMAP, len(poses) - SUBMAP, EVERY)
+        middles = middles[np.abs(ways[middles] - ways[j]) > AFTER_M]
+        apart = poses[middles, :2] - poses[j, :2]
+        squares = (apart * apart).sum(axis=1)
+        found: list[int] = []
+        for k in np.argsort(squares, kind="stable"):
+            if squares[k] > AGAIN_M**2 or len(found) == PASSAGES:
+                break
+            middle = int(middles[k])
+            if all(abs(ways[middle] - ways[other]) > AFTER_M for other in found):
+                found.append(middle)
+        return found
+
+    def _tie(self, middle: int, j: int, predicted: Float) -> Edge | None:
+        """Key frame ``j`` matched to the network about ``middle``, near where it is predicted."""
+        network, seen = self._submap(middle), self.keys[j].observations
+        start = self._matcher.approach(network, seen, predicted, COARSE)
+        match = self._matcher.climb(network, seen, start, predicted, inverted(COARSE))
+        return self._edge(middle, j, match, support(network, seen, match))
+
+    def _gate(self, j: int, middle: int) -> float:
+        way = self.keys[j].way_m - self.keys[middle].way_m
+        return min(GATE_M + GATE_SHARE * way, WIDEST_M)
+
+    def _nearest(self, j: int) -> int | None:
+        """Middle of the little network nearest to where key frame ``j`` should be."""
+        best, nearest = None, math.inf
+        for middle in range(SUBMAP, j - SUBMAP, EVERY):
+            if self.keys[j].way_m - self.keys[middle + SUBMAP].way_m < AFTER_M:
+                break
+            d = self._poses[middle] - self._poses[j]
+            distance = math.hypot(float(d[0]), float(d[1])) - self._gate(j, middle)
+            if distance < min(nearest, 1.0):
+                best, nearest = middle, distance
+        return best
+
+    def _loop(self, middle: int, j: int, predicted: Float, gate: float) -> Edge | None:
+        """Key frame ``j`` matched to the network about ``middle``, in its frame."""
+        network, seen = self._submap(middle), self.keys[j].observations
+        short_term = self._matcher.reward.short_term
+        found: list[tuple[float, Match]] = []
+        about = (predicted, gate, GATE_RAD)
+        if middle not in self._fields:
+            self._fields[middle] = coarse_field(network, short_term)
+        field = self._fields[middle]
+        for place in places(network, short_term, seen.points_robot, MOST, about, field):
+            start = self._matcher.approach(network, seen, place, COARSE)
+            match = self._matcher.climb(network, seen, start, place, inverted(COARSE))
+            found.append((support(network, seen, match), match))
+        if not found:
+            return None
+        found.sort(key=lambda one: -one[0])
+        (best, match), others = found[0], found[1:]
+        alike = any(other > ALIAS * best for other, _ in others)
+        return None if alike else self._edge(middle, j, match, best)
+
+    def _edge(self, middle: int, j: int, match: Match, backing: float) -> Edge | None:
+        if backing < GOOD_SUPPORT or match.matched < GOOD_MATCH:
+            return None
+        information = INFORMATION_SHARE * match.tau * match.information
+        covariance = inverted(information + np.diag([1.0, 1.0, 1.0]))
+        covariance = covariance + np.diag([LOOP_M**2, LOOP_M**2, LOOP_RAD**2])
+        T_a_b = match.T_map_robot
+        return Edge(a=middle, b=j, T_a_b=T_a_b, information=inverted(covariance), robust=True)
+
+    def _submap(self, middle: int) -> Network:
+        """What the key frames about ``middle`` saw, in the frame of that one."""
+        if middle not in self._submaps:
+            about = range(middle - SUBMAP, middle + SUBMAP + 1)
+            self._submaps[middle] = self._network(about, middle)
+        return self._submaps[middle]
+
+    def _network(self, members: range, origin: int) -> Network:
+        """What some key frames saw, in the frame of one, as the chain puts them."""
+        network = Network(self._config)
+        for k in members:
+            key, pose = self.keys[k], se2.between(self._chained[origin], self._chained[k])
+            stamp(network, key.observations, pose)
+            T_map_laser = se2.compose(pose, key.observations.T_robot_laser)
+            network.integrate(key.observations.view, T_map_laser, LOOK_S, write=True)
+        return network

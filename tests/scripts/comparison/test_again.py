@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run of a comparison, simulated again for a film or an inquest, is the run on file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from scripts.cli import app
+from scripts.comparison.again import run_of
+from scripts.comparison.folder import RunFile
+from scripts.comparison.plan import Plan
+from scripts.debugger.episode import case_of
+from scripts.debugger.recording import record
+from scripts.film.footage import open_run
+from scripts.verbs import compare as verb
+from slam.errors import InvalidValueError, LogFormatError
+
+PLAN = {"scenes": ("arena",), "levels": (0.5,), "seeds": (7,), "scanner": "noise"}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("compare") / "out"
+    verb.carry_out(Plan(slams=("odometry", "occupancy"), seconds=1.3, **PLAN), out)
+    return out / "runs" / "arena_d0.5_s7.npz"
+
+
+def test_a_film_shows_the_scans_that_its_slams_got(run):
+    footage, on_file = open_run(run, view=None), RunFile(run)
+    frames = list(footage.stream)
+    assert footage.stream.length == len(frames) == 7
+    assert (footage.slam, footage.title) == ("occupancy", "arena · dynamism 0.5 · seed 7")
+    assert [frame.stamp_ns for frame in frames] == on_file.stamps_ns.tolist()
+    np.testing.assert_array_equal([frame.scan.ranges for frame in frames], on_file.ranges)
+    np.testing.assert_array_equal([frame.truth for frame in frames], on_file.truth)
+
+
+@pytest.mark.parametrize("slam", ["odometry", "occupancy"])
+def test_an_inquest_is_held_on_the_run_on_file(run, slam):
+    case = case_of(run, slam, 1)
+    strip = record(case).strip
+    np.testing.assert_array_equal(strip.believed, RunFile(run).believed(slam).poses)
+    np.testing.assert_array_equal(strip.truth, RunFile(run).truth)
+    np.testing.assert_array_equal(case.recorded, strip.believed)
+
+
+def test_the_verbs_take_it(run, tmp_path):
+    film, out = tmp_path / "film.mp4", tmp_path / "blame"
+    made = CliRunner().invoke(app, ["render", str(run), "--no-3d", "--out", str(film)])
+    assert made.exit_code == 0, made.exception
+    assert film.stat().st_size > 1000
+    asked = CliRunner().invoke(app, ["blame", str(run), "--out", str(out)])
+    assert asked.exit_code == 0, asked.exception
+    assert "note:" not in asked.stdout  # run again, it is the run on file
+    assert json.loads((out / "blame.json").read_text())["slam"] == "occupancy"
+
+
+def test_what_is_no_run_is_told_in_a_line(run, tmp_path):
+    for opened in (open_run, lambda path: case_of(path, None, 1)):
+        with pytest.raises(LogFormatError, match=r"many runs: name one of them, as .*_s7\.npz"):
+            opened(run.parent.parent)
+    with pytest.raises(InvalidValueError, match=r"--every: .* one scan in 8"):
+        case_of(run, None, 4)
+    with pytest.raises(LogFormatError, match=r"first is arena_d0\.5_s7"):
+        run_of(run.with_name("arena_d1_s7.npz"))
+    (tmp_path / "runs").mkdir()
+    with pytest.raises(LogFormatError, match="No such file"):
+        run_of(tmp_path / "runs" / "x.npz")
+    (tmp_path / "recipe.json").write_text('{"command": "drive"}')
+    with pytest.raises(LogFormatError, match="went its own way"):
+        run_of(tmp_path / "runs" / "x.npz")
+    (tmp_path / "recipe.json").write_text('{"command": "compare", "settings": {"slams": 3}}')
+    with pytest.raises(LogFormatError, match="no recipe of a comparison: "):
+        run_of(tmp_path / "runs" / "x.npz")

@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison as a whole: same frames for all, resumed to the same numbers, failures scored."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from scripts.comparison import folder, tables
+from scripts.comparison.columns import COLUMNS, lost_at
+from scripts.comparison.plan import Plan
+from scripts.comparison.recording import load
+from scripts.experiments import dynamism_curve
+from scripts.many import ManyValues, repeated
+from scripts.verbs import compare as verb
+from slam import Estimate, Trajectory, se2, system
+from slam.errors import InvalidValueError, LogFormatError, OutputError, UnknownNameError
+from slam.evaluation import metrics
+from slam.evaluation.lost import LOST_M
+
+REPO = Path(__file__).resolve().parents[3]
+SECONDS = 1.6
+PLAN = {"scenes": ("arena",), "levels": (1.0,), "seeds": (7,), "seconds": SECONDS}
+OF_THE_MACHINE = ("ms_per_scan_p50", "ms_per_scan_p99", "peak_memory_mb")
+
+
+class Wheels:
+    """Odometry by hand, so that what it gets can be compared with what is on file."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        self.first, self.stamps, self.poses = None, [], []
+
+    def map(self) -> None:
+        return None
+
+    def update(self, frame) -> Estimate:
+        here = frame.odometry.T_odom_robot
+        self.first = here if self.first is None else self.first
+        self.stamps.append(frame.stamp_ns)
+        self.poses.append(se2.between(self.first, here))
+        return Estimate(
+            stamp_ns=frame.stamp_ns, T_map_robot=self.poses[-1], covariance=np.eye(3) * 1e-4
+        )
+
+    def trajectory(self) -> Trajectory:
+        return Trajectory(stamps_ns=np.array(self.stamps), poses=np.array(self.poses))
+
+
+class Raises(Wheels):
+    """Fails at its fourth scan."""
+
+    def update(self, frame) -> Estimate:
+        if len(self.stamps) == 3:
+            raise RuntimeError("enough")
+        return super().update(frame)
+
+
+class Drifts(Wheels):
+    """Answers a NaN."""
+
+    def update(self, frame) -> Estimate:
+        pose = super().update(frame).T_map_robot * np.nan
+        return Estimate(stamp_ns=frame.stamp_ns, T_map_robot=pose, covariance=np.eye(3))
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory) -> Iterator[folder.Compared]:
+    """Ours and three by hand; those from outside, in processes of their own, are tested apart."""
+    out = tmp_path_factory.mktemp("compare") / "out"
+    by_hand = {"wheels": Wheels, "raises": Raises, "drifts": Drifts}
+    with pytest.MonkeyPatch.context() as patch:
+        for name, factory in by_hand.items():
+            patch.setitem(system._registry, name, factory)
+        verb.carry_out(Plan(slams=("odometry", "occupancy", *by_hand), **PLAN), out)
+        yield folder.read(out)
+
+
+def rows_of(compared, slam):
+    return [row for row in compared.runs if row["slam"] == slam]
+
+
+def test_tables_are_tidy_and_whole(compared):
+    with (compared.folder / "runs.csv").open() as file:
+        header = next(csv.reader(file))
+    assert tuple(header) == COLUMNS
+    assert len(compared.runs) == 5
+    assert {row["n"] for row in compared.levels if row["metric"] == "lost"} == {1}
+    assert all(row["value"] is not None for row in compared.levels)
+
+
+def test_everybody_gets_the_same_frames(compared):
+    """What adds up the odometry by hand believes what ours believes, scan by scan."""
+    run = compared.run("arena", 1.0, 7)
+    ours, theirs = run.believed("odometry"), run.believed("wheels")
+    assert np.array_equal(ours.stamps_ns, run.stamps_ns)
+    assert np.allclose(ours.poses, theirs.poses, atol=1e-12)
+    assert run.believed("occupancy").map is not None
+    a, b = (rows_of(compared, slam)[0] for slam in ("odometry", "wheels"))
+    assert a["ate_unaligned_m"] == pytest.approx(b["ate_unaligned_m"], abs=1e-9)
+
+
+def test_rows_are_the_metrics(compared):
+    run = compared.run("arena", 1.0, 7)
+    believed = run.believed("odometry")
+    truth = Trajectory(stamps_ns=run.stamps_ns, poses=run.truth)
+    online = Trajectory(stamps_ns=believed.stamps_ns, poses=believed.poses)
+    row = rows_of(compared, "odometry")[0]
+    assert row["ate_unaligned_m"] == pytest.approx(metrics.ate(online, truth).value)
+    statistics = metrics.error_statistics(online, truth)
+    assert row["var_p_theta_rad2"] == pytest.approx(statistics.var_p[2])
+    assert row["distance_m"] == pytest.approx(truth.length_m())
+    assert 0.0 <= row["moving_share_of_returns"] < row["semi_static_share_of_returns"] < 1.0
+
+
+def test_failures_are_scored_and_take_nothing_down(compared):
+    raised, drifted = rows_of(compared, "raises"), rows_of(compared, "drifts")
+    assert [row["outcome"] for row in raised] == ["raised"]
+    assert [row["outcome"] for row in drifted] == ["nan"]
+    assert "enough" in raised[0]["failure"]
+    assert all(row["lost"] == 1 and row["ate_unaligned_m"] is None for row in raised + drifted)
+    assert raised[0]["scans"] == 3
+    pair = next(
+        row
+        for row in compared.paired
+        if row["metric"] == "ate_unaligned_m"
+        and (row["slam_a"], row["slam_b"]) == ("odometry", "raises")
+    )
+    assert (pair["wins"], pair["losses"]) == (1, 0)  # its errors count as infinite
+
+
+def without_timings(rows):
+    return [{key: row[key] for key in row if key not in OF_THE_MACHINE} for row in rows]
+
+
+def test_killed_and_resumed_and_one_slam_more(tmp_path):
+    """Kill -9 after the first result; the same command ends with the same numbers and frames."""
+    command = (
+        "from pathlib import Path; from scripts.comparison import verb; "
+        "from scripts.comparison.plan import Plan; "
+        "verb.carry_out(Plan(slams=('odometry', 'occupancy'), scenes=('arena',), levels=(1.0,),"
+        f" seeds=(7,), seconds={SECONDS}), Path({str(tmp_path / 'a')!r}))"
+    )
+    process = subprocess.Popen([sys.executable, "-c", command], cwd=REPO)
+    while not list(tmp_path.glob("a/entries/arena*.npz")) and process.poll() is None:
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    kept = {file: file.stat().st_mtime_ns for file in tmp_path.glob("a/*/arena*.npz")}
+    plan = Plan(slams=("odometry", "occupancy"), **PLAN)
+    resumed = verb.carry_out(plan, tmp_path / "a")
+    assert {file: file.stat().st_mtime_ns for file in kept} == kept
+    straight = verb.carry_out(plan, tmp_path / "b")
+    assert repr(without_timings(resumed)) == repr(without_timings(straight))
+    for file in tmp_path.glob("a/recordings/arena*.npz"):
+        assert file.read_bytes() == (tmp_path / "b" / "recordings" / file.name).read_bytes()
+    before = {file: file.stat().st_mtime_ns for file in tmp_path.glob("b/[er]*s/arena*-*.npz")}
+    more = Plan(slams=("odometry", "occupancy", "ekf"), **PLAN)
+    rows = verb.carry_out(more, tmp_path / "b")
+    assert len(rows) == 3
+    assert {file: file.stat().st_mtime_ns for file in before} == before
+
+
+def test_a_recording_is_what_the_simulation_gave(compared):
+    drive = load(next((compared.folder / "recordings").glob("arena_d1_*")))
+    assert len(drive.frames) == len(range(0, round(SECONDS * 37.5), 8))
+    assert drive.names[-1] == "robot"
+    assert drive.hit.shape == (len(drive.frames), 361)
+    truth = drive.truth()
+    assert np.array_equal(truth.poses[0][:2], drive.poses[0, -1, :2])  # before the first beam
+    with_hits = [k for k in range(len(drive.names)) if (drive.hit == k).any()]
+    assert with_hits
+
+
+def test_lost_is_as_the_rule_says():
+    """Half a metre off for longer than a second, or 20 degrees."""
+    stamps = np.arange(31, dtype=np.int64) * 200_000_000
+    still = Trajectory(stamps_ns=stamps, poses=np.zeros((31, 3)))
+
+    def off(first: int, last: int, error) -> float | None:
+        poses = np.zeros((31, 3))
+        poses[first:last] = error
+        return lost_at(Trajectory(stamps_ns=stamps, poses=poses), still)
+
+    far, turned = (LOST_M + 0.01, 0.0, 0.0), (0.0, 0.0, 0.36)
+    assert off(10, 16, far) is None  # 1.0 s is not more than 1 s
+    assert off(10, 17, far) == 2.0
+    assert off(10, 17, turned) == 2.0
+    assert off(10, 31, (LOST_M - 0.01, 0.0, 0.3)) is None
+
+
+def test_words_after_a_list_option():
+    words = "--slam a b --seeds 3 --scene c --slam d"
+    one_by_one = "--slam a --slam b --seeds 3 --scene c --slam d"
+    assert repeated(words.split(), {"--slam", "--scene"}) == one_by_one.split()
+    assert repeated(["--seeds", "3", "x"], {"--slam"}) == ["--seeds", "3", "x"]
+
+
+def test_the_command_line_of_the_readme(monkeypatch):
+    seen = {}
+    app = typer.Typer()
+    app.command(cls=ManyValues)(verb.compare)
+
+    def carry_out(plan, out, **ways):
+        seen.update(plan=plan, out=out, ways=ways)
+        return []
+
+    monkeypatch.setattr(verb, "carry_out", carry_out)
+    monkeypatch.setattr(verb, "_table", lambda *_: "")
+    line = (
+        "--slam shunting ekf my_pkg:MySlam --scene arena office --dynamism 0:1:0.25 --seeds 10 "
+        "--jobs 2 --out there"
+    )
+    result = CliRunner().invoke(app, line.split())
+    assert result.exit_code == 0, result.output
+    plan = seen["plan"]
+    assert plan.slams == ("shunting", "ekf", "my_pkg:MySlam")
+    assert plan.scenes == ("arena", "office")
+    assert plan.levels == (0.0, 0.25, 0.5, 0.75, 1.0)
+    assert plan.seeds == tuple(range(100, 110))
+    assert seen["ways"] == {"jobs": 2, "cluster": None}
+
+
+def test_what_cannot_be_compared_is_said_in_a_line(tmp_path):
+    with pytest.raises(UnknownNameError, match="Did you mean 'shunting'"):
+        verb.carry_out(Plan(slams=("shuntin",), **PLAN), tmp_path / "a")
+    with pytest.raises(UnknownNameError, match="Did you mean 'arena'"):
+        verb.carry_out(Plan(slams=("odometry",), **{**PLAN, "scenes": ("arenna",)}), tmp_path / "a")
+    with pytest.raises(InvalidValueError, match=r"Plan\.slams"):
+        Plan(slams=("odometry", "odometry"), **PLAN)
+    with pytest.raises(InvalidValueError, match="--dynamism"):
+        verb.levels(["much"])
+    with pytest.raises(InvalidValueError, match=r"\[0, 1\]"):
+        Plan(slams=("odometry",), **{**PLAN, "levels": (2.0,)})
+    with pytest.raises(InvalidValueError, match="needs 2 scans a run"):
+        Plan(slams=("odometry",), **{**PLAN, "seconds": 0.1})
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").write_text("dear")
+    with pytest.raises(OutputError, match="choose another"):
+        verb.carry_out(Plan(slams=("odometry",), **PLAN), tmp_path / "mine")
+    with pytest.raises(LogFormatError):
+        folder.read(tmp_path)
+
+
+def rows_rising(slam: str, errors) -> list[dict]:
+    return [
+        {"scene": "arena", "dynamism": level, "seed": seed, "slam": slam, "outcome": "finished",
+         "ate_unaligned_m": error * (1.0 + 0.01 * seed), "lost": 0,
+         "moving_share_of_returns": 0.05 * level}
+        for level, error in zip((0.0, 0.5, 1.0), errors, strict=True)
+        for seed in range(4)
+    ]  # fmt: skip
+
+
+def test_the_knob(tmp_path, capsys):
+    """Rank correlations over the medians of the levels, and a picture."""
+    from scripts.output import write_recipe
+
+    rows = rows_rising("ekf", (0.1, 0.2, 0.9)) + rows_rising("odometry", (0.3, 0.1, 0.2))
+    settings = {"compare_schema": folder.SCHEMA, "scenes": ["arena"], "slams": ["ekf", "odometry"]}
+    settings |= {"levels": [0.0, 0.5, 1.0], "seeds": [0, 1, 2, 3], "seconds": 60.0}
+    write_recipe(tmp_path, "compare", settings)
+    folder.write_csv(tmp_path / "levels.csv", tables.levels(rows), tables.LEVEL_COLUMNS)
+    found = {row["slam"]: row for row in dynamism_curve.correlations(folder.read(tmp_path))}
+    assert found["ekf"]["ATE"] == pytest.approx(1.0)
+    assert found["odometry"]["ATE"] == pytest.approx(-0.5)
+    assert np.isnan(found["ekf"]["lost"])
+    assert dynamism_curve.main([str(tmp_path), "--out", str(tmp_path / "knob.png")]) == 0
+    assert "ekf" in capsys.readouterr().out
+    assert (tmp_path / "knob.png").stat().st_size > 10_000
+    assert dynamism_curve.main([str(tmp_path / "nowhere")]) == 1

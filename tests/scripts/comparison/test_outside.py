@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison scores what SLAMs from outside do to it, and goes on."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from scripts.comparison.entry import Entry
+from scripts.comparison.plan import Plan, source_of
+from scripts.jobs import _digest
+from slam.guests import Limits
+from tests.scripts.comparison.hand_made import recording
+from tests.slam.guests import misbehaving
+
+CLIENT = Path(__file__).parents[2] / "slam" / "misbehaving.py"
+
+
+def scored(fault: str, *, scan_s: float = 5.0, first_s: float = 10.0) -> dict[str, object]:
+    drive = recording([(2.0, 1.0)] * 8)
+    command = f"pipe:{sys.executable} -S -E {CLIENT} {fault}"
+    entry = Entry(command, drive, Limits(scan_s=scan_s, first_s=first_s))
+    entry.over([frame.without_truth() for frame in drive.frames])
+    row: dict[str, object] = json.loads(entry.arrays()["row"])
+    return row
+
+
+@pytest.mark.parametrize(
+    ("fault", "outcome"),
+    [("crash", "raised"), ("hang", "hung"), ("nan", "nan"), ("stamp", "bad"), ("garbage", "bad")],
+)
+def test_each_fault_is_an_outcome(fault: str, outcome: str):
+    row = scored(fault, scan_s=0.3 if outcome == "hung" else 5.0)
+    assert (row["outcome"], row["scans"], row["lost"]) == (outcome, 2, 1)
+    assert "scan 2," in str(row["failure"])
+    assert row["lost_at_s"] == pytest.approx(0.4)
+
+
+def test_one_that_cannot_start_has_lost_at_once():
+    row = scored("mute", first_s=0.3)
+    assert (row["outcome"], row["scans"], row["lost_at_s"]) == ("hung", 0, 0.0)
+
+
+def test_a_program_that_changed_is_run_again(tmp_path: Path):
+    (program := tmp_path / "mine.py").write_text("")
+    assert source_of(f"pipe:python3 {program} --fast") == (program,)
+    assert source_of("tests.slam.guests.misbehaving:Any") == (Path(misbehaving.__file__),)
+    assert source_of("shunting") == ()
+
+
+OWN = {
+    "own_package/__init__.py": "",
+    "own_package/system.py": "from . import maths\nfrom .deep.er import more\nimport own_helper\n",
+    "own_package/maths.py": "import numpy, os.path",
+    "own_package/deep/__init__.py": "from .. import constants",
+    "own_package/deep/er.py": "def more():\n    from own_package import late\n",
+    "own_package/constants.py": "not Python",
+    "own_package/late.py": "from .system import System",  # and round again
+    "own_package/other.py": "",
+    "own_helper.py": "import own_package.nowhere",
+    "own_module.py": "from own_helper import *",
+}
+
+
+@pytest.fixture(params=["own"])
+def own(tmp_path: Path, monkeypatch, request) -> Iterator[Path]:
+    """A package of one's own beside a module of one's own, each with what it imports."""
+    folder = tmp_path / request.param
+    for name, text in OWN.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    monkeypatch.syspath_prepend(folder)
+    yield folder
+    sys.modules.pop("own_package", None)
+
+
+def test_what_it_imports_from_beside_it_counts(own: Path):
+    within = {p.relative_to(own).as_posix() for p in source_of("own_package.system:System")}
+    whole = {p.relative_to(own).as_posix() for p in own.rglob("*.py")}
+    assert within == whole - {"own_package/other.py", "own_module.py"}
+    alone = ("own_helper.py", "own_module.py", "own_package/__init__.py")
+    assert source_of("own_module:System") == tuple(own / name for name in alone)
+    assert source_of(f"pipe:python3 {own / 'own_module.py'}") == source_of("own_module:System")
+
+
+@pytest.mark.parametrize("own", ["site-packages"], indirect=True)
+def test_of_what_is_installed_only_its_package_counts(own: Path):
+    within = {p.relative_to(own).as_posix() for p in source_of("own_package.system:System")}
+    assert "own_package/maths.py" in within
+    assert "own_helper.py" not in within
+
+
+def test_after_a_change_in_a_helper_its_runs_are_made_again(own: Path):
+    def files() -> dict[str, str]:
+        jobs = Plan(
+            slams=("own_module:System", "odometry"), scenes=("arena",), levels=(0.0,), seeds=(1,)
+        ).entries()
+        _digest.cache_clear()
+        return {slam: job.file_name() for _, slam, job in jobs}
+
+    before = files()
+    assert files() == before
+    (own / "own_helper.py").write_text("GAIN = 2.0")
+    assert files()["odometry"] == before["odometry"]
+    assert files()["own_module:System"] != before["own_module:System"]
+
+
+def test_rows_are_scored_again_when_what_scores_them_changes():
+    plan = Plan(slams=("odometry",), scenes=("arena",), levels=(0.0,), seeds=(1,))
+    ((_, _, job),) = plan.entries()
+    scoring = {"columns.py", "entry.py", "maps.py", "memory.py", "places.py", "sight.py"}
+    assert scoring | {"slam", "statistics.py"} <= {path.name for path in job.code}
+    assert not {"tables.py", "verb.py", "plan.py"} & {path.name for path in job.code}
+
+
+def test_a_good_one_is_charged_its_own_time_and_memory():
+    row = scored("none")
+    assert row["failure"] is None
+    assert row["scans"] == 8
+    assert float(str(row["ms_per_scan_p50"])) > 0.0
+    if sys.platform == "linux":
+        assert 0.0 <= float(str(row["peak_memory_mb"])) < 100.0

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The chart of a film: curves at their heights, the band as claimed, events at their times."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from scripts.film.chart import BAND_PALE, Bar, ErrorChart, Series
+from scripts.film.draw import GREEN, INK, MAGENTA, ORANGE, RED, paler
+
+COLORS = {"shunting": RED, "odometry": ORANGE}
+LANES = ("chair", "door", "unsure")
+
+
+def chart(span_s=(0.0, 60.0)) -> ErrorChart:
+    return ErrorChart(
+        (600, 240), 1.0, span_s=span_s, primary="shunting", colors=COLORS, lanes=LANES
+    )
+
+
+def series(error_m: float | None, sigma_m: float, seconds=range(61)) -> Series:
+    made = Series()
+    for at_s in seconds:
+        error = None if error_m is None else np.array([error_m, 0.0, 0.001])
+        made.add(float(at_s), error, np.diag([sigma_m**2, (0.5 * sigma_m) ** 2, 1e-5]))
+    return made
+
+
+def rows(picture: np.ndarray, color) -> np.ndarray:
+    return np.flatnonzero((picture[:, 300] == color).all(axis=1))
+
+
+def test_a_series_claims_two_sigma_of_the_longest_axis():
+    made = Series()
+    turn = math.pi / 6.0
+    axes = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2] = axes @ np.diag([0.04, 0.01]) @ axes.T
+    covariance[2, 2] = 0.0009
+    made.add(0.0, np.array([0.3, -0.4, 0.1]), covariance)
+    assert made.position[0] == pytest.approx(0.5)
+    assert made.claimed[0] == pytest.approx(0.4)
+    assert made.claimed_rad[0] == pytest.approx(0.06)
+
+
+def test_ten_times_the_error_is_a_decade_higher():
+    one = rows(chart().paint({"shunting": series(0.003, 1e-6)}, ()), RED)
+    ten = rows(chart().paint({"shunting": series(0.03, 1e-6)}, ()), RED)
+    hundred = rows(chart().paint({"shunting": series(0.3, 1e-6)}, ()), RED)
+    assert one[0] - ten[0] == pytest.approx(ten[0] - hundred[0], abs=1)
+    assert one[0] - ten[0] > 10
+
+
+def test_an_error_beyond_the_claim_leaves_the_band():
+    band = paler(RED, BAND_PALE)
+    inside = chart().paint({"shunting": series(0.01, 0.05)}, ())
+    outside = chart().paint({"shunting": series(0.1, 0.005)}, ())
+    assert rows(inside, band)[0] < rows(inside, RED)[0]
+    assert rows(outside, band)[0] > rows(outside, RED)[0]
+
+
+def test_events_stand_at_their_times_and_in_their_lanes():
+    still = chart().paint({"shunting": series(None, 0.01)}, ())
+    bars = [
+        Bar(lane="chair", start_s=10.0, end_s=20.0),
+        Bar(lane="door", start_s=30.0, end_s=40.0, strong=False),
+        Bar(lane="unsure", start_s=50.0, end_s=50.0),
+    ]
+    picture = chart().paint({"shunting": series(None, 0.01)}, bars)
+    changed = (picture != still).any(axis=2)
+    columns = np.flatnonzero(changed.any(axis=0))
+    left, width = 58, 600 - 58 - 10
+    assert columns[0] == pytest.approx(left + width / 6.0, abs=1)
+    assert columns[-1] == pytest.approx(left + width * 50.0 / 60.0, abs=2)
+    at = {c: np.argwhere((picture == c).all(axis=2) & changed) for c in (MAGENTA, RED)}
+    assert len(at[MAGENTA]) > 0
+    assert at[MAGENTA][:, 0].max() < at[RED][:, 0].min()
+
+
+def test_a_kidnap_is_a_line_through_everything():
+    picture = chart().paint({"shunting": series(0.01, 0.01)}, (), kidnaps=[30.0])
+    still = chart().paint({"shunting": series(0.01, 0.01)}, ())
+    x = round(58 + (600 - 68) / 2)
+    assert (picture[:, x] != still[:, x]).any(axis=1).sum() > 150
+    assert (picture[215, x] == INK).all()
+
+
+def test_nothing_and_a_single_number_can_be_painted():
+    empty = chart().paint({"shunting": Series(), "odometry": Series()}, ())
+    assert empty.shape == (240, 600, 3)
+    one = series(0.02, 0.01, seconds=[0])
+    assert chart((0.0, 1.0)).paint({"shunting": one}, ()).shape == (240, 600, 3)
+    assert not (empty == GREEN).all(axis=2).any()
+
+
+def test_painting_again_gives_the_same():
+    pane, data = chart(), {"shunting": series(0.02, 0.01), "odometry": series(2.0, 0.1)}
+    np.testing.assert_array_equal(pane.paint(data, ()), pane.paint(data, ()))

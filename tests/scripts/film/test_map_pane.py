@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the film shows is where it is: a cell of the map lands on the pixel of its centre."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scripts.film.close_up import CloseUp, off_by
+from scripts.film.draw import GREEN, RED
+from scripts.film.map_pane import MAX_TRAIL, Trail, View, draw_trail, raster_picture
+from slam import se2
+from slam.system import Raster
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5, np.pi / 2.0, -2.0])
+def test_a_cell_is_drawn_at_its_place(yaw: float):
+    values = np.full((40, 60), np.nan, np.float32)
+    values[10:13, 50:53] = 1.0
+    raster = Raster(values=values, resolution_m=0.1, T_map_origin=np.array([-3.0, -1.0, 0.0]))
+    T_view_map = np.array([1.0, 2.0, yaw])
+    view = View.fitting((-8.0, -8.0, 8.0, 8.0), 640, 640)
+    picture = raster_picture(raster, view, T_view_map)
+    center = se2.transform(T_view_map, np.array([[-3.0 + 5.15, -1.0 + 1.15]]))
+    dark = np.argwhere(picture.sum(axis=2) < 150)
+    found = dark.mean(axis=0)[::-1] + 0.5
+    np.testing.assert_allclose(found, view.pixels(center)[0], atol=1.0)
+
+
+def test_unknown_is_paper_and_trails_end_in_a_robot():
+    raster = Raster(
+        values=np.full((4, 4), np.nan, np.float32), resolution_m=1.0, T_map_origin=np.zeros(3)
+    )
+    view = View.fitting((0.0, 0.0, 4.0, 4.0), 100, 100)
+    picture = raster_picture(raster, view, np.zeros(3))
+    assert (picture == picture[0, 0]).all()
+    here = np.array([2.0, 2.0, 0.0])
+    draw_trail(picture, view, np.array([[0.0, 0.0], [2.0, 2.0]]), here, GREEN, 2)
+    assert (picture[50, 50] == GREEN).all()
+
+
+def test_a_long_trail_keeps_its_ends():
+    trail = Trail()
+    for k in range(4 * MAX_TRAIL + 1):
+        trail.add(np.array([float(k), -float(k), 0.0]))
+    points = trail.points()
+    assert len(points) <= MAX_TRAIL + 1
+    assert points[0].tolist() == [0.0, 0.0]
+    assert points[-1].tolist() == [4.0 * MAX_TRAIL, -4.0 * MAX_TRAIL]
+
+
+def test_the_close_up_shows_truth_and_estimate_however_far_apart():
+    pane = CloseUp((150, 150), 1.0, RED)
+    for gap in (0.0, 0.004, 0.3, 7.0, 0.01):
+        truth = np.array([5.0 + gap, 5.0, 0.3])
+        picture = pane.paint(np.array([5.0, 5.0, 0.3]), truth, 1e-4 * np.eye(2))
+        assert (picture[75, 75] == RED).all()
+        if gap > 0.0:
+            assert (picture == GREEN).all(axis=2).any()
+
+
+@pytest.mark.parametrize(
+    ("error", "says"), [((0.02, 0.0), "2.0 cm off, 2.0 σ"), ((0.0, 1.5), "1.50 m off, 75.0 σ")]
+)
+def test_how_far_off_is_told_in_its_own_sigmas(error, says):
+    assert off_by(np.array(error), np.diag([1e-4, 4e-4])) == says
+
+
+def test_a_covariance_of_nothing_has_no_sigmas():
+    assert off_by(np.array([0.02, 0.0]), np.zeros((2, 2))) == "2.0 cm off"

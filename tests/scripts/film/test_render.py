@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Films of runs, episodes and logs: the promised size, rate and length, with and without GL."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from scripts.cli import app
+from scripts.film import live_view
+from scripts.film.draw import AZURE, BLUE, GRAY, GREEN, MAGENTA, TEAL, VIOLET
+from scripts.film.encode import FILM_S, Pace, size_of
+from scripts.film.footage import of_scene, open_run
+from scripts.film.layout import Layout
+from scripts.film.render import pictures_at
+from scripts.film.rerun_log import RerunLog
+from scripts.film.scan_pane import LEGEND, RobotScan, beam_colors
+from sim.recording.episode import record
+from sim.recording.recipe import Recipe
+from sim.simulation import stream
+from sim.view.gl import Gl
+from slam.errors import InvalidValueError, LogFormatError, MissingDependencyError, MobiliaError
+from slam.frames import BeamClass, BeamLabels, Frame, LaserSpec, Odometry, Scan
+from slam.logs.carmen_writer import write_carmen
+
+SETTINGS = {"scene": "arena", "seconds": 2.0, "dynamism": 1.0, "seed": 3}
+
+
+@pytest.fixture
+def without_gl(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(live_view.gl, "find", lambda: Gl(backend=None, reason="no GL here"))
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    settings = {**SETTINGS, "slams": ["shunting", "odometry"], "simulation": {}}
+    recipe = {"schema": 1, "command": "run", "settings": settings, "versions": {}}
+    (folder / "recipe.json").write_text(json.dumps(recipe))
+    return folder
+
+
+def render(*words: str | Path) -> str:
+    """What the verb prints, in one line; raises what it raises."""
+    done = CliRunner().invoke(app, ["render", *map(str, words)])
+    if done.exception is not None:
+        raise done.exception
+    return " ".join(done.output.split())
+
+
+def decoded(path: Path) -> tuple[list[np.ndarray], float]:
+    """Every picture of a film, and its rate."""
+    film = cv2.VideoCapture(str(path))
+    pictures = []
+    while (read := film.read())[0]:
+        pictures.append(read[1])
+    fps = film.get(cv2.CAP_PROP_FPS)
+    film.release()
+    return pictures, fps
+
+
+def test_a_film_has_the_size_rate_and_length_it_should(run: Path, tmp_path: Path, without_gl):
+    out, strip = tmp_path / "film.mp4", tmp_path / "strip.png"
+    said = render(run, "--out", out, "--strip", strip, "--at", "0,1", "--size", "640x360")
+    pictures, fps = decoded(out)
+    assert fps == 30.0
+    assert len(pictures) == math.floor((round(2.0 * 37.5) - 1) / 37.5 * 30.0) + 1
+    assert {p.shape for p in pictures} == {(360, 640, 3)}
+    assert pictures[-1].std() > 20.0
+    assert "no 3D panel: no GL here" in said
+    assert f"{len(pictures)} pictures" in said
+    with Image.open(strip) as image:
+        assert image.size[0] > 2 * 400
+
+
+def test_a_part_at_double_speed(run: Path, tmp_path: Path):
+    out = tmp_path / "film.mp4"
+    render(run, "--out", out, "--no-3d", "--from", "0.5", "--to", "1.5", "--speed", "2", "--fps",
+           "20", "--slam", "odometry")  # fmt: skip
+    pictures, fps = decoded(out)
+    assert (len(pictures), fps) == (11, 20.0)
+
+
+def test_the_same_seed_gives_the_same_pictures_byte_for_byte():
+    first, second = (
+        pictures_at(f.stream, f.show(["shunting"]), [0.5, 1.5], whole=True)
+        for f in (of_scene(SETTINGS, view=None), of_scene(SETTINGS, view=None))
+    )
+    np.testing.assert_array_equal(first, second)
+    assert (first[0] != first[1]).any()
+    assert first[0].shape == (720, 1280, 3)
+
+
+def test_the_pictures_do_not_depend_on_which_others_were_taken():
+    alone = of_scene(SETTINGS, view=None)
+    among = of_scene(SETTINGS, view=None)
+    (want,) = pictures_at(alone.stream, alone.show(["odometry"]), [1.5])
+    got = pictures_at(among.stream, among.show(["odometry"]), [0.2, 0.9, 1.5])[-1]
+    np.testing.assert_array_equal(got, want)
+    assert got.shape[1] == Layout.of((1280, 720), camera=False).scan.width
+
+
+def test_an_episode_is_filmed_with_its_world_and_truth(tmp_path: Path):
+    record(Recipe(scene="arena", seed=1, dynamism=0.5, seconds=1.0), tmp_path)
+    (folder,) = tmp_path.iterdir()
+    with open_run(folder, view=None) as footage:
+        assert footage.title == "arena · dynamism 0.5 · seed 1"
+        (picture,) = pictures_at(footage.stream, footage.show(["odometry"]), [0.5], whole=True)
+    assert (picture == AZURE).all(axis=2).sum() > 100
+    assert (picture == GREEN).all(axis=2).any()
+
+
+def test_a_twin_is_filmed_from_above(tmp_path: Path):
+    record(Recipe(scene="arena", seed=1, dynamism=1.0, seconds=0.5, twin="dynamic"), tmp_path)
+    last = []
+    for name in ("static", "dynamic"):
+        with open_run(tmp_path / f"arena-d1-s0001-{name}") as footage:
+            assert footage.title.endswith(f"{name} twin")
+            assert "twins" in footage.no_camera
+            last.append(pictures_at(footage.stream, footage.show(["odometry"]), [0.4])[0])
+    assert (last[0] != last[1]).any()
+
+
+def test_a_log_without_truth_is_filmed_without_it(tmp_path: Path):
+    log = tmp_path / "bare.log"
+    write_carmen(log, stream("arena", seed=1, seconds=1.0))
+    bare = [line for line in log.read_text().splitlines() if not line.startswith("TRUEPOS")]
+    log.write_text("\n".join(bare) + "\n")
+    with open_run(log) as footage:
+        show = footage.show(["odometry"])
+        (picture,) = pictures_at(footage.stream, show, [0.9], whole=True)
+    assert (picture == BLUE).all(axis=2).sum() > 100
+    assert "truth" not in show.trails
+    assert not (picture == GREEN).all(axis=2).any()
+    assert not (picture == MAGENTA).all(axis=2).any()
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (640, 360), (1920, 1080), (1000, 1000)])
+@pytest.mark.parametrize("camera", [True, False])
+def test_panes_lie_inside_the_frame_and_apart(size, camera):
+    layout = Layout.of(size, camera=camera)
+    boxes = [layout.scan, layout.map, layout.chart, layout.close]
+    boxes += [layout.camera] if layout.camera is not None else []
+    assert (layout.camera is not None) == camera
+    taken = np.zeros((size[1], size[0]), int)
+    for box in boxes:
+        assert box.x >= 0
+        assert box.y >= 40 * layout.unit
+        assert box.x + box.width <= size[0]
+        assert box.y + box.height <= size[1]
+        taken[box.y : box.y + box.height, box.x : box.x + box.width] += 1
+    assert taken.max() == 1
+    assert taken.mean() > (0.7 if not camera else 0.75)
+
+
+def labelled() -> Frame:
+    spec = LaserSpec(n_beams=5, angle_min=-1.0, angle_increment=0.5)
+    kinds = [BeamClass.STATIC, BeamClass.SEMI_STATIC, BeamClass.MOVING, BeamClass.MOVING, 0]
+    labels = BeamLabels(
+        body=np.array([0, 1, 2, 2, -1], np.int32), kind=np.array(kinds, np.uint8),
+        displacement=np.zeros(5), incidence=np.zeros(5), mixed=np.array([0, 0, 0, 1, 0], bool),
+    )  # fmt: skip
+    ranges = np.array([2.0, 2.0, 2.0, 2.0, np.inf], np.float32)
+    odometry = Odometry(stamp_ns=0, T_odom_robot=np.zeros(3))
+    scan = Scan(stamp_ns=0, ranges=ranges, spec=spec)
+    return Frame(stamp_ns=0, odometry=odometry, scan=scan, labels=labels)
+
+
+def test_beams_have_the_colour_of_what_they_hit_and_the_legend_says_which():
+    colors = beam_colors(labelled())
+    assert colors.tolist() == [list(c) for c in (AZURE, TEAL, MAGENTA, VIOLET, GRAY)]
+    assert [color for _, color in LEGEND] == [AZURE, TEAL, MAGENTA, VIOLET, GRAY]
+    picture = RobotScan((400, 300), 1.0)(labelled())
+    for color in (AZURE, TEAL, MAGENTA, VIOLET):
+        assert (picture == color).all(axis=2).any()
+    assert (beam_colors(labelled().without_truth())[:4] == BLUE).all()
+
+
+def test_a_pace_counts_its_pictures():
+    pace = Pace(fps=30.0, speed=2.0, from_s=1.0, to_s=3.0)
+    assert [pace.due(t) for t in (0.99, 1.0, 2.0, 3.0, 9.0)] == [0, 1, 16, 31, 31]
+    assert Pace.within_a_minute(20.0).speed == 1.0
+    assert Pace.within_a_minute(10.0 * FILM_S).speed == 10.0
+
+
+@pytest.mark.parametrize("words", ["1280", "1280x721", "0x0", "1280x99999", "axb", "-1280x720"])
+def test_a_size_is_two_even_numbers(words: str):
+    with pytest.raises(InvalidValueError, match="--size must be"):
+        size_of(words)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--fps", "0"), "fps must lie in 1..240, got 0.0"),
+        (("--speed", "0"), "speed must lie in"),
+        (("--from", "5"), "--from must be >= 0 s and before --to"),
+        (("--from", "-1"), "--from must be >= 0 s"),
+        (("--to", "nan"), "--from must be >= 0 s and before --to"),
+        (("--view", "side"), "--view must be one of follow, top, persp, got 'side'"),
+        (("--at", "3,x", "--strip", "x.png"), "--at must be seconds"),
+        (("--at", "3,1", "--strip", "x.png"), "rising order"),
+        (("--at", "3,99", "--strip", "x.png"), "--at must lie within the run's"),
+        (("--at", "1"), "--at names the moments of --strip"),
+        (("--strip", "x.txt"), "--strip must be a file that ends in .png, got 'x.txt'"),
+        (("--rerun", "x.mp4"), "--rerun must be a file that ends in .rrd"),
+        (("--slam", "shuntin"), "Did you mean 'shunting'"),
+    ],
+)
+def test_a_wrong_option_is_named_and_nothing_is_written(run: Path, tmp_path: Path, words, says):
+    with pytest.raises(MobiliaError, match=r"^[^\n]*$") as caught:
+        render(run, "--out", tmp_path / "film.mp4", *words)
+    assert says in str(caught.value)
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_film_is_an_mp4(run: Path, tmp_path: Path):
+    with pytest.raises(MobiliaError, match=r"--out must be a file that ends in \.mp4"):
+        render(run, "--out", tmp_path / "film.xyz")
+
+
+def test_what_is_no_run_is_told_in_one_line(run: Path, tmp_path: Path):
+    def told(path: Path) -> str:
+        with pytest.raises(LogFormatError, match=r"^[^\n]*$") as caught:
+            open_run(path)
+        return str(caught.value)
+
+    assert "no such file" in told(tmp_path / "absent")
+    whole = (run / "recipe.json").read_text()
+    (run / "recipe.json").write_text(whole[: len(whole) // 2])
+    assert "recipe.json: no recipe" in told(run)
+    (run / "recipe.json").write_text("[]")
+    assert "not a JSON object" in told(run)
+    (run / "recipe.json").write_text('{"settings": {"scene": "arena", "seconds": "long"}}')
+    assert "no recipe of a run: seconds must be" in told(run)
+    (run / "recipe.json").write_text('{"settings": {"scene": "arena", "slams": [7]}}')
+    assert "slams must be a list of names, got [7]" in told(run)
+    (run / "recipe.json").write_text('{"command": "bench", "settings": {}}')
+    assert "made by 'mobilia bench'" in told(run)
+    (run / "recipe.json").write_text('{"command": "drive", "settings": {}}')
+    assert "made by 'mobilia drive', where each SLAM's robot went its own way" in told(run)
+    (run / "recipe.json").write_text('{"settings": {"log": "intel.log", "slams": ["ekf"]}}')
+    assert "render 'intel.log' itself with --slam ekf" in told(run)
+
+
+def test_a_truncated_log_is_named(tmp_path: Path):
+    log = tmp_path / "torn.log"
+    log.write_text("FLASER 3 1.0 1.0 1.0 0 0 0 0 0 0 1.0 host 1.0\nFLASER 3 1.")
+    with pytest.raises(LogFormatError, match=r"torn\.log"):
+        render(log, "--out", tmp_path / "film.mp4")
+    assert [p.name for p in tmp_path.iterdir()] == ["torn.log"]
+
+
+def test_rerun_is_asked_for_in_words_where_it_is_missing(run: Path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    with pytest.raises(MissingDependencyError, match=r"pip install 'mobilia\[rerun\]'"):
+        render(run, "--rerun", "out.rrd")
+
+
+def test_a_rerun_recording_is_written_whole(run: Path, tmp_path: Path):
+    pytest.importorskip("rerun")
+    out = tmp_path / "run.rrd"
+    render(run, "--rerun", out, "--slam", "odometry", "--to", "0.5", "--no-3d")
+    assert out.read_bytes()[:3] == b"RRF"
+    assert out.stat().st_size > 10_000
+    assert {p.name for p in tmp_path.iterdir()} == {"run", "run.rrd"}
+    with pytest.raises(MobiliaError):
+        RerunLog.writing(tmp_path / "run" / "recipe.json" / "x.rrd", None).__enter__()

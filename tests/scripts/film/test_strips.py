@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A film strip holds every picture once, in the order of time, and says what does not fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from scripts.film.strips import GAP, LABEL, MARGIN, evenly, strip, strips
+from slam.errors import InvalidValueError
+
+
+def plain(level: int) -> np.ndarray:
+    return np.full((90, 160, 3), level, np.uint8)
+
+
+def test_pictures_stand_side_by_side_in_the_order_of_time(tmp_path: Path):
+    path = tmp_path / "strip.png"
+    whole = strip([plain(10), plain(20), plain(30)], [0.0, 1.5, 3.0], path, cell_width=80)
+    with Image.open(path) as image:
+        np.testing.assert_array_equal(np.asarray(image), whole)
+    for k, level in enumerate((10, 20, 30)):
+        x = MARGIN + k * (80 + GAP)
+        cell = whole[6 + LABEL : 6 + LABEL + 45, x : x + 80]
+        assert (cell == level).all()
+        assert whole[6 : 6 + LABEL, x : x + 80].min() < 200  # its time is written above it
+
+
+def test_two_runs_stand_under_one_another(tmp_path: Path):
+    seconds = [0.0, 2.0]
+    both = strips({"with": [plain(0), plain(1)], "without": [plain(2), plain(3)]}, seconds)
+    one = strip([plain(0), plain(1)], seconds)
+    assert both.shape[1] == one.shape[1]
+    assert both.shape[0] > 2 * 225
+    assert {0, 1, 2, 3} <= set(np.unique(both).tolist())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_many_moments_go_over_several_lines():
+    pictures = [plain(k) for k in range(5)]
+    whole = strip(pictures, [float(k) for k in range(5)], columns=3, cell_width=160)
+    assert whole.shape[1] == 2 * MARGIN + 3 * 160 + 2 * GAP
+    assert set(range(5)) <= set(np.unique(whole).tolist())
+
+
+def test_evenly():
+    assert evenly(3, 1.0, 5.0) == [1.0, 3.0, 5.0]
+    assert evenly(1, 1.0, 5.0) == [5.0]
+    with pytest.raises(InvalidValueError, match="at least 1 moment, got 0"):
+        evenly(0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("pictures", "seconds", "says"),
+    [
+        ([plain(0)], [0.0, 1.0], "1 pictures for 2 moments"),
+        ([], [], "at least 1 moment"),
+        ([plain(0), plain(0)[:50]], [0.0, 1.0], "of one size"),
+    ],
+)
+def test_what_does_not_fit_is_named(pictures, seconds, says):
+    with pytest.raises(InvalidValueError, match=says):
+        strip(pictures, seconds)

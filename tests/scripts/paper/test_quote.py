@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Results on a page: tables between marks, pictures small and beside it."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from scripts.paper.comparison import paper_table
+from scripts.paper.paper_numbers import TABLE_3
+from scripts.paper.quote import compact, quote
+from scripts.paper.report import Report, new_figure
+from scripts.paper.runs import Plan
+from slam.errors import InvalidValueError
+
+
+def test_a_page_quotes_what_was_run_and_keeps_the_rest(tmp_path):
+    (tmp_path / "office").mkdir()
+    (tmp_path / "office" / "summary.md").write_text("new \\1 numbers\n")
+    page = tmp_path / "page.md"
+    page.write_text("<!-- office -->\nold\n<!-- /office -->\nby hand\n<!-- chairs -->\nkept\n")
+    assert quote(tmp_path, page) == ["office"]
+    told = page.read_text()
+    assert told.startswith("<!-- office -->\n\nnew \\1 numbers\n\n<!-- /office -->\nby hand\n")
+    assert told.endswith("<!-- chairs -->\nkept\n")
+    assert quote(tmp_path, page) == ["office"]
+    assert page.read_text() == told
+    (tmp_path / "chairs").mkdir()
+    (tmp_path / "chairs" / "summary.md").write_text("more\n")
+    with pytest.raises(InvalidValueError, match="/chairs"):
+        quote(tmp_path, page)
+    page.write_text(mixed_up := "<!-- /chairs -->\nby hand\n<!-- chairs -->\nthe rest\n")
+    (tmp_path / "office" / "summary.md").unlink()
+    with pytest.raises(InvalidValueError, match="<!-- chairs --> before <!-- /chairs -->"):
+        quote(tmp_path, page)
+    assert page.read_text() == mixed_up
+
+
+def test_its_figures_come_along_and_those_of_before_go(tmp_path: Path):
+    report = Report("office", Plan(out=tmp_path / "out", quick=True))
+    figure, axes = new_figure(4.0, 3.0)
+    axes[0].plot([0.0, 1.0])
+    report.figure("rmse", figure, "RMSE of every seed")
+    report.finish("Office")
+    (page := tmp_path / "page.md").write_text("<!-- office -->\n<!-- /office -->\n")
+    pictures = tmp_path / "pictures" / "paper"
+    pictures.mkdir(parents=True)
+    for name in ("office-gone.png", "chairs-rmse.png"):
+        (pictures / name).write_bytes(b"")
+    quote(tmp_path / "out", page)
+    shown = "![RMSE of every seed](pictures/paper/office-rmse.png)\n\n*RMSE of every seed*\n"
+    assert shown in page.read_text()
+    names = ["chairs-rmse.png", "office-rmse.png"]
+    assert sorted(path.name for path in pictures.iterdir()) == names
+    with Image.open(pictures / "office-rmse.png") as small:
+        assert small.size == (520, 390)
+
+
+def test_pictures_get_small_whatever_is_in_them(tmp_path: Path):
+    noise = np.random.default_rng(0).integers(0, 256, (90, 120, 3), dtype=np.uint8)
+    Image.fromarray(noise).save(tmp_path / "noise.png")
+    assert 2_000 < len(compact(tmp_path / "noise.png", most=6_000)) <= 6_000
+
+
+def test_a_colour_of_few_pixels_is_kept(tmp_path: Path):
+    shades = np.random.default_rng(0).integers(0, 256, (400, 600, 1), dtype=np.uint8)
+    image = np.concatenate([np.full_like(shades, 255), shades, shades // 2], axis=2)
+    image[100, 100] = image[200, 300] = (31, 97, 190)
+    Image.fromarray(image).save(tmp_path / "dots.png")
+    with Image.open(io.BytesIO(compact(tmp_path / "dots.png", most=1_000_000))) as small:
+        kept = np.asarray(small.convert("RGB")).astype(int)
+    np.testing.assert_allclose(kept[100, 100], (31, 97, 190), atol=12)
+
+
+def test_the_papers_table_stands_beside_ours_in_the_summary(tmp_path: Path):
+    report = Report("chairs", Plan(out=tmp_path, quick=True))
+    one = {f"{key} {q}": 0.5 for key in ("mean", "var_e", "var_p") for q in ("x", "y", "θ")}
+    other = {name: 3.0 * value for name, value in one.items()}
+    paper_table(report, "Table 3", TABLE_3, [{"ours": one}, {"ours": other}], ["ours"])
+    assert "| x: mean(e), m | -0.2339 | 0.0762 | 0.5 | 1 [0.75, 1.2] |" in report.quoted
+    assert "| θ: var(p), rad² | 1.4973 | 0.0592 | 0.5 | 1 [0.75, 1.2] |" in report.quoted

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The experiments end to end, as short as they can be, and the rules by which they score."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from scripts.output import write_recipe
+from scripts.paper import theory_data
+from scripts.paper.census import Census
+from scripts.paper.comparison import below_printed
+from scripts.paper.paper_numbers import TABLE_1, TABLE_2, TABLE_3
+from scripts.paper.runs import Plan, statistics
+from scripts.verbs import reproduce as verbs
+from scripts.verbs.reproduce import EXPERIMENTS, experiment
+from scripts.verbs.reproduce import reproduce as verb
+from slam import se2
+from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+from slam.frames import Features
+from slam.frontend.observations import from_features
+from slam.logs.victoria_graph import read_graph, stamped
+from slam.logs.victoria_park import read_victoria_park, twist_of
+from slam.shunting.config import ShuntingConfig
+
+DT = 0.025
+
+
+def write_park(folder: Path, duration_s: float = 36.0) -> None:
+    """A truck that circles among trees: detections, GPS, and the graph of what was seen."""
+    rng = np.random.default_rng(1)
+    times = 10.0 + DT * np.arange(round(duration_s / DT) + 1)
+    speed, steering = np.full(len(times), 4.0), np.full(len(times), 0.25)
+    trees = rng.uniform(-30.0, 40.0, (60, 2))
+    poses = [np.zeros(3)]
+    for v, a in zip(speed[:-1], steering[:-1], strict=True):
+        poses.append(se2.compose(poses[-1], se2.exp(twist_of(v, a), DT)))
+    scans = np.arange(0, len(times), 8)
+    cells = np.empty((1, len(scans)), dtype=object)
+    rear = se2.inverse([3.78, 0.5, 0.0])
+    lines, seen, before = [], {}, None
+    for k, at in enumerate(scans):
+        x, y = se2.transform(se2.inverse(poses[at]), trees).T
+        near = np.flatnonzero((np.hypot(x, y) < 25.0) & (np.abs(np.arctan2(y, x)) < 1.5))
+        bearings = np.arctan2(y[near], x[near]) + math.pi / 2.0
+        cells[0, k] = np.stack([np.hypot(x[near], y[near]), bearings, 0.3 * np.ones(len(near))])
+        axle = se2.compose(poses[at], rear)
+        if before is not None:
+            step = se2.between(before, axle)
+            numbers = " ".join(f"{v:.9f}" for v in step)
+            lines.append(f"ODOMETRY p{k - 1} p{k} {numbers} 1e-4 0 0 4e-6 0 4e-6")
+            for i in near[:3].tolist():
+                dx, dy = se2.transform(se2.inverse(axle), trees[i])
+                seen[i] = trees[i]
+                lines.append(f"LANDMARK p{k} l{i} {dx:.6f} {dy:.6f} 0.4 0 0.4")
+        before = axle
+    u = np.vstack([speed, steering])
+    park = {"TLsr": times[scans], "zt": cells, "time": times, "u": u}
+    savemat(folder / "features_trees.mat", park)
+    fixes = np.array([poses[k][:2] for k in scans]) + rng.normal(0.0, 0.3, (len(scans), 2))
+    fixes[20] += 50.0
+    gps = {"timeGps": 1000.0 * times[scans], "Lo_m": fixes[:, 0], "La_m": fixes[:, 1]}
+    savemat(folder / "aa3_gpsx.mat", gps)
+    (folder / "graph_known_association.txt").write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="module")
+def park(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("park")
+    write_park(folder)
+    return folder
+
+
+def test_quick_leaves_pages_figures_and_recipes_of_all_and_closes_the_synthetic_park(
+    tmp_path, park, capsys
+):
+    verb(["all"], quick=True, data=park, out=tmp_path, jobs=1)
+    for name in EXPERIMENTS:
+        whole(tmp_path / name)
+    told = (tmp_path / "summary.md").read_text()
+    assert told.startswith("victoria-park, landmarks, chairs, office, theory together: processor")
+    assert told in capsys.readouterr().out
+    page = (tmp_path / "victoria-park" / "README.md").read_text()
+    assert "1 of them outliers" in page
+    rmse = {}
+    for row in page.partition("## Table 1")[0].splitlines():
+        cells = [cell.strip() for cell in row.split("|")]
+        if len(cells) > 5 and cells[2][0].isdigit():
+            rmse[cells[1]] = float(cells[2])
+    assert {"odometry", "EKF", "shunting", "graph"} <= set(rmse)
+    assert max(rmse.values()) < 1.0
+
+
+def whole(folder: Path) -> str:
+    """The page of an experiment that left all it promises."""
+    page = (folder / "README.md").read_text()
+    pictures = sorted(path.stem for path in folder.glob("*.png"))
+    assert pictures == sorted(path.stem for path in folder.glob("*.svg"))
+    assert all(f"({name}.png)" in page for name in pictures)
+    assert "Processor time of all this" in page
+    assert "wall time of this call" in page
+    summary = (folder / "summary.md").read_text().strip().splitlines()
+    assert set(summary) <= set(page.splitlines())
+    recipe = json.loads((folder / "recipe.json").read_text())
+    assert recipe["settings"]["plan"]["quick"] is True
+    assert recipe["settings"]["plan"]["seeds"] == [200]
+    assert recipe["settings"]["cpu_s"] > 0.0
+    assert {"machine", "wall_s"} <= set(recipe["settings"])
+    return page
+
+
+def test_without_the_data_it_says_where_to_get_it(tmp_path):
+    with pytest.raises(InvalidValueError, match=r"aa3_gpsx\.mat"):
+        experiment("victoria-park")(Plan(out=tmp_path))
+    with pytest.raises(LogFormatError, match="no Victoria Park here"):
+        experiment("victoria-park")(Plan(out=tmp_path, data=tmp_path))
+    with pytest.raises(InvalidValueError, match="--data must be the folder"):
+        Plan(out=tmp_path, data=tmp_path / "features_trees.mat")
+    with pytest.raises(UnknownNameError, match="no experiment is called 'nonsense'"):
+        verb(["nonsense"], out=tmp_path)
+
+
+def test_all_without_the_data_says_at_the_end_what_is_left_out(tmp_path, monkeypatch, capsys):
+    def made_up(name: str):
+        return lambda plan: write_recipe(plan.out / name, name, {"cpu_s": 1.0, "page_cpu_s": 0.5})
+
+    monkeypatch.setattr(verbs, "experiment", made_up)
+    verb(["all"], out=tmp_path)
+    assert capsys.readouterr().out.strip().splitlines()[-1] == (
+        "note: victoria-park is left out: pass --data with the folder of the dataset"
+    )
+    assert (tmp_path / "summary.md").read_text().startswith("landmarks, chairs, office, theory ")
+
+
+def test_a_missing_graph_is_told_before_anything_runs(tmp_path, park):
+    for name in ("features_trees.mat", "aa3_gpsx.mat"):
+        (tmp_path / name).write_bytes((park / name).read_bytes())
+    with pytest.raises(LogFormatError, match=r"no graph_known_association\.txt"):
+        experiment("victoria-park")(Plan(out=tmp_path / "out", data=tmp_path))
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_graph_is_stamped_by_the_distance_driven(park):
+    frames = list(read_victoria_park(park))
+    graph = read_graph(park)
+    track = stamped(graph, frames)
+    truth = np.array([frame.odometry.T_odom_robot for frame in frames])
+    np.testing.assert_allclose(track.poses[:, :2], truth[:, :2], atol=0.02)
+    np.testing.assert_allclose(se2.wrap_array(track.poses[:, 2] - truth[:, 2]), 0.0, atol=0.005)
+    again = graph.optimised()
+    np.testing.assert_allclose(again.poses, graph.poses, atol=1e-3)
+
+
+def test_census_counts_what_is_missed_spurious_and_deleted():
+    true = np.array([[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]])
+    census = Census(true)
+    census.take(true[:2] + 0.1, np.array([3, 4]))
+    census.take(np.array([[0.1, 0.0], [20.0, 0.0], [0.2, 0.0]]), np.array([3, 5, 6]))
+    numbers = census.numbers()
+    assert numbers["misses"] == 2
+    assert numbers["spurious"] == 2
+    assert (numbers["gone"], numbers["deleted by mistake"]) == (1, 1)
+    # the one that was at 5 m is still there, wherever the map has it now
+    census.take(np.array([[0.1, 0.0], [25.0, 0.0]]), np.array([3, 4]))
+    assert census.numbers()["misses"] == 2
+    assert (census.numbers()["gone"], census.numbers()["deleted by mistake"]) == (1, 0)
+
+
+def test_statistics_are_the_papers_and_its_identity_holds():
+    e = np.random.default_rng(0).normal(0.3, 1.0, (50, 2))
+    s = statistics(e, ("x", "y"))
+    np.testing.assert_allclose(s["mean x"], e[:, 0].mean())
+    np.testing.assert_allclose(s["var_p y"], s["var_e y"] + 50 / 49 * s["mean y"] ** 2)
+    assert math.isnan(statistics(e[:1], ("x", "y"))["mean x"])
+
+
+def test_the_papers_printed_var_p_break_its_definition():
+    """Hence only means and var(e) are compared."""
+    broken = 0
+    for table in (TABLE_1, TABLE_2, TABLE_3):
+        for columns in table.values():
+            for mean, var_e, var_p in columns.values():
+                broken += abs(var_p - (var_e + mean**2)) > 0.1 * var_p
+    assert broken > 20
+
+
+def test_short_falls_are_bold():
+    runs = [{"ours": {"mean x": 0.5, "var_e x": 0.001}}]
+    told = below_printed({"EKF": {}, "shunting": {"x": (0.1, 0.01, 0.0)}}, runs, "ours")
+    assert told[0].startswith("**x |mean(e)|")
+    assert not told[1].startswith("**")
+
+
+def test_multi_colour_sweeps_end_where_the_librarys_do():
+    rng = np.random.default_rng(3)
+    config = ShuntingConfig.paper(cell_m=0.05)
+    points = np.column_stack([rng.uniform(1.0, 3.0, 25), rng.uniform(-1.0, 1.0, 25)])
+    features = Features(
+        stamp_ns=0, points_robot=points, covariances=np.tile(0.004 * np.eye(2), (25, 1, 1))
+    )
+    seen = from_features(features, config)
+    one, given = theory_data.library_sweeps(seen, config, 60, 0.5)
+    four = theory_data.colour_sweeps(given, config, 60, 0.5)
+    assert one[-1].max() > 0.5
+    np.testing.assert_allclose(one[-1], four[-1], atol=1e-6)
+    assert np.abs(one[1] - four[1]).max() > 1e-4  # the orders differ
+    alone = theory_data.colour_sweeps(given, ShuntingConfig.paper(lateral_sum=0.0), 60, 0.5)
+    assert np.abs(alone[-1] - four[-1]).max() > 1e-2  # and neighbours do count
+
+
+def test_activities_keep_the_shape_of_a_bell():
+    _, sections = theory_data.bell((1, 10, 40))
+    for section in sections.values():
+        top = int(section.argmax())
+        assert (np.diff(section[: top + 1]) >= 0.0).all()
+        assert (np.diff(section[top:]) <= 0.0).all()

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs: what they depend on, what they keep, and the numbers over seeds."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scripts.jobs import _digest, run_jobs
+from scripts.output import write_recipe
+from scripts.paper import park_runs, point_runs, rooms
+from scripts.paper.depends import depends_on
+from scripts.paper.runs import Plan, job, load_run, save_run, sign_test, spread
+from scripts.paper.times import total
+from slam.errors import InvalidValueError
+
+
+def a_run(path: Path, *, seed: int, data: str) -> None:
+    save_run(path, {"seed": seed}, {"poses": np.eye(3)})
+
+
+def test_a_run_is_made_again_when_its_data_change_and_not_when_their_folder_is_named_anew(
+    tmp_path, monkeypatch
+):
+    file = tmp_path / "aa3_gpsx.mat"
+    file.write_bytes(b"1")
+
+    def name(data: str) -> str:
+        _digest.cache_clear()
+        return job("a", a_run, seed=1, data=data).file_name()
+
+    before = name(str(tmp_path))
+    monkeypatch.chdir(tmp_path.parent)
+    assert name(f"./{tmp_path.name}") == before
+    (tmp_path / "notes.md").write_text("mine")
+    assert name(str(tmp_path)) == before
+    file.write_bytes(b"2")
+    assert name(str(tmp_path)) != before
+
+
+def test_a_run_depends_on_what_makes_it_and_not_on_pages():
+    def depends(call, **arguments) -> set[str]:
+        return {path.name for path in depends_on(call, arguments)}
+
+    of_rooms = depends(rooms.run_one, scene="office")
+    assert {"slam", "rooms.py", "runs.py", "accuracy.py", "sim", "scenes"} <= of_rooms
+    assert not {"report.py", "times.py"} & of_rooms
+    assert {"slam", "point_runs.py", "census.py"} <= depends(point_runs.run_one)
+    for runs in (point_runs, park_runs):
+        made_of = depends(runs.run_one)
+        assert (
+            not {"sim", "landmarks.py", "victoria_park.py", "report.py", "map_figures.py"} & made_of
+        )
+
+
+def test_a_run_keeps_its_processor_time(tmp_path):
+    (made,) = run_jobs([job("a", a_run, seed=7, data=str(tmp_path))], tmp_path).values()
+    run = load_run(made)
+    assert run.numbers == {"seed": 7}
+    assert list(run.arrays) == ["poses"]
+    assert 0.0 <= run.cpu_s < 10.0
+
+
+def test_time_is_told_of_all_whenever_it_was_spent(tmp_path):
+    for name, cpu_s, page in (("office", 4000.0, 40.0), ("theory", 200.0, 200.0)):
+        write_recipe(tmp_path / name, name, {"cpu_s": cpu_s, "page_cpu_s": page})
+    told = total(Plan(out=tmp_path), ["office", "theory"], 13.0)
+    assert "processor time 70 min, that is 37 min on 2 cores; wall time of this call 13 s" in told
+    assert told.endswith("met.")
+    write_recipe(tmp_path / "office", "office", {"cpu_s": 9000.0, "page_cpu_s": 40.0})
+    assert total(Plan(out=tmp_path), ["office", "theory"], 13.0).endswith("**missed.**")
+
+
+def test_runs_come_back_as_they_were(tmp_path):
+    numbers = {"a": {"b": math.nan, "θ": 1.5}}
+    save_run(tmp_path / "run.npz", numbers, {"poses": np.eye(3)})
+    run = load_run(tmp_path / "run.npz")
+    assert math.isnan(run.numbers["a"]["b"])
+    assert run.numbers["a"]["θ"] == 1.5
+    np.testing.assert_array_equal(run.arrays["poses"], np.eye(3))
+
+
+def test_medians_and_sign_tests():
+    assert spread([1.0, 2.0, 3.0, math.nan]).median == 2.0
+    assert spread([]).text() == "–"
+    assert spread([1.0, math.nan, 2.0]).text() == "1.5 [1.25, 1.75] (2 of 3)"
+    test = sign_test([1.0] * 17 + [3.0] * 3, [2.0] * 20)
+    assert (test.wins, test.losses) == (17, 3)
+    np.testing.assert_allclose(test.p, 0.00258, rtol=0.01)
+    assert sign_test([1.0], [1.0]).p == 1.0
+    lost = sign_test([math.nan, 1.0, math.nan], [1.0, math.nan, math.nan])
+    assert (lost.wins, lost.losses) == (1, 1)
+
+
+def test_seeds_are_those_nobody_tuned_on(tmp_path):
+    assert Plan(out=tmp_path).seed_list() == list(range(200, 220))
+    assert Plan(out=tmp_path, quick=True).seed_list() == [200]
+    assert Plan(out=tmp_path, quick=True, seeds=3).seed_list() == [200, 201, 202]
+    with pytest.raises(InvalidValueError, match="--seeds must be >= 1, got 0"):
+        Plan(out=tmp_path, seeds=0)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison's folder as a results file, by hand: medians, pairs, pairs over the levels."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from scripts.comparison.columns import COLUMNS
+from scripts.comparison.folder import LEVELS, RUNS, Compared, write_csv
+from scripts.comparison.tables import LEVEL_COLUMNS, levels
+from scripts.quotes.distil import distil, main
+from scripts.quotes.results import Comparison, Pair, write
+from slam.errors import InvalidValueError
+
+DYNAMISM, SEEDS = [0.0, 0.5, 1.0], [100, 101, 102]
+SETTINGS = {
+    "compare_schema": 1, "slams": ["shunting", "occupancy"], "scenes": ["arena"],
+    "levels": DYNAMISM, "seeds": SEEDS, "seconds": 60.0, "every": 8, "scanner": "full",
+    "scan_limit_s": 10.0, "machine": {"processor": "p", "cores": 2, "python": "3.12.0"},
+}  # fmt: skip
+
+
+@pytest.fixture
+def compared(tmp_path: Path) -> Compared:
+    """Shunting is 1 cm nearer at 0, 2 cm at 0.5, 3 cm at 1; in seed 102 it is as near everywhere.
+    Ghosts are there at 1 only, and the grid failed once there."""
+    rows = []
+    for k, dynamism in enumerate(DYNAMISM):
+        for seed in SEEDS:
+            head = {"scene": "arena", "dynamism": dynamism, "seed": seed, "lost": 0}
+            head |= {"moving_share_of_returns": 0.01 * k, "outcome": "finished"}
+            for slam, further in (("shunting", 0.0), ("occupancy", 0.01 * (k + 1))):
+                error = 0.02 + further * (seed != 102)
+                rows.append({**head, "slam": slam, "ate_unaligned_m": error})
+                if dynamism == 1.0:
+                    rows[-1]["ghost_rate"] = 0.1 + further
+    failed = rows[-1]
+    del failed["ate_unaligned_m"]
+    failed |= {"outcome": "nan", "lost": 1}
+    recipe = {"command": "compare", "settings": SETTINGS, "versions": {}}
+    (tmp_path / "recipe.json").write_text(json.dumps(recipe))
+    write_csv(tmp_path / RUNS, rows, COLUMNS)
+    write_csv(tmp_path / LEVELS, levels(Compared(tmp_path).runs), LEVEL_COLUMNS)
+    return Compared(tmp_path)
+
+
+def test_what_a_results_file_holds(compared: Compared, tmp_path: Path, monkeypatch):
+    monkeypatch.setattr("scripts.quotes.distil.commit", lambda *code: "c" * 40)
+    head, tables = distil(compared, "mobilia compare")
+    assert (head["commit"], head["seeds"], head["scanner"]) == ("c" * 40, SEEDS, "full")
+    write(tmp_path / "r.json", head, tables)
+    found = Comparison(tmp_path / "r.json")
+    medians = [level.value for level in found.levels("arena", "occupancy", "ate_unaligned_m")]
+    assert medians == pytest.approx([0.03, 0.04, 0.05])
+    assert [pair.value for pair in found.pairs("arena", "occupancy", "ate_unaligned_m")] == (
+        pytest.approx([-0.01, -0.02, -0.03])
+    )
+    assert found.pairs("arena", "occupancy", "ghost_rate")[:2] == [None, None]
+    over = found.over_levels("arena", "occupancy", "ate_unaligned_m")
+    assert isinstance(over, Pair)
+    assert over.value == pytest.approx(-0.02)  # of seeds 100 and 101, 102: its median is a tie
+    assert (over.wins, over.ties, over.losses) == (2, 1, 0)
+    assert [level.value for level in found.levels("arena", "occupancy", "lost")][-1] == (
+        pytest.approx(1 / 3)
+    )
+    assert found.rank_correlation("arena", "occupancy", "ate_unaligned_m") == 1.0
+
+
+def test_a_folder_that_other_code_made_is_refused(compared: Compared, tmp_path: Path, capsys):
+    assert main([str(compared.folder), "--command", "c", "--out", str(tmp_path / "r.json")]) == 1
+    assert "was not made by the code here" in capsys.readouterr().err
+    assert not (tmp_path / "r.json").exists()
+
+
+def test_code_that_is_not_committed_names_no_commit(monkeypatch):
+    from scripts.quotes import results
+
+    monkeypatch.setattr(results, "_git", lambda *words: " M slam/se2.py")
+    with pytest.raises(InvalidValueError, match=r"slam/se2\.py"):
+        results.commit()

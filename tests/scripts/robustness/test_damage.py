@@ -1,0 +1,359 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever is done to a result, verify says so, and nobody reads something else from it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+
+from scripts import results
+from scripts.film.footage import open_run
+from scripts.output import locked_folder, together, whole_folder, write_recipe
+from scripts.report.page import REPORT
+from scripts.robustness.damage import Tally, damaged, damages, try_consumers, try_verify
+from scripts.robustness.samples import COMPARED, SAMPLES
+from scripts.verbs.verify import verify
+from sim.recording.dataset import Plan, read_plan, writing
+from sim.recording.episode import record
+from sim.recording.recipe import RECIPE, Recipe
+from sim.recording.sums import SUMS, add_to_sums, check_vouched, read_sums, write_sums
+from sim.recording.verify import METADATA, STATUS, Finding, check_bag
+from slam import locks
+from slam.errors import InvalidValueError, LogFormatError, OutputError
+
+EPISODES = ["arena-d0.5-s0000", "arena-d0.5-s0001"]
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory) -> Path:
+    return SAMPLES["dataset"](tmp_path_factory.mktemp("made") / "data")
+
+
+@pytest.fixture(scope="module")
+def comparison(tmp_path_factory) -> Path:
+    return SAMPLES["comparison"](tmp_path_factory.mktemp("made") / "compared")
+
+
+@pytest.fixture
+def copied(dataset, tmp_path) -> Path:
+    return Path(shutil.copytree(dataset, tmp_path / "data"))
+
+
+def verdicts(path: Path) -> set[str]:
+    return {finding.verdict for finding in results.check(path) if finding.verdict != "whole"}
+
+
+def status(path: Path) -> int:
+    try:
+        verify(path)
+    except typer.Exit as left:
+        return left.exit_code
+    return 0
+
+
+def test_every_damage_of_a_dataset_is_noticed(dataset):
+    tally = Tally.new()
+    try_verify(tally, "dataset", dataset, 60, seed=1)
+    assert (tally.wrong, tally.counts.total()) == ([], 60)
+
+
+@pytest.mark.parametrize("name", ["map", "raster", "drive"])
+def test_every_damage_of_other_results_is_noticed(name, tmp_path):
+    tally = Tally.new()
+    folder = SAMPLES[name](tmp_path / name)
+    try_verify(tally, name, folder, 21, seed=2)
+    try_consumers(tally, name, folder, 3, seed=3)
+    assert tally.wrong == []
+
+
+def test_every_damage_of_a_comparison_is_noticed_or_made_good(comparison):
+    tally = Tally.new()
+    try_verify(tally, "comparison", comparison, 24, seed=4)
+    try_consumers(tally, "comparison", comparison, 3, seed=5)
+    assert tally.wrong == []
+
+
+def test_damages_are_the_same_for_the_same_seed_and_leave_the_folder_as_it_was(copied, dataset):
+    assert damages(copied, 9, seed=5) == damages(dataset, 9, seed=5)
+    for damage in damages(dataset, 12, seed=6):
+        with damaged(copied, dataset, damage):
+            assert verdicts(copied)
+    assert not verdicts(copied)
+
+
+def append(name: str, text: str = "x") -> Callable[[Path], object]:
+    def change(folder: Path) -> None:
+        path = folder / name
+        path.write_text(path.read_text() + text if path.exists() else text)
+
+    return change
+
+
+def drop_line(sums: str, *names: str) -> Callable[[Path], object]:
+    """The files and their lines."""
+
+    def change(folder: Path) -> None:
+        kept = {k: v for k, v in read_sums((folder / sums).parent).items() if k not in names}
+        for name in names:
+            ((folder / sums).parent / name).unlink()
+        (folder / sums).write_text("".join(f"{v}  {k}\n" for k, v in kept.items()))
+
+    return change
+
+
+def relisted(folder: Path) -> None:
+    """A changed map whose episode was given new hashes."""
+    append(f"{EPISODES[0]}/map.yaml", "\n")(folder)
+    write_sums(folder / EPISODES[0])
+
+
+def swapped(folder: Path) -> None:
+    """Whole episodes under each other's names."""
+    one, other = (folder / name for name in EPISODES)
+    one.rename(folder / "aside")
+    other.rename(one)
+    (folder / "aside").rename(other)
+
+
+def linked(folder: Path) -> None:
+    path = folder / EPISODES[1]
+    path.rename(folder.parent / "elsewhere")
+    path.symlink_to(folder.parent / "elsewhere")
+
+
+def in_other_words(change: Callable[[str], str], name: str = SUMS) -> Callable[[Path], object]:
+    def rewritten(folder: Path) -> None:
+        (folder / name).write_text(change((folder / name).read_text()))
+
+    return rewritten
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "words"),
+    [
+        (append(f"{EPISODES[0]}/{METADATA}", " "), 1, "metadata.yaml is damaged"),
+        (append("dataset.json", "\n"), 1, "dataset.json: damaged"),
+        (append(SUMS, "\n"), 1, "SHA256SUMS:18: no hash"),
+        (in_other_words(lambda text: text[:-1]), 1, "not as it was written"),
+        (in_other_words(str.upper), 1, "no hash and file name"),
+        (in_other_words(lambda text: text.replace("  a", " *a")), 1, "no hash and file name"),
+        (in_other_words(lambda t: "\n".join(t.splitlines()[::-1]) + "\n"), 1, "not as it was"),
+        (in_other_words(lambda t: t.replace('"seed": 0', '"seed": 1'), "dataset.json"), 1, "SUMS"),
+        (drop_line(SUMS, f"{EPISODES[0]}/map.pgm"), 1, "does not list"),
+        (drop_line(f"{EPISODES[0]}/{SUMS}", "map.pgm"), 1, "does not list map.pgm"),
+        (relisted, 1, "is not what"),
+        (swapped, 1, "not the recipe that is planned"),
+        (lambda folder: shutil.rmtree(folder / EPISODES[1]), 3, f"{EPISODES[1]} is missing"),
+        (lambda folder: (folder / EPISODES[0] / "map.pgm").unlink(), 3, "map.pgm is missing"),
+        (lambda folder: (folder / EPISODES[0] / SUMS).unlink(), 3, "No such file"),
+        (lambda folder: (folder / "dataset.json").unlink(), 3, "dataset.json: cannot be read"),
+        (lambda folder: (folder / SUMS).unlink(), 3, "SHA256SUMS: cannot be read"),
+        (linked, 3, "is no folder"),
+        (append("notes.txt"), 4, "notes.txt is foreign"),
+        (append(f"{EPISODES[0]}/.hidden"), 4, ".hidden is foreign"),
+        (append(locks.LOCK), 4, ".lock is left of a run that was killed"),
+        (lambda folder: (folder / ".a-d1.host.1.part").mkdir(), 4, "was killed"),
+        (lambda folder: (folder / EPISODES[0] / "empty").mkdir(), 4, "empty is foreign"),
+        (lambda folder: (folder / "l").symlink_to(folder / "dataset.json"), 4, "l is a link"),
+        (lambda folder: shutil.copytree(folder / EPISODES[0], folder / "b"), 4, "b is foreign"),
+    ],
+)
+def test_words_and_status_say_what_is_wrong(copied, capsys, change, code, words):
+    change(copied)
+    assert status(copied) == code
+    printed = capsys.readouterr()
+    assert words in (printed.out + printed.err).replace("\n", "")
+
+
+def test_the_worst_status_wins(copied, dataset):
+    append("notes.txt")(copied)
+    assert status(copied) == 4
+    (copied / EPISODES[0] / "map.yaml").unlink()
+    assert status(copied) == 3
+    append(f"{EPISODES[1]}/relations.txt")(copied)
+    assert status(copied) == 1
+    assert status(dataset) == 0
+    assert Finding(episode="a", verdict="same messages").status == STATUS["same messages"] == 5
+
+
+def test_other_bytes_of_the_same_messages_are_no_excuse_for_the_rest(copied):
+    from backports import zstd
+
+    import sim.recording.bag as bag
+
+    episode = copied / EPISODES[0]
+    recipe = next(iter(read_plan(copied).planned().values()))
+    options = dict(bag._OPTIONS)
+    bag._OPTIONS[zstd.CompressionParameter.compression_level] = 5
+    try:
+        record(recipe, copied.parent)
+    finally:
+        bag._OPTIONS.update(options)
+    packed = copied.parent / episode.name / f"{episode.name}.mcap"
+    shutil.copy(packed, episode / packed.name)
+    assert (verdicts(copied), status(copied)) == ({"same messages"}, 5)
+    check_bag(episode)
+    append("notes.txt")(copied)
+    assert status(copied) == 4
+    append(f"{EPISODES[0]}/{METADATA}", "\n")(copied)
+    assert status(copied) == 1
+    with pytest.raises(LogFormatError, match="mcap: damaged"):
+        check_bag(copied / EPISODES[1] / _with_a_flip(copied / EPISODES[1]))
+
+
+def _with_a_flip(episode: Path) -> str:
+    bag = next(episode.glob("*.mcap"))
+    data = bytearray(bag.read_bytes())
+    data[len(data) // 2] ^= 1
+    bag.write_bytes(bytes(data))
+    return bag.name
+
+
+def test_generate_keeps_what_is_not_its_own(copied):
+    append(f"{EPISODES[0]}/notes.txt", "mine")(copied)
+    plan = read_plan(copied)
+    with writing(copied, plan) as data:
+        missing, notes = data.missing()
+    assert (missing, len(notes)) == ([], 1)
+    (copied / EPISODES[0] / "map.pgm").unlink()
+    with pytest.raises(OutputError, match=r"notes\.txt"), writing(copied, plan) as data:
+        data.missing()
+    assert (copied / EPISODES[0] / "notes.txt").read_text() == "mine"
+
+
+def test_the_sums_of_a_dataset_are_those_of_sha256sum(dataset):
+    done = subprocess.run(["sha256sum", "-c", "--quiet", SUMS], cwd=dataset, check=False)
+    assert done.returncode == 0
+    listed = {path.relative_to(dataset).as_posix() for path in dataset.rglob("*")}
+    assert set(read_sums(dataset)) == listed - {SUMS, *EPISODES}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"episodes": 10**9},
+        {"dynamisms": [0.1 * k / 10**4 for k in range(10**4)], "episodes": 10**4},
+        {"dynamisms": 3},
+        {"episodes": "2"},
+        {"schema": 2},
+        {"extra": 1},
+        {"recipe": {"scene": "arena"}},
+    ],
+)
+def test_a_plan_that_cannot_be_is_refused(copied, change):
+    path = copied / "dataset.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(LogFormatError, match=r"dataset\.json"):
+        read_plan(copied)
+    assert "damaged" in verdicts(copied)
+
+
+def test_a_plan_of_too_many_episodes_is_refused():
+    recipe = Recipe(scene="arena", seed=0, dynamism=0.0, seconds=1.0)
+    with pytest.raises(InvalidValueError, match="at most"):
+        Plan(recipe=recipe, dynamisms=tuple(np.linspace(0, 1, 1001)), episodes=1000)
+
+
+def test_a_flipped_recording_and_a_torn_entry_are_made_again(comparison, tmp_path, capsys):
+    from scripts.verbs.compare import carry_out
+
+    folder = Path(shutil.copytree(comparison, tmp_path / "compared"))
+    recording = min((folder / "recordings").glob("*.npz"))
+    whole = recording.read_bytes()
+    recording.write_bytes(whole[:500] + bytes([whole[500] ^ 1]) + whole[501:])
+    entry = min((folder / "entries").glob("*odometry*.npz"))
+    entry.write_bytes(entry.read_bytes()[:300])
+    (folder / "notes.txt").write_text("mine")
+    (folder / "a\udc80\n.npz").write_text("no name that a list could hold")
+    carry_out(COMPARED, folder)
+    told = capsys.readouterr().out.replace("\n", "")
+    assert f"made again: {recording} is damaged" in told
+    assert f"made again: {entry} is damaged" in told
+    assert recording.read_bytes() == whole
+    assert (status(folder), verdicts(folder)) == (4, {"foreign"})
+    for mine in (*folder.glob("*.txt"), folder / "a\udc80\n.npz"):
+        mine.unlink()
+    assert status(folder) == 0
+    assert REPORT in read_sums(folder)
+
+
+def test_a_folder_that_grows_is_vouched_for_when_its_tables_are_in_place(tmp_path):
+    out = tmp_path / "out"
+    with locked_folder(out):
+        write_recipe(out, "compare", {})
+        assert "incomplete" in verdicts(out)
+        (out / "kept.npz").write_bytes(b"a job's result")
+        with together(out) as staged:
+            write_recipe(staged, "compare", {"more": 1})
+    assert set(read_sums(out)) == {RECIPE, "kept.npz"}
+    before = (out / SUMS).read_bytes()
+    with pytest.raises(TypeError), locked_folder(out), together(out) as staged:
+        write_recipe(staged, "compare", {"more": object()})
+    assert (out / SUMS).read_bytes() == before  # and all that it lists is as it was
+    assert check_vouched(out / RECIPE) is None
+
+
+def test_a_drive_within_a_comparison_is_a_result_of_its_own(comparison, tmp_path):
+    folder = Path(shutil.copytree(comparison, tmp_path / "compared"))
+    with whole_folder(folder / "drive", overwrite=False) as part:
+        write_recipe(part, "other", {})
+    assert [finding.verdict for finding in results.check(folder)] == ["whole", "whole"]
+    append("drive/recipe.json")(folder)
+    assert status(folder) == 1
+
+
+def test_a_file_that_is_vouched_for_is_read_only_as_it_was(tmp_path):
+    with whole_folder(tmp_path / "run", overwrite=False) as part:
+        write_recipe(part, "run", {"seed": 0})
+    recipe = tmp_path / "run" / RECIPE
+    check_vouched(recipe)
+    recipe.write_text(recipe.read_text().replace("0", "1"))
+    with pytest.raises(LogFormatError, match="damaged"):
+        check_vouched(recipe)
+    add_to_sums(recipe)
+    check_vouched(recipe)
+
+
+def test_one_episode_is_checked_and_made_again_by_any_name(copied, monkeypatch, capsys):
+    (copied / EPISODES[0]).rename(copied / "mine")
+    monkeypatch.chdir(copied / "mine")
+    verify(Path(), regenerate_=1)
+    assert "same bytes mine" in capsys.readouterr().out
+    Path("map.yaml").unlink()
+    assert status(Path()) == 3
+
+
+def test_names_in_a_list_cannot_lead_elsewhere_or_write_to_the_terminal(copied):
+    for name in ("../x", "/etc/passwd", "a\x1b[2J"):
+        (copied / SUMS).write_text(f"{'0' * 64}  {name}\n")
+        with pytest.raises(LogFormatError, match="no hash and file name"):
+            read_sums(copied)
+
+
+def test_an_episode_without_its_recipe_is_no_log(copied):
+    (copied / EPISODES[0] / RECIPE).unlink()
+    with pytest.raises(LogFormatError, match=r"recipe\.json: cannot be read"):
+        open_run(copied / EPISODES[0], view=None)
+    with open_run(copied / EPISODES[1] / f"{EPISODES[1]}.mcap", view=None) as footage:
+        assert footage.slam == ""
+
+
+def test_a_folder_of_nothing_of_ours_is_refused(tmp_path):
+    (tmp_path / "photos").mkdir()
+    for path in (tmp_path / "photos", tmp_path / "none"):
+        with pytest.raises(LogFormatError, match=r"holds no|no such"):
+            verify(path)
+
+
+def test_a_map_without_hashes_is_not_called_well(tmp_path):
+    folder = SAMPLES["raster"](tmp_path / "raster")
+    assert status(folder / "map.yaml") == status(folder / "map.pgm") == 0
+    (folder / SUMS).unlink()
+    assert status(folder / "map.yaml") == 3

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A full disk is one line that names what the user named; nothing half-written is left."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scripts.comparison.plan import Plan
+from scripts.console import console
+from scripts.film.encode import film
+from scripts.output import whole_folder, write_recipe
+from scripts.robustness.disk_log import tree
+from scripts.verbs import compare as verb
+from slam.errors import OutputError
+from slam.files import write_bytes
+from slam.maps import read_map, write_map
+from slam.shunting import ShuntingSlam
+from slam.system import Raster
+
+REPO = Path(__file__).resolve().parents[3]
+FULL = "No space left on device"
+Disk = Callable[[int], Path]
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Disk]:
+    """Makes a disk of some kB; where that is not allowed, the test is skipped."""
+    place = tmp_path / "disk"
+
+    def of(kilobytes: int) -> Path:
+        place.mkdir()
+        words = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(place)]
+        if shutil.which("mount") is None or subprocess.run(words, capture_output=True).returncode:
+            pytest.skip("no small file system can be mounted here")
+        return place
+
+    yield of
+    if os.path.ismount(place):
+        subprocess.run(["umount", str(place)], check=True)
+
+
+@pytest.fixture(autouse=True)
+def quiet() -> Iterator[None]:
+    console.quiet = True
+    yield
+    console.quiet = False
+
+
+def filmed(path: Path, pictures: int) -> None:
+    rng = np.random.default_rng(0)
+    with film(path, 30.0) as reel:
+        for _ in range(pictures):
+            reel.add(rng.integers(0, 256, (180, 320, 3), dtype=np.uint8))
+
+
+def run_folder(path: Path) -> None:
+    with whole_folder(path, overwrite=True) as folder:
+        filmed(folder / "film.mp4", 60)
+        write_recipe(folder, "test", {})
+
+
+def test_a_film(disk: Disk):
+    place = disk(100)
+    with pytest.raises(OutputError) as caught:
+        filmed(place / "film.mp4", 60)
+    assert str(caught.value) == f"cannot write {place / 'film.mp4'}: {FULL} (ffmpeg stopped)"
+    assert tree(place) == {}
+    write_bytes(place / "run" / "recipe.json", b"{}")
+    with pytest.raises(OutputError) as caught:
+        run_folder(place / "run")
+    said = f"cannot write {place / 'run' / 'film.mp4'}: {FULL} (ffmpeg stopped)"
+    assert str(caught.value) == said
+    assert tree(place) == {"run": None, "run/recipe.json": b"{}"}
+
+
+@pytest.mark.parametrize("pictures", [1, 60])
+def test_ffmpeg_that_ends_badly_leaves_no_film(tmp_path: Path, monkeypatch, pictures: int):
+    """Though it took all pictures: what counts is how it ended."""
+    bad = tmp_path / "ffmpeg"
+    bad.write_text("#!/bin/sh\ncat > /dev/null\nexit 3\n")
+    bad.chmod(0o755)
+    monkeypatch.setattr("scripts.film.encode.imageio_ffmpeg.get_ffmpeg_exe", lambda: str(bad))
+    with pytest.raises(OutputError, match=r"film.mp4: exit status 3 \(ffmpeg stopped\)"):
+        filmed(tmp_path / "film.mp4", pictures)
+    assert not (tmp_path / "film.mp4").exists()
+
+
+def test_a_film_without_pictures(tmp_path: Path):
+    with pytest.raises(OutputError, match="a film needs a picture"):
+        filmed(tmp_path / "film.mp4", 0)
+    assert tree(tmp_path) == {}
+
+
+def test_maps(disk: Disk):
+    place = disk(64)
+    values = np.zeros((10, 10), dtype=np.float32)
+    small = Raster(values=values, resolution_m=0.05, T_map_origin=np.zeros(3))
+    large = Raster(values=np.tile(values, (40, 40)), resolution_m=0.05, T_map_origin=np.zeros(3))
+    write_map(place / "map", small)
+    ShuntingSlam().save(place / "map.npz")
+    before = tree(place)
+    with pytest.raises(OutputError, match=f"cannot write {place}/map.pgm: {FULL}"):
+        write_map(place / "map", large)
+    write_bytes(place / "rest", b"0" * (os.statvfs(place).f_bavail * os.statvfs(place).f_bsize))
+    with pytest.raises(OutputError, match=f"cannot write {place}/map.npz: {FULL}"):
+        ShuntingSlam().save(place / "map.npz")
+    (place / "rest").unlink()
+    assert tree(place) == before
+    assert read_map(place / "map.yaml").values.shape == (10, 10)
+
+
+def test_tables_of_a_comparison(disk: Disk, tmp_path: Path):
+    """Room for another SLAM's runs and not for the tables: the earlier ones stay, all of them."""
+    ways = {"scenes": ("arena",), "levels": (1.0,), "seeds": (100,), "seconds": 1.0}
+    one, two = (Plan(slams=slams, **ways) for slams in (("odometry",), ("odometry", "occupancy")))
+    verb.carry_out(one, tmp_path / "compared")
+    place = disk(400)
+    out = place / "compared"
+    shutil.copytree(tmp_path / "compared", out)
+    before = tree(out)
+    room = os.statvfs(place).f_bavail * os.statvfs(place).f_bsize
+    write_bytes(place / "rest", b"0" * (room - (32 << 10)))
+    with pytest.raises(OutputError, match=f"cannot write {out}/.*: {FULL}"):
+        verb.carry_out(two, out)
+    after = tree(out)
+    assert {name: data for name, data in after.items() if name in before} == before
+    new = set(after) - set(before)
+    assert all(name.startswith("entries/") and "_occupancy-" in name for name in new)
+    assert len(new) == 2  # the entry and its hash
+    (place / "rest").unlink()
+    assert len(verb.carry_out(two, out)) == 2
+
+
+@pytest.mark.parametrize(
+    ("kilobytes", "words", "named"),
+    [
+        (100, ("generate", "arena", "--episodes", "2", "--seconds", "20"), "out/arena-"),
+        (
+            24,
+            ("compare", "--slam", "odometry", "--scene", "arena", "--dynamism", "1"),
+            "out/recordings: ",
+        ),
+    ],
+)
+def test_two_processes(disk: Disk, kilobytes: int, words: tuple[str, ...], named: str):
+    place = disk(kilobytes)
+    more = ("--seconds", "3", "--seeds", "2") if words[0] == "compare" else ()
+    done = subprocess.run(
+        [sys.executable, "-m", "scripts", *words, *more, "--jobs", "2", "--out", "out"],
+        cwd=place, env={**os.environ, "PYTHONPATH": str(REPO)}, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert f"{place}/{named}" in done.stderr
+    assert done.stderr.endswith(f": {FULL}\n")
+    assert not [name for name in tree(place) if "/." in name]

@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line as people meet it: the whole run, and every wrong input as one clear line."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+
+from scripts.cli import main
+from sim.simulation import stream
+from slam.logs.carmen_writer import write_carmen
+from slam.maps import read_map
+from slam.trajectory import read_tum
+
+REPO = Path(__file__).resolve().parents[3]
+
+
+def mobilia(*words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The command as a process of its own, which takes seconds to start."""
+    return subprocess.run(
+        [sys.executable, "-m", "scripts", *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=240,
+        cwd=REPO,
+        env={**os.environ, "COLUMNS": "200", **environment},
+    )
+
+
+@pytest.fixture
+def called(capsys, monkeypatch) -> Callable[..., SimpleNamespace]:
+    """``mobilia`` without the process: what it printed, and its exit status."""
+
+    def call(*words: str | Path) -> SimpleNamespace:
+        monkeypatch.setattr(sys, "argv", ["mobilia", *map(str, words)])
+        monkeypatch.setattr(sys, "path", [*sys.path])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = capsys.readouterr()
+        return SimpleNamespace(returncode=ended.value.code, stdout=printed.out, stderr=printed.err)
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory) -> tuple[Path, str]:
+    out = tmp_path_factory.mktemp("demo") / "run"
+    done = mobilia("demo", "--seconds", "3", "--seed", "3", "--out", out)
+    assert done.returncode == 0, done.stderr
+    return out, done.stdout
+
+
+def test_the_demo_leaves_everything_it_promises(finished):
+    out, printed = finished
+    promised = {
+        "film.mp4", "map.png", "map.pgm", "map.yaml", "trajectories.png", "errors.png",
+        "trajectory_shunting.tum", "trajectory_odometry.tum", "trajectory_truth.tum",
+        "recipe.json", "results.json", "changes.png", "map.npz",
+    }  # fmt: skip
+    assert promised <= {p.name for p in out.iterdir()}
+    assert all(p.stat().st_size > 0 for p in out.iterdir())
+    assert "film.mp4 first" in printed.replace("\n", " ")
+    assert "ATE, unaligned" in printed
+
+
+def test_results_follow_the_schema(finished):
+    results = json.loads((finished[0] / "results.json").read_text())
+    assert results["schema"] == 1
+    keys = {"ate_unaligned_m", "ate_se2_m", "heading_rmse_rad", "ms_per_scan_p50",
+            "mean_e_x", "var_e_x", "var_p_theta", "real_time_factor"}  # fmt: skip
+    for name in ("shunting", "odometry"):
+        assert keys <= set(results["slams"][name])
+    assert results["slams"]["shunting"]["ate_unaligned_m"] < 0.05
+
+
+def test_the_recipe_says_what_was_run(finished):
+    recipe = json.loads((finished[0] / "recipe.json").read_text())
+    assert recipe["settings"]["scene"] == "office"
+    assert recipe["settings"]["seed"] == 3
+    assert {"mujoco", "numpy", "numba", "python"} <= set(recipe["versions"])
+
+
+def test_the_files_for_other_tools_can_be_read_back(finished):
+    out, _ = finished
+    trajectory = read_tum(out / "trajectory_shunting.tum")
+    assert len(trajectory) == round(3.0 * 37.5)
+    raster = read_map(out / "map.yaml")
+    assert (raster.values == 1.0).sum() > 100
+    assert np.isnan(raster.values).any()
+
+
+def test_the_film_has_the_frames_of_three_seconds(finished):
+    film = cv2.VideoCapture(str(finished[0] / "film.mp4"))
+    frames = []
+    while (read := film.read())[0]:
+        frames.append(read[1])
+    film.release()
+    assert 40 <= len(frames) <= 50  # FILM_FPS of scripts.verbs.demo
+    assert frames[0].shape == (720, 1280, 3)
+    assert frames[-1].std() > 20.0
+
+
+def test_a_log_runs_from_end_to_end(tmp_path: Path, called):
+    log = tmp_path / "arena.log"
+    write_carmen(log, stream("arena", seed=1, seconds=2.0))
+    done = called("run", "shunting", "--log", log, "--out", tmp_path / "run", "--no-film")
+    assert done.returncode == 0, done.stderr
+    results = json.loads((tmp_path / "run" / "results.json").read_text())
+    assert results["slams"]["shunting"]["scans"] == 75
+
+
+def test_list_names_scenes_slams_and_environments(called):
+    done = called("list")
+    assert done.returncode == 0
+    for word in ("arena", "office", "shunting", "odometry", "mobilia/Office-v1"):
+        assert word in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("demo", "--scene", "ofice"), "Did you mean 'office'"),
+        (("demo", "--dynamism", "2"), "dynamism must lie in [0, 1], got 2.0"),
+        (("demo", "--seconds", "0"), "seconds must be > 0"),
+        (("demo", "--seed", "-1"), "seed must be a whole number >= 0"),
+        (("run", "shunting", "--log", "missing.log"), "missing.log: no such file"),
+        (("run", "shunting"), "exactly one of --log and --scene"),
+        (("run", "shuntin", "--scene", "arena"), "Did you mean 'shunting'"),
+        (("run", "no_module:Slam", "--scene", "arena"), "cannot import 'no_module'"),
+    ],
+)
+def test_a_wrong_word_is_one_line_and_a_status(tmp_path: Path, called, words, says):
+    done = called(*words, "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert says in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_log_is_named_and_nothing_is_written(tmp_path: Path, called):
+    (tmp_path / "torn.log").write_text("FLASER 3 1.0 1.0 1.0 0 0 0 0 0 0 1.0 host 1.0\nFLASER 3 1.")
+    (tmp_path / "noise.log").write_bytes(bytes(range(256)) * 20)
+    before = sorted(p.name for p in tmp_path.iterdir())
+    for name in ("torn.log", "noise.log"):
+        done = called("run", "shunting", "--log", tmp_path / name, "--out", tmp_path / "out")
+        assert done.returncode == 1
+        assert name in done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == before
+
+
+def test_an_earlier_run_stays_unless_overwriting_is_asked_for(tmp_path: Path, called):
+    words = ("run", "odometry", "--scene", "arena", "--seconds", "0.2", "--no-film",
+             "--out", tmp_path / "out")  # fmt: skip
+    assert called(*words).returncode == 0
+    kept = (tmp_path / "out" / "recipe.json").stat().st_mtime_ns
+    again = called(*words)
+    assert again.returncode == 1
+    assert "holds an earlier run: pass --overwrite" in again.stderr
+    assert (tmp_path / "out" / "recipe.json").stat().st_mtime_ns == kept
+    assert called(*words, "--overwrite").returncode == 0
+
+
+def test_an_output_that_cannot_be_written_is_named(tmp_path: Path, called):
+    (tmp_path / "file").write_text("in the way")
+    done = called("demo", "--seconds", "1", "--out", tmp_path / "file" / "out")
+    assert done.returncode == 1
+    assert "cannot write" in done.stderr
+
+
+def test_without_ffmpeg_it_says_so_before_it_starts(tmp_path: Path):
+    done = mobilia("demo", "--out", tmp_path / "out", IMAGEIO_FFMPEG_EXE="/nonexistent")
+    assert done.returncode == 1
+    assert "no ffmpeg was found" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unusable_mujoco_gl_is_one_line_and_no_obstacle(tmp_path: Path):
+    done = mobilia("run", "odometry", "--scene", "arena", "--seconds", "0.2", "--no-film",
+                   "--out", tmp_path / "out", MUJOCO_GL="nonsense")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "MUJOCO_GL=nonsense is ignored" in done.stdout
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_nothing(tmp_path: Path, number):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "scripts", "demo", "--seconds", "600", "--no-film",
+         "--out", str(tmp_path / "made" / "out")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=REPO,
+    )  # fmt: skip
+    deadline = time.monotonic() + 120.0
+    while not list(tmp_path.iterdir()) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    time.sleep(0.5)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted" in errors
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["nope [/x].log", "[red]gone[/red].log"])
+def test_brackets_in_a_name_are_just_brackets(tmp_path: Path, called, name: str):
+    done = called("run", "shunting", "--log", tmp_path / name, "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert f"{name}: no such file" in done.stderr
+
+
+def test_a_log_of_one_scan_is_a_run(tmp_path: Path, called):
+    beams = " ".join(["2.5"] * 180)
+    log = tmp_path / "one.log"
+    log.write_text(f"FLASER 180 {beams} 0 0 0 0 0 0 1.0 host 1.0\n")
+    done = called("run", "shunting", "--log", log, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "film.mp4" in done.stdout
+
+
+def test_only_files_that_exist_are_recommended(tmp_path: Path, called):
+    out = tmp_path / "a [b] c" / "out"
+    done = called(
+        "run", "odometry", "--scene", "arena", "--seconds", "0.2", "--no-film", "--out", out
+    )
+    assert done.returncode == 0, done.stderr
+    assert "trajectories.png first" in done.stdout.replace("\n", " ")
+    assert "map.yaml" not in done.stdout
+    assert (out / "results.json").exists()
+
+
+def test_a_failing_slam_is_one_line(tmp_path: Path):
+    (tmp_path / "bad_slam.py").write_text("1/0\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "scripts", "run", "bad_slam:Slam", "--scene", "arena"],
+        capture_output=True, text=True, check=False, timeout=60, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(REPO), "COLUMNS": "200"},
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "ZeroDivisionError: division by zero (bad_slam.py:1)" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1

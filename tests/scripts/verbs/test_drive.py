@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia drive``: tables of every run, made where they are missing and found where not."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+
+from scripts.closed_loop import tables
+from scripts.closed_loop.plan import Plan
+from scripts.closed_loop.runs import Driven, load, run_one
+from scripts.verbs.drive import _goals, _seeds, carry_out
+from sim.loop import LoopConfig
+from slam.errors import InvalidValueError, OutputError, UnknownNameError
+
+SHORT = {"goals": 1, "loop": LoopConfig(limit_s=1.0)}
+FILES = ("goals.csv", "runs.csv", "levels.csv", "runs.json", "closed_loop.png", "paths.png")
+
+
+def plan(**changes):
+    settings = {"scene": "arena", "slams": ("odometry",), "levels": (0.0,), "seeds": (100,)}
+    return Plan(**{**settings, **SHORT, **changes})
+
+
+def read(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_killed_call_goes_on_and_ends_with_the_same_bytes(tmp_path):
+    wanted = plan(seeds=(100, 101))
+    carry_out(wanted, tmp_path / "out")
+    before = {name: (tmp_path / "out" / name).read_bytes() for name in FILES}
+    runs = sorted((tmp_path / "out" / "runs").glob("*.npz"))
+    kept = runs[0].stat().st_mtime_ns
+    runs[1].unlink()
+    (tmp_path / "out" / "levels.csv").unlink()
+    carry_out(wanted, tmp_path / "out")
+    assert {name: (tmp_path / "out" / name).read_bytes() for name in FILES} == before
+    assert runs[0].stat().st_mtime_ns == kept
+    rows = read(tmp_path / "out" / "goals.csv")
+    assert [(row["seed"], row["outcome"], row["reason"]) for row in rows] == [
+        ("100", "given up", "time"),
+        ("101", "given up", "time"),
+    ]
+    recipe = json.loads((tmp_path / "out" / "recipe.json").read_text())
+    assert recipe["settings"]["loop"]["limit_s"] == 1.0
+
+
+def test_a_run_depends_on_what_drives_it_and_not_on_tables():
+    ((_, job),) = plan().jobs()
+    names = {path.name for path in job.code}
+    assert {"slam", "sim", "scenes", "runs.py"} <= names
+    assert not {"plan.py", "tables.py", "pictures.py", "film.py"} & names
+
+
+def test_somebody_elses_folder_and_wrong_names_are_refused(tmp_path):
+    (tmp_path / "thesis.tex").write_text("")
+    with pytest.raises(OutputError, match="choose another"):
+        carry_out(plan(), tmp_path)
+    with pytest.raises(UnknownNameError, match="no goal 'cellar'"):
+        carry_out(plan(goals=("cellar",)), tmp_path / "out")
+    with pytest.raises(UnknownNameError, match="no SLAM"):
+        carry_out(plan(slams=("shuntin",)), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"seeds": (1, 1)}, "seeds"),
+        ({"levels": (1.5,)}, "dynamism"),
+        ({"goals": 0}, "goals"),
+        ({"slams": ()}, "slams"),
+        ({"seeds": (-1,)}, "seeds"),
+    ],
+)
+def test_plans_that_cannot_be_are_refused_by_name(wrong, named):
+    with pytest.raises(InvalidValueError, match=named):
+        plan(**wrong)
+
+
+def test_seeds_and_goals_are_a_number_or_a_list():
+    assert _seeds(("2",)) == (100, 101)
+    assert _seeds(("3", "7")) == (3, 7)
+    assert _seeds(("3:6",)) == (3, 4, 5)
+    with pytest.raises(InvalidValueError, match="--seeds"):
+        _seeds(("many",))
+    assert _goals(("2",)) == 2
+    assert _goals(("lounge", "copy")) == ("lounge", "copy")
+
+
+def test_a_slam_that_cannot_be_made_has_failed_at_every_goal(tmp_path, monkeypatch):
+    (tmp_path / "stillborn.py").write_text("class Slam:\n    def __init__(self): 1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    who = {"scene": "arena", "dynamism": 0.0, "seed": 100, "slam": "stillborn:Slam"}
+    run_one(tmp_path / "run.npz", **who, goals=2, loop={})
+    run = load(tmp_path / "run.npz", who)
+    rows = tables.goal_rows(run)
+    assert [(row["outcome"], row["reason"]) for row in rows] == [("failed", "raised")] * 2
+    row = tables.run_row(run)
+    assert (row["failed"], row["success"], row["failure"]) == (2, 0.0, "raised")
+    assert row["failure_words"].count("cannot be made") == 1
+    assert "ZeroDivisionError" in row["failure_words"]
+    (level,) = tables.levels(rows, [row])
+    assert (level["failed"], level["collisions_per_km"]) == (2, None)
+
+
+def goal(outcome, precision=None):
+    return {
+        "goal": "lounge", "outcome": outcome, "reason": "", "precision_m": precision,
+        "precision_rad": None if precision is None else -0.1, "time_s": 10.0, "driven_m": 500.0,
+        "tally": {"by_robot": 1, "by_others": 0, "near_misses": 2, "touched": ["chair1"]},
+        "taken": "",
+    }  # fmt: skip
+
+
+def test_a_level_counts_goals_over_seeds_and_says_how_sure_it_is():
+    import numpy as np
+
+    runs = []
+    for seed, outcomes in enumerate((("reached", "wrong"), ("reached", "given up"))):
+        goals = [goal(o, {"reached": 0.1, "wrong": 0.9}.get(o)) for o in outcomes]
+        identity = {"scene": "office", "dynamism": 0.5, "seed": seed, "slam": "mine"}
+        rest = {"lost_s": 3.0 if seed else None, "found_s": None, "failure": ["", ""]}
+        arrays = {"believed": np.zeros((2, 3)), "true": np.ones((2, 3)), "trusted": np.ones(2)}
+        runs.append(Driven(identity=identity, goals=goals, rest=rest, arrays=arrays))
+    rows = [row for run in runs for row in tables.goal_rows(run)]
+    (level,) = tables.levels(rows, [tables.run_row(run) for run in runs])
+    assert (level["goals"], level["reached"], level["success"]) == (4, 2, 0.5)
+    assert level["success_low"] == pytest.approx(0.150, abs=1e-3)  # Wilson's, of 2 in 4
+    assert level["success_high"] == pytest.approx(0.850, abs=1e-3)
+    assert level["precision_m"] == 0.1
+    assert level["collisions_per_km"] == 2.0
+    assert (level["runs_lost"], level["runs_recovered"]) == (1, 0)

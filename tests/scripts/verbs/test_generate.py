@@ -1,0 +1,364 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A dataset ends with the same bytes however it was made; every fault is one clear line."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+
+from scripts.verbs.export import export
+from scripts.verbs.generate import generate, sweep
+from scripts.verbs.verify import verify
+from sim.recording.dataset import Plan, writing
+from sim.recording.recipe import RECIPE, Recipe, read_recipe
+from sim.recording.sums import SUMS, write_sums
+from sim.recording.verify import check_hashes, messages_sha256, regenerate
+from slam.errors import InvalidValueError, LogFormatError, MobiliaError, OutputError
+from slam.logs import read_bag, read_carmen
+from slam.trajectory import read_tum
+
+REPO = Path(__file__).resolve().parents[3]
+SETTINGS = {"episodes": 3, "seconds": 1.5, "seed": 1}
+NAMES = [f"arena-d0.5-s000{k}" for k in (1, 2, 3)]
+
+
+def environment(**more: str) -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(REPO), "COLUMNS": "200", **more}
+
+
+def in_background(out: Path, *options: str, seconds: float = 1.5) -> subprocess.Popen[str]:
+    command = ["generate", "arena", "--episodes", "3", "--seed", "1", "--out", out, *options]
+    return subprocess.Popen(
+        [sys.executable, "-m", "scripts", *map(str, command), "--seconds", str(seconds)],
+        cwd=REPO, env=environment(), start_new_session=True, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )  # fmt: skip
+
+
+def wait_for(there: Callable[[], object]) -> None:
+    for _ in range(6000):
+        if there():
+            return
+        time.sleep(0.01)
+    raise AssertionError("nothing happened for a minute")
+
+
+def whole_episodes(out: Path) -> list[Path]:
+    return sorted(out.glob("arena-*"))
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("serial") / "data"
+    generate("arena", out, **SETTINGS)
+    return out
+
+
+def copy(serial: Path, target: Path) -> Path:
+    return Path(shutil.copytree(serial, target))
+
+
+def flip(path: Path, at: float = 0.5) -> None:
+    data = bytearray(path.read_bytes())
+    data[int(at * len(data))] ^= 0x40
+    path.write_bytes(bytes(data))
+
+
+def test_killed_in_mid_episode_and_started_again_ends_with_the_same_bytes(serial, tmp_path):
+    out = tmp_path / "data"
+    code = (
+        "from pathlib import Path; from scripts.verbs.generate import generate\n"
+        f"generate('arena', Path({str(out)!r}), **{SETTINGS})"
+    )
+    child = subprocess.Popen([sys.executable, "-c", code], env=environment())
+    wait_for(lambda: whole_episodes(out) and list(out.glob(".*.part/*/*.mcap")))
+    child.kill()
+    child.wait()
+    assert not (out / SUMS).exists()
+    first = whole_episodes(out)[0]
+    kept = (first / RECIPE).stat()
+    generate("arena", out, **SETTINGS)
+    assert (out / SUMS).read_bytes() == (serial / SUMS).read_bytes()
+    assert (first / RECIPE).stat().st_mtime_ns == kept.st_mtime_ns  # not made again
+    assert {p.name for p in out.iterdir()} == {*NAMES, SUMS, "dataset.json"}
+    done = subprocess.run(["sha256sum", "-c", "--quiet", SUMS], cwd=out, check=False)
+    assert done.returncode == 0
+
+
+def test_ctrl_c_leaves_whole_episodes_and_nothing_else(tmp_path):
+    out = tmp_path / "data"
+    running = in_background(out, "--jobs", "2", seconds=30.0)
+    wait_for(lambda: list(out.glob(".*.part/*/*.mcap")))
+    os.killpg(running.pid, signal.SIGINT)
+    printed, _ = running.communicate(timeout=60)
+    assert running.returncode == 130, printed
+    assert "interrupted" in printed
+    assert {p.name for p in out.iterdir()} <= {*NAMES, "dataset.json"}
+
+
+def test_numpy_without_its_vector_units_makes_the_same_messages(serial, tmp_path):
+    found = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    if not found:
+        pytest.skip("this NumPy names no vector units to turn off")
+    code = (
+        "import sys; from pathlib import Path\n"
+        "from sim.recording.episode import record\n"
+        "from sim.recording.recipe import made_with, read_recipe\n"
+        f"made = read_recipe(Path({str(serial / NAMES[0] / RECIPE)!r}))\n"
+        "again = record(made.recipe, Path(sys.argv[1]))\n"
+        "print(again[made.recipe.name]['messages_sha256'], made_with()['cpu'] or 'none')\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False,
+        env=environment(NPY_DISABLE_CPU_FEATURES=" ".join(found)),
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    digest, cpu = done.stdout.split()[:2]
+    made = read_recipe(serial / NAMES[0] / RECIPE)
+    assert digest == made.result["messages_sha256"]
+    assert cpu == "none"
+
+
+def test_regenerated_bytes_are_the_same(serial):
+    finding = regenerate(serial / NAMES[1])
+    assert (finding.verdict, finding.ok) == ("same bytes", True)
+    verify(serial)
+
+
+def rewritten(folder: Path, change: Callable[[dict], None]) -> Path:
+    """The episode with another recipe.json, hashes made good."""
+    recipe = json.loads((folder / RECIPE).read_text())
+    change(recipe)
+    (folder / RECIPE).write_text(json.dumps(recipe))
+    write_sums(folder)
+    return folder
+
+
+def test_what_another_machine_made_differs_but_is_not_called_damaged(serial, tmp_path):
+    def elsewhere(recipe: dict) -> None:
+        recipe["made_with"]["versions"]["mujoco"] = "3.0.0"
+        recipe["made_with"]["cpu"] = "AVX512F"
+        recipe["result"]["messages_sha256"] = "0" * 64
+
+    def unexplained(recipe: dict) -> None:
+        recipe["result"]["messages_sha256"] = "0" * 64
+
+    def repacked(recipe: dict) -> None:
+        recipe["made_with"]["versions"]["rosbags"] = "0.1"
+
+    folder = copy(serial / NAMES[0], tmp_path / "a" / NAMES[0])
+    finding = regenerate(rewritten(folder, elsewhere))
+    assert (finding.verdict, finding.ok) == ("differs", True)
+    assert "other CPU or version: cpu AVX512F then" in finding.why
+    assert "mujoco 3.0.0 then" in finding.why
+    folder = copy(serial / NAMES[0], tmp_path / "b" / NAMES[0])
+    finding = regenerate(rewritten(folder, unexplained))
+    assert (finding.verdict, finding.ok) == ("differs", False)
+    folder = copy(serial / NAMES[0], tmp_path / "c" / NAMES[0])
+    assert regenerate(rewritten(folder, repacked)).verdict == "same messages"
+
+
+def test_a_flipped_bit_is_found_named_and_mended(serial, tmp_path, capsys):
+    out = copy(serial, tmp_path / "data")
+    flip(out / NAMES[1] / f"{NAMES[1]}.mcap")
+    with pytest.raises(typer.Exit):
+        verify(out)
+    printed = capsys.readouterr()
+    assert f"{NAMES[1]}.mcap is damaged" in (printed.out + printed.err).replace("\n", "")
+    with pytest.raises(LogFormatError, match=NAMES[1]):
+        list(read_bag(out / NAMES[1], labels=True))
+    generate("arena", out, **SETTINGS)
+    assert (out / SUMS).read_bytes() == (serial / SUMS).read_bytes()
+    verify(out)
+
+
+def test_a_bag_packed_anew_is_whole_a_changed_one_is_not(serial, tmp_path):
+    from backports import zstd
+
+    import sim.recording.bag as bag
+    from sim.recording.episode import record
+
+    folder = copy(serial / NAMES[0], tmp_path / NAMES[0])
+    made = read_recipe(folder / RECIPE)
+    assert messages_sha256(folder) == made.result["messages_sha256"]
+    options = dict(bag._OPTIONS)
+    bag._OPTIONS[zstd.CompressionParameter.compression_level] = 5
+    try:
+        record(made.recipe, tmp_path / "..")
+    finally:
+        bag._OPTIONS.update(options)
+    packed = tmp_path / ".." / NAMES[0] / f"{NAMES[0]}.mcap"
+    shutil.copy(packed, folder / packed.name)
+    assert check_hashes(folder).verdict == "same messages"
+    (folder / "map.pgm").unlink()
+    assert check_hashes(folder).verdict == "damaged"
+
+
+def test_two_writers_another_plan_and_foreign_files_are_refused(serial, tmp_path):
+    plan = Plan(
+        recipe=Recipe(scene="arena", seed=0, dynamism=0.5, seconds=1.0),
+        dynamisms=(0.5,),
+        episodes=1,
+    )
+    with (
+        writing(tmp_path / "a", plan),
+        pytest.raises(OutputError, match="another process"),
+        writing(tmp_path / "a", plan),
+    ):
+        pass
+    before = (serial / SUMS).read_bytes()
+    with pytest.raises(OutputError, match="another dataset"):
+        generate("arena", serial, **{**SETTINGS, "seed": 9})
+    assert (serial / SUMS).read_bytes() == before
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("mine")
+    with pytest.raises(OutputError, match="no dataset"):
+        generate("arena", tmp_path / "mine", **SETTINGS)
+    with pytest.raises(OutputError, match=r"thesis\.tex"):
+        generate("arena", tmp_path / "mine" / "thesis.tex", **SETTINGS)
+    assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
+
+
+@pytest.fixture
+def small_disk(tmp_path) -> Iterator[Path]:
+    """A file system of 512 KB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=512k", "tmpfs", str(folder)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
+        pytest.skip("may not mount a tmpfs")
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def test_a_full_and_a_read_only_disk_are_named(small_disk):
+    with pytest.raises(OutputError, match=f"cannot write .*{NAMES[0]}: No space left"):
+        generate("arena", small_disk / "data", **SETTINGS)
+    assert [p.name for p in (small_disk / "data").iterdir()] == ["dataset.json"]
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    with pytest.raises(OutputError, match=r"cannot write .*other: Read-only"):
+        generate("arena", small_disk / "other", **SETTINGS)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"episodes": 0}, "episodes must be 1"),
+        ({"jobs": 0}, "--jobs must be 1"),
+        ({"dynamism_sweep": "0:1:0"}, "step > 0"),
+        ({"dynamism_sweep": "0:1"}, "start:stop:step"),
+        ({"dynamism_sweep": "0:2:0.5"}, "stop <= 1"),
+        ({"dynamism_sweep": "0:1:1e-9"}, "at most"),
+        ({"seed": -1}, "seed must be a whole number >= 0"),
+        ({"seconds": float("nan")}, "seconds must be > 0"),
+        ({"dynamism": 1.5}, "dynamism must lie in"),
+        ({"scanner": "lidar"}, "scanner must be one of"),
+    ],
+)
+def test_impossible_wishes_are_one_clear_line_and_leave_nothing(change, message, tmp_path):
+    with pytest.raises(InvalidValueError, match=message):
+        generate("arena", tmp_path / "data", **{**SETTINGS, **change})
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unknown_scene_or_cluster_is_refused(tmp_path):
+    with pytest.raises(MobiliaError, match="Did you mean 'arena'"):
+        generate("arenas", tmp_path / "a", **SETTINGS)
+    with pytest.raises(InvalidValueError, match="no Dask scheduler"):
+        generate("arena", tmp_path / "b", **SETTINGS, cluster="nowhere")
+
+
+def test_a_sweep_has_both_ends():
+    assert sweep("0:1:0.25") == (0.0, 0.25, 0.5, 0.75, 1.0)
+    assert sweep("0.1:0.35:0.1") == (0.1, 0.2, 0.3)
+
+
+def test_twins_share_path_and_odometry_and_differ_in_what_moves(tmp_path):
+    out = tmp_path / "data"
+    generate("arena", out, episodes=1, seconds=2.0, seed=2, dynamism=1.0, twins=True)
+    frames = {
+        name: list(read_bag(out / f"arena-d1-s0002-{name}"))
+        for name in ("dynamic", "semi_static", "static")
+    }
+    for a, b, c in zip(*frames.values(), strict=True):
+        assert a.odometry == b.odometry == c.odometry
+        assert np.array_equal(a.truth, b.truth)
+        assert np.array_equal(a.truth, c.truth)
+    moving = [
+        read_recipe(out / f"arena-d1-s0002-{name}" / RECIPE).result["returns"]["moving"]
+        for name in ("dynamic", "static")
+    ]
+    assert moving[0] > moving[1] == 0
+    assert regenerate(out / "arena-d1-s0002-static").verdict == "same bytes"
+
+
+def test_exports_are_read_back(serial, tmp_path):
+    episode, frames = serial / NAMES[0], list(read_bag(serial / NAMES[0], labels=True))
+    export(episode, "tum", tmp_path / "a.tum")
+    poses = read_tum(tmp_path / "a_truth.tum").poses
+    np.testing.assert_allclose(poses, [f.truth for f in frames], atol=1e-9)
+    odometry = read_tum(tmp_path / "a.tum").poses
+    np.testing.assert_allclose(odometry, [f.odometry.T_odom_robot for f in frames], atol=1e-9)
+    export(episode, "carmen", tmp_path / "a.log.gz")
+    back = list(read_carmen(tmp_path / "a.log.gz"))
+    for ours, theirs in zip(frames, back, strict=True):
+        assert ours.stamp_ns == theirs.stamp_ns
+        assert np.array_equal(ours.scan.ranges, theirs.scan.ranges, equal_nan=True)
+        assert np.array_equal(ours.odometry.T_odom_robot, theirs.odometry.T_odom_robot)
+        assert np.array_equal(ours.truth, theirs.truth)
+    export(episode, "npz", tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as arrays:
+        assert np.array_equal(arrays["ranges"][3], frames[3].scan.ranges, equal_nan=True)
+        assert np.array_equal(arrays["label_kind"][3], frames[3].labels.kind)
+        assert np.array_equal(arrays["T_world_robot"][-1], frames[-1].truth)
+    with pytest.raises(InvalidValueError, match="--to must be one of"):
+        export(episode, "minari", tmp_path / "a.h5")
+    with pytest.raises(LogFormatError, match="no such file"):
+        export(tmp_path / "none.mcap", "tum", None)
+
+
+def kill_in_mid_episode(worker: subprocess.Popen[bytes], out: Path) -> None:
+    wait_for(lambda: list(out.glob(f".*.{worker.pid}.part/*/*.mcap")))
+    worker.kill()
+
+
+def test_a_dask_cluster_that_loses_a_worker_makes_the_same_bytes(serial, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    told = tmp_path / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+
+    def start(part: str, *options: object) -> subprocess.Popen[bytes]:
+        words = [sys.executable, "-m", f"distributed.cli.dask_{part}", "--scheduler-file", told]
+        words += ["--host", "127.0.0.1", "--no-dashboard", *options]
+        return subprocess.Popen([str(w) for w in words], cwd=REPO, env=environment(), **quiet)
+
+    worker = ("--nthreads", 1, "--no-nanny", "--local-directory", tmp_path)
+    parts = [start("scheduler", "--port", 0), start("worker", *worker), start("worker", *worker)]
+    out = tmp_path / "data"
+    try:
+        wait_for(lambda: told.exists() and told.read_text().endswith("}"))
+        address = json.loads(told.read_text())["address"]
+        with distributed.Client(address) as client:
+            client.wait_for_workers(2, timeout=60)
+        killer = threading.Thread(target=kill_in_mid_episode, args=(parts[1], out))
+        killer.start()
+        generate("arena", out, **SETTINGS, cluster=address)
+        killer.join()
+        assert parts[1].poll() == -signal.SIGKILL
+    finally:
+        for part in reversed(parts):
+            part.terminate()
+            part.wait(timeout=20)
+    assert (out / SUMS).read_bytes() == (serial / SUMS).read_bytes()

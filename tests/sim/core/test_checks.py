@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values of the wrong type are refused by name, wherever a user sets one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from sim.actors.robot import DriveConfig
+from sim.core.dynamism import Dynamism
+from sim.driving.drive import TourConfig
+from sim.gym.env import MobiliaEnv
+from sim.sensors.lidar.effects import RangeEffects
+from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.odometry.config import OdometryConfig
+from sim.sensors.tag_cameras import TagCameraConfig
+from sim.simulation import Simulation, stream
+from slam.errors import InvalidValueError
+
+
+@pytest.mark.parametrize(
+    ("config", "field", "value"),
+    [
+        (Lms221Config, "noise_std_m", "much"),
+        (Lms221Config, "range_mode", ["8m"]),
+        (Lms221Config, "quantise", "yes"),
+        (Lms221Config, "effects", {"glass": False}),
+        (Lms221Config, "fov_deg", 180.5),
+        (RangeEffects, "glass", 1),
+        (RangeEffects, "dropout_rate", None),
+        (Dynamism, "door_rate", "often"),
+        (Dynamism, "moving_share", True),
+        (OdometryConfig, "scale_std", "0.1"),
+        (DriveConfig, "accel", None),
+        (TourConfig, "v_max_mps", [0.5]),
+        (TagCameraConfig, "rate_hz", "30"),
+    ],
+)
+def test_a_field_of_the_wrong_type_is_named(
+    config: Callable[..., object], field: str, value: object
+) -> None:
+    with pytest.raises(InvalidValueError, match=rf"\.{field} must be"):
+        config(**{field: value})
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"laser": {"fov_deg": 100}}, "laser must be a Lms221Config"),
+        ({"drive": {"accel": 2.0}}, "drive must be a DriveConfig"),
+        ({"odometry": 3}, "odometry must be a OdometryConfig"),
+        ({"start": (0.0, 0.0)}, "start must be"),
+        ({"start": "here"}, "start must be"),
+        ({"scene": None}, "scene must be a Scene"),
+    ],
+)
+def test_a_simulation_names_what_it_cannot_take(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidValueError, match=message):
+        Simulation(**{"scene": "arena", **settings})
+
+
+def test_times_states_and_actions_are_checked() -> None:
+    with pytest.raises(InvalidValueError, match="seconds must be"):
+        stream("arena", seconds="ten")  # type: ignore[arg-type]
+    with pytest.raises(InvalidValueError, match="no saved world"):
+        Simulation("arena", n_chairs=0).load_state(None)  # type: ignore[arg-type]
+    env = MobiliaEnv("arena", laser=Lms221Config.ideal())
+    env.reset(seed=0)
+    for action in ("go", (0.1, 0.2, 0.3), None):
+        with pytest.raises(InvalidValueError, match="an action is two numbers"):
+            env.step(action)  # type: ignore[arg-type]

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Saved worlds are data: sizes and types are checked before anything is made of them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from sim.core import state
+from slam.errors import InvalidValueError
+
+MAGIC = b"mobilia-world-1\n"
+
+
+def block(arrays, body: bytes = bytes(64), length: int | None = None) -> bytes:
+    header = json.dumps({"words": {}, "arrays": arrays}).encode()
+    claimed = len(header) if length is None else length
+    return MAGIC + claimed.to_bytes(8, "little") + header + body
+
+
+def test_round_trip():
+    arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.zeros((0, 3)), "c": np.array(True)}
+    back, words = state.unpack(state.pack(arrays, {"n": 3}))
+    assert words == {"n": 3}
+    for name, array in arrays.items():
+        np.testing.assert_array_equal(back[name], array)
+
+
+@pytest.mark.parametrize(
+    ("damaged", "match"),
+    [
+        (block({"a": ["<f8", [10**12]]}), "does not fit 64 bytes"),
+        (block({"a": ["<f8", [-8]]}), "does not fit"),
+        (block({"a": ["<f8", [-1, -8]]}), "does not fit"),
+        (block({"a": ["<f8", [2**33, 2**33]]}), "does not fit"),
+        (block({"a": ["<f8", [1.0]]}), "does not fit"),
+        (block({"a": ["<f8", [1] * 30]}), "does not fit"),
+        (block({"a": ["O", [8]]}), "which is no number's"),
+        (block({"a": ["V0", [10**9]]}), "which is no number's"),
+        (block({"a": ["(9,)f8", [1]]}), "which is no number's"),
+        (block({"a": [["f8"], [8]]}), "which is no number's"),
+        (block({"a": ["<f8", [4]]}), "32 bytes too many"),
+        (block({"a": 5}), "damaged"),
+        (block([1]), "damaged"),
+        (block({}, b"", length=2**62), "a header of 4611686018427387904 bytes"),
+        (MAGIC + (90_000).to_bytes(8, "little") + b"[" * 90_000, "damaged"),
+        (MAGIC, "does not start with its mark"),
+    ],
+)
+def test_what_was_never_saved_is_refused(damaged, match):
+    with pytest.raises(InvalidValueError, match=match):
+        state.unpack(damaged)

@@ -1,0 +1,296 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The contract of the Gymnasium environments, checked as registered ones."""
+
+from __future__ import annotations
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env, data_equivalence
+
+import sim  # noqa: F401  (registers the environments)
+from sim.gym.env import MobiliaEnv
+from sim.view import gl
+from slam.errors import InvalidValueError, MobiliaError
+
+IDS = ("mobilia/Arena-v1", "mobilia/Office-v1")
+
+
+def make(id_: str, **settings):
+    return gymnasium.make(id_, disable_env_checker=True, **settings).unwrapped
+
+
+@pytest.mark.parametrize("id_", IDS)
+def test_the_checker_finds_nothing_to_say(id_):
+    # warnings are errors in this suite, and the env has a spec, so reset determinism is checked too
+    check_env(make(id_, render_mode="map"), skip_render_check=gl.find().backend is None)
+
+
+def test_it_can_be_made_without_importing_sim_first():
+    env = gymnasium.make("sim:mobilia/Arena-v1", disable_env_checker=True)
+    observation, _ = env.reset(seed=0)
+    assert env.observation_space.contains(observation)
+
+
+def rollout(seed: int, steps: int = 12):
+    env = make("mobilia/Arena-v1")
+    seen = [env.reset(seed=seed)[0]]
+    for k in range(steps):
+        seen.append(env.step(np.array([0.5, math.sin(0.3 * k)], np.float32))[0])
+    return seen
+
+
+def test_the_seed_and_only_the_seed_decides_a_run():
+    same, again, other = rollout(3), rollout(3), rollout(4)
+    assert data_equivalence(same, again, exact=True)
+    assert not np.array_equal(same[-1]["ranges"], other[-1]["ranges"])
+
+
+def test_no_return_is_range_max_and_invalid_and_an_inf_in_the_frame():
+    env = make("mobilia/Office-v1")
+    observation, info = env.reset(seed=0)
+    scan = info["frame"].scan
+    np.testing.assert_array_equal(observation["valid"].astype(bool), scan.valid)
+    assert (observation["ranges"][observation["valid"] == 0] == scan.spec.range_max).all()
+    valid = observation["valid"] == 1
+    np.testing.assert_array_equal(observation["ranges"][valid], scan.ranges[valid])
+
+
+def test_truth_is_in_info_only():
+    env = make("mobilia/Arena-v1")
+    observation, info = env.reset(seed=0)
+    assert set(observation) == {"ranges", "valid", "encoders", "time"}
+    assert {"pose", "frame", "beam_time", "contacts", "movers"} <= set(info)
+    assert info["beam_time"].shape == (361,)
+    assert info["beam_time"].max() - info["beam_time"].min() == pytest.approx(
+        1.0 / 75.0 + 179.5 / 360.0 / 75.0, abs=1e-9
+    )  # the last half-degree beam of the second turn
+
+
+def test_reward_is_the_progress_towards_the_goal_and_the_goal_ends_the_episode():
+    env = make("mobilia/Arena-v1", dynamism=0.0)
+    _, info = env.reset(seed=1, options={"scene": {"n_chairs": 0}})
+    x, y, theta = info["pose"]
+    goal = (x + 1.2 * math.cos(theta), y + 1.2 * math.sin(theta))
+    _, info = env.reset(seed=1, options={"goal": goal, "scene": {"n_chairs": 0}})
+    start, total, terminated = info["goal_distance"], 0.0, False
+    for _ in range(120):
+        _, reward, terminated, truncated, info = env.step(np.array([1.0, 0.0], np.float32))
+        total += reward
+        if terminated:
+            break
+    assert terminated
+    assert not truncated
+    assert total == pytest.approx(start - info["goal_distance"], abs=1e-9)
+    assert info["goal_distance"] < 0.4
+
+
+def test_without_a_goal_the_reward_is_zero_and_time_truncates():
+    env = make("mobilia/Arena-v1", time_limit_s=0.2)
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(2, np.float32))[1:4] for _ in range(8)]
+    assert all(reward == 0.0 and not terminated for reward, terminated, _ in ends)
+    assert ends[-1][2] is True
+    assert ends[0][2] is False
+
+
+def test_a_hard_collision_ends_the_episode_only_when_asked():
+    def crash(**settings):
+        env = make("mobilia/Arena-v1", dynamism=0.0, time_limit_s=30.0, **settings)
+        env.reset(seed=2, options={"scene": {"n_chairs": 0}})
+        for _ in range(700):
+            _, _, terminated, _, info = env.step(np.array([1.0, 0.0], np.float32))
+            if info["hard_collision"]:
+                return terminated
+        pytest.fail("it never reached a wall")
+
+    assert crash(terminate_on_collision=True) is True
+    assert crash() is False
+
+
+def test_the_map_is_a_picture_and_needs_no_gl():
+    env = make("mobilia/Office-v1", render_mode="map", render_size=(320, 240))
+    env.reset(seed=0)
+    picture = env.render()
+    assert picture.shape == (240, 320, 3)
+    assert picture.dtype == np.uint8
+    assert picture.std() > 10.0
+    env.close()
+
+
+@pytest.mark.skipif(gl.find().backend is None, reason="NO OpenGL HERE: 3D pictures not tested")
+def test_the_cameras_see_a_room():
+    for view in ("top", "follow", "persp"):
+        env = make("mobilia/Arena-v1", render_mode="rgb_array", view=view, render_size=(160, 120))
+        env.reset(seed=0)
+        picture = env.render()
+        env.close()
+        assert picture.shape == (120, 160, 3)
+        assert picture.std() > 10.0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"gaol": (1, 2)}, "unknown reset option 'gaol'"),
+        ({"goal": (1, 2, 3)}, "option goal must be"),
+        ({"goal": (math.nan, 0)}, "option goal must be finite"),
+        ({"dynamism": 2.0}, "dynamism must lie in"),
+        ({"seeds": {"chiars": 1}}, "Did you mean 'chairs'"),
+        ({"scene": {"n_chairs": -1}}, "n_chairs"),
+        ({"scene": {"dynamism": 0.1}}, "'dynamism' is none of them"),
+        ({"scene": {"seed": 3}}, "'seed' is none of them"),
+        ({"scene": "office"}, "option scene must be a dictionary"),
+        ({"seeds": 5}, "option seeds must be a dictionary"),
+        ({"n_people": -1}, "n_people"),
+        ({"rates": {"door_rat": 1.0}}, "door_rat"),
+        ({"moving_share": 3.0}, "moving_share"),
+        ({"resolution_deg": 0.3}, "resolution_deg"),
+        ({"laser": "best"}, "option laser"),
+        ({"start": (0.0, 0.0)}, "option start must be"),
+        ({"start": (99.0, 0.0, 0.0)}, "free floor"),
+    ],
+)
+def test_wrong_options_are_refused_by_name(options, message):
+    env = make("mobilia/Arena-v1")
+    with pytest.raises(MobiliaError, match=message):
+        env.reset(seed=0, options=options)
+
+
+def test_an_episode_can_have_its_own_counts_rates_laser_and_start():
+    env = make("mobilia/Arena-v1")
+    start = (1.2, 1.1, 0.7)
+    observation, info = env.reset(
+        seed=3,
+        options={
+            "n_chairs": 2,
+            "rates": {"chair_push_rate": 0.3},
+            "moving_share": 1.0,
+            "resolution_deg": 1.0,
+            "noise_std_m": 0.0,
+            "start": start,
+        },
+    )
+    world = env.simulation.world
+    np.testing.assert_allclose(info["pose"], start, atol=1e-6)
+    assert [m.kind.partition("_")[0] for m in world.scene.movers] == ["chair", "chair", "robot"]
+    assert (world.rates.chair_push_rate, world.rates.moving_share) == (0.3, 1.0)
+    assert env.simulation.laser.config.noise_std_m == 0.0
+    assert observation["ranges"].shape == (181,)
+    assert env.observation_space.contains(observation)
+    observation, _ = env.reset(seed=3)
+    assert observation["ranges"].shape == (361,)
+    assert env.observation_space.contains(observation)
+
+
+def test_a_start_on_a_chair_is_refused():
+    env = make("mobilia/Arena-v1")
+    layout = {"seeds": {"layout": 1}}
+    _, info = env.reset(seed=0, options=layout)
+    with pytest.raises(InvalidValueError, match="taken by chair0"):
+        env.reset(seed=0, options={"start": info["movers"]["chair0"], **layout})
+
+
+def test_wrong_settings_are_refused():
+    with pytest.raises(InvalidValueError, match="render_mode"):
+        MobiliaEnv("arena", render_mode="human3000")
+    with pytest.raises(InvalidValueError, match="time_limit_s"):
+        make("mobilia/Arena-v1", time_limit_s=0.0)
+
+
+ODD_ACTIONS = [
+    np.array([np.nan, 0.0]),
+    np.array([0.0, np.inf]),
+    np.array([-np.inf, 0.0]),
+    np.zeros(3),
+    np.zeros((1, 2)),
+    0.5,
+    None,
+    "go",
+    ["0.1", "0.2"],
+    [None, 1.0],
+    [True, False],
+    [1j, 0.0],
+    [[0.0], [0.0, 1.0]],
+]
+
+
+@pytest.mark.parametrize("action", ODD_ACTIONS, ids=repr)
+def test_what_is_no_action_is_refused_and_nothing_moves(action):
+    env = MobiliaEnv("arena")
+    env.reset(seed=0, options={"n_chairs": 0})
+    before = env.simulation.world.time_ns
+    with pytest.raises(InvalidValueError, match="two finite numbers"):
+        env.step(action)
+    assert env.simulation.world.time_ns == before
+
+
+def test_finite_actions_beyond_the_space_are_clipped():
+    def after(action) -> dict:
+        env = MobiliaEnv("arena")
+        env.reset(seed=0, options={"n_chairs": 0})
+        return env.step(action)[0]
+
+    assert data_equivalence(after([1e30, -7]), after(np.array([1.0, -1.0], np.float32)), exact=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"options": 5}, "reset options must be a dictionary or None, got 5"),
+        ({"options": {3: 1}}, "words as keys"),
+        ({"options": {"goal": (1e9, 0.0)}}, "option goal must lie within 10000 m"),
+        ({"options": {"goal": "ab"}}, "option goal must be"),
+        ({"seed": -1}, "seed must be a whole number >= 0"),
+        ({"seed": "a"}, "seed must be a whole number"),
+        ({"seed": 3.5}, "seed must be a whole number"),
+        ({"seed": True}, "seed must be a whole number"),
+    ],
+)
+def test_an_odd_reset_is_refused_and_the_episode_goes_on(arguments, message):
+    env = MobiliaEnv("arena")
+    env.reset(seed=0, options={"n_chairs": 0})
+    with pytest.raises(InvalidValueError, match=message):
+        env.reset(**arguments)
+    env.step(np.zeros(2))
+
+
+def test_numpy_s_and_huge_seeds_are_seeds():
+    env = MobiliaEnv("arena")
+    same = [env.reset(seed=s, options={"n_chairs": 1})[0] for s in (7, np.int64(7), np.uint8(7))]
+    assert data_equivalence(same[0], same[1], exact=True)
+    assert data_equivalence(same[0], same[2], exact=True)
+    env.reset(seed=2**70, options={"n_chairs": 1})
+
+
+def test_a_step_before_the_first_reset_is_an_error_of_ours_and_of_gymnasium():
+    with pytest.raises(MobiliaError, match="reset") as caught:
+        MobiliaEnv("arena").step(np.zeros(2))
+    assert isinstance(caught.value, gymnasium.error.ResetNeeded)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"time_limit_s": [1]},
+        {"time_limit_s": math.nan},
+        {"terminate_on_collision": "no"},
+        {"labels": 1},
+        {"laser": 5},
+        {"laser": np.zeros(2)},
+        {"scene": None},
+        {"odometry": 3},
+        {"render_mode": np.zeros(2)},
+        {"view": "x"},
+        {"render_size": (0, 5)},
+        {"render_size": (10**6, 5)},
+        {"render_size": 5},
+    ],
+    ids=repr,
+)
+def test_odd_arguments_are_refused_by_name(settings):
+    (name,) = settings
+    with pytest.raises(InvalidValueError, match=name):
+        MobiliaEnv(**({"scene": "arena"} | settings))

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages per mirror turn as the ROS driver makes them; the serial link's printed losses."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from sim.sensors.lidar.config import Lms221Config
+from sim.sensors.lidar.link import SerialLink, partial_scans
+from sim.simulation import stream
+from slam.errors import InvalidValueError
+from slam.frames import Scan
+
+
+def link(baud: int, resolution: float, fov: int = 180) -> SerialLink:
+    return SerialLink(baud=baud, config=Lms221Config(resolution_deg=resolution, fov_deg=fov))
+
+
+@pytest.mark.parametrize(
+    ("baud", "quarter", "half", "whole"),
+    # TL table 10-17, best case; 19.2 kBd inferred.
+    [(9_600, 16, 29, 30), (19_200, 8, 15, 15), (38_400, 4, 8, 8), (500_000, 0, 0, 0)],
+)
+def test_lost_scans_are_those_of_the_telegram_listing(
+    baud: int, quarter: int, half: int, whole: int
+) -> None:
+    assert link(baud, 0.25, 100).lost_scans == quarter
+    assert link(baud, 0.5).lost_scans == half
+    assert link(baud, 1.0).lost_scans == whole
+
+
+def test_rates_and_ages_at_arrival() -> None:
+    """Design note, fidelity 1.7: 3.8, 4.2, 8.3 Hz; 26.6, 53.3, 106 ms at 500 kBd.
+
+    The note's 79.9 ms for 0.25 degrees is printed with 52.28 + 26.64; four turns are 53.3.
+    """
+    rates = [link(38_400, r, f).rate_hz for r, f in ((0.25, 100), (0.5, 180), (1.0, 180))]
+    assert rates == pytest.approx([3.75, 4.17, 8.33], abs=0.02)
+    assert link(500_000, 1.0).latency_ns == pytest.approx(26.67e6, abs=0.1e6)
+    assert link(500_000, 0.5).latency_ns == pytest.approx(53.33e6, abs=0.1e6)
+    quarter = link(500_000, 0.25, 100)
+    oldest = quarter.latency_ns + quarter.config.stamp_offset_ns
+    assert oldest == pytest.approx(80.0e6, abs=0.2e6)
+    assert link(38_400, 0.5).latency_ns == pytest.approx((26.67 + 190.6) * 1e6, abs=0.1e6)
+
+
+def test_every_ninth_scan_is_sent_at_38400_baud() -> None:
+    slow, fast = link(38_400, 0.5), link(500_000, 0.5)
+    assert [k for k in range(30) if slow.sends(k)] == [0, 9, 18, 27]
+    assert all(fast.sends(k) for k in range(30))
+
+
+def test_a_slow_line_loses_scans_but_no_odometry() -> None:
+    settings = {"seed": 3, "seconds": 1.0, "n_chairs": 2, "dynamism": 0.0}
+    whole, slow = stream("arena", **settings), stream("arena", baud=38_400, **settings)
+    every, sent = list(whole), list(slow)
+    assert len(sent) == slow.length == 5
+    assert slow.metadata.extra["link"]["baud"] == 38_400
+    assert slow.metadata.extra["link"]["latency_ns"] == link(38_400, 0.5).latency_ns
+    for k, frame in enumerate(sent):
+        same = every[9 * k]
+        assert frame.stamp_ns == same.stamp_ns
+        np.testing.assert_array_equal(frame.scan.ranges, same.scan.ranges)
+        np.testing.assert_array_equal(frame.odometry.T_odom_robot, same.odometry.T_odom_robot)
+        parts = [f.odometry.increment_covariance for f in every[max(9 * k - 8, 0) : 9 * k + 1]]
+        np.testing.assert_array_equal(frame.odometry.increment_covariance, np.sum(parts, axis=0))
+    with pytest.raises(InvalidValueError, match=r"SerialLink\.baud"):
+        stream("arena", baud=300, **settings)
+
+
+def test_what_the_device_cannot_send_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match=r"SerialLink\.baud must be one of 9600"):
+        link(115_200, 0.5)
+    with pytest.raises(InvalidValueError, match="turn by turn"):
+        link(38_400, 0.25)
+    assert link(500_000, 0.25).telegram_bytes == 362
+
+
+@pytest.mark.parametrize("resolution", [0.5, 0.25])
+def test_each_mirror_turn_is_a_message_of_one_degree_steps(resolution: float) -> None:
+    config = Lms221Config(resolution_deg=resolution)
+    spec = config.spec(np.array([0.1, 0.0, 0.0]))
+    ranges = np.linspace(1.0, 9.0, spec.n_beams).astype(np.float32)
+    scan = Scan(stamp_ns=7_000_000, ranges=ranges, spec=spec)
+    parts = partial_scans(scan, config)
+    assert [p.spec.n_beams for p in parts] == [181, *[180] * (config.turns - 1)]
+    for k, part in enumerate(parts):
+        assert math.degrees(part.spec.angle_increment) == pytest.approx(1.0)
+        assert math.degrees(part.spec.angle_min) == pytest.approx(-90.0 + k * resolution)
+        np.testing.assert_array_equal(part.ranges, ranges[k :: config.turns])
+        np.testing.assert_allclose(part.spec.angles, spec.angles[k :: config.turns], atol=1e-12)
+        at = part.stamp_ns + part.spec.beam_time_offsets * 1e9
+        want = scan.stamp_ns + spec.beam_time_offsets[k :: config.turns] * 1e9
+        np.testing.assert_allclose(at, want, atol=2.0)
+        np.testing.assert_array_equal(part.spec.T_robot_laser, spec.T_robot_laser)
+    assert all(b.stamp_ns > a.stamp_ns for a, b in itertools.pairwise(parts))
+
+
+def test_whole_turns_and_narrow_scans_stay_whole() -> None:
+    for config in (Lms221Config(resolution_deg=1.0), Lms221Config(fov_deg=100)):
+        spec = config.spec()
+        scan = Scan(stamp_ns=0, ranges=np.ones(spec.n_beams, np.float32), spec=spec)
+        assert partial_scans(scan, config) == [scan]
+    with pytest.raises(InvalidValueError, match="expected 361"):
+        partial_scans(scan, Lms221Config())

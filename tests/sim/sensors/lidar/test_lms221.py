@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The LMS-221 against its data sheet, and its timing against closed forms."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sim.sensors.lidar.lms221 import Lms221, Lms221Config, ScanResult
+from slam.errors import InvalidValueError
+
+TURN = 1.0 / 75.0
+
+
+def scan(
+    room: SimpleNamespace,
+    config: Lms221Config,
+    *,
+    seed: int = 0,
+    twist: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    world: str | None = None,
+) -> tuple[ScanResult, Lms221]:
+    model, data = room.build(room.SQUARE if world is None else world)
+    lidar = Lms221(model, config, np.random.default_rng(seed))
+    return lidar.observe(room.stepper(model, data, twist), data), lidar
+
+
+@pytest.mark.parametrize(
+    ("resolution", "fov", "beams", "rate"),
+    [  # TD p10, TL p19, p47-48
+        (1.0, 180, 181, 75.0),
+        (0.5, 180, 361, 37.5),
+        (0.25, 180, 721, 18.75),
+        (1.0, 100, 101, 75.0),
+        (0.5, 100, 201, 37.5),
+        (0.25, 100, 401, 18.75),
+    ],
+)
+def test_beams_and_rates_are_those_of_the_data_sheet(
+    resolution: float, fov: int, beams: int, rate: float
+) -> None:
+    config = Lms221Config(resolution_deg=resolution, fov_deg=fov)
+    spec = config.spec()
+    assert spec.n_beams == beams
+    assert 300.0 / config.steps == pytest.approx(rate)
+    assert math.degrees(spec.angle_min) == pytest.approx(-fov / 2)
+    assert math.degrees(spec.angles[-1]) == pytest.approx(fov / 2)
+    assert spec.beam_time_offsets[0] == 0.0
+    assert spec.sweep_duration <= config.sweep_steps / 300.0 + 1e-9
+
+
+def test_half_degree_beams_come_from_the_second_turn() -> None:
+    offsets = Lms221Config(resolution_deg=0.5).spec().beam_time_offsets
+    whole, half = offsets[0::2], offsets[1::2]
+    np.testing.assert_allclose(whole, np.arange(181) / 360 * TURN, atol=1e-9)
+    np.testing.assert_allclose(half, TURN + (np.arange(180) + 0.5) / 360 * TURN, atol=1e-9)
+    per_degree = np.diff(whole)
+    np.testing.assert_allclose(per_degree, 37.0e-6, atol=0.1e-6)
+
+
+def test_quarter_degree_scans_are_four_turns_of_181_and_three_times_180_beams() -> None:
+    config = Lms221Config(resolution_deg=0.25)
+    degrees, turn = config.beams
+    assert np.bincount(turn).tolist() == [181, 180, 180, 180]
+    for k, start in enumerate((0.0, 0.25, 0.5, 0.75)):
+        np.testing.assert_allclose(degrees[turn == k][0], start)
+    times = config.spec().beam_time_offsets
+    np.testing.assert_allclose(times, (turn + degrees / 360.0) * TURN, atol=1e-9)
+
+
+def test_the_stamp_of_a_100_degree_scan_is_40_degrees_of_mirror_after_the_turn_begins() -> None:
+    assert Lms221Config(fov_deg=180).stamp_offset_ns == 0
+    assert Lms221Config(fov_deg=100).stamp_offset_ns == round(40 / 360 / 75 * 1e9)
+
+
+@pytest.mark.parametrize("resolution", [1.0, 0.5, 0.25])
+@pytest.mark.parametrize("fov", [180, 100])
+def test_a_moving_robot_smears_the_wall_as_computed(
+    room: SimpleNamespace, resolution: float, fov: int
+) -> None:
+    config = Lms221Config.ideal(resolution_deg=resolution, fov_deg=fov)
+    speed, omega = 0.8, 1.2
+    result, lidar = scan(room, config, twist=(speed, 0.0, omega))
+    time = lidar.spec.beam_time_offsets + config.stamp_offset_ns * 1e-9
+    heading = omega * time
+    bearing = heading + lidar.spec.angles
+    ahead = np.abs(bearing) < math.radians(40.0)
+    want = (4.0 - speed * time - 0.02 * np.cos(heading)) / np.cos(bearing)
+    np.testing.assert_allclose(result.true_ranges[ahead], want[ahead], atol=2e-6)
+    still, _ = scan(room, config)
+    assert np.abs(result.true_ranges - still.true_ranges)[ahead].max() > 0.004
+
+
+def test_the_mounting_and_the_incidence_are_those_of_the_model(room: SimpleNamespace) -> None:
+    result, lidar = scan(room, Lms221Config.ideal())
+    np.testing.assert_allclose(lidar.spec.T_robot_laser, (0.02, 0.0, 0.0), atol=1e-12)
+    ahead = np.abs(lidar.spec.angles) < math.radians(40.0)
+    np.testing.assert_allclose(result.incidence[ahead], np.abs(lidar.spec.angles[ahead]), atol=1e-6)
+    assert set(result.bodies.tolist()) == {0}
+
+
+def test_noise_has_the_deviation_of_the_data_sheet(room: SimpleNamespace) -> None:
+    """TD p34: 10 mm, one sigma, in millimetre mode; here of what is sent, rounding included."""
+    for mode in ("32m", "80m"):
+        model, data = room.build()
+        lidar = Lms221(model, Lms221Config.noise_only(range_mode=mode), np.random.default_rng(1))
+        advance = room.stepper(model, data)
+        errors = []
+        for _ in range(60):
+            result = lidar.observe(advance, data)
+            errors.append(result.ranges - result.true_ranges)
+        pooled = np.concatenate(errors)
+        assert pooled.std() == pytest.approx(0.010, rel=0.03)
+        assert abs(pooled.mean()) < 0.0004
+
+
+@pytest.mark.parametrize(("mode", "unit"), [("8m", 0.001), ("32m", 0.001), ("80m", 0.01)])
+def test_ranges_lie_on_the_grid_of_the_mode(room: SimpleNamespace, mode: str, unit: float) -> None:
+    result, _ = scan(room, Lms221Config.noise_only(range_mode=mode))
+    codes = result.ranges.astype(np.float64) / unit
+    np.testing.assert_allclose(codes, np.rint(codes), atol=1e-3)
+    assert len(np.unique(result.ranges)) > 20
+
+
+def test_nothing_and_too_far_are_no_return(room: SimpleNamespace) -> None:
+    """A wall at 12 m is beyond the 8 m mode, within the 16 m mode; behind it there is nothing."""
+    far = room.wall(12.1, 0.0, 0.1, 1.0)
+    for mode, seen in (("8m", False), ("16m", True), ("80m", True)):
+        result, lidar = scan(room, Lms221Config.noise_only(range_mode=mode), world=far)
+        assert np.isfinite(result.ranges[180]) == seen
+        assert result.ranges[0] == np.inf
+        assert result.geoms[0] == -1
+        assert result.bodies[0] == -1
+        assert np.isnan(result.incidence[0])
+        assert math.isfinite(result.true_ranges[180])
+        assert np.nanmax(result.ranges[np.isfinite(result.ranges)], initial=0.0) <= (
+            lidar.spec.range_max
+        )
+
+
+def test_a_scan_never_reaches_beyond_80_m(room: SimpleNamespace) -> None:
+    world = room.wall(79.0, 0.0, 0.1, 3.0) + room.wall(0.0, 90.0, 50.0, 0.1)
+    result, lidar = scan(room, Lms221Config.ideal(), world=world)
+    assert result.ranges[180] == pytest.approx(78.88)
+    assert result.true_ranges[-1] == pytest.approx(89.9)
+    assert result.ranges[-1] == np.inf
+    assert lidar.spec.range_max == 80.0
+
+
+def test_draws_do_not_depend_on_what_is_hit(room: SimpleNamespace) -> None:
+    states = []
+    for world in (room.SQUARE, "", room.wall(2.0, 0.0, 0.1, 0.1)):
+        model, data = room.build(world)
+        lidar = Lms221(model, Lms221Config(), np.random.default_rng(9))
+        lidar.observe(room.stepper(model, data), data)
+        states.append([stream.bit_generator.state for stream in lidar.streams])
+    assert states[0] == states[1] == states[2]
+
+
+def test_the_seed_and_only_the_seed_decides_the_noise(room: SimpleNamespace) -> None:
+    same, again, other = (scan(room, Lms221Config(), seed=s)[0].ranges for s in (7, 7, 8))
+    assert same.tobytes() == again.tobytes()
+    assert same.tobytes() != other.tobytes()
+
+
+def test_a_scan_takes_its_mirror_turns_in_physics_steps(room: SimpleNamespace) -> None:
+    for resolution, steps in ((1.0, 4), (0.5, 8), (0.25, 16)):
+        model, data = room.build()
+        lidar = Lms221(model, Lms221Config.ideal(resolution_deg=resolution))
+        lidar.observe(room.stepper(model, data), data)
+        assert data.time == pytest.approx(steps / 300.0)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("resolution_deg", 0.3),
+        ("fov_deg", 90),
+        ("range_mode", "50m"),
+        ("noise_std_m", -0.01),
+        ("noise_std_m", math.nan),
+    ],
+)
+def test_what_the_device_cannot_do_is_refused(field: str, value: object) -> None:
+    with pytest.raises(InvalidValueError, match=f"Lms221Config.{field}"):
+        Lms221Config(**{field: value})  # type: ignore[arg-type]
+
+
+def test_a_model_with_another_timestep_or_without_the_site_is_refused(
+    room: SimpleNamespace,
+) -> None:
+    model, _ = room.build()
+    with pytest.raises(InvalidValueError, match="no site 'roof'"):
+        Lms221(model, site="roof")
+    model.opt.timestep = 0.002
+    with pytest.raises(InvalidValueError, match="expected 1/300 s"):
+        Lms221(model)

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""3-D pictures, where the machine can make them, and one clear line where it cannot."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+import scenes
+from sim.view import gl
+from sim.view.camera import Camera, soften
+from slam.errors import InvalidValueError, MissingDependencyError
+
+
+@pytest.fixture(scope="module")
+def world():
+    scene = scenes.build("arena", 0, n_chairs=4)
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    scene.place(model, data)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+@pytest.fixture(scope="module")
+def _needs_gl():
+    found = gl.find()
+    if found.backend is None:
+        pytest.skip(f"3-D pictures are NOT tested: {found.reason}")
+
+
+@pytest.mark.usefixtures("_needs_gl")
+@pytest.mark.parametrize("shadows", [False, True])
+def test_each_camera_makes_a_picture_of_its_own(world, shadows):
+    model, data = world
+    quality = model.vis.quality.shadowsize, model.vis.quality.numslices
+    casting = model.geom_castshadow.copy()
+    with Camera(model, 160, 90, shadows=shadows, samples=0) as camera:
+        top, follow, persp = (camera.render(data, name) for name in ("top", "follow", "persp"))
+    for picture in (top, follow, persp):
+        assert picture.shape == (90, 160, 3)
+        assert picture.dtype == np.uint8
+        assert picture.std() > 5.0
+    assert np.abs(top.astype(int) - follow).mean() > 5.0
+    assert np.abs(top.astype(int) - persp).mean() > 5.0
+    assert (model.vis.quality.shadowsize, model.vis.quality.numslices) == quality
+    np.testing.assert_array_equal(model.geom_castshadow, casting)
+
+
+@pytest.mark.usefixtures("_needs_gl")
+def test_shadows_darken_the_floor_and_are_the_only_difference(world):
+    model, data = world
+    pictures = []
+    for shadows in (False, True):
+        with Camera(model, 640, 360, shadows=shadows) as camera:
+            pictures.append(camera.render(data, "top").astype(int).sum(axis=2))
+    change = pictures[1] - pictures[0]
+    assert 0.02 < (change < -60).mean() < 0.5
+    assert (change > 60).mean() < 0.02
+
+
+def test_only_edges_are_softened():
+    picture = np.full((40, 40, 3), 100, np.uint8)
+    picture[:, 20:] = 110  # no edge
+    picture[20:] = 200
+    soft = soften(picture.copy())
+    np.testing.assert_array_equal(soft[:18], picture[:18])
+    np.testing.assert_array_equal(soft[22:], picture[22:])
+    assert (picture[19, 5] < soft[19, 5]).all()
+    assert (soft[20, 5] < picture[20, 5]).all()
+
+
+@pytest.mark.usefixtures("_needs_gl")
+def test_hulls_are_hidden_and_frames_are_copies(world):
+    model, data = world
+    with Camera(model, 160, 90, samples=0) as camera:
+        first = camera.render(data, "top")
+        kept = first.copy()
+        model.geom_rgba[:, 3][model.geom_group == 3] = 1.0
+        again = camera.render(data, "top")
+        camera.render(data, "persp")
+    np.testing.assert_array_equal(first, kept)
+    np.testing.assert_array_equal(again, first)
+
+
+@pytest.mark.usefixtures("_needs_gl")
+def test_a_camera_says_what_is_wrong(world):
+    model, data = world
+    camera = Camera(model, 32, 32, samples=0)
+    with camera, pytest.raises(InvalidValueError, match="top"):
+        camera.render(data, "nowhere")
+    camera.close()
+    with pytest.raises(InvalidValueError, match="closed"):
+        camera.render(data, "top")
+    with pytest.raises(InvalidValueError, match="width"):
+        Camera(model, 0, 32)
+
+
+def test_without_gl_a_camera_gives_the_reason(world, monkeypatch):
+    monkeypatch.setattr(gl, "find", lambda: gl.Gl(backend=None, reason="egl: no library"))
+    with pytest.raises(MissingDependencyError, match="egl: no library"):
+        Camera(world[0], 32, 32)
+
+
+def test_find_asks_each_library_in_a_subprocess_and_joins_the_reasons(monkeypatch):
+    asked = []
+
+    def fail(program, backend):
+        asked.append(backend)
+        return "no library"
+
+    monkeypatch.setattr(gl, "_try", fail)
+    monkeypatch.setattr(gl, "_candidates", lambda: ("egl", "osmesa"))
+    found = gl.find.__wrapped__()
+    assert found.backend is None
+    assert asked == ["egl", "osmesa"]
+    assert "egl: no library; osmesa: no library" in found.reason
+
+
+def test_a_clean_environment_is_left_alone(monkeypatch):
+    monkeypatch.delenv(gl.VARIABLE, raising=False)
+    monkeypatch.setattr(gl, "_try", lambda *_: pytest.fail("nothing should be run"))
+    assert gl.sanitise_environment() is None
+
+
+@pytest.mark.parametrize("value", ["nonsense", "cgl"])
+def test_a_bad_mujoco_gl_does_not_kill_the_program(value):
+    """In a fresh process: the import dies without the repair, and lives with it."""
+    program = "{}import mujoco; print(note)"
+    repair = "from sim import gl; note = gl.sanitise_environment(); "
+    environment = {**os.environ, gl.VARIABLE: value}
+    environment.pop("PYOPENGL_PLATFORM", None)
+    plain, repaired = (
+        subprocess.run(
+            [sys.executable, "-c", program.format(start)],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        for start in ("note = ''; ", repair)
+    )
+    assert plain.returncode != 0
+    assert repaired.returncode == 0, repaired.stderr
+    assert f"{gl.VARIABLE}={value} is ignored" in repaired.stdout
+    assert len(repaired.stdout.splitlines()) == 1
+
+
+def test_the_probe_itself_imports_no_mujoco():
+    program = "import sys, sim.view.gl; print('mujoco' in sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert run.stdout.strip() == "False"
+
+
+@pytest.mark.usefixtures("_needs_gl")
+def test_the_camera_closes_without_a_word(world):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for _ in range(3):
+            with Camera(world[0], 32, 32, samples=0) as camera:
+                assert camera.render(world[1], "top").shape == (32, 32, 3)

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sections 3.1 and 3.2 on real updates: energy, fixed points, times, the four characteristics."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from slam.frontend.visibility import View
+from slam.shunting.config import ShuntingConfig
+from slam.shunting.map.energy import energy
+from slam.shunting.map.grid import FREE_COUNT, SIDE, TOUCHED_COUNT
+from slam.shunting.map.network import Network
+
+Array = NDArray[np.float64]
+CELL, ACROSS = 0.1, 2  # blocks along an edge of the test fields
+COUNT = ACROSS * SIDE
+OPEN = View(math.tau / 8, np.full(8, 50.0), np.zeros(8), 50.0, 0.0, math.inf)
+BLIND = View(math.tau / 8, np.zeros(8), np.zeros(8), 50.0, 0.0, math.inf)
+ASIDE = np.array([-5.0, -5.0, 0.0])
+
+
+def started(config: ShuntingConfig, x: Array) -> Network:
+    """A network whose (COUNT, COUNT) neurons begin at activities ``x``."""
+    network = Network(config)
+    network.cover(0.0, 0.0, COUNT * CELL, COUNT * CELL)
+    cells = network.cells
+    for row in range(ACROSS):
+        for column in range(ACROSS):
+            cells.counts[FREE_COUNT] -= 1
+            slot = int(cells.free[cells.counts[FREE_COUNT]])
+            cells.directory[row - cells.corner[1], column - cells.corner[0]] = slot
+            cells.x[slot] = x[row * SIDE :, column * SIDE :][:SIDE, :SIDE]
+    return network
+
+
+def inspired(network: Network, field: Array, step: float, view: View = OPEN) -> Array:
+    """One update with input I = ``field``; the activities after it."""
+    cells = network.cells
+    for row in range(ACROSS):
+        for column in range(ACROSS):
+            k = row * ACROSS + column
+            slot = int(cells.directory[row - cells.corner[1], column - cells.corner[0]])
+            if slot < 0:
+                continue
+            count = int(cells.counts[TOUCHED_COUNT])
+            cells.scratch_of[slot] = count
+            cells.touched[count] = slot, column, row, 0
+            cells.impression[count] = field[row * SIDE :, column * SIDE :][:SIDE, :SIDE]
+            cells.counts[TOUCHED_COUNT] = count + 1
+            assert count <= k
+    network.integrate(view, ASIDE, step, write=True)
+    return activities(network)
+
+
+def activities(network: Network) -> Array:
+    edge = (COUNT - 0.5) * CELL
+    return network.window(0.5 * CELL, 0.5 * CELL, edge, edge)[0].astype(np.float64)
+
+
+def plain(**changes: float) -> ShuntingConfig:
+    """Short-term memory alone."""
+    return ShuntingConfig(cell_m=CELL, trace_s=0.0, short_term_weight=1.0, **changes)  # type: ignore[arg-type]
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    decay=st.floats(0.05, 5.0),
+    share=st.floats(0.0, 0.95),
+    reach=st.sampled_from([1.5, 2.5]),
+    step=st.sampled_from([0.0267, 0.2, 1.0, 30.0]),
+    seen=st.floats(0.0, 1.0),
+    all_in_view=st.booleans(),
+)
+def test_energy_never_rises_along_updates(
+    seed: int, decay: float, share: float, reach: float, step: float, seen: float, all_in_view: bool
+) -> None:
+    """V of Eq. (10), for any fixed input, start, weights and time step, hidden neurons or not."""
+    rng = np.random.default_rng(seed)
+    config = plain(decay_per_s=decay, lateral_sum=share * decay, lateral_reach_cells=reach)
+    x = rng.uniform(0.0, 0.95, (COUNT, COUNT))
+    field = rng.uniform(0.0, 1.0, (COUNT, COUNT)) * (rng.random((COUNT, COUNT)) < seen)
+    network = started(config, x)
+    view = OPEN if all_in_view else BLIND
+
+    def value() -> float:
+        return energy(
+            activities(network), field.astype(np.float32), decay=decay,
+            threshold=config.threshold, mu=network.mu, reach=reach,
+        )  # fmt: skip
+
+    energies = [value()]
+    for _ in range(8):
+        inspired(network, field, step, view)
+        energies.append(value())
+    scale = COUNT * COUNT * max(1.0, decay)
+    assert np.diff(energies).max() <= 1e-7 * scale  # activities are stored in 32 bits
+
+
+def test_sweeps_settle_where_every_neuron_is_at_its_own_equilibrium() -> None:
+    """Whatever the order and the step: x = E / (A + E) with E = I + sum of w d(x), everywhere."""
+    rng = np.random.default_rng(5)
+    config = plain(lateral_sum=0.5, lateral_reach_cells=2.5)
+    field = rng.uniform(0.05, 1.0, (COUNT, COUNT))
+    settled = []
+    for step, start in ((0.5, 0.0), (5.0, 0.9)):
+        network = started(config, np.full((COUNT, COUNT), start))
+        for _ in range(200):
+            x = inspired(network, field, step)
+        settled.append(x)
+    np.testing.assert_allclose(settled[0], settled[1], atol=2e-6)
+    x = settled[0]
+    d = np.pad(np.maximum(x - config.threshold, 0.0), 2)
+    E = field.copy()
+    for dj in range(-2, 3):
+        for di in range(-2, 3):
+            distance = math.hypot(di, dj)
+            if 0.0 < distance < 2.5:
+                E += network.mu / distance * d[2 + dj :, 2 + di :][:COUNT, :COUNT]
+    np.testing.assert_allclose(x, E / (0.8 + E), atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("strength", "expected"), [(1.0, 0.556), (0.5, 0.385), (0.2, 0.2), (0.1, 0.111), (0.05, 0.059)]
+)
+def test_equilibrium_and_rise_of_every_strength(strength: float, expected: float) -> None:
+    """x* = I / (A + I), reached with the rate A + I."""
+    network = started(plain(), np.zeros((COUNT, COUNT)))
+    field = np.full((COUNT, COUNT), strength)
+    step = 0.005
+    looks = round(1.0 / (0.8 + strength) / step)  # one time constant
+    for _ in range(looks):
+        x = inspired(network, field, step)
+    assert x[3, 3] == pytest.approx(expected * (1.0 - math.exp(-1.0)), rel=0.01)
+    for _ in range(9 * looks):
+        x = inspired(network, field, step)
+    assert x[3, 3] == pytest.approx(expected, abs=6e-4)
+
+
+def test_half_of_what_is_seen_empty_is_forgotten_in_ln_2_over_A() -> None:
+    network = started(plain(), np.full((COUNT, COUNT), 0.5))
+    step = 0.005
+    for _ in range(round(math.log(2.0) / 0.8 / step)):
+        x = inspired(network, np.zeros((COUNT, COUNT)), step)
+    np.testing.assert_allclose(x, 0.25, rtol=0.003)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    share=st.floats(0.0, 0.9),
+    step=st.sampled_from([0.0267, 0.2, 3.0]),
+)
+def test_a_higher_existence_probability_never_gives_a_lower_activity(
+    seed: int, share: float, step: float
+) -> None:
+    """Characteristic 1: monotone in the input, whatever came before and beside."""
+    rng = np.random.default_rng(seed)
+    config = plain(lateral_sum=share * 0.8)
+    start = rng.uniform(0.02, 0.9, (COUNT, COUNT))
+    low, high = started(config, start), started(config, start)
+    for _ in range(6):
+        less = rng.uniform(0.02, 1.0, (COUNT, COUNT))
+        more = less + (1.0 - less) * rng.uniform(0.0, 1.0, (COUNT, COUNT))
+        x, y = inspired(low, less, step), inspired(high, more, step)
+        assert (y >= x - 1e-6).all()
+
+
+def test_what_is_static_grows_and_what_moved_fades() -> None:
+    """Characteristics 2 and 3: confidence rises look by look; gone, it falls look by look."""
+    network = started(plain(), np.zeros((COUNT, COUNT)))
+    thing = np.zeros((COUNT, COUNT))
+    thing[4:7, 0:3] = 0.9
+    rising = [inspired(network, thing, 0.1)[5, 1] for _ in range(20)]
+    assert (np.diff(rising) > 0.0).all()
+    moved = np.roll(thing, 4, axis=1)
+    steps = [inspired(network, moved, 0.1) for _ in range(60)]
+    left, now = [x[5, 1] for x in steps], [x[5, 5] for x in steps]
+    assert (np.diff(left)[: np.flatnonzero(np.array(left) > 0.0)[-1]] < 0.0).all()
+    assert left[-1] == 0.0
+    assert (np.diff(now) > 0.0).all()
+
+
+def test_confidence_rises_when_a_loop_closes() -> None:
+    """Characteristic 4: seen briefly, out of sight for long, seen again: more sure than ever."""
+    config = ShuntingConfig(cell_m=CELL)
+    network = started(config, np.zeros((COUNT, COUNT)))
+    field = np.full((COUNT, COUNT), 0.8)
+    for _ in range(5):
+        inspired(network, field, 0.1)
+    first = [a.copy() for a in network.window(0.5 * CELL, 0.5 * CELL, 1.0, 1.0)]
+    nothing = np.zeros((COUNT, COUNT))
+    for _ in range(100):
+        inspired(network, nothing, 0.1, BLIND)
+    away = network.window(0.5 * CELL, 0.5 * CELL, 1.0, 1.0)
+    for before, after in zip(first, away, strict=True):
+        np.testing.assert_array_equal(after, before)
+    inspired(network, field, 0.1)
+    for before, after in zip(first, network.window(0.5 * CELL, 0.5 * CELL, 1.0, 1.0), strict=True):
+        assert (after > before).all()
+
+
+def test_the_weight_from_i_to_j_is_that_from_j_to_i() -> None:
+    """What one active neuron does to another is what the other would do to it."""
+    config = plain(lateral_sum=0.6, lateral_reach_cells=2.5, threshold=2e-3)
+
+    def felt(source: tuple[int, int], target: tuple[int, int]) -> float:
+        x, field = np.zeros((COUNT, COUNT)), np.zeros((COUNT, COUNT))
+        x[source], field[target] = 0.8, 1e-3
+        return float(inspired(started(config, x), field, 1.0, BLIND)[target])
+
+    for i, j in (((5, 5), (5, 6)), ((5, 5), (6, 6)), ((7, 7), (8, 9)), ((3, 8), (3, 7))):
+        assert felt(i, j) == felt(j, i)
+        assert felt(i, j) > config.threshold
+    assert felt((5, 5), (5, 8)) == 0.0  # out of reach, and too faint by itself

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a scan costs does not depend on what lies elsewhere, and what is silent costs nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scripts.benches.slam import enlarge
+from slam import se2
+from slam.frontend.observations import from_scan
+from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.shunting.map.grid import FREE_COUNT, TOUCHED_COUNT, living
+from slam.shunting.map.network import Network
+from slam.shunting.map.rasterise import stamp
+from slam.shunting.matching.branch_and_bound import Search
+from slam.shunting.matching.local_search import SearchWindow
+from slam.shunting.matching.matcher import Matcher
+from tests.world2d import World2D, arena, frames, laser, office, office_loop, wander
+
+CONFIG = ShuntingConfig(cell_m=0.05)
+STREAM = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(181), seed=3)[:60]
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    slam = ShuntingSlam(CONFIG)
+    for frame in STREAM[:40]:
+        slam.update(frame.without_truth())
+    path = tmp_path_factory.mktemp("map") / "map.npz"
+    slam.save(path)
+    return path
+
+
+def test_neurons_touched_and_candidates_scored_stay_while_the_map_grows_100_fold(
+    saved: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    visited: list[int] = []
+    whole = Network.integrate
+
+    def counted(self, *args, **options):  # type: ignore[no-untyped-def]
+        result = whole(self, *args, **options)
+        visited.append(result[2] + int(self.cells.counts[TOUCHED_COUNT]))
+        return result
+
+    monkeypatch.setattr(Network, "integrate", counted)
+    costs, blocks = [], []
+    for times in (1, 100):
+        slam = ShuntingSlam.load(saved)
+        enlarge(slam.network, times)
+        blocks.append(len(living(slam.network.cells)[0]))
+        visited.clear()
+        candidates = []
+        for frame in STREAM[40:]:
+            pose = slam.update(frame.without_truth()).T_map_robot
+            assert frame.scan is not None
+            observations = from_scan(frame.scan, np.zeros(3), CONFIG)
+            window = SearchWindow(reach_m=0.4, turn_rad=0.2)
+            match = Matcher(CONFIG).search(
+                slam.network, observations, pose, np.diag([1e2, 1e2, 1e2]), window
+            )
+            candidates.append(match.evaluations)
+        costs.append((sum(visited), sum(candidates)))
+    assert blocks[1] == 100 * blocks[0]
+    assert costs[0][0] > 10_000
+    for small, large in zip(costs[0], costs[1], strict=True):
+        assert large == pytest.approx(small, rel=0.2)
+
+
+def test_a_live_neuron_costs_few_bytes() -> None:
+    """All arrays counted. 39 in the furnished office of ``mobilia bench``; here walls are bare."""
+    slam = ShuntingSlam()
+    for frame in frames(World2D(office()), office_loop(), rate_hz=1.0, spec=laser(), seed=3):
+        slam.update(frame.without_truth())
+    assert slam.network.bytes_per_neuron() <= 46.0
+
+
+def test_blocks_of_impressions_that_are_forgotten_die() -> None:
+    """A look from a wrong pose that is taken back leaves neither blocks nor slots behind."""
+    slam = ShuntingSlam(CONFIG)
+    for frame in STREAM[:5]:
+        slam.update(frame.without_truth())
+    network = slam.network
+    directory, unused = network.cells.directory.copy(), int(network.cells.counts[FREE_COUNT])
+    assert STREAM[0].scan is not None
+    observations = from_scan(STREAM[0].scan, np.zeros(3), CONFIG)
+    slots = len(network.cells.free)
+    for k in range(20):
+        stamp(network, observations, np.array([30.0 + k, 0.3 * k, 0.1 * k]))
+        network.release()
+    _, places = living(network.cells)
+    assert len(places) == (directory >= 0).sum()
+    born = len(network.cells.free) - slots
+    assert int(network.cells.counts[FREE_COUNT]) == unused + born
+    assert len(np.unique(network.cells.free[: unused + born])) == unused + born
+    assert network.cells.counts[TOUCHED_COUNT] == 0
+
+
+def test_every_slot_is_either_free_or_lives_once() -> None:
+    """Whatever comes and goes, no slot is lost and none is given twice."""
+    rng = np.random.default_rng(2)
+    network = Network(ShuntingConfig(cell_m=0.05, trace_s=0.0))
+    for _ in range(60):
+        frame = STREAM[int(rng.integers(len(STREAM)))]
+        assert frame.scan is not None
+        observations = from_scan(frame.scan, np.zeros(3), CONFIG)
+        pose = rng.uniform([-6.0, -6.0, -3.0], [6.0, 6.0, 3.0])
+        stamp(network, observations, pose)
+        T_map_laser = se2.compose(pose, observations.T_robot_laser)
+        network.integrate(observations.view, T_map_laser, 2.0, write=bool(rng.random() < 0.7))
+        network.release()
+        slots, _ = living(network.cells)
+        free = network.cells.free[: int(network.cells.counts[FREE_COUNT])]
+        together = np.sort(np.concatenate([slots, free]))
+        np.testing.assert_array_equal(together, np.arange(len(network.cells.free)))
+        assert (network.cells.x[slots] != 0.0).any(axis=(1, 2)).all()
+
+
+def test_the_whole_map_is_searched_alike_on_any_number_of_threads(
+    saved: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from slam.shunting.matching import branch_and_bound, global_search
+
+    slam = ShuntingSlam.load(saved)
+    assert STREAM[50].scan is not None
+    points = from_scan(STREAM[50].scan, np.zeros(3), CONFIG).points_robot
+    monkeypatch.setattr(branch_and_bound, "WORTH_THREADS", 0)
+    found = []
+    for threads in (1, 2, 4):
+        monkeypatch.setattr(global_search, "Search", lambda of, n=threads: Search(of, n))
+        found.append(global_search.places(slam.network, 0.3, points, 3))
+    for other in found[1:]:
+        np.testing.assert_array_equal(np.array(other), np.array(found[0]))
+    assert STREAM[50].truth is not None
+    assert STREAM[0].truth is not None
+    truth = se2.between(STREAM[0].truth, STREAM[50].truth)
+    assert min(np.abs(place[:2] - truth[:2]).max() for place in found[0]) < 0.15
