@@ -6,6 +6,7 @@ from slam import _numba  # noqa: F401  (before anything else imports Numba)
 
 # isort: on
 from slam import ekf as _ekf  # noqa: F401  (registers itself)
+from slam import grid as _grid  # noqa: F401
 from slam import guests as _guests  # noqa: F401
 from slam import odometry as _odometry  # noqa: F401
 from slam import shunting as _shunting  # noqa: F401

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,6 @@ from slam.frames import Features, Float, Frame, Scan
 from slam.frontend.seen_space import FREE_WITHOUT_RETURN_M
 from slam.frontend.surfaces import face, join, unveiled
 from slam.frontend.visibility import View, view_of_beams, view_of_features
-from slam.shunting.config import ShuntingConfig
 
 SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
 SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
@@ -26,6 +26,22 @@ NEAR_JOIN_CELLS = 3.0
 MOST_SWEPT_M = 50.0  # during one sweep; beyond, the beams of a scan belong to no one place
 MOST_STD_M = 3.0  # of a feature; one known worse says nothing, and fills the map in saying it
 SPACING_M, LEAST_WEIGHT = 0.1, 0.3  # beams closer than this share one observation's weight
+
+
+class Grain(Protocol):
+    """How finely a map takes observations in, and from how far.
+
+    cell_m   edge of a cell, m: the least spread of an observation follows from it
+    range_m  returns beyond are ignored, m
+    """
+
+    @property
+    def cell_m(self) -> float:
+        """As above."""
+
+    @property
+    def range_m(self) -> float:
+        """As above."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,7 +120,7 @@ def _deskew(
     return count
 
 
-def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
+def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     """Beams, moved to where the robot was at the scan's stamp.
 
     ``twist`` is the body velocity (vx, vy, omega) over the sweep. Raises ``InvalidValueError``
@@ -120,7 +136,7 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
     n = spec.n_beams
     points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
     beams = np.empty(n, np.int64)
-    use = min(config.range_m, spec.range_max)
+    use = min(grain.range_m, spec.range_max)
     count = _deskew(
         scan.ranges,
         spec.angles,
@@ -142,7 +158,7 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
         in_order = np.argsort(beams)
         points, beams = points.take(in_order, axis=0), beams[in_order]
     onward, tangents = np.zeros(count, np.bool_), np.zeros((count, 2))
-    near = NEAR_JOIN_CELLS * config.cell_m
+    near = NEAR_JOIN_CELLS * grain.cell_m
     join(points, beams, spec.T_robot_laser, near, onward, tangents)
     clear = np.zeros(count, np.bool_)
     if unveiled(points, beams, spec.T_robot_laser, onward, clear) < count:
@@ -151,13 +167,13 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
         tangents = tangents.take(kept, axis=0)
     facings = np.zeros(len(points), np.uint8)
     face(points, spec.T_robot_laser, onward, facings)
-    variance = max(SIGMA_CELLS * config.cell_m, SENSOR_SIGMA_M) ** 2
+    variance = max(SIGMA_CELLS * grain.cell_m, SENSOR_SIGMA_M) ** 2
     covariances = np.zeros((len(points), 3))
     covariances[:, 0] = covariances[:, 2] = variance
     x, y = points[:, 0], points[:, 1]
     shares = np.sqrt(x * x + y * y) * spec.angle_increment / SPACING_M
     weights = np.minimum(np.maximum(shares, LEAST_WEIGHT), 1.0)
-    view = view_of_beams(bearings, free, spec.angle_increment, config.cell_m)
+    view = view_of_beams(bearings, free, spec.angle_increment, grain.cell_m)
     return Observations(
         points_robot=points,
         covariances=covariances,
@@ -170,17 +186,17 @@ def from_scan(scan: Scan, twist: Float, config: ShuntingConfig) -> Observations:
     )
 
 
-def from_features(features: Features, config: ShuntingConfig) -> Observations:
+def from_features(features: Features, grain: Grain) -> Observations:
     """Point features within range; their covariance widened to what the lattice can carry.
 
     Those with a standard deviation beyond ``MOST_STD_M`` are left out.
     """
     points = features.points_robot
-    near = (points * points).sum(axis=1) <= config.range_m**2
+    near = (points * points).sum(axis=1) <= grain.range_m**2
     near &= (
         features.covariances.diagonal(axis1=1, axis2=2).max(axis=1, initial=0.0) <= MOST_STD_M**2
     )
-    floor = (SIGMA_CELLS * config.cell_m) ** 2
+    floor = (SIGMA_CELLS * grain.cell_m) ** 2
     given = features.covariances[near]
     covariances = np.stack([given[:, 0, 0] + floor, given[:, 0, 1], given[:, 1, 1] + floor], axis=1)
     return Observations(
@@ -190,12 +206,12 @@ def from_features(features: Features, config: ShuntingConfig) -> Observations:
         tangents=np.zeros((len(covariances), 2)),
         joined=np.zeros(len(covariances), np.bool_),
         facings=np.zeros(len(covariances), np.uint8),
-        view=view_of_features(points[near], config.cell_m),
+        view=view_of_features(points[near], grain.cell_m),
         T_robot_laser=np.zeros(3),
     )
 
 
-def observe(frame: Frame, twist: Float, config: ShuntingConfig) -> Observations:
+def observe(frame: Frame, twist: Float, grain: Grain) -> Observations:
     """What a frame shows to a robot that moves with ``twist``: beams, features or both.
 
     Raises ``InvalidValueError`` for a frame with neither.
@@ -203,11 +219,11 @@ def observe(frame: Frame, twist: Float, config: ShuntingConfig) -> Observations:
     if frame.scan is None and frame.features is None:
         raise InvalidValueError("the shunting SLAM needs a scan or features in every frame")
     if frame.scan is None:
-        return from_features(frame.features, config)  # type: ignore[arg-type]
-    beams = from_scan(frame.scan, twist, config)
+        return from_features(frame.features, grain)  # type: ignore[arg-type]
+    beams = from_scan(frame.scan, twist, grain)
     if frame.features is None:
         return beams
-    return joined(beams, from_features(frame.features, config))
+    return joined(beams, from_features(frame.features, grain))
 
 
 def joined(first: Observations, second: Observations) -> Observations:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
@@ -19,11 +20,19 @@ from slam.frames import Float, Frame, LaserSpec, Odometry
 from slam.frontend import odometry_steps
 from slam.frontend.observations import from_scan
 from slam.frontend.odometry_prior import Prediction, predict
-from slam.shunting.config import ShuntingConfig
 from slam.system import Estimate, Raster, told
 from slam.trajectory import Trajectory
 
-_BEAMS = ShuntingConfig()  # guests get the very points that "shunting" sees
+
+@dataclass(frozen=True)
+class _Grain:
+    """Guests get the very points that "shunting" sees with its defaults."""
+
+    cell_m: float = 0.03
+    range_m: float = 40.0
+
+
+_GRAIN = _Grain()
 
 
 def needed(module: str, package: str) -> ModuleType:

@@ -26,7 +26,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
-from slam.ekf.config import EkfConfig
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame
 from slam.frontend.corners import corners
@@ -53,7 +52,8 @@ LEAST_M2 = 1e-6  # variance of a feature, at least
 # takes two thirds of what their overlap says of the pose. 2 to 5 does as well.
 PAPER_REWARD = 3.0
 PRESETS = {"robust": ShuntingConfig.robust, "paper": ShuntingConfig.paper}
-GATES, CORNER_GATES = Gates(), EkfConfig.corners().gates  # as the EKF takes points, and corners
+GATES = Gates()  # of points
+CORNER_GATES = Gates(individual=0.999, joint=0.99, posterior=0.95)  # the tuned EKF's on corners
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)

@@ -60,8 +60,8 @@ def test_another_world_is_another_version():
     found = digest()
     assert WORLD in DIGESTS, f"world {WORLD} is new: its digest is {found}"
     assert found == DIGESTS[WORLD], (
-        f"the same seeds give another world: raise WORLD in sim/core/versions.py, say in CHANGES what "
-        f"became of world {WORLD}, and add the new digest {found} here"
+        f"the same seeds give another world: raise WORLD in sim/core/versions.py, say in CHANGES "
+        f"what became of world {WORLD}, and add the new digest {found} here"
     )
     assert sorted(versions.CHANGES) == list(range(WORLD + 1))
     assert len(set(DIGESTS.values())) == len(DIGESTS)
