@@ -13,6 +13,7 @@ from sim.driving.drive import TourConfig
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation, n_frames
 from slam.frames import Float, Frame
+from slam.frontend.odometry_sum import MotionSum
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,13 +50,8 @@ def thinned(moments: Iterable[Moment], every: int) -> Iterator[Moment]:
 
     None, where the odometry stated none: zero would say that it is exact.
     """
-    spread: Float | None = None
+    motion = MotionSum()
     for k, moment in enumerate(moments):
-        odometry = moment.frame.odometry
-        stated = odometry.increment_covariance
-        if stated is not None:
-            spread = stated if spread is None else spread + stated
+        motion.add(moment.frame.odometry)
         if k % every == 0:
-            odometry = replace(odometry, increment_covariance=spread)
-            yield replace(moment, frame=replace(moment.frame, odometry=odometry))
-            spread = None
+            yield replace(moment, frame=motion.passed_on(moment.frame))

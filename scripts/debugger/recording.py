@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from slam import se2
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 from slam.evaluation.divergence import errors_since_m
 from slam.frames import Float, Frame
+from slam.frontend.odometry_sum import MotionSum
 from slam.replay import Track
 from slam.system import create
 
@@ -135,7 +136,7 @@ class _Ear:
 
     def __init__(self, simulation: Simulation, strip: Strip, track: Track, every: int) -> None:
         self._simulation, self._strip, self._track = simulation, strip, track
-        self._every, self._spread = every, np.zeros((3, 3))
+        self._every, self._motion = every, MotionSum()
 
     def scan(self, number: int, command: tuple[float, float]) -> None:
         """Let the time of scan ``number`` pass under a command."""
@@ -143,18 +144,13 @@ class _Ear:
         world.set_command(*command)
         poses = world.mover_poses()
         frame = self._simulation.observe()
-        if frame.odometry.increment_covariance is not None:
-            self._spread = self._spread + frame.odometry.increment_covariance
+        self._motion.add(frame.odometry)
         if number % self._every or frame.labels is None:
             return
         bodies = frame.labels.body
         seen = world.bodies.mover_of_body[bodies[bodies >= 0]]
         beams = np.bincount(seen[seen >= 0], minlength=len(poses))
-        if self._every > 1:
-            odometry = replace(frame.odometry, increment_covariance=self._spread)
-            frame = replace(frame, odometry=odometry)
-        self._strip.take(frame, poses, beams, self._track)
-        self._spread = np.zeros((3, 3))
+        self._strip.take(self._motion.passed_on(frame), poses, beams, self._track)
 
 
 class Checkpoint:

@@ -26,7 +26,8 @@ from sim.simulation import Simulation, n_frames, tour
 from slam import create
 from slam.evaluation import metrics
 from slam.files import write_text
-from slam.frames import Frame, Odometry
+from slam.frames import Frame
+from slam.frontend.odometry_sum import MotionSum
 from slam.replay import Track
 from slam.trajectory import Trajectory
 
@@ -109,20 +110,11 @@ class Score:
 
 def thinned(frames: list[Frame], stride: int) -> list[Frame]:
     """Every ``stride``-th frame, with the covariance of all the motion in between."""
-    out = []
-    for k in range(0, len(frames), stride):
-        frame, odometry = frames[k], frames[k].odometry
-        parts = [f.odometry.increment_covariance for f in frames[max(k - stride + 1, 0) : k + 1]]
-        given = [part for part in parts if part is not None]
-        whole = Odometry(
-            stamp_ns=odometry.stamp_ns,
-            T_odom_robot=odometry.T_odom_robot,
-            increment_covariance=np.sum(given, axis=0) if given else None,
-            twist=odometry.twist,
-        )
-        out.append(
-            Frame(stamp_ns=frame.stamp_ns, odometry=whole, scan=frame.scan, truth=frame.truth)
-        )
+    out, motion = [], MotionSum()
+    for k, frame in enumerate(frames):
+        motion.add(frame.odometry)
+        if k % stride == 0:
+            out.append(replace(motion.passed_on(frame), labels=None))
     return out
 
 

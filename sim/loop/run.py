@@ -121,6 +121,7 @@ class _Ride:
         self._referee = Referee(self._world, config.near_m)
         self._failure: SlamFailedError | None = None
         self._rows: list[tuple[int, Float, Float, tuple[float, float], bool]] = []
+        self._motion = MotionSum()
         self._firsts: list[int] = []  # rows at which goals begin
         try:
             with judged():
@@ -178,15 +179,12 @@ class _Ride:
     def _frame(self, scans: int) -> tuple[Frame, Float]:
         """The last of so many scans, with the covariance of all the motion since the one before,
         without its truth; and its truth."""
-        covariance: Float = np.zeros((3, 3))
         for _ in range(scans):
             frame = self._simulation.observe()
             self._referee.watch(self._simulation.contacts)
-            if frame.odometry.increment_covariance is not None:
-                covariance = covariance + frame.odometry.increment_covariance
+            self._motion.add(frame.odometry)
         assert frame.truth is not None  # the simulator always knows
-        odometry = replace(frame.odometry, increment_covariance=covariance)
-        return replace(frame, odometry=odometry).without_truth(), frame.truth
+        return self._motion.passed_on(frame).without_truth(), frame.truth
 
     def result(self, goals: Sequence[GoalResult]) -> LoopRun:
         """All of it."""

@@ -16,14 +16,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
 from sim.sensors.lidar.config import TURNS_PER_S, Lms221Config
 from slam.errors import InvalidValueError
-from slam.frames import NS_PER_S, Float, Frame, LaserSpec, Scan
+from slam.frames import NS_PER_S, Frame, LaserSpec, Scan
+from slam.frontend.odometry_sum import MotionSum
 
 BITS_PER_BYTE = 10  # TL 4.1
 BYTES_PER_TURN = 508  # TL p22, at 500 kBd
@@ -101,14 +102,11 @@ def over_link(frames: Iterable[Frame], link: SerialLink) -> Iterator[Frame]:
     Odometry comes by a line of its own, so that none of it is lost: the covariance of an increment
     is that of all the motion since the last scan that was sent.
     """
-    since: list[Float] = []
+    motion = MotionSum()
     for index, frame in enumerate(frames):
-        part = frame.odometry.increment_covariance
-        since += [] if part is None else [part]
+        motion.add(frame.odometry)
         if link.sends(index):
-            whole = None if part is None else np.sum(since, axis=0)
-            yield replace(frame, odometry=replace(frame.odometry, increment_covariance=whole))
-            since = []
+            yield motion.passed_on(frame)
 
 
 def partial_spec(spec: LaserSpec, config: Lms221Config, turn: int) -> LaserSpec:

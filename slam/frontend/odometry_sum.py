@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Odometry over several scans of which one is used: the covariance of all the motion in between."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from slam.frames import Float, Frame, Odometry
+
+
+class MotionSum:
+    """Sums the increments' covariances between the frames that a listener gets.
+
+    Where a step states none, the whole states none: a missing part would read as exact. The first
+    step of a stream moves nothing, so it may state none.
+    """
+
+    def __init__(self) -> None:
+        self._sum: Float | None = None
+        self._unstated, self._begun = False, False
+
+    def add(self, odometry: Odometry) -> None:
+        """One more step."""
+        part = odometry.increment_covariance
+        if part is None:
+            self._unstated |= self._begun
+        else:
+            self._sum = part if self._sum is None else self._sum + part
+        self._begun = True
+
+    def passed_on(self, frame: Frame) -> Frame:
+        """``frame`` with the covariance (3, 3) of all the motion since the last one passed on."""
+        whole = None if self._unstated else self._sum
+        self._sum, self._unstated = None, False
+        return replace(frame, odometry=replace(frame.odometry, increment_covariance=whole))
