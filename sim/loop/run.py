@@ -19,6 +19,7 @@ from slam import se2
 from slam.errors import SlamFailedError, UnknownNameError
 from slam.evaluation import lost
 from slam.frames import NS_PER_S, Float, Frame
+from slam.frontend.odometry_sum import MotionSum
 from slam.replay import Track, judged
 from slam.system import SlamSystem
 

@@ -22,7 +22,7 @@ def moments(stated):
     ("stated", "kept"),
     [
         ([0.5, 1.0, 2.0, 4.0, 8.0], [0.5, 3.0, 12.0]),
-        ([None, 1.0, None, None, None], [None, 1.0, None]),
+        ([None, 1.0, 2.0, None, 4.0], [None, 3.0, None]),
         ([None] * 3, [None, None]),
     ],
 )
