@@ -64,6 +64,20 @@ class Landmarks:
         return np.column_stack([self.points_map, axes, angles])
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Pairs:
+    """``landmarks`` (k,) the landmark of each point or -1; ``plausible`` (k,) whether one is near
+    enough to explain it, taken or not."""
+
+    landmarks: NDArray[np.int64]
+    plausible: NDArray[np.bool_]
+
+    @property
+    def matched(self) -> int:
+        """Number of pairs."""
+        return int((self.landmarks >= 0).sum())
+
+
 @register("ekf")
 class EkfSlam:
     """EKF-SLAM on point landmarks: IPJC association, landmarks that are confirmed and deleted.
@@ -109,25 +123,24 @@ class EkfSlam:
         self._poses: list[Float] = []
 
     def update(self, frame: Frame) -> Estimate:
-        """Predict, associate with landmarks, then with candidates, judge all, add what is new."""
+        """One frame in six steps: from odometry and points to pose, covariance and landmarks."""
+        self._begin(frame)
+        points, covariances = self._observe(frame)  # 1 corners, or features as given
+        self._predict(frame.odometry)  # 2 odometry
+        confirmed = self.lifecycle.confirmed
+        pairs = self._correct(points, covariances, confirmed)  # 3 data association and update
+        expected = self._expected(frame, points)  # 4 what should have been seen
+        self._judge(pairs, expected, confirmed)  # 5 lost or not; landmarks that are deleted
+        self._add(points[~pairs.plausible], covariances[~pairs.plausible])  # 6 new candidates
+        return self._report(frame, pairs.matched, len(points))
+
+    def _begin(self, frame: Frame) -> None:
+        """Refuse a frame out of order; let the first one tell which preset is meant."""
         odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
         if not self._stamps and not self._told:
             name = "points" if frame.features is not None else "corners"
             self._configure(PRESETS[name](**self._options))
             self.lifecycle = Lifecycle(self.config)
-        points, covariances = self._observe(frame)
-        self._predict(frame.odometry)
-        confirmed = self.lifecycle.confirmed
-        landmarks = np.full(len(points), -1)
-        plausible = np.zeros(len(points), dtype=np.bool_)
-        for stage in (confirmed, ~confirmed):
-            self._associate(np.flatnonzero(stage), points, covariances, landmarks, plausible)
-        matched = int((landmarks >= 0).sum())
-        expected = self._expected(frame, points)
-        self._believe(matched, int((expected & confirmed).sum()))
-        self._forget(landmarks[landmarks >= 0], expected)
-        self._add(points[~plausible], covariances[~plausible])
-        return self._report(frame, matched, len(points))
 
     def _observe(self, frame: Frame) -> tuple[Float, Float]:
         features = frame.features
@@ -160,25 +173,23 @@ class EkfSlam:
             self.filter.predict(increment, covariance)
         self._before = odometry
 
-    def _associate(
-        self,
-        chosen: NDArray[np.int64],
-        points: Float,
-        covariances: Float,
-        landmarks: NDArray[np.int64],
-        plausible: NDArray[np.bool_],
-    ) -> None:
-        """Pair free points with the chosen landmarks and update; fills in the last two arrays."""
-        near = chosen[self._within_reach(chosen)]
-        free = np.flatnonzero(landmarks < 0)
-        if len(near) == 0 or len(free) == 0:
-            return
-        method = METHODS[self.config.association]
-        found = method(self.filter, near, points[free], covariances[free], self._gates)
-        landmarks[free] = found.landmarks
-        plausible[free] |= found.plausible
-        pairs = free[found.landmarks >= 0]
-        self.filter.update(landmarks[pairs], points[pairs], covariances[pairs])
+    def _correct(self, points: Float, covariances: Float, confirmed: NDArray[np.bool_]) -> _Pairs:
+        """Pair points with confirmed landmarks, then with candidates; update with each."""
+        landmarks = np.full(len(points), -1)
+        plausible = np.zeros(len(points), dtype=np.bool_)
+        for stage in (confirmed, ~confirmed):
+            chosen = np.flatnonzero(stage)
+            near = chosen[self._within_reach(chosen)]
+            free = np.flatnonzero(landmarks < 0)
+            if len(near) == 0 or len(free) == 0:
+                continue
+            method = METHODS[self.config.association]
+            found = method(self.filter, near, points[free], covariances[free], self._gates)
+            landmarks[free] = found.landmarks
+            plausible[free] |= found.plausible
+            pairs = free[found.landmarks >= 0]
+            self.filter.update(landmarks[pairs], points[pairs], covariances[pairs])
+        return _Pairs(landmarks=landmarks, plausible=plausible)
 
     def _within_reach(self, chosen: NDArray[np.int64]) -> NDArray[np.bool_]:
         """What could be seen if the pose is off by three standard deviations."""
@@ -200,13 +211,15 @@ class EkfSlam:
             return expected & unhidden_by_beams(landmarks_laser, frame.scan)
         return expected & unhidden_by_features(landmarks_robot, points, self.config)
 
-    def _believe(self, matched: int, expected: int) -> None:
-        if matched:
+    def _judge(
+        self, pairs: _Pairs, expected: NDArray[np.bool_], confirmed: NDArray[np.bool_]
+    ) -> None:
+        """Count frames in which nothing expected was met; delete what is gone or left behind."""
+        if pairs.matched:
             self._unmatched = 0
-        elif expected:
+        elif (expected & confirmed).any():
             self._unmatched += 1
-
-    def _forget(self, seen: NDArray[np.int64], expected: NDArray[np.bool_]) -> None:
+        seen = pairs.landmarks[pairs.landmarks >= 0]
         landmarks_robot = se2.transform(se2.inverse(self.filter.pose), self.filter.landmarks)
         left_behind = ~in_view(landmarks_robot, self.config, WITHOUT)
         gone = self.lifecycle.judge(seen, expected, left_behind)

@@ -76,7 +76,7 @@ class Guest(ABC):
             twist = np.zeros(3) if frame.odometry.twist is None else frame.odometry.twist
         else:
             twist = prediction.twist
-        points_robot = from_scan(frame.scan, np.asarray(twist), _BEAMS).points_robot
+        points_robot = from_scan(frame.scan, np.asarray(twist), _GRAIN).points_robot
         try:
             T_map_robot, diagnostics = self._locate(points_robot, prediction)
         except MobiliaError:

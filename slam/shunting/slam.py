@@ -81,35 +81,20 @@ class ShuntingSlam:
         return Network(self.config)
 
     def update(self, frame: Frame) -> Estimate:
-        """Predict, look, match, integrate.
+        """One frame in seven steps: from odometry and scan to pose, covariance and map.
 
         Not converged while frozen, lost, or blind: a scan without a single return.
         """
         if self._before is None and self._resumed is None:
             return self._first(frame)
         odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
-        prediction = self._predict(frame.odometry)
-        observations = observe(frame, prediction.twist, self.config)
-        if float(observations.weights.sum()) >= TELLING:
-            motion = prediction.T_map_robot - self._T_map_robot
-            prediction = replace(prediction, carried=self._belief.odometry_part(motion))
-        evidence = None
-        if self._recovery is None:
-            match = _near(self._match(observations, prediction), prediction)
-            if match.slipped:
-                prediction = replace(prediction, covariance=SLIPPED)
-            evidence = self._look(observations, match, prediction.elapsed)
-            state = self._integrate(observations, match, prediction.elapsed)
-        else:
-            match, state = self._recover(self._recovery, observations, prediction)
-        if state == "tracking" and len(observations.points_robot) == 0:
-            state = "blind"  # odometry alone
-        self._belief.update(self._T_map_robot, prediction, match, evidence)
-        if state == "tracking" and not match.slipped:
-            self._increments.learn(prediction, match)
-        else:
-            self._increments.skip()
-        self._keep(observations, match, prediction, state)
+        prediction = self._predict(frame.odometry)  # 1 odometry prior
+        observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
+        prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
+        evidence = self._compare(observations, match, prediction, state)  # 4 residuals
+        state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
+        self._update_uncertainty(prediction, match, evidence, state)  # 6 pose, odometry noise
+        self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
         return self._report(frame, match, state)
 
     def _first(self, frame: Frame) -> Estimate:
@@ -136,6 +121,25 @@ class ShuntingSlam:
             elapsed=RESUMED_LOOK_S,
         )
 
+    def _localise(
+        self, observations: Observations, prediction: Prediction
+    ) -> tuple[Prediction, Match, str]:
+        """The pose by scan matching, or by relocalisation where the robot was lost; the state.
+
+        The prior comes back wider where enough is in view to correct what odometry alone told of
+        the pose before, and after a slip.
+        """
+        if float(observations.weights.sum()) >= TELLING:
+            motion = prediction.T_map_robot - self._T_map_robot
+            prediction = replace(prediction, carried=self._belief.odometry_part(motion))
+        if self._recovery is not None:
+            match, state = self._recover(self._recovery, observations, prediction)
+            return prediction, match, state
+        match = _near(self._match(observations, prediction), prediction)
+        if match.slipped:
+            prediction = replace(prediction, covariance=SLIPPED)
+        return prediction, match, "tracking"
+
     def _match(self, observations: Observations, prediction: Prediction) -> Match:
         """Climb from the prediction; search around it when that is vague or finds too little."""
         predicted = prediction.T_map_robot
@@ -158,36 +162,6 @@ class ShuntingSlam:
         shoved = slipped(self.network, self._matcher, observations, prediction, usual)
         return match if shoved is None else shoved
 
-    def _look(self, observations: Observations, match: Match, elapsed: float) -> Evidence:
-        short_term = self._matcher.reward.short_term
-        step, turn = min(elapsed, LONGEST_LOOK_S), len(self._poses)
-        return look(self.network, short_term, observations, match.T_map_robot, step, turn)
-
-    def _integrate(self, observations: Observations, match: Match, elapsed: float) -> str:
-        """Let the network see the frame, unless the map in view contradicts it; the state."""
-        stamp(self.network, observations, match.T_map_robot)
-        T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
-        step = min(elapsed, LONGEST_LOOK_S)
-        doubt, doubtful = self._doubt, False
-        if float(observations.weights.sum()) >= TELLING and doubt.arises(match.matched):
-            confirmed, contradicted, _ = self.network.integrate(
-                observations.view, T_map_laser, step, write=False
-            )
-            motion = match.T_map_robot - self._T_map_robot
-            doubtful = doubt.denied(match.matched, confirmed, contradicted, motion)
-        doubt.count(doubtful)
-        if doubtful and doubt.scans <= PATIENCE:
-            self.network.release()
-            if doubt.scans >= LOST_AFTER and doubt.suspicious:
-                self._recovery = Recovery(self.network, self._matcher)
-            return "lost" if doubt.scans > LOST_AFTER else "frozen"
-        confirmed, contradicted, _ = self.network.integrate(
-            observations.view, T_map_laser, step, write=True
-        )
-        if not doubtful and len(observations.points_robot) > 0:
-            doubt.learn(match.matched, confirmed, contradicted, elapsed)
-        return "lost" if doubtful else "tracking"
-
     def _recover(
         self, recovery: Recovery, observations: Observations, prediction: Prediction
     ) -> tuple[Match, str]:
@@ -206,7 +180,57 @@ class ShuntingSlam:
             self._doubt.give_up()
         return unmatched(predicted, matched=here.matched, score=here.score), "lost"
 
-    def _keep(
+    def _compare(
+        self, observations: Observations, match: Match, prediction: Prediction, state: str
+    ) -> Evidence | None:
+        """What the observed surfaces say about the pose, before the map takes them in."""
+        if state != "tracking":
+            return None
+        short_term = self._matcher.reward.short_term
+        step, turn = min(prediction.elapsed, LONGEST_LOOK_S), len(self._poses)
+        return look(self.network, short_term, observations, match.T_map_robot, step, turn)
+
+    def _update_map(
+        self, observations: Observations, match: Match, prediction: Prediction, state: str
+    ) -> str:
+        """Let the network see the frame, unless the map in view contradicts it; the state."""
+        if state != "tracking":
+            return state
+        stamp(self.network, observations, match.T_map_robot)
+        T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
+        step = min(prediction.elapsed, LONGEST_LOOK_S)
+        doubt, doubtful = self._doubt, False
+        if float(observations.weights.sum()) >= TELLING and doubt.arises(match.matched):
+            confirmed, contradicted, _ = self.network.integrate(
+                observations.view, T_map_laser, step, write=False
+            )
+            motion = match.T_map_robot - self._T_map_robot
+            doubtful = doubt.denied(match.matched, confirmed, contradicted, motion)
+        doubt.count(doubtful)
+        if doubtful and doubt.scans <= PATIENCE:
+            self.network.release()
+            if doubt.scans >= LOST_AFTER and doubt.suspicious:
+                self._recovery = Recovery(self.network, self._matcher)
+            return "lost" if doubt.scans > LOST_AFTER else "frozen"
+        confirmed, contradicted, _ = self.network.integrate(
+            observations.view, T_map_laser, step, write=True
+        )
+        if len(observations.points_robot) == 0:
+            return "lost" if doubtful else "blind"  # odometry alone
+        if not doubtful:
+            doubt.learn(match.matched, confirmed, contradicted, prediction.elapsed)
+        return "lost" if doubtful else "tracking"
+
+    def _update_uncertainty(
+        self, prediction: Prediction, match: Match, evidence: Evidence | None, state: str
+    ) -> None:
+        self._belief.update(self._T_map_robot, prediction, match, evidence)
+        if state == "tracking" and not match.slipped:
+            self._increments.learn(prediction, match)
+        else:
+            self._increments.skip()
+
+    def _add_to_path(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
     ) -> None:
         """For closing loops: motion as matched, or by odometry where an end of it is in doubt."""
