@@ -101,7 +101,7 @@ def picture(compared: Compared, path: Path) -> None:
         errors.yaxis.set_major_formatter(FormatStrFormatter("%g"))
         errors.yaxis.set_minor_locator(NullLocator())
         _name_levels(losses, Curve(compared, scene, slams[0], MOVING))
-    runs = len(settings["seeds"])
+    runs, scanner = len(settings["seeds"]), settings.get("scanner", "full")
     grid[0][0].set_ylabel("position error (ATE) in cm,\nunaligned: median, 95 % interval")
     grid[1][0].set_ylabel("runs lost in %,\n95 % interval")
     grid[1][0].set_ylim(-4.0, 104.0)
@@ -110,7 +110,7 @@ def picture(compared: Compared, path: Path) -> None:
     figure.supxlabel(
         "dynamism (below it: share of the scanner's returns that come from things that move)\n"
         f"{runs} runs of {settings['seconds']:g} s a point, seeds {settings['seeds'][0]} to "
-        f"{settings['seeds'][-1]}; {SCANNERS.get(settings['scanner'], settings['scanner'])}",
+        f"{settings['seeds'][-1]}; {SCANNERS.get(scanner, scanner)}",
         fontsize=9,
     )
     save(figure, path)

@@ -84,7 +84,7 @@ ROWS = [
     Row("blame", "comparison: a command as SLAM",
         lambda h: [str(h.comparison(scene="arena", slam=h.pipe))], REFUSED),
     Row("blame", "comparison: arrays of objects",
-        lambda h: [str(h.comparison(scene="arena", slam="odometry"))], "no run of a comparison"),
+        lambda h: [str(h.comparison(scene="arena", slam="odometry"))], "holds objects"),
     Row("verify", "episode: a module as scene", lambda h: [str(h.episode())]),
     Row("verify", "episode: YAML with objects", lambda h: [str(h.bag())]),
     Row("verify", "episode made again: a module as scene",

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,7 @@ def said_after(number: signal.Signals, words: list[str]) -> str:
     with subprocess.Popen(
         words, cwd=REPO, env={**os.environ, "PYTHONPATH": str(REPO)},
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),  # ignored after "&"
     ) as process:  # fmt: skip
         assert process.stdout.readline() == "ready\n"
         process.send_signal(number)

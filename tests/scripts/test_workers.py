@@ -83,7 +83,7 @@ def test_workers_and_their_guests_end_with_a_killed_command(tmp_path):
     for begun in tmp_path.glob(".*.begun"):
         begun.unlink()
     files = run_jobs(some_jobs(quick), tmp_path, processes=2)
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+    assert sorted(path.name for path in tmp_path.glob("*.npz")) == sorted(
         path.name for path in files.values()
     )
 

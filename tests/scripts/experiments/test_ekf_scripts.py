@@ -22,7 +22,7 @@ def test_trials_are_scored_on_the_training_seeds(tmp_path, monkeypatch):
     assert [changes for changes, _ in results[:2]] == [{}, {"noise_scale": 0.8}]
     assert all(scores.shape == (2, 1) for _, scores in results)
     assert all((scores < math.log10(0.05)).all() for _, scores in results)
-    assert len(list(tmp_path.iterdir())) == 2
+    assert len(list(tmp_path.glob("*.json"))) == 2
     lines = list(tune_ekf.table("points", results))
     assert lines[4].startswith("| noise_scale | 1.25 | 0.8 |")
     assert len(lines) == 4 + len(results) - 1

@@ -69,5 +69,5 @@ def test_times_states_and_actions_are_checked() -> None:
     env = MobiliaEnv("arena", laser=Lms221Config.ideal())
     env.reset(seed=0)
     for action in ("go", (0.1, 0.2, 0.3), None):
-        with pytest.raises(InvalidValueError, match="an action is two numbers"):
+        with pytest.raises(InvalidValueError, match="an action is two finite numbers"):
             env.step(action)  # type: ignore[arg-type]
