@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -17,57 +18,27 @@ from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.driving.drive import TourConfig
 from sim.driving.pilot import Pilot
+from sim.sensors.lidar.device import LaserScanner, ScanResult
 from sim.sensors.lidar.link import SerialLink, over_link
-from sim.sensors.lidar.lms221 import Lms221, Lms221Config, ScanResult
+from sim.sensors.lidar.registry import ScannerConfig
+from sim.sensors.lidar.schedule import Window
 from sim.sensors.odometry.encoders import WheelOdometry
+from sim.sensors.scan_timing import ScanTiming
 from sim.sensors.tag_cameras import TagCameras, TagReading
 from sim.world.labels import BeamLabeller
 from sim.world.substeps import plain
 from sim.world.world import SUBSTEPS_PER_S, World
-from slam import se2
 from slam.errors import InvalidValueError
-from slam.frames import BeamLabels, Float, Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata
-
-
-@dataclass(frozen=True, kw_only=True)
-class ScanTiming:
-    """When a scan's first and last beam are, in physics steps after its start.
-
-    What the encoders and the truth say is interpolated to these between the steps.
-    """
-
-    offset_ns: int
-    first: float
-    last: float
-    sweep_s: float
-
-    @classmethod
-    def of(cls, laser: Lms221) -> ScanTiming:
-        offset_ns = laser.config.stamp_offset_ns
-        first = offset_ns * 1e-9 * SUBSTEPS_PER_S
-        sweep = laser.spec.sweep_duration
-        return cls(
-            offset_ns=offset_ns, first=first, last=first + sweep * SUBSTEPS_PER_S, sweep_s=sweep
-        )
-
-    def odometry(
-        self, encoders: WheelOdometry, travel: Float, stamp_ns: int, touched: bool
-    ) -> Odometry:
-        """Advance the encoders over a scan; ``travel`` (steps + 1, 2) m rolled at its steps."""
-        self.roll(encoders, travel, touched)
-        return encoders.reading(stamp_ns=stamp_ns, sweep_s=self.sweep_s)
-
-    def roll(self, encoders: WheelOdometry, travel: Float, touched: bool) -> None:
-        """The same without the reading."""
-        encoders.over_scan(travel, self.first, self.last, contact=touched)
-
-    def truth(self, path: Float) -> Float:
-        """(3,) pose at the first beam; ``path`` (steps + 1, 3)."""
-        k = min(int(self.first), len(path) - 2)
-        if self.first == k:
-            x, y, theta = path[k].tolist()
-            return np.array([x, y, se2.wrap(theta)])
-        return se2.interpolate(path[k], path[k + 1], self.first - k)
+from slam.frames import (
+    NS_PER_S,
+    BeamLabels,
+    Float,
+    Frame,
+    LaserSpec,
+    Scan,
+    Stream,
+    StreamMetadata,
+)
 
 
 class Simulation:
@@ -77,7 +48,8 @@ class Simulation:
     seed       whole number or ``Seeds``; every part draws from its own stream
     dynamism   0 (nothing moves) to 1, or the rates themselves
     moving_share  in [0, 1]: of the chairs, on the move at any time (``sim.actors.rolling``)
-    laser      how the scanner is set; default ``Lms221Config()``
+    laser      a scanner by name ("utm30lx", "lms221:noise"; ``sim.sensors.lidar.registry``), a
+               ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
     drive      limits of the robot
     start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted
@@ -88,7 +60,8 @@ class Simulation:
     options    passed on to ``scenes.build``: ``scan_height_m`` of the robot's scanner above the
                floor (0.36), and the scene's own, e.g. ``n_chairs=10``
 
-    Attribute ``path``: (steps + 1, 3) true poses of the robot at the steps of the last scan.
+    Attribute ``path``: (rows, 3) true poses of the robot at the steps of the last scan; where it
+    began between two steps, row 0 is the step before.
     """
 
     def __init__(
@@ -98,7 +71,7 @@ class Simulation:
         seed: int | Seeds = 0,
         dynamism: float | Dynamism = 0.5,
         moving_share: float | None = None,
-        laser: Lms221Config | None = None,
+        laser: ScannerConfig | str | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
         start: Sequence[float] | None = None,
@@ -114,7 +87,7 @@ class Simulation:
         )
         self.odometry_preset = odometry
         seeds = self.world.seeds
-        self.laser = Lms221(self.world.model, laser, seeds.generator("lidar"))
+        self.laser = LaserScanner(self.world.model, laser, seeds.generator("lidar"))
         self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=drive.track)
         self._labeller = BeamLabeller(self.world) if labels else None
         self._tags = self._tag_cameras(tags)
@@ -123,13 +96,7 @@ class Simulation:
         self._labels: BeamLabels | None = None
         self._frame: Frame | None = None
         self.contacts: list[Contact] = []  # what the robot touched during the last scan
-        self._timing = ScanTiming.of(self.laser)
-        steps = self.laser.config.steps
-        self.path: Float = np.zeros((steps + 1, 3))
-        self._travel: Float = np.zeros((steps + 1, 2))
-        self._watch: Any = None
-        # With ceiling cameras the world stops after every step for them to look.
-        self._stops = range(1, steps + 1) if self._tags else (steps,)
+        self._room()
 
     def _tag_cameras(self, tags: str) -> TagCameras | None:
         if tags not in ("truth", "camera"):
@@ -149,27 +116,48 @@ class Simulation:
         """Geometry and timing of the scanner, as in every frame's scan."""
         return self.laser.spec
 
-    def use_laser(self, laser: Lms221) -> None:
+    def _room(self) -> None:
+        """Room for what is written down during a scan, whatever its phase."""
+        rows = self.laser.caster.poses.shape[0]
+        self._rows: tuple[Float, Float] = (np.zeros((rows, 3)), np.zeros((rows, 2)))
+        self._window: Window | None = None  # that watch and timing are of
+        self._watch: Any = None
+        self.path, self._travel = self._rows
+
+    def use_laser(self, laser: LaserScanner) -> None:
         """Go on with another scanner of the same timing on the same robot."""
-        self.laser, self._watch = laser, None
+        self.laser, self._window = laser, None
 
     @property
     def scan_period_s(self) -> float:
-        """Seconds of simulated time that one ``observe`` takes."""
-        return self.laser.config.steps / SUBSTEPS_PER_S
+        """Seconds of simulated time from scan to scan."""
+        return float(self.laser.scanner.period_s)
 
     def _advance(self) -> None:
         """Let the time of one scan pass."""
-        world = self.world
-        world.read_robot(self.path[0], self._travel[0])
+        world, tags = self.world, self._tags
         noted = self.laser.begin(world.data)
-        if self._watch is None:
-            self._watch = plain((self.laser.marks, noted, self.path, self._travel))
-        first = 0
-        for stop in self._stops:
+        window = self.laser.window
+        if window.before:  # the scan begins within the step that the one before ended with
+            for rows, own in zip(self._rows, (self.path, self._travel), strict=True):
+                rows[0] = own[-2]
+        world.read_robot(self._rows[0][window.before], self._rows[1][window.before])
+        if self.laser.carried:
+            self._rows[0][0] = self._rows[0][1]
+        if window is not self._window:
+            self._window, self._timing = window, ScanTiming.of(self.laser)
+            self._watch = plain((window.marks, noted, *self._rows))
+            self.path, self._travel = (rows[: window.last + 1] for rows in self._rows)
+        start_ns, phase = world.time_ns, self.laser.phase
+        if phase:
+            start_ns = round((world.step_count - phase) * Fraction(NS_PER_S, SUBSTEPS_PER_S))
+        self._stamp_ns = start_ns + self._timing.offset_ns
+        first = window.before
+        # With ceiling cameras the world stops after every step for them to look.
+        for stop in range(first + 1, window.last + 1) if tags else (window.last,):
             world.advance(first, stop, self._watch)
-            if self._tags is not None:
-                self._tags.note(world.time_ns, world.data)
+            if tags is not None:
+                tags.note(world.time_ns, world.data)
             first = stop
 
     def observe(self) -> Frame:
@@ -185,7 +173,6 @@ class Simulation:
 
     def sense(self) -> ScanResult:
         """As ``observe``, without the frame, which ``frame`` makes when it is asked for."""
-        self._stamp_ns = self.world.time_ns + self._timing.offset_ns
         self._advance()
         self._scan, self._frame = self.laser.finish(), None
         self.contacts = self.world.take_contacts()
@@ -218,21 +205,40 @@ class Simulation:
         seen = self._labeller.last_seen if self._labeller else np.zeros((0, 3))
         lasers = [state.random_words(rng) for rng in self.laser.streams]
         seen_by, tags = ({}, None) if self._tags is None else self._tags.save()
+        between, scan = self.laser.save()
+        if scan:  # the next scan begins within the last step
+            between |= {"path": self.path[-2:], "travel": self._travel[-2:]}
         return state.pack(
-            {**arrays, **seen_by, "world": world, "seen": seen},
-            {"encoders": words, "lasers": lasers, "tags": tags},
-        )
+            {
+                **arrays, **seen_by, "world": world, "seen": seen,
+                **{f"scan.{name}": values for name, values in between.items()},
+            },
+            {
+                "encoders": words, "lasers": lasers, "tags": tags, "scan": scan,
+                "scanner": self.laser.scanner.name,
+            },
+        )  # fmt: skip
 
     def load_state(self, block: bytes) -> None:
         """Go on from ``save_state``; ``InvalidValueError`` if it is of another simulation."""
         arrays, words = state.unpack(block)
         if not {"encoders", "lasers"} <= set(words) or "world" not in arrays:
             raise InvalidValueError("this is the state of a world, not of a simulation")
-        if len(words["lasers"]) != len(self.laser.streams):
-            raise InvalidValueError("the state is of another kind of scanner")
+        own_name = self.laser.scanner.name
+        if words.get("scanner", own_name) != own_name or (
+            len(words["lasers"]) != len(self.laser.streams)
+        ):
+            raise InvalidValueError(
+                f"the state is of scanner '{words.get('scanner')}', expected '{own_name}'"
+            )
         if (words.get("tags") is None) != (self._tags is None):
             raise InvalidValueError("ceiling cameras are in the state or in the simulation only")
+        own = {k.removeprefix("scan."): v for k, v in arrays.items() if k.startswith("scan.")}
+        self.laser.load(own, words.get("scan", {}))
         self.world.load_state(arrays["world"].tobytes())
+        self._window = None
+        if own:
+            self.path, self._travel = own["path"], own["travel"]
         self.encoders.load(arrays, words["encoders"])
         for rng, saved in zip(self.laser.streams, words["lasers"], strict=True):
             state.restore_random(rng, saved)
@@ -287,7 +293,8 @@ def stream(
     """
     probe = Simulation(scene, **settings)
     metadata, n = probe.metadata(), n_frames(seconds, probe.scan_period_s)
-    link = None if baud is None else SerialLink(baud=baud, config=probe.laser.config)
+    config: Any = probe.laser.config  # the link refuses any but the LMS-221
+    link = None if baud is None else SerialLink(baud=baud, config=config)
     if link is not None:
         line = {"baud": link.baud, "latency_ns": link.latency_ns}
         metadata = replace(metadata, extra={**metadata.extra, "link": line})

@@ -37,7 +37,7 @@ def rows(seconds: float, *, seed: int, dynamism: float) -> Iterator[Row]:
             share = 100.0 * spent / written
             yield _row(f"episode, share of {what}", share, "%", "", "of processor time")
         size = sum(file.stat().st_size for file in bag.iterdir())
-        raw = 4 * recipe.laser().beams[0].size
+        raw = 4 * recipe.laser().spec().n_beams
         per_frame = size / (frames + n_frames(WARM_S, 1.0 / 37.5))
         yield _row("episode, bytes a frame", per_frame, "B", "", f"ranges as float32: {raw} B")
         for what, labels, target in (("", False, "≥ 8000"), (", with labels", True, "")):

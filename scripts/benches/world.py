@@ -15,7 +15,8 @@ import mujoco
 import numpy as np
 
 import sim  # noqa: F401  (registers the environments)
-from sim.sensors.lidar.lms221 import Lms221, Lms221Config
+from sim.sensors.lidar.device import LaserScanner
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.sensors.lidar.windows import note
 from sim.simulation import Simulation, n_frames, tour
 from sim.view import gl
@@ -85,11 +86,11 @@ def scanner(seconds: float) -> Iterator[Row]:
     )
     scans = max(20, round(10 * seconds))
     for name, config, room, target in cases:
-        laser = Lms221(room.model, config, np.random.default_rng(0))
+        laser = LaserScanner(room.model, config, np.random.default_rng(0))
 
-        def many(laser: Lms221 = laser, room: World = room) -> None:
+        def many(laser: LaserScanner = laser, room: World = room) -> None:
             for _ in range(scans):
-                _note(laser.begin(room.data), int(laser.marks[1:].sum()))
+                _note(laser.begin(room.data), int(laser.window.marks[1:].sum()))
                 laser.finish()
 
         many()

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from scripts.card.bench import Bench, box, only, post
-from sim.sensors.lidar.config import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from slam.frames import Float
 
 RED, GREY = "#ce2c3c", "#8a8a8a"

@@ -10,8 +10,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.sensors.lidar.effects import RangeEffects
-from sim.sensors.lidar.lms221 import Lms221, Lms221Config, ScanResult
+from sim.sensors.lidar.device import LaserScanner, ScanResult
+from sim.sensors.lidar.models.lms221 import Lms221Config, RangeEffects
+from sim.sensors.lidar.registry import ScannerConfig
 
 HEIGHT = 0.36
 NONE = RangeEffects.none()
@@ -52,13 +53,13 @@ def plate(distance: float, half: float = 30.0, material: str = "wall") -> str:
 class Bench:
     """One scanner before one set of things; ``scan`` as often as wanted."""
 
-    def __init__(self, world: str, config: Lms221Config | None = None, seed: int = 0) -> None:
+    def __init__(self, world: str, config: ScannerConfig | None = None, seed: int = 0) -> None:
         assets = "".join(f'<material name="{name}"/>' for name in MATERIALS)
         text = _FRAME.format(assets=assets, height=HEIGHT, world=world)
         self.model = mujoco.MjModel.from_xml_string(text)
         self.data = mujoco.MjData(self.model)
         mujoco.mj_kinematics(self.model, self.data)
-        self.laser = Lms221(self.model, config, np.random.default_rng(seed))
+        self.laser = LaserScanner(self.model, config, np.random.default_rng(seed))
         self.steps = 0
 
     def _advance(self) -> None:

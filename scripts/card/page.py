@@ -15,8 +15,8 @@ from PIL import Image
 from scripts.card import rows as measure
 from scripts.card.ablation import ablation
 from scripts.figures import save, styled
-from sim.sensors.lidar.config import Lms221Config
-from sim.sensors.lidar.effects import NEEDED, NEEDED_RANGE_M, needed_reflectivity
+from sim.sensors.lidar.effects import needed_reflectivity
+from sim.sensors.lidar.models.lms221 import NEEDED, Lms221Config
 from slam.files import write_text
 
 INK, RED, BLUE, GREY = "#222222", "#ce2c3c", "#1f61be", "#8a8a8a"
@@ -67,7 +67,7 @@ NOTES = (
     "",
     "Effects against the ideal scan (grey rings), noise and rounding off but where named: three by",
     "themselves, then what builds on the spot, then everything. Each has its own switch in",
-    "`sim.sensors.lidar.effects.RangeEffects`; `Lms221Config()` has all of them on,",
+    "`sim.sensors.lidar.models.lms221.RangeEffects`; `Lms221Config()` has all of them on,",
     "`Lms221Config.ideal()` none, `Lms221Config.noise_only()` the 10 mm noise and the rounding.",
     "",
     "## What no source says, and what is assumed",
@@ -135,7 +135,7 @@ def _needed(ax: Axes) -> None:
     at = np.geomspace(0.16, 60.0, 50).tolist()
     found = [100 * measure.least_reflectivity(d) for d in at]
     ax.loglog(at, found, color=BLUE, label="measured")
-    ax.loglog(NEEDED_RANGE_M, 100 * np.array(NEEDED), "o", color=INK, ms=4, label="TD fig. 4-2")
+    ax.loglog(*(np.array(NEEDED) * (1.0, 100.0)).T, "o", color=INK, ms=4, label="TD fig. 4-2")
     ax.axhline(10.0, color=GREY, lw=0.8, ls=":")
     ax.set(title="reflectivity needed for a return", xlabel="range [m]", ylabel="%")
     ax.set_xticks([0.2, 0.5, 1, 2, 5, 10, 30, 60], ["0.2", "0.5", "1", "2", "5", "10", "30", "60"])
@@ -160,7 +160,7 @@ def _rate(ax: Axes) -> None:
     names = {"white paper": 0.80, "black trousers": 0.08, "black rubber": 0.02}
     at = np.geomspace(0.16, 79.0, 400).tolist()
     for row, (name, value) in enumerate(names.items()):
-        seen = np.array([value >= needed_reflectivity(d) for d in at])
+        seen = np.array([value >= needed_reflectivity(NEEDED, d) for d in at])
         lit = np.where(seen, row, math.nan)
         ax.plot(at, lit, lw=9, color=(BLUE, INK, RED)[row], solid_capstyle="butt")
         ax.text(0.17, row + 0.2, f"{name}, {100 * value:g} %", fontsize=8)

@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scripts.card.bench import NONE, Bench, box, only, plate
-from sim.sensors.lidar.config import RANGE_MODES, Lms221Config
-from sim.sensors.lidar.effects import DISC_WEIGHTS, LMS221_SPOT, NEEDED, NEEDED_RANGE_M
 from sim.sensors.lidar.link import SerialLink
+from sim.sensors.lidar.models.lms221 import LMS221_SPOT, NEEDED, RANGE_MODES, Lms221Config
 from sim.sensors.lidar.receiver import SignalModel
 from slam.frames import Float
 
@@ -140,7 +139,7 @@ def systematic() -> Iterator[Row]:
 
 def spot_diameter(distance: float) -> float:
     """Diameter m of the disc that has the rays' second moment (four deviations, as ISO 11146)."""
-    weights, offsets = np.array(DISC_WEIGHTS), np.array(LMS221_SPOT.offsets)
+    weights, offsets = np.array(LMS221_SPOT.weights), np.array(LMS221_SPOT.offsets)
     radius = LMS221_SPOT.aperture + LMS221_SPOT.divergence * distance
     return 4.0 * math.sqrt(float((weights * (radius * offsets[:, 0]) ** 2).sum()))
 
@@ -169,7 +168,7 @@ def least_reflectivity(distance: float) -> float:
     for _ in range(30):
         middle = math.sqrt(low * high)
         surface = (np.array([middle]), np.array([False]), np.zeros(1, int), np.zeros(1, int))
-        receiver = SignalModel(config, surface, np.random.default_rng(0))
+        receiver = SignalModel(config.scanner(), surface, np.random.default_rng(0))
         sent = receiver.scan(ahead, NOTHING_MIRRORED).ranges[0]
         low, high = (low, middle) if np.isfinite(sent) else (middle, high)
     return high
@@ -177,7 +176,7 @@ def least_reflectivity(distance: float) -> float:
 
 def reflectivity() -> Iterator[Row]:
     """What is needed for a return."""
-    for distance, needed in zip(NEEDED_RANGE_M, NEEDED, strict=True):
+    for distance, needed in NEEDED:
         found = least_reflectivity(distance)
         yield Row(
             what=f"needed reflectivity at {distance:g} m",

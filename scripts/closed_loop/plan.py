@@ -26,7 +26,8 @@ IDENTITY = ("scene", "dynamism", "seed", "slam")
 class Plan:
     """Every SLAM in the same worlds: at every level, with every seed.
 
-    goals  names, or how many of the seed's order; () is all
+    goals    names, or how many of the seed's order; () is all
+    scanner  by name (``sim.sensors.lidar.registry``)
     """
 
     scene: str
@@ -35,6 +36,7 @@ class Plan:
     seeds: tuple[int, ...]
     goals: tuple[str, ...] | int = ()
     loop: LoopConfig = field(default_factory=LoopConfig)
+    scanner: str = "full"
 
     def __post_init__(self) -> None:
         for name in ("slams", "levels", "seeds"):
@@ -65,7 +67,7 @@ class Plan:
             call=runs.run_one,
             arguments={
                 "scene": self.scene, "dynamism": level, "seed": seed, "slam": name,
-                "goals": goals or None, "loop": asdict(self.loop),
+                "goals": goals or None, "loop": asdict(self.loop), "laser": self.scanner,
             },
             code=(
                 *sources(sim, scenes, slam), *scripts_of(runs.__file__, runs.__name__),

@@ -29,9 +29,10 @@ def run_one(
     slam: str,
     goals: list[str] | int | None,
     loop: Mapping[str, Any],
+    laser: str = "full",
 ) -> None:
     """A job: one run, into ``path``. A SLAM that cannot be made has failed at every goal."""
-    simulation = Simulation(scene, seed=seed, dynamism=dynamism)
+    simulation = Simulation(scene, seed=seed, dynamism=dynamism, laser=laser)
     try:
         system = limited(slam, Limits())
     except SlamFailedError as error:

@@ -11,7 +11,7 @@ from scripts.comparison.plan import Plan
 from scripts.output import RECIPE, check_whole, read_recipe_words, scenes_of, slams_of
 from sim.core.versions import check_world, world_of
 from sim.recording.recipe import Recipe
-from slam.errors import InvalidValueError, LogFormatError
+from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 
 RUNS = "runs"
 
@@ -55,7 +55,7 @@ def run_of(path: Path) -> Again:
         told: dict[str, Any] = {k: v for k, v in settings.items() if k in known}
         told |= {k: tuple(v) for k, v in told.items() if isinstance(v, list)}
         plan = Plan(**told)
-    except (TypeError, InvalidValueError) as error:
+    except (TypeError, InvalidValueError, UnknownNameError) as error:
         raise LogFormatError(recipe, f"no recipe of a comparison: {error}") from error
     for run in plan.runs():
         if run.name == path.stem:

@@ -27,7 +27,6 @@ from slam.names import join_folders
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
-SCAN_PERIOD_S = 1.0 / 37.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +51,8 @@ class Plan:
     levels    of dynamism, each in [0, 1]
     seeds     whole numbers >= 0, the same at every level
     seconds   of driving
-    every     one scan in so many is kept (of 37.5 a second)
-    scanner   "full", "noise" or "ideal"
+    every     one scan in so many is kept
+    scanner   by name (``sim.sensors.lidar.registry``)
     scan_limit_s  that module:Class and pipe:COMMAND may take for a scan before they count as hung
     """
 
@@ -78,10 +77,11 @@ class Plan:
             raise InvalidValueError(f"a comparison has at most {MAX_RUNS} runs")
         for run in self.runs():
             self.recipe(run)  # complains of values that cannot be
-        if n_frames(self.seconds, SCAN_PERIOD_S) <= self.every:
+        period_s = self.recipe(self.runs()[0]).laser().scanner().period_s
+        if n_frames(self.seconds, float(period_s)) <= self.every:
             raise InvalidValueError(
                 f"a comparison needs 2 scans a run: {self.seconds:g} s with one scan in "
-                f"{self.every} of 37.5 a second has 1"
+                f"{self.every} of {float(1 / period_s):g} a second has 1"
             )
 
     def runs(self) -> list[Run]:

@@ -21,7 +21,7 @@ import numpy as np
 
 from sim.actors.robot import DriveConfig
 from sim.driving.drive import TourConfig
-from sim.sensors.lidar.config import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation, n_frames, tour
 from slam import create
 from slam.evaluation import metrics

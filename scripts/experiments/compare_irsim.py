@@ -30,7 +30,7 @@ import gymnasium
 import numpy as np
 
 import sim  # noqa: F401  (registers the environments)
-from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 
 MOVERS, STEPS = 30, 100
 SCENE = """

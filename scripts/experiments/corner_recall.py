@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 
 from sim.driving.pilot import Pilot
-from sim.sensors.lidar.config import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation, n_frames
 from slam import se2
 from slam.frames import Float, Scan

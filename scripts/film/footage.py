@@ -17,7 +17,7 @@ from scripts.single_run.session import primary_of, systems_named
 from scripts.trust import admitted
 from sim.core.versions import check_world, world_of
 from sim.recording.sums import check_vouched
-from slam.errors import InvalidValueError, LogFormatError
+from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.frames import NS_PER_S, Stream
 from slam.logs import open_log
 from slam.logs.bag import read_bag
@@ -28,7 +28,14 @@ if TYPE_CHECKING:
     from sim.moments import Moment
     from sim.simulation import Simulation
 
-SIMULATED = ("scene", "seconds", "seed", "dynamism", "scan_height_m")  # of a run's settings
+SIMULATED = (
+    "scene",
+    "seconds",
+    "seed",
+    "dynamism",
+    "scan_height_m",
+    "laser",
+)  # of a run's settings
 
 
 @dataclass(eq=False, kw_only=True)
@@ -114,7 +121,7 @@ def open_run(path: Path, *, view: str | None = "follow", trust: bool = False) ->
     known["scene"] = admitted(scenes_of(recipe, {"scene": settings["scene"]})[0], "scene", trust)
     try:
         return replace(of_scene(known, view=view), slam=slam)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, UnknownNameError) as error:
         raise LogFormatError(recipe, f"no recipe of a run: {error}") from error
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from sim.core.dynamism import Dynamism
 from sim.gym.env import MobiliaEnv
 from sim.gym.vector import MobiliaVectorEnv
-from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from slam.errors import MobiliaError
 from slam.frames import Features, Float, Frame, LaserSpec, Odometry, Scan
 from slam.guests.pipe import guarded

@@ -22,9 +22,10 @@ from scripts.debugger.picture import blame_picture
 from scripts.debugger.recording import Tape, record
 from scripts.debugger.words import FIXED, as_json, headline, table
 from scripts.output import whole_folder, write_recipe
+from scripts.scanner_option import Scanner
 from scripts.single_run.session import file_name
 from scripts.trust import Trust
-from sim.recording.recipe import SCANNERS
+from sim.sensors.lidar.registry import scanner_of
 from slam.errors import InvalidValueError
 from slam.evaluation.divergence import Rule
 from slam.files import write_text
@@ -47,13 +48,11 @@ def blame(
     dynamism: Annotated[float, typer.Option(help="Of the scene, 0 to 1.")] = 0.5,
     seed: Annotated[int, typer.Option(help="Of the simulated run, whole number >= 0.")] = 0,
     seconds: Annotated[float, typer.Option(help="Length of the simulated tour, s.")] = 60.0,
-    scanner: Annotated[str, typer.Option(help="full, noise (statistical only) or ideal.")] = "full",
+    scanner: Scanner = "full",
     option: Annotated[
         list[str] | None, typer.Option(help="Of the scene: NAME=VALUE, e.g. n_chairs=6.")
     ] = None,
-    every: Annotated[
-        int, typer.Option(help="The SLAM gets one scan in so many, of 37.5 a second.")
-    ] = 1,
+    every: Annotated[int, typer.Option(help="The SLAM gets one scan in so many.")] = 1,
     threshold: Annotated[
         float, typer.Option(help="Rise of the error that counts as a divergence, m.")
     ] = Rule.threshold_m,
@@ -96,12 +95,10 @@ def blame(
     if run is not None:
         case = case_of(run, slam, every, trust)
     else:
-        if scanner not in SCANNERS:
-            known = ", ".join(SCANNERS)
-            raise InvalidValueError(f"--scanner must be one of {known}, got {scanner!r}")
+        laser = scanner_of(scanner)
         settings = {"scene": scene, "dynamism": dynamism, "seed": seed, **options_of(option or [])}
         if scanner != "full":
-            settings["laser"] = SCANNERS[scanner]()
+            settings["laser"] = laser
         case = Case(settings=settings, seconds=seconds, slam=slam or "shunting", every=every)
     if at is not None and not 0.0 <= at <= case.seconds:
         raise InvalidValueError(f"--at must lie in 0..{case.seconds:g} s, got {at:g}")

@@ -22,6 +22,7 @@ from scripts.comparison.recording import load
 from scripts.console import console, level_table
 from scripts.jobs import Job, run_jobs
 from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
+from scripts.scanner_option import Scanner, every_of
 from scripts.verbs.generate import sweep
 from slam.errors import InvalidValueError
 from slam.evaluation.lost import LOST_RULE
@@ -43,8 +44,10 @@ def compare(
         int, typer.Option(help="The first of them; the SLAMs here were tuned on 0 to 19.")
     ] = 100,
     seconds: Annotated[float, typer.Option(help="Length of a run, s.")] = 60.0,
-    every: Annotated[int, typer.Option(help="One scan in so many is used, of 37.5 a second.")] = 8,
-    scanner: Annotated[str, typer.Option(help="full, noise (statistical only) or ideal.")] = "full",
+    every: Annotated[
+        int | None, typer.Option(help="One scan in so many is used; default about 4.7 a second.")
+    ] = None,
+    scanner: Scanner = "full",
     scan_limit: Annotated[
         float, typer.Option(help="After which a SLAM from outside counts as hung at a scan, s.")
     ] = Limits.scan_s,
@@ -69,7 +72,7 @@ def compare(
         levels=levels(dynamism or ["0:1:0.25"]),
         seeds=tuple(range(first_seed, first_seed + seeds)),
         seconds=seconds,
-        every=every,
+        every=every_of(scanner, every, 8),
         scanner=scanner,
         scan_limit_s=scan_limit,
     )

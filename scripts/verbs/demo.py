@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from scripts.scanner_option import Scanner
 from scripts.single_run.session import Outputs
 
 FILM_FPS = 15.0  # the whole demo is to last a minute on two cores
@@ -22,6 +23,7 @@ def demo(
     ] = 0.5,
     seed: Annotated[int, typer.Option(help="Seed of everything, whole number >= 0.")] = 0,
     scan_height: Annotated[float, typer.Option(help="Of the scanner above the floor, m.")] = 0.36,
+    scanner: Scanner = "full",
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
     ] = False,
@@ -44,6 +46,7 @@ def demo(
             "dynamism": dynamism,
             "seed": seed,
             "scan_height_m": scan_height,
+            "laser": scanner,
         },
         Outputs(
             folder=out,

@@ -22,6 +22,7 @@ from scripts.comparison.folder import write_csv
 from scripts.console import console, level_table
 from scripts.jobs import run_jobs
 from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
+from scripts.scanner_option import Scanner, every_of
 from scripts.verbs.compare import levels, named
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError, UnknownNameError
@@ -49,7 +50,10 @@ def drive(
     goals: Annotated[
         list[str] | None, typer.Option(help="How many, or which by name; default all rooms'.")
     ] = None,
-    every: Annotated[int, typer.Option(help="One scan in so many is used, of 37.5 a second.")] = 4,
+    every: Annotated[
+        int | None, typer.Option(help="One scan in so many is used; default about 9.4 a second.")
+    ] = None,
+    scanner: Scanner = "full",
     jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
 ) -> None:
     """Drive to a goal in every room, steered by what each SLAM believes; truth only scores.
@@ -66,7 +70,8 @@ def drive(
         levels=levels(dynamism or ["0:1:0.25"]),
         seeds=_seeds(named(seeds or ["5"])),
         goals=_goals(named(goals or [])),
-        loop=LoopConfig(plan_on=plan_on, limit_s=seconds, scans=every),
+        loop=LoopConfig(plan_on=plan_on, limit_s=seconds, scans=every_of(scanner, every, 4)),
+        scanner=scanner,
     )
     started = time.perf_counter()
     rows = carry_out(plan, out, jobs=jobs)

@@ -17,13 +17,13 @@ from rich.table import Table
 from scenes import registry
 from scripts import interrupt, workers
 from scripts.console import console, note, progress
+from scripts.scanner_option import Scanner, rate_hz
 from sim.recording.dataset import Dataset, Plan, writing
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from slam.errors import InvalidValueError
 
 MAX_SWEEP = 1000
-SCANS_PER_S = 37.5  # of the bar, at half a degree
 
 
 def generate(
@@ -43,7 +43,7 @@ def generate(
     cluster: Annotated[
         str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
     ] = None,
-    scanner: Annotated[str, typer.Option(help="full, noise (statistical only) or ideal.")] = "full",
+    scanner: Scanner = "full",
 ) -> None:
     """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
 
@@ -90,7 +90,13 @@ def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | Non
     total, length_s = len(dataset.plan.jobs()), dataset.plan.recipe.seconds
     alone = cluster is None and (jobs == 1 or len(missing) < 2)
     with progress() as bar:
-        meter = _Meter(bar, total=total, done=total - len(missing), length_s=length_s)
+        meter = _Meter(
+            bar,
+            total=total,
+            done=total - len(missing),
+            length_s=length_s,
+            rate_hz=rate_hz(dataset.plan.recipe.scanner),
+        )
         note_frame = meter.frame if alone else None
         call = partial(_one, dataset.path, note_frame)
         for _ in workers.each(call, missing, jobs=jobs, cluster=cluster, shared=dataset.path):
@@ -105,9 +111,12 @@ def _one(folder: Path, note_frame: Callable[[], None] | None, recipe: Recipe) ->
 class _Meter:
     """The progress bar; counts in simulated seconds."""
 
-    def __init__(self, bar: Progress, *, total: int, done: int, length_s: float) -> None:
+    def __init__(
+        self, bar: Progress, *, total: int, done: int, length_s: float, rate_hz: float
+    ) -> None:
         self._bar, self._total, self._done, self._length_s = bar, total, done, length_s
         self._frames, self._before, self._started = 0, done, time.perf_counter()
+        self._rate_hz = rate_hz
         self._task = bar.add_task(
             "generating", unit="", total=total * length_s, completed=int(done * length_s)
         )
@@ -116,7 +125,7 @@ class _Meter:
         """One more scan of the episode that is being made here."""
         self._frames += 1
         if self._frames % 25 == 0:
-            self._show(min(self._frames / SCANS_PER_S, self._length_s))
+            self._show(min(self._frames / self._rate_hz, self._length_s))
 
     def episode(self) -> None:
         """One more episode."""

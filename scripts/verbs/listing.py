@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mobilia list``: which scenes and SLAMs there are."""
+"""``mobilia list``: which scenes, scanners and SLAMs there are."""
 
 from __future__ import annotations
 
@@ -10,17 +10,20 @@ from slam import system
 
 
 def listing() -> None:
-    """List the registered scenes, SLAMs and Gymnasium environments."""
+    """List the registered scenes, scanners, SLAMs and Gymnasium environments."""
     import gymnasium
 
     from scenes import registry
     from sim.core.versions import WORLD
+    from sim.sensors.lidar import registry as scanners
 
     table = Table(show_header=True, title_justify="left")
     for heading in ("what", "name", "about"):
         table.add_column(heading)
     for name in registry.names():
         table.add_row("scene", name, registry.describe(name))
+    for name in scanners.names():
+        table.add_row("scanner", name, scanners.describe(name))
     for name in system.names():
         table.add_row("SLAM", name, system.describe(name))
     ours = (name for name in gymnasium.registry if name.startswith("mobilia/"))

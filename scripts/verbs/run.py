@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from scripts.film.footage import of_log
+from scripts.scanner_option import Scanner
 from scripts.single_run.session import Outputs, run_session
 from slam.errors import InvalidValueError
 
@@ -38,6 +39,7 @@ def run(
     scan_height: Annotated[
         float, typer.Option(help="Of the simulated scanner above the floor, m.")
     ] = 0.36,
+    scanner: Scanner = "full",
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default out/run-<log or scene>.")
     ] = None,
@@ -67,6 +69,7 @@ def run(
                 "dynamism": dynamism,
                 "seed": seed,
                 "scan_height_m": scan_height,
+                "laser": scanner,
             },
             outputs=Outputs(
                 folder=out or Path("out") / f"run-{scene.replace(':', '-')}",

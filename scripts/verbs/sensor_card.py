@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mobilia sensor-card``: the simulated LMS-221 measured against its data sheet, row by row."""
+"""``mobilia sensor-card``: a simulated scanner measured against its data sheet, row by row."""
 
 from __future__ import annotations
 
@@ -7,23 +7,35 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 from scripts.console import console, note
 from slam.errors import MobiliaError
+from slam.files import write_text
 
 
 def sensor_card(
     out: Annotated[
         Path | None, typer.Option(help="Also write sensor_card.md and pictures/ into this folder.")
     ] = None,
+    scanner: Annotated[
+        str, typer.Option(help="Which one, by name: utm30lx, tim561, ... (mobilia list).")
+    ] = "lms221",
 ) -> None:
-    """Measure the simulated LMS-221 against its data sheet; with --out, as a page with figures."""
-    from scripts.card import page  # mujoco: only once the environment is known good
-    from scripts.card import rows as sensor_rows
+    """Measure a simulated scanner against its data sheet; with --out, as a page.
 
-    rows = sensor_rows.rows()
-    table = Table(title="SICK LMS-221, simulated", title_justify="left")
+    The LMS-221's page has figures; that of another scanner is sensor_card_NAME.md.
+
+    [bold]mobilia sensor-card --scanner utm30lx[/bold]
+    """
+    from scripts.card import page, stated  # mujoco: only once the environment is known good
+    from scripts.card import rows as sensor_rows
+    from sim.sensors.lidar.registry import DEFAULT, describe
+
+    own = scanner == DEFAULT
+    rows = sensor_rows.rows() if own else stated.rows_of(scanner)
+    table = Table(title=escape(f"{describe(scanner)} (simulated)"), title_justify="left")
     for heading in ("", "what", "data sheet", "measured", "source"):
         table.add_column(heading)
     for row in rows:
@@ -31,8 +43,13 @@ def sensor_card(
         table.add_row(mark, row.what, row.datasheet, row.measured, row.source)
     console.print(table)
     if out is not None:
-        page.write_card(out, rows)
-        note(f"wrote {out / 'sensor_card.md'} and its pictures")
+        if own:
+            page.write_card(out, rows)
+            note(f"wrote {out / 'sensor_card.md'} and its pictures")
+        else:
+            out.mkdir(parents=True, exist_ok=True)
+            write_text(out / f"sensor_card_{scanner}.md", stated.page(scanner, rows))
+            note(f"wrote {out / f'sensor_card_{scanner}.md'}")
     broken = [row.what for row in rows if not row.kept]
     if broken:
         raise MobiliaError(f"the scanner departs from its data sheet: {'; '.join(broken)}")

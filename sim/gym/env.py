@@ -17,7 +17,8 @@ from sim.core.seeds import Seeds
 from sim.gym.actions import clipped
 from sim.gym.options import checked_seed, episode
 from sim.gym.pose_source import PoseSource
-from sim.sensors.lidar.lms221 import Lms221Config, ScanResult
+from sim.sensors.lidar.device import ScanResult
+from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from sim.simulation import Simulation
 from slam._jit import njit
 from slam.errors import InvalidValueError, MobiliaError
@@ -65,7 +66,7 @@ class ResetNeededError(MobiliaError, gymnasium.error.ResetNeeded):
 
 
 class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
-    """A robot with an LMS-221 in a room that does not sit still; a step is one whole scan.
+    """A robot with a laser scanner in a room that does not sit still; a step is one whole scan.
 
     ### Action space
     ``Box(-1, 1, (2,), float32)``: forward speed (times 0.8 m/s) and turn rate (times 1.2 rad/s,
@@ -129,10 +130,11 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     | `moving_share`            | share of chairs on the move at any time                       |
     | `rates`                   | single rates of ``Dynamism``, e.g. ``{"door_rate": 0.1}``     |
     | `scan_height_m`           | of the scanner above the floor                                |
-    | `resolution_deg`          | 1, 0.5 or 0.25; changes the observation space (give ``laser`` |
-    |                           | to the constructor where a wrapper holds on to the space)     |
-    | `noise_std_m`             | statistical error of the ranges                               |
-    | `laser`                   | a whole ``Lms221Config``, e.g. ``Lms221Config.ideal()``       |
+    | `resolution_deg`          | of a ``Lms221Config``: 1, 0.5 or 0.25; changes the observation |
+    |                           | space (give ``laser`` to the constructor where a wrapper holds |
+    |                           | on to the space)                                              |
+    | `noise_std_m`             | of a ``Lms221Config``: statistical error of the ranges         |
+    | `laser`                   | a scanner by name, a ``Scanner`` or a ``Lms221Config``        |
     | `seeds`                   | stream name -> seed (``sim.core.seeds``) |
 
     ### Version history
@@ -151,7 +153,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         scene: str = "office",
         *,
         dynamism: float = 0.5,
-        laser: Lms221Config | None = None,
+        laser: ScannerConfig | str | None = None,
         scan_height_m: float = SCAN_HEIGHT,
         odometry: str = "pioneer3dx",
         time_limit_s: float = 60.0,
@@ -173,8 +175,6 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
                 raise InvalidValueError(f"{name} must be True or False, got {value!r}")
         for name, word in (("scene", scene), ("odometry", odometry)):
             instance(name, word, str)
-        if laser is not None:
-            instance("laser", laser, Lms221Config)
         width, height = whole_numbers("render_size", render_size, "(width, height) in px", MAX_PX)
         self.render_mode = render_mode
         self.time_limit_s = time_limit_s
@@ -182,7 +182,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._settings: dict[str, Any] = {
             "scene": scene,
             "dynamism": dynamism,
-            "laser": laser or Lms221Config(),
+            "laser": scanner_of(laser),
             "scan_height_m": scan_height_m,
             "odometry": odometry,
             "labels": labels,

@@ -13,7 +13,8 @@ import numpy as np
 
 from sim.core.checks import numbers
 from sim.core.dynamism import Dynamism
-from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
+from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from slam.errors import InvalidValueError
 
 OPTIONS = (
@@ -114,9 +115,14 @@ def _rates(dynamism: float | Dynamism, given: Mapping[str, Any]) -> Dynamism:
     return replace(rates, **changes)
 
 
-def _laser(laser: Lms221Config, given: Mapping[str, Any]) -> Lms221Config:
-    chosen = given.get("laser", laser)
-    if not isinstance(chosen, Lms221Config):
-        raise InvalidValueError(f"option laser must be a Lms221Config, got {chosen!r}")
+def _laser(laser: ScannerConfig, given: Mapping[str, Any]) -> ScannerConfig:
+    chosen = scanner_of(given.get("laser", laser))
     changes = {k: given[k] for k in ("resolution_deg", "noise_std_m") if k in given}
+    if not changes:
+        return chosen
+    if not isinstance(chosen, Lms221Config):
+        raise InvalidValueError(
+            f"option {next(iter(changes))} is of the LMS-221, not of scanner "
+            f"'{chosen.scanner().name}': give a whole scanner as option laser"
+        )
     return replace(chosen, **changes)

@@ -32,6 +32,8 @@ def turns_of(spec: LaserSpec) -> int:
     Raises ``InvalidValueError`` for beam times that no number of turns explains.
     """
     offsets_ns = np.round(spec.beam_time_offsets * NS_PER_S)
+    if is_clockwise(spec):
+        offsets_ns = offsets_ns[::-1]
     for turns in range(1, min(9, spec.n_beams + 1)):
         steps = offsets_ns[turns:] - offsets_ns[:-turns]
         if steps.size == 0 or (steps.min() >= 0.0 and steps.max() - steps.min() <= 2.0):
@@ -39,12 +41,18 @@ def turns_of(spec: LaserSpec) -> int:
     raise InvalidValueError("LaserSpec.beam_time_offsets are not those of a turning mirror")
 
 
+def is_clockwise(spec: LaserSpec) -> bool:
+    """Whether the leftmost beam is measured first: such a scan is written clockwise."""
+    return bool(spec.beam_time_offsets[0] > spec.beam_time_offsets[-1])
+
+
 def turn_time_s(spec: LaserSpec, turns: int) -> float:
     """Seconds of one turn of the mirror; 0 where the beams have no times."""
     if spec.n_beams <= turns:
         return 0.0
     last = ((spec.n_beams - 1) // turns) * turns
-    sweep = float(spec.beam_time_offsets[last])
+    offsets = spec.beam_time_offsets[::-1] if is_clockwise(spec) else spec.beam_time_offsets
+    sweep = float(offsets[last])
     if sweep <= 0.0:
         return 0.0
     turn = sweep * math.tau / (last * spec.angle_increment)
@@ -56,7 +64,10 @@ def turn_time_s(spec: LaserSpec, turns: int) -> float:
 
 
 class ScanMessage:
-    """sensor_msgs/LaserScan of every ``stride``-th beam from ``first`` on."""
+    """sensor_msgs/LaserScan of every ``stride``-th beam from ``first`` on, in order of time.
+
+    Of a scanner whose mirror turns clockwise, beams and ``angle_increment`` run that way.
+    """
 
     KIND = "sensor_msgs/msg/LaserScan"
 
@@ -64,9 +75,14 @@ class ScanMessage:
         self, spec: LaserSpec, *, scan_time: float, first: int, stride: int, intensities: bool
     ) -> None:
         marks, beams = Marks(), slice(first, None, stride)
-        n = len(spec.beam_time_offsets[beams])
-        increment = stride * spec.angle_increment
-        start = float(spec.angles[first])
+        increment, angles, offsets = (
+            stride * spec.angle_increment,
+            spec.angles,
+            spec.beam_time_offsets,
+        )
+        if is_clockwise(spec):
+            beams, increment = slice(spec.n_beams - 1 - first, None, -stride), -increment
+        n, start = len(offsets[beams]), float(angles[beams][0])
         ranges, remissions = marks(n, np.float32), marks(n if intensities else 0, np.float32)
         prototype = message(
             self.KIND,
@@ -74,7 +90,7 @@ class ScanMessage:
             angle_min=start,
             angle_max=start + (n - 1) * increment,
             angle_increment=increment,
-            time_increment=scan_time / math.tau * increment,
+            time_increment=scan_time / math.tau * abs(increment),
             scan_time=scan_time,
             range_min=spec.range_min,
             range_max=spec.range_max,
@@ -84,7 +100,7 @@ class ScanMessage:
         self._beams, self._template = beams, Template(self.KIND, prototype)
         self._ranges = self._template.view(ranges)
         self._intensities = self._template.view(remissions) if intensities else None
-        self._offset_ns = round(float(spec.beam_time_offsets[first]) * NS_PER_S)
+        self._offset_ns = round(float(offsets[beams][0]) * NS_PER_S)
 
     def __call__(self, scan: Scan) -> tuple[int, bytearray]:
         """(stamp ns, message)."""

@@ -20,12 +20,12 @@ import numpy as np
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.core.versions import WORLD, world_of
-from sim.sensors.lidar.config import Lms221Config
+from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from sim.sensors.odometry.config import PRESETS
 from sim.simulation import Simulation
 from sim.twins.twins import TWINS
 from sim.world.world import World
-from slam.errors import InvalidValueError, LogFormatError
+from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.files import write_text
 from slam.names import NameFromFile
 
@@ -33,7 +33,6 @@ RECIPE = "recipe.json"
 SCHEMA = 1
 MAX_BYTES = 1 << 16
 MAX_SECONDS = 86_400.0
-SCANNERS = {"full": Lms221Config, "noise": Lms221Config.noise_only, "ideal": Lms221Config.ideal}
 _DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "rosbags")
 
 
@@ -46,8 +45,9 @@ class Recipe:
     seed        whole number >= 0
     dynamism    knob in [0, 1]
     seconds     of driving
-    scanner     "full" (every effect), "noise" (the statistical error alone) or "ideal"
-    resolution_deg, range_mode  of the scanner (``Lms221Config``)
+    scanner     registered name, and which errors: "utm30lx:noise" (``sim.sensors.lidar.registry``);
+                "full", "noise" and "ideal" are those of the LMS-221
+    resolution_deg, range_mode  of the LMS-221 (``Lms221Config``)
     odometry    preset of the wheel encoders
     twin        "", or which one of a drive's three versions (``sim.twins.twins``)
     """
@@ -74,7 +74,7 @@ class Recipe:
             raise InvalidValueError(
                 f"Recipe.seconds must be > 0 and at most {MAX_SECONDS:g}, got {self.seconds}"
             )
-        for name, known in (("scanner", SCANNERS), ("odometry", PRESETS), ("twin", ("", *TWINS))):
+        for name, known in (("odometry", PRESETS), ("twin", ("", *TWINS))):
             value = getattr(self, name)
             if not isinstance(value, str) or value not in known:
                 raise InvalidValueError(
@@ -90,11 +90,13 @@ class Recipe:
             )
         self.laser()
 
-    def laser(self) -> Lms221Config:
+    def laser(self) -> ScannerConfig:
         """How the scanner is set."""
-        return SCANNERS[self.scanner](
-            resolution_deg=self.resolution_deg, range_mode=self.range_mode
-        )
+        if not isinstance(self.scanner, str):
+            raise InvalidValueError(f"Recipe.scanner must be a name, got {self.scanner!r:.80}")
+        own = {n: getattr(self, n) for n in ("resolution_deg", "range_mode")}
+        changed = {n: v for n, v in own.items() if v != getattr(Recipe, n)}
+        return scanner_of(self.scanner, **changed)
 
     def simulation(self) -> dict[str, Any]:
         """Arguments of ``Simulation``."""
@@ -225,7 +227,7 @@ def read_recipe(path: Path) -> Made:
         parts[0]["scene"] = NameFromFile(parts[0]["scene"], path)
     try:
         recipe = Recipe(**parts[0])
-    except (InvalidValueError, TypeError) as error:
+    except (InvalidValueError, UnknownNameError, TypeError) as error:
         raise LogFormatError(path, f"no recipe: {error}") from error
     if recipe.sha256 != data["recipe_sha256"]:
         raise LogFormatError(path, "damaged: recipe_sha256 is not that of the recipe")

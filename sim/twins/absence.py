@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from sim.actors.doors import OPENED
 from sim.actors.people import gait, right_of_way
 from sim.sensors.lidar.candidates import HULL_GROUP
-from sim.sensors.lidar.lms221 import Lms221
+from sim.sensors.lidar.device import LaserScanner
 from sim.simulation import Simulation
 from sim.world.substeps import Pinned
 from sim.world.world import World
@@ -107,9 +107,10 @@ def _look_again(simulation: Simulation) -> None:
     """A scanner that does not see what is hidden now, with the draws of the one before."""
     before = simulation.laser
     seeds = simulation.world.seeds
-    laser = Lms221(simulation.world.model, before.config, seeds.generator("lidar"))
+    laser = LaserScanner(simulation.world.model, before.config, seeds.generator("lidar"))
     for new, old in zip(laser.streams, before.streams, strict=True):
         new.bit_generator.state = old.bit_generator.state
+    laser.load(*before.save())
     simulation.use_laser(laser)
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.moments import Moment
-from sim.sensors.lidar.lms221 import Lms221, ScanResult
+from sim.sensors.lidar.device import LaserScanner, ScanResult
 from sim.world.labels import BeamLabeller
-from sim.world.world import SUBSTEPS_PER_S, World
+from sim.world.world import World
 from slam._jit import njit
 from slam.frames import Float, Frame, Odometry, Scan
 
@@ -31,14 +31,16 @@ class Drive:
     """A recorded drive through the dynamic version, of n scans.
 
     stamps_ns, truths  n each: of the frames that were observed
-    path    (n, steps + 1, 3) m, m, rad: the robot at each physics step of each scan
+    path    n times (rows, 3) m, m, rad: the robot at each physics step of each scan
+    before  n each: the row at which the world stood when the scan was begun
     qpos    (n, nq) of everything at the start of each scan
     rests   (n, movers) whether it rested then
     """
 
     stamps_ns: list[int]
     truths: list[Float]
-    path: Float
+    path: list[Float]
+    before: list[int]
     qpos: Float
     rests: NDArray[np.bool_]
 
@@ -59,7 +61,7 @@ def gap(path: Float, pose: Float, length: float) -> float:
 class _Shapes:
     """Discs and leaves of the movers of a world, without its robot."""
 
-    def __init__(self, world: World, path: Float) -> None:
+    def __init__(self, world: World, path: Sequence[Float]) -> None:
         movers, radius = world.scene.movers, world.bodies.radius
         doors = np.array([m.kind == "door" for m in movers], dtype=np.bool_)
         self.rows = [k for k, m in enumerate(movers) if m.kind != "robot"]
@@ -67,7 +69,7 @@ class _Shapes:
         self.radius = np.where(doors, LEAF_M, radius)
         robot = world.bodies.robot
         self._robot = MARGIN_M + (0.0 if robot is None else float(radius[robot]))
-        self._path = np.ascontiguousarray(path.reshape(-1, 3)[::3])
+        self._path = np.ascontiguousarray(np.concatenate(path)[::3])
 
     def clear(self, row: int, pose: Float) -> bool:
         """Whether the whole path passes mover ``row`` if it stands at ``pose``."""
@@ -99,7 +101,7 @@ class _Shapes:
 class TwinRoom:
     """A room at rest through which the robot is carried."""
 
-    def __init__(self, world: World, laser: Lms221, drive: Drive, *, labels: bool) -> None:
+    def __init__(self, world: World, laser: LaserScanner, drive: Drive, *, labels: bool) -> None:
         self.world, self._laser, self._drive = world, laser, drive
         self._labeller = BeamLabeller(world) if labels else None
         self._robot = int(world.model.joint("robot/x").qposadr[0])
@@ -108,7 +110,7 @@ class TwinRoom:
         self._shapes = _Shapes(world, drive.path)
         self._unseen = np.full(len(world.scene.movers), math.inf)  # s
         self._steps: Iterator[Float] = iter(())
-        self._put(drive.path[0, 0])
+        self._put(drive.path[0][0])
 
     def _put(self, pose: Float) -> None:
         self.world.data.qpos[self._robot : self._robot + 3] = pose
@@ -126,13 +128,14 @@ class TwinRoom:
     def moments(self, odometry: list[Odometry], *, moved: bool) -> Iterator[Moment]:
         """All of them; with ``moved`` things are displaced while out of sight."""
         resting = np.zeros(len(self.world.scene.movers), dtype=np.bool_)
-        period = self._laser.config.steps / SUBSTEPS_PER_S
+        period = float(self._laser.scanner.period_s)
         for k, path in enumerate(self._drive.path):
-            self._put(path[0])
+            present = self._drive.before[k]
+            self._put(path[present])
             if moved and k % round(LOOK_S / period) == 0:
                 self._displace(k)
             poses = self.world.mover_poses()
-            self._steps = iter(path[1:])
+            self._steps = iter(path[present + 1 :])
             result = self._laser.observe(lambda: self._put(next(self._steps)), self.world.data)
             self._saw(result, period)
             stamp_ns = odometry[k].stamp_ns

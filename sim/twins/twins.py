@@ -30,9 +30,10 @@ from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.driving.drive import TourConfig
 from sim.moments import Moment, toured
-from sim.sensors.lidar.lms221 import Lms221
+from sim.sensors.lidar.device import LaserScanner
 from sim.sensors.odometry.encoders import WheelOdometry
-from sim.simulation import ScanTiming, Simulation
+from sim.sensors.scan_timing import ScanTiming
+from sim.simulation import Simulation
 from sim.twins.room import Drive, TwinRoom
 from sim.world.world import World
 from slam._jit import njit
@@ -131,7 +132,7 @@ def _toured(
 
 
 def _driven(simulation: Simulation, moments: Iterator[Moment]) -> Drive:
-    stamps_ns, truths, path, qpos, rests = [], [], [], [], []
+    stamps_ns, truths, path, starts, qpos, rests = [], [], [], [], [], []
     before = simulation.world.data.qpos.copy()
     for moment in moments:
         if moment.frame.truth is not None:
@@ -140,11 +141,13 @@ def _driven(simulation: Simulation, moments: Iterator[Moment]) -> Drive:
         qpos.append(before)
         rests.append(~moment.moving)
         path.append(simulation.path.copy())
+        starts.append(simulation.laser.window.before)
         before = simulation.world.data.qpos.copy()
     return Drive(
         stamps_ns=stamps_ns,
         truths=truths,
-        path=np.array(path),
+        path=path,
+        before=starts,
         qpos=np.array(qpos),
         rests=np.array(rests),
     )
@@ -154,7 +157,7 @@ def _twin(simulation: Simulation, drive: Drive, *, labels: bool) -> TwinRoom:
     """The same room, at rest, with a scanner that draws the same noise."""
     seeds, scene = simulation.world.seeds, simulation.world.scene
     world = World(scene, seed=seeds, dynamism=0.0, drive=simulation.world.drive_config)
-    laser = Lms221(world.model, simulation.laser.config, seeds.generator("lidar"))
+    laser = LaserScanner(world.model, simulation.laser.config, seeds.generator("lidar"))
     return TwinRoom(world, laser, drive, labels=labels)
 
 
@@ -164,16 +167,17 @@ def _odometry(simulation: Simulation, drive: Drive) -> list[Odometry]:
     encoders = WheelOdometry(
         simulation.odometry_preset, simulation.world.seeds.generator("odometry"), track=track
     )
-    n, steps = len(drive.path), drive.path.shape[1] - 1
-    whole = np.concatenate([drive.path[0, :1], drive.path[:, 1:].reshape(-1, 3)])
-    travel = rolled(np.ascontiguousarray(whole), track)
-    timing = ScanTiming.of(simulation.laser)
-    return [
-        timing.odometry(
-            encoders, travel[k * steps : (k + 1) * steps + 1], drive.stamps_ns[k], False
-        )
-        for k in range(n)
-    ]
+    rows = [path[k + 1 :] for path, k in zip(drive.path, drive.before, strict=True)]
+    whole = np.concatenate([drive.path[0][:1], *rows])
+    travel, readings = rolled(np.ascontiguousarray(whole), track), []
+    laser, at = LaserScanner(simulation.world.model, simulation.laser.config), 0
+    for stamp_ns, path, before in zip(drive.stamps_ns, drive.path, drive.before, strict=True):
+        timing = ScanTiming.of(laser)
+        own = travel[at - before : at - before + len(path)]
+        readings.append(timing.odometry(encoders, own, stamp_ns, False))
+        at += len(path) - 1 - before
+        laser.skip()
+    return readings
 
 
 def _with(frame: Frame, odometry: Odometry) -> Frame:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.sensors.lidar.lms221 import ScanResult
+from sim.sensors.lidar.receiver import ScanResult
 from sim.world.world import World
 from slam._jit import njit
 from slam.frames import BeamClass, BeamLabels, Float

@@ -31,7 +31,7 @@ from slam._jit import njit
 
 Float = NDArray[np.float64]
 SUBSTEPS_PER_S = 300
-SUBSTEPS_PER_TICK = 4  # one mirror turn of the LMS-221: 13.33 ms
+SUBSTEPS_PER_TICK = 4  # 13.33 ms: the control period of the actors and of the drive
 
 
 class Physics(NamedTuple):
@@ -83,7 +83,7 @@ class Actors(NamedTuple):
 
 
 class Watch(NamedTuple):
-    """What is written down after each substep k: row k of all.
+    """What is written down after each substep k: row k of all, longer than a scan where need be.
 
     marks    (n,) whether the scanner notes all poses
     scanner  where to

@@ -96,7 +96,7 @@ def _line_times(message: Any) -> Float:
     period = _mirror_period(message)
     count: Float = np.arange(len(message.ranges), dtype=np.float64)
     if period > 0.0:
-        return count * _degrees(message.angle_increment) / 360.0 * period
+        return count * abs(_degrees(message.angle_increment)) / 360.0 * period
     return count * step
 
 
@@ -120,8 +120,8 @@ def _turn_times(whole: Any, turns: Sequence[Any]) -> Float:
         after_s = (_stamp_ns(message) - start_ns) / NS_PER_S
         if period > 0.0:
             angles = start_deg + beams * step_deg
-            turn = round(after_s / period - first * step_deg / 360.0)
-            times[beams] = (turn + (angles - start_deg) / 360.0) * period
+            turn = round(after_s / period - first * abs(step_deg) / 360.0)
+            times[beams] = (turn + np.abs(angles - start_deg) / 360.0) * period
         else:
             times[beams] = after_s + np.arange(len(beams)) * float(message.time_increment)
     if np.isnan(times).any():

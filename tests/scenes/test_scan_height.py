@@ -14,7 +14,7 @@ import scenes
 from scenes.mounting import FOOT, LASER
 from scenes.scene import Scene
 from sim.gym.env import MobiliaEnv
-from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 from sim.world.world import World
 from slam.errors import InvalidValueError

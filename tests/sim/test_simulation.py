@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sim.core.seeds import Seeds
-from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation, stream, tour
 from slam import create, se2
 from slam.errors import InvalidValueError, UnknownNameError

@@ -13,7 +13,7 @@ from sim.actors import doors
 from sim.actors.people import right_of_way
 from sim.core.seeds import Seeds
 from sim.driving.pilot import Pilot
-from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 
 PARTS = ("layout", "chairs", "bins", "doors", "people", "lidar", "odometry", "driving", "tags")

@@ -13,33 +13,11 @@ from numpy.typing import NDArray
 
 from sim.sensors.lidar import raycast, windows
 from sim.sensors.lidar.candidates import candidates
+from sim.sensors.lidar.scanner import Spot
 
 Float = NDArray[np.float64]
 Hits = tuple[Float, NDArray[np.int64], Float]
-
-MAX_SLOTS = 12  # the ends of the two physics steps of each of four sweeps
-
-
-@dataclass(frozen=True, kw_only=True)
-class Spot:
-    """The disc a beam lights: ``aperture`` radius m at the window, ``divergence`` half angle rad.
-
-    ``offsets`` (k, 2): places of the k rays on the unit disc, (left, up). An ideal beam is the
-    default: one ray in the middle.
-    """
-
-    aperture: float = 0.0
-    divergence: float = 0.0
-    offsets: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
-
-    def rays(self) -> Float:
-        """(k, 6): left, up, unit direction (forward, left, up), way up per metre forward."""
-        out = np.empty((len(self.offsets), 6))
-        for k, (u, v) in enumerate(self.offsets):
-            left, up = self.divergence * u, self.divergence * v
-            length = math.sqrt(1.0 + left * left + up * up)
-            out[k] = u, v, 1.0 / length, left / length, up / length, up
-        return out
+Noted = tuple[Float, Float]  # (m, 12) poses of what can move, (3,) x, y, yaw of the laser
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,7 +35,9 @@ class FanPlan:
     rows: Float
 
     @classmethod
-    def of(cls, fans: Sequence[tuple[NDArray[np.int64], Float, Float, Float]]) -> FanPlan:
+    def of(
+        cls, fans: Sequence[tuple[NDArray[np.int64], Float, NDArray[np.int64], Float]]
+    ) -> FanPlan:
         """From (beams, angles, slots, parts) of each fan."""
         beams, angles, slots, parts = (np.concatenate(column) for column in zip(*fans, strict=True))
         cos, sin = ([f(a) for a in angles.tolist()] for f in (math.cos, math.sin))
@@ -75,6 +55,7 @@ class Raycaster:
     robot      name of the scanner's own body; it and its children are not seen
     spot       the rays of each beam
     range_max  m, bounds how far the spot spreads up and down
+    slots      the most notes of a scan
     panes      optional (ngeom,) True for what beams may pass: cast apart, as a second layer
     site       id of the laser's site, whose poses are then noted too
 
@@ -95,6 +76,7 @@ class Raycaster:
         robot: str | None = "robot/base",
         spot: Spot | None = None,
         range_max: float = 80.0,
+        slots: int = 12,
         panes: NDArray[np.bool_] | None = None,
         site: int = -1,
     ) -> None:
@@ -107,9 +89,9 @@ class Raycaster:
         n = self.ids.size
         self._rays = self.spot.rays()
         self._optics = (height, self.spot.aperture, self.spot.divergence)
-        self.poses = np.zeros((MAX_SLOTS, n, 12))
+        self.poses = np.zeros((slots, n, 12))
         self.bounds = np.zeros((n, 6))
-        self.lasers = np.zeros((MAX_SLOTS, 3))
+        self.lasers = np.zeros((slots, 3))
         self._all = np.arange(n)
         self._movable = np.flatnonzero(
             np.isin(model.geom_bodyid[self.ids], np.flatnonzero(model.body_weldid != 0))
@@ -124,8 +106,11 @@ class Raycaster:
         """Number of rays cast for each beam."""
         return len(self.spot.offsets)
 
-    def start(self, data: mujoco.MjData) -> None:
-        """Forget the last scan, and note where everything is; needs fresh kinematics."""
+    def start(self, data: mujoco.MjData, before: Noted | None = None) -> None:
+        """Forget the last scan, and note where everything is; needs fresh kinematics.
+
+        before  what ``last_notes`` gave of the step before, to be the first note instead
+        """
         self._filled[0] = 0
         if data is not self._seen:
             self._seen = data
@@ -136,7 +121,36 @@ class Raycaster:
             windows.enclose(self.table, self._all, self.poses, 1, self.bounds)
             self.noted = (self.ids, self._movable, *where)
             self._filled[0] = 0
+        if before is not None:
+            self.poses[0, self._movable], self.lasers[0] = before
+            self._filled[0] = 1
         self.note()
+
+    def last_notes(self) -> tuple[Noted, Noted]:
+        """The two last notes of the scan, the older one first."""
+        last = int(self._filled[0]) - 1
+        older, newer = (
+            (self.poses[slot][self._movable], self.lasers[slot].copy()) for slot in (last - 1, last)
+        )
+        return older, newer
+
+    def settle(self, expected: Noted) -> bool:
+        """What was moved by hand since the first of two notes is taken to have stood there then.
+
+        expected  what the second note would be otherwise
+        Returns whether the laser is where it was expected.
+        """
+        moved = self._movable[(self.poses[1, self._movable] != expected[0]).any(axis=1)]
+        self.poses[0, moved] = self.poses[1, moved]
+        stands = bool(np.array_equal(self.lasers[1], expected[1]))
+        if not stands:
+            self.lasers[0] = self.lasers[1]
+        return stands
+
+    @property
+    def movable_ids(self) -> NDArray[np.int64]:
+        """(m,) ids of the geoms that ``last_notes`` is of."""
+        return self.ids[self._movable]
 
     def note(self) -> None:
         """Note where everything is now, in the next slot."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The beams of a scan in the world, and the tables that the caster's kernels share.
 
-A fan is the beams of one sweep of the mirror, at even steps of azimuth; a scan is one to four of
-them. Every beam has its own time, hence its own origin and direction, because the robot moves; and
-so do the things: poses are noted at the physics steps and are linear in between.
+A fan is the beams of one sweep of the mirror, at about even steps of azimuth; an interlaced scan is
+several of them. Every beam has its own time, hence its own origin and direction, because the robot
+moves; and so do the things: poses are noted at the physics steps and are linear in between.
 """
 
 from __future__ import annotations
@@ -71,16 +71,18 @@ def lay_fans(plan: Float, lasers: Float, ends: Int, fan: Float, frames: Float) -
     plan    (m, 5) of the beams; fan k has the rows ``ends[k]`` to ``ends[k + 1]``
     lasers  (slots, 3); the laser moves evenly between slots
     """
-    slot = -1
-    yaw, turn, cos_yaw, sin_yaw = _wrapped(lasers[0, 2]), 0.0, 1.0, 0.0
+    slot, yaw, turn, cos_yaw, sin_yaw = -1, _wrapped(lasers[0, 2]), 0.0, 1.0, 0.0
     for i in range(plan.shape[0]):
         k, part = int(plan[i, PLAN_SLOT]), plan[i, PLAN_PART]
+        if k < slot:  # the mirror turns clockwise
+            slot, yaw = -1, _wrapped(lasers[0, 2])
         while slot < k:
             slot += 1
             if slot > 0:
                 yaw += _wrapped(lasers[slot, 2] - lasers[slot - 1, 2])
-            turn = _wrapped(lasers[slot + 1, 2] - lasers[slot, 2])
-            cos_yaw, sin_yaw = math.cos(yaw), math.sin(yaw)
+            if slot == k:
+                turn = _wrapped(lasers[slot + 1, 2] - lasers[slot, 2])
+                cos_yaw, sin_yaw = math.cos(yaw), math.sin(yaw)
         c, s = cos_yaw, sin_yaw
         if turn != 0.0:
             a, b = _turned_by(part * turn)

@@ -21,7 +21,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from sim.sensors.lidar.config import TURNS_PER_S, Lms221Config
+from sim.sensors.lidar.models.lms221 import TURNS_PER_S, Lms221Config
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Frame, LaserSpec, Scan
 from slam.frontend.odometry_sum import MotionSum
@@ -47,6 +47,11 @@ class SerialLink:
     config: Lms221Config
 
     def __post_init__(self) -> None:
+        if not isinstance(self.config, Lms221Config):
+            raise InvalidValueError(
+                "SerialLink.config must be a Lms221Config: the line is that of the LMS-221, got "
+                f"{self.config!r:.80}"
+            )
         if self.baud not in BAUD_RATES:
             known = ", ".join(str(rate) for rate in BAUD_RATES)
             raise InvalidValueError(f"SerialLink.baud must be one of {known}, got {self.baud!r}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One scan of the LMS-221 from what its rays hit; every scan takes the same number of draws."""
+"""One scan from what its rays hit; every scan takes the same number of draws."""
 
 from __future__ import annotations
 
@@ -9,16 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.sensors.lidar.caster import Hits, Spot
-from sim.sensors.lidar.config import Lms221Config
-from sim.sensors.lidar.effects import (
-    DISC_WEIGHTS,
-    LMS221_SPOT,
-    TIMER_UNIT,
-    RangeEffects,
-    error_function,
-    needed_table,
-)
+from sim.sensors.lidar.caster import Hits
+from sim.sensors.lidar.effects import error_function, needed_table
+from sim.sensors.lidar.scanner import Scanner
 from sim.sensors.lidar.signal import Bool, Float, Int, measure, receive, send
 from slam._jit import njit
 
@@ -27,8 +20,8 @@ from slam._jit import njit
 class ScanResult:
     """One scan, and the truth about it that only a simulator has.
 
-    ranges       (n,) float32 m, as sent: inf beyond what the mode can say, NaN an error code
-                 (REP 117); no return is NaN with ``RangeEffects.error_codes``, else inf
+    ranges       (n,) float32 m, as sent: inf beyond the largest range, NaN an error code (REP
+                 117); no return is NaN with ``Scanner.error_codes``, else inf
     true_ranges  (n,) float64 m, inf where nothing was hit
     geoms        (n,) int32 geom id, -1 where nothing was hit or nothing came back
     bodies       (n,) int32 body id, -1 likewise
@@ -66,7 +59,7 @@ def arccos(cosines: Float) -> Float:
 class SignalModel:
     """The receiver of one scanner: hits in, what is sent out.
 
-    config   which effects, which range mode
+    scanner  which ranges, which parts
     surface  (candidates,) each: reflectivity; polished; geom id; body id
     rng      drawn from once, to seed a stream for each effect: what is off draws nothing, and
              neither that nor what is hit changes the draws of the others
@@ -76,30 +69,34 @@ class SignalModel:
 
     def __init__(
         self,
-        config: Lms221Config,
+        scanner: Scanner,
         surface: tuple[Float, Bool, Int, Int],
         rng: np.random.Generator,
     ) -> None:
-        effects = config.effects
         seeds = rng.integers(0, 2**63, size=4)
         unit_of_run, *rest = (np.random.default_rng(seed) for seed in seeds)
         self.streams = tuple(rest)  # noise, mixed pixels, lost values
-        self._weights = np.array(DISC_WEIGHTS if effects.spot else (1.0,))
+        self._weights = np.array(scanner.spot.weights)
         self._surface = (np.append(surface[0], 0.0), np.append(surface[1], False))
         self._owner = np.stack([np.append(ids, -1) for ids in surface[2:]])
-        self._needed = needed_table() if effects.reflectivity else np.zeros(1)
+        self._needed = needed_table(scanner.needed) if scanner.needed else np.zeros(1)
         self._error: tuple[Float, float] = (np.zeros(0), 0.0)
-        if effects.systematic:
-            self._error = error_function(config.systematic_bound_m, unit_of_run)
-        shaping = ("spot", "reflectivity", "incidence", "mixed_pixels", "glass", "bounce")
-        self._ruler = not any(getattr(effects, name) for name in shaping)
-        self._switches = (effects.reflectivity, effects.incidence, effects.mixed_pixels)
-        unit = config.mode.unit_m if config.quantise else 0.0
-        counter = TIMER_UNIT if effects.timer else 0.0
-        self._steps = (counter, unit, config.mode.range_max_m)
-        noise = analog_noise(config.noise_std_m, counter, unit, effects)
-        none = math.nan if effects.error_codes else math.inf
-        self._errors = (noise, effects.dropout_rate, none)
+        if scanner.systematic:
+            self._error = error_function(scanner.systematic, unit_of_run)
+        self._ruler = len(scanner.spot.weights) == 1 and not (
+            scanner.needed
+            or scanner.incidence
+            or scanner.mixed_pixels
+            or scanner.glass
+            or scanner.bounce
+        )
+        self._switches = (bool(scanner.needed), scanner.incidence, scanner.mixed_pixels)
+        self._steps = (
+            scanner.counter_m, scanner.unit_m, scanner.range_min_m, scanner.range_max_m,
+        )  # fmt: skip
+        self._bands = analog_noise(scanner)
+        none = math.nan if scanner.error_codes else math.inf
+        self._errors = (scanner.dropout_rate, none)
         self._nothing = np.zeros(0)
 
     def scan(self, hits: Hits, mirrored: tuple[Float, Int, Float]) -> ScanResult:
@@ -114,12 +111,12 @@ class SignalModel:
                 hits, mirrored, self._surface, self._weights, self._switches, self._needed,
                 chances, (places, seen, marks),
             )  # fmt: skip
-        normal = self.streams[0].standard_normal((n,)) if self._errors[0] > 0.0 else self._nothing
-        lost = self.streams[2].random((n,)) if self._errors[1] > 0.0 else self._nothing
+        normal = self.streams[0].standard_normal((n,)) if len(self._bands) else self._nothing
+        lost = self.streams[2].random((n,)) if self._errors[0] > 0.0 else self._nothing
         ranges, whose = np.empty(n, dtype=np.float32), np.empty((2, n), dtype=np.int32)
         send(
             (places, seen), self._surface[0], self._owner, self._error, (normal, lost),
-            self._steps, self._errors, (ranges, whose),
+            self._steps, self._bands, self._errors, (ranges, whose),
         )  # fmt: skip
         return ScanResult(
             ranges=ranges, true_ranges=places[1], geoms=whose[0], bodies=whose[1],
@@ -127,16 +124,20 @@ class SignalModel:
         )  # fmt: skip
 
 
-def analog_noise(std: float, counter: float, unit: float, effects: RangeEffects) -> float:
-    """Deviation before rounding, so that what is sent has ``std``.
+def analog_noise(scanner: Scanner) -> Float:
+    """(k, 3) bands of range: up to m; deviation m before rounding, so that what is sent has that of
+    ``Scanner.noise``; further deviation per metre. (0, 3) for none.
 
     Rounding to u adds u^2 / 12 of its own; the second rounding adds nothing where it finds only
     multiples of its unit, that is without corrections in between.
     """
-    again = unit if effects.systematic or unit > counter else 0.0
-    return math.sqrt(max(std**2 - (counter**2 + again**2) / 12.0, 0.0))
-
-
-def spot_of(effects: RangeEffects) -> Spot:
-    """The rays of a beam."""
-    return LMS221_SPOT if effects.spot else Spot()
+    counter, unit = scanner.counter_m, scanner.unit_m
+    again = unit if scanner.systematic or unit > counter else 0.0
+    rounding = (counter**2 + again**2) / 12.0
+    bands = [
+        (band.up_to_m, math.sqrt(max(band.error_m**2 - rounding, 0.0)), band.share)
+        for band in scanner.noise
+    ]
+    if not any(std > 0.0 or share > 0.0 for _, std, share in bands):
+        return np.zeros((0, 3))
+    return np.array(bands)

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the geometry under a laser spot to the value the LMS-221 sends.
+"""From the geometry under a laser spot to the value a scanner sends.
 
-A spot of 16 mm + 11.9 mrad (TL p114) is seven rays. Rays at about the same distance make one pulse
-whose energy is the sum of weight, reflectivity and cosine of incidence. The first pulse that
-carries the energy needed at its distance (TD fig. 4-2) is the one that counts (TL p19); if more
-energy comes back from within the pulse length of about 1 m behind it, the value lies anywhere
+A spot is several rays. Rays at about the same distance make one pulse whose energy is the sum of
+weight, reflectivity and cosine of incidence. The first pulse that carries the energy needed at its
+distance (TD fig. 4-2) is the one that counts (TL p19); if more energy comes back from within the
+pulse length of about 1 m behind it, the value lies anywhere
 between the two (TL p110-111): a mixed pixel. What a pane lets through and what it mirrors share
 the energy as Fresnel's two faces of n = 1.5 do (Schlick's approximation; inferred, as is all about
 glass: no source gives numbers for this device). The counter's value is then corrected by the
-unit's own tables and rounded to the code of the range mode (TL p113).
+unit's own tables and rounded to the code of the range mode (TL p113). TD and TL are the documents
+of the LMS-221 (``sim.sensors.lidar.models.lms221``), whose receiver this is.
 """
 
 from __future__ import annotations
@@ -220,8 +221,9 @@ def send(
     owner: Int,
     error: tuple[Float, float],
     draws: tuple[Float, Float],
-    steps: tuple[float, float, float],
-    errors: tuple[float, float, float],
+    steps: tuple[float, float, float, float],
+    bands: Float,
+    errors: tuple[float, float],
     out: tuple[NDArray[np.float32], NDArray[np.int32]],
 ) -> None:
     """Counter, corrections, rounding: the values sent and whose they are.
@@ -230,15 +232,16 @@ def send(
     reflectivity  (candidates + 1,); ``owner`` (2, candidates + 1) geom, body; -1 for no hit
     draws         standard normal; 0..1 against the share of lost values; (n,) where needed
     error         of ``error_function``; (0,) for none
-    steps         m: of the counter and of the code, 0 for continuous; the largest value
-    errors        noise m; share of lost values; what no return becomes, NaN or inf
+    steps         m: of the counter and of the code, 0 for continuous; least and largest range
+    bands         (k, 3) of the noise: up to m, deviation m, deviation per m; (0, 3) for none
+    errors        share of lost values; what no return becomes, NaN or inf
     out           (n,) ranges m; (2, n) geom, body
     """
     places, seen = received
     ranges, whose = out
-    counter, unit, limit = steps
+    counter, unit, least, limit = steps
     normal, lost = draws
-    noise, rate, none = errors
+    rate, none = errors
     for i in range(ranges.size):
         place, j = places[0, i], seen[i]
         whose[0, i], whose[1, i] = owner[0, j], owner[1, j]
@@ -248,7 +251,16 @@ def send(
         if j < 0:
             ranges[i] = none
             continue
-        value = max(place + noise * normal[i], 0.0) if noise > 0.0 else place
+        if place < least:
+            ranges[i] = math.nan
+            continue
+        value = place
+        if len(bands) > 0:
+            band = 0
+            while band < len(bands) - 1 and place > bands[band, 0]:
+                band += 1
+            noise = bands[band, 1] + bands[band, 2] * place
+            value = max(place + noise * normal[i], 0.0)
         if counter > 0.0:
             value = math.floor(value / counter + 0.5) * counter
         if error[0].size > 0:

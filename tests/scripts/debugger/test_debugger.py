@@ -230,7 +230,7 @@ def test_the_verb_leaves_picture_table_and_numbers(tmp_path: Path):
         (("--scene", "arena", "--option", "walls"), "--option must be NAME=VALUE"),
         (("--scene", "arena", "--option", "seed=4"), "--option seed: that has an option"),
         (("--scene", "arena", "--option", "wall=no"), "cannot take these options"),
-        (("--scene", "arena", "--scanner", "best"), "--scanner must be one of full"),
+        (("--scene", "arena", "--scanner", "best"), "no scanner is called 'best'. Known: lms221"),
         (("--scene", "arena", "--slam", "shuntin"), "Did you mean 'shunting'"),
         (("--scene", "arena", "--seconds", "1", "--at", "7"), "--at must lie in"),
     ],

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 from scripts.experiments import association_effort, corner_recall, rival_bar, tune_ekf
-from sim.sensors.lidar.config import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 from slam.frames import LaserSpec, Scan
 from slam.trajectory import Trajectory

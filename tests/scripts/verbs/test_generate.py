@@ -264,7 +264,6 @@ def test_a_full_and_a_read_only_disk_are_named(small_disk):
         ({"seed": -1}, "seed must be a whole number >= 0"),
         ({"seconds": float("nan")}, "seconds must be > 0"),
         ({"dynamism": 1.5}, "dynamism must lie in"),
-        ({"scanner": "lidar"}, "scanner must be one of"),
     ],
 )
 def test_impossible_wishes_are_one_clear_line_and_leave_nothing(change, message, tmp_path):
@@ -273,7 +272,9 @@ def test_impossible_wishes_are_one_clear_line_and_leave_nothing(change, message,
     assert not list(tmp_path.iterdir())
 
 
-def test_an_unknown_scene_or_cluster_is_refused(tmp_path):
+def test_an_unknown_scene_scanner_or_cluster_is_refused(tmp_path):
+    with pytest.raises(MobiliaError, match="Did you mean 'rplidar_a1'"):
+        generate("arena", tmp_path / "c", **SETTINGS, scanner="lidar")
     with pytest.raises(MobiliaError, match="Did you mean 'arena'"):
         generate("arenas", tmp_path / "a", **SETTINGS)
     with pytest.raises(InvalidValueError, match="no Dask scheduler"):

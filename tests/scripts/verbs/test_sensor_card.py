@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from scripts.card import rows as sensor_rows
+from scripts.card import stated
 from scripts.verbs.sensor_card import sensor_card
-from slam.errors import MobiliaError
+from sim.sensors.lidar.sheet import NOT_STATED, sheet_of
+from slam.errors import InvalidValueError, MobiliaError, UnknownNameError
 
 
 @pytest.mark.parametrize(
@@ -44,3 +47,30 @@ def test_a_row_that_does_not_hold_fails_the_card(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(sensor_rows, "rows", lambda: [broken])
     with pytest.raises(MobiliaError, match="departs from its data sheet: colour"):
         sensor_card()
+
+
+@pytest.mark.parametrize("name", ["utm30lx", "tim561", "rplidar_a1"])
+def test_every_row_of_another_scanner_agrees_with_its_data_sheet(name: str) -> None:
+    rows, sheet = stated.rows_of(name), sheet_of(name)
+    broken = [f"{row.what}: {row.measured}, not {row.datasheet}" for row in rows if not row.kept]
+    assert not broken
+    named = {row.what for row in sheet}
+    assert {"field_of_view_deg", "step_deg", "rate_hz", "range_min_m", "range_max_m", "noise_m",
+            "systematic_m", "unit_m", "beam_to_beam_us"} <= named  # fmt: skip
+    for row in sheet:
+        assert (row.value is None) == row.text.startswith(NOT_STATED)
+        assert row.source or row.value is None
+    assert f"| {rows[0].what} |" in stated.page(name, rows)
+
+
+def test_a_card_can_be_broken(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = [replace(row, value=50.0) for row in sheet_of("tim561") if row.what == "rate_hz"]
+    monkeypatch.setattr(stated, "sheet_of", lambda name: wrong)
+    assert [row.kept for row in stated.rows_of("tim561")] == [False]
+
+
+def test_a_scanner_without_a_data_sheet_has_no_card() -> None:
+    with pytest.raises(InvalidValueError, match="'scanner' has no data sheet"):
+        sensor_card(scanner="scanner")
+    with pytest.raises(UnknownNameError, match="Did you mean 'tim561'"):
+        sensor_card(scanner="tim562")

@@ -12,8 +12,7 @@ from sim.actors.robot import DriveConfig
 from sim.core.dynamism import Dynamism
 from sim.driving.drive import TourConfig
 from sim.gym.env import MobiliaEnv
-from sim.sensors.lidar.effects import RangeEffects
-from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config, RangeEffects
 from sim.sensors.odometry.config import OdometryConfig
 from sim.sensors.tag_cameras import TagCameraConfig
 from sim.simulation import Simulation, stream
@@ -48,7 +47,7 @@ def test_a_field_of_the_wrong_type_is_named(
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"laser": {"fov_deg": 100}}, "laser must be a Lms221Config"),
+        ({"laser": {"fov_deg": 100}}, "laser must be a scanner's name"),
         ({"drive": {"accel": 2.0}}, "drive must be a DriveConfig"),
         ({"odometry": 3}, "odometry must be a OdometryConfig"),
         ({"start": (0.0, 0.0)}, "start must be"),

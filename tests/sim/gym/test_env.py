@@ -148,7 +148,7 @@ def test_the_cameras_see_a_room():
         ({"rates": {"door_rat": 1.0}}, "door_rat"),
         ({"moving_share": 3.0}, "moving_share"),
         ({"resolution_deg": 0.3}, "resolution_deg"),
-        ({"laser": "best"}, "option laser"),
+        ({"laser": "best"}, "no scanner is called .best.. Known: lms221"),
         ({"start": (0.0, 0.0)}, "option start must be"),
         ({"start": (99.0, 0.0, 0.0)}, "free floor"),
     ],

@@ -21,7 +21,7 @@ from sim.moments import Moment, toured
 from sim.recording.bag import BagWriter, _accumulate
 from sim.recording.messages import turns_of
 from sim.recording.relations import pairs
-from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 from slam import create, se2
 from slam.errors import InvalidValueError

@@ -10,7 +10,7 @@ import pytest
 
 from sim.core.dynamism import Dynamism
 from sim.driving.drive import TourConfig
-from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.twins.room import UNSEEN_S
 from sim.twins.twins import TWINS, rolled, twins
 from sim.world.world import SUBSTEPS_PER_S, World

@@ -8,7 +8,7 @@ import math
 import mujoco
 import numpy as np
 
-from sim.sensors.lidar.lms221 import Lms221Config
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 from slam.frames import BeamClass
 

@@ -10,16 +10,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sim.sensors.lidar.caster import Spot
-from sim.sensors.lidar.effects import (
-    LMS221_SPOT,
-    NEEDED,
-    NEEDED_RANGE_M,
-    RangeEffects,
-    error_function,
-    needed_reflectivity,
-)
-from sim.sensors.lidar.lms221 import Lms221, Lms221Config, ScanResult
+from sim.sensors.lidar.device import LaserScanner, ScanResult
+from sim.sensors.lidar.effects import error_function, needed_reflectivity
+from sim.sensors.lidar.models.lms221 import LMS221_SPOT, NEEDED, Lms221Config, RangeEffects
+from sim.sensors.lidar.scanner import Band, Spot
 from sim.sensors.lidar.surfaces import reflectivity_of
 from slam.errors import InvalidValueError
 
@@ -32,12 +26,12 @@ MATERIALS = "".join(
 
 def look(
     room: SimpleNamespace, world: str, *, seed: int = 0, noise: float = 0.0, **effects: bool
-) -> tuple[ScanResult, Lms221]:
+) -> tuple[ScanResult, LaserScanner]:
     """One scan of ``world`` with only the named effects on."""
     config = Lms221Config(noise_std_m=noise, quantise=False, effects=replace(NONE, **effects))
     text = world + "</worldbody>" + MATERIALS + "<worldbody>"
     model, data = room.build(text)
-    lidar = Lms221(model, config, np.random.default_rng(seed))
+    lidar = LaserScanner(model, config, np.random.default_rng(seed))
     return lidar.observe(room.stepper(model, data), data), lidar
 
 
@@ -58,10 +52,10 @@ def test_the_spot_has_the_size_of_the_data_sheet() -> None:
 
 
 def test_the_needed_reflectivity_is_the_printed_curve() -> None:
-    for range_m, needed in zip(NEEDED_RANGE_M, NEEDED, strict=True):
-        assert needed_reflectivity(range_m) == pytest.approx(needed, rel=1e-9)
-    assert needed_reflectivity(0.1) > 1.0
-    assert needed_reflectivity(80.0) > needed_reflectivity(60.0)
+    for range_m, needed in NEEDED:
+        assert needed_reflectivity(NEEDED, range_m) == pytest.approx(needed, rel=1e-9)
+    assert needed_reflectivity(NEEDED, 0.1) > 1.0
+    assert needed_reflectivity(NEEDED, 80.0) > needed_reflectivity(NEEDED, 60.0)
 
 
 def test_black_rubber_vanishes_close_by_and_far_away(room: SimpleNamespace) -> None:
@@ -167,7 +161,7 @@ def test_the_counter_counts_in_centimetres_also_in_millimetre_mode(room: SimpleN
             range_mode="32m", effects=replace(NONE, timer=True, systematic=systematic)
         )
         model, data = room.build()
-        lidar = Lms221(model, config, np.random.default_rng(4))
+        lidar = LaserScanner(model, config, np.random.default_rng(4))
         advance = room.stepper(model, data)
         scans = [lidar.observe(advance, data) for _ in range(60)]
         errors = np.array([s.ranges - s.true_ranges for s in scans])
@@ -184,7 +178,7 @@ def test_no_return_is_an_error_code_as_the_driver_has_it(room: SimpleNamespace) 
     for error_codes in (False, True):
         config = Lms221Config(range_mode="8m", effects=replace(NONE, error_codes=error_codes))
         model, data = room.build(text)
-        result = Lms221(model, config).observe(room.stepper(model, data), data)
+        result = LaserScanner(model, config).observe(room.stepper(model, data), data)
         assert result.ranges[180] == np.inf
         assert np.isnan(result.ranges[0]) == error_codes
 
@@ -208,7 +202,9 @@ def test_the_systematic_error_is_smooth_bounded_and_of_the_unit(room: SimpleName
     """TD p34, over 20 units, black to white."""
     curves = []
     for seed in range(20):
-        by_range, by_reflectivity = error_function(0.035, np.random.default_rng(seed))
+        by_range, by_reflectivity = error_function(
+            (Band(up_to_m=80.0, error_m=0.035),), np.random.default_rng(seed)
+        )
         curves.append(by_range[10:201])
         assert np.abs(by_range[10:201]).max() + abs(by_reflectivity) <= 0.035
     errors = np.array(curves)
@@ -230,7 +226,7 @@ def test_centimetre_mode_has_the_larger_bound() -> None:
 def test_lost_values_are_error_codes(room: SimpleNamespace) -> None:
     model, data = room.build()
     config = Lms221Config(effects=replace(NONE, dropout_rate=0.25))
-    result = Lms221(model, config).observe(room.stepper(model, data), data)
+    result = LaserScanner(model, config).observe(room.stepper(model, data), data)
     assert 0.15 < float(np.isnan(result.ranges).mean()) < 0.35
 
 
@@ -239,7 +235,7 @@ def test_a_switch_does_not_change_what_other_effects_draw(room: SimpleNamespace)
     for effects in (NONE, replace(NONE, mixed_pixels=True, dropout_rate=0.1)):
         model, data = room.build()
         config = Lms221Config(quantise=False, effects=effects)
-        result = Lms221(model, config, np.random.default_rng(3)).observe(
+        result = LaserScanner(model, config, np.random.default_rng(3)).observe(
             room.stepper(model, data), data
         )
         noise.append(result.ranges)

@@ -9,8 +9,8 @@ import math
 import numpy as np
 import pytest
 
-from sim.sensors.lidar.config import Lms221Config
 from sim.sensors.lidar.link import SerialLink, partial_scans
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import stream
 from slam.errors import InvalidValueError
 from slam.frames import Scan

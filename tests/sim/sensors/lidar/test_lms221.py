@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sim.sensors.lidar.lms221 import Lms221, Lms221Config, ScanResult
+from sim.sensors.lidar.device import LaserScanner, ScanResult
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from slam.errors import InvalidValueError
 
 TURN = 1.0 / 75.0
@@ -22,9 +23,9 @@ def scan(
     seed: int = 0,
     twist: tuple[float, float, float] = (0.0, 0.0, 0.0),
     world: str | None = None,
-) -> tuple[ScanResult, Lms221]:
+) -> tuple[ScanResult, LaserScanner]:
     model, data = room.build(room.SQUARE if world is None else world)
-    lidar = Lms221(model, config, np.random.default_rng(seed))
+    lidar = LaserScanner(model, config, np.random.default_rng(seed))
     return lidar.observe(room.stepper(model, data, twist), data), lidar
 
 
@@ -45,11 +46,11 @@ def test_beams_and_rates_are_those_of_the_data_sheet(
     config = Lms221Config(resolution_deg=resolution, fov_deg=fov)
     spec = config.spec()
     assert spec.n_beams == beams
-    assert 300.0 / config.steps == pytest.approx(rate)
+    assert config.rate_hz == pytest.approx(rate)
     assert math.degrees(spec.angle_min) == pytest.approx(-fov / 2)
     assert math.degrees(spec.angles[-1]) == pytest.approx(fov / 2)
     assert spec.beam_time_offsets[0] == 0.0
-    assert spec.sweep_duration <= config.sweep_steps / 300.0 + 1e-9
+    assert spec.sweep_duration <= (config.turns - 0.5) / 75.0 + 1e-9
 
 
 def test_half_degree_beams_come_from_the_second_turn() -> None:
@@ -106,7 +107,9 @@ def test_noise_has_the_deviation_of_the_data_sheet(room: SimpleNamespace) -> Non
     """TD p34: 10 mm, one sigma, in millimetre mode; here of what is sent, rounding included."""
     for mode in ("32m", "80m"):
         model, data = room.build()
-        lidar = Lms221(model, Lms221Config.noise_only(range_mode=mode), np.random.default_rng(1))
+        lidar = LaserScanner(
+            model, Lms221Config.noise_only(range_mode=mode), np.random.default_rng(1)
+        )
         advance = room.stepper(model, data)
         errors = []
         for _ in range(60):
@@ -154,7 +157,7 @@ def test_draws_do_not_depend_on_what_is_hit(room: SimpleNamespace) -> None:
     states = []
     for world in (room.SQUARE, "", room.wall(2.0, 0.0, 0.1, 0.1)):
         model, data = room.build(world)
-        lidar = Lms221(model, Lms221Config(), np.random.default_rng(9))
+        lidar = LaserScanner(model, Lms221Config(), np.random.default_rng(9))
         lidar.observe(room.stepper(model, data), data)
         states.append([stream.bit_generator.state for stream in lidar.streams])
     assert states[0] == states[1] == states[2]
@@ -169,7 +172,7 @@ def test_the_seed_and_only_the_seed_decides_the_noise(room: SimpleNamespace) -> 
 def test_a_scan_takes_its_mirror_turns_in_physics_steps(room: SimpleNamespace) -> None:
     for resolution, steps in ((1.0, 4), (0.5, 8), (0.25, 16)):
         model, data = room.build()
-        lidar = Lms221(model, Lms221Config.ideal(resolution_deg=resolution))
+        lidar = LaserScanner(model, Lms221Config.ideal(resolution_deg=resolution))
         lidar.observe(room.stepper(model, data), data)
         assert data.time == pytest.approx(steps / 300.0)
 
@@ -194,7 +197,7 @@ def test_a_model_with_another_timestep_or_without_the_site_is_refused(
 ) -> None:
     model, _ = room.build()
     with pytest.raises(InvalidValueError, match="no site 'roof'"):
-        Lms221(model, site="roof")
+        LaserScanner(model, site="roof")
     model.opt.timestep = 0.002
     with pytest.raises(InvalidValueError, match="expected 1/300 s"):
-        Lms221(model)
+        LaserScanner(model)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.sensors.lidar.caster import FanPlan, Raycaster, Spot
+from sim.sensors.lidar.caster import FanPlan, Raycaster
+from sim.sensors.lidar.scanner import Spot
 from slam.errors import InvalidValueError
 
 HEIGHT = 0.36

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sensor card of any scanner with a data sheet: what is stated, and what is measured."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from scripts.card.bench import Bench, box, plate
+from scripts.card.rows import Row
+from sim.sensors.lidar.registry import describe, scanner_of
+from sim.sensors.lidar.scanner import Scanner
+from sim.sensors.lidar.sheet import NOT_STATED, QUANTITIES, Stated, sheet_of
+from slam.errors import InvalidValueError
+from slam.frames import Float
+
+UNITS = 40  # whose systematic errors are drawn
+WITHIN = 0.05  # of a deviation found by sampling
+STEPS_PER_S = 300
+UNIT_OF = {"deg": ("°", 1.0), "hz": ("Hz", 1.0), "us": ("µs", 1.0), "m": ("mm", 1e3)}
+
+
+def rows_of(name: str) -> list[Row]:
+    """Every row of a scanner's data sheet, measured anew; a few seconds.
+
+    Raises ``InvalidValueError`` for a scanner without a data sheet.
+    """
+    sheet = sheet_of(name)
+    if not sheet:
+        raise InvalidValueError(f"scanner '{name}' has no data sheet to be measured against")
+    model = scanner_of(name).scanner()
+    return [_row(model, stated) for stated in sheet]
+
+
+def _row(model: Scanner, stated: Stated) -> Row:
+    what = QUANTITIES[stated.what]
+    if stated.at_m is not None:
+        what += f" at {stated.at_m:g} m"
+    if stated.value is None:
+        unit = "the model has none"
+        if stated.what in ("range_min_m", "unit_m") and getattr(model, stated.what):
+            unit = f"{1e3 * getattr(model, stated.what):g} mm"
+        return Row(what=what, datasheet=stated.text, measured=unit, source=stated.source, kept=True)
+    measured, words = _measured(model, stated)
+    return Row(
+        what=what, datasheet=stated.text, measured=words, source=stated.source,
+        kept=_kept(stated, measured),
+    )  # fmt: skip
+
+
+def _kept(stated: Stated, measured: float | str) -> bool:
+    if isinstance(stated.value, str) or isinstance(measured, str):
+        return measured == stated.value
+    assert stated.value is not None
+    if stated.what == "systematic_m":  # a bound, of which the worst of some units comes near
+        return 0.4 * stated.value < measured <= stated.value + 1e-6
+    usual = WITHIN if stated.what == "noise_m" else 1e-3
+    return math.isclose(measured, stated.value, rel_tol=stated.within or usual)
+
+
+def _measured(model: Scanner, stated: Stated) -> tuple[float | str, str]:
+    """What the simulated scanner does: as a number or a word, and as it is printed."""
+    spec, at = model.spec(), stated.at_m or 0.0
+    increment = math.degrees(spec.angle_increment)
+    if stated.what in ("direction", "too_near", "no_return"):
+        word = _word(model, stated.what)
+        return word, word
+    value = {
+        "field_of_view_deg": lambda: (
+            increment * (spec.n_beams - (increment * spec.n_beams < 359.9))
+        ),
+        "n_beams": lambda: float(Bench(plate(3.0), model).scan().ranges.size),
+        "step_deg": lambda: increment,
+        "rate_hz": lambda: _rate(model),
+        "beam_to_beam_us": lambda: 1e6 * float(np.abs(np.diff(spec.beam_time_offsets)).mean()),
+        "range_min_m": lambda: _limit(model, model.range_min_m),
+        "range_max_m": lambda: _limit(model, model.range_max_m),
+        "noise_m": lambda: _noise(model, at),
+        "systematic_m": lambda: _systematic(model, at),
+        "unit_m": lambda: _unit(model),
+    }[stated.what]()
+    suffix, scale = UNIT_OF.get(stated.what.rsplit("_", 1)[-1], ("", 1.0))
+    words = f"{float(f'{scale * value:.4g}'):g} {suffix}".strip()
+    return value, f"{words}, worst of {UNITS} units" if stated.what == "systematic_m" else words
+
+
+def _word(model: Scanner, what: str) -> str:
+    times = model.times_s
+    if what == "direction":
+        return "clockwise" if times[0] > times[-1] else "counter-clockwise"
+    near = 0.5 * model.range_min_m
+    bench = Bench(plate(near, 0.01) if what == "too_near" else "", model)
+    ahead = int(np.argmin(np.abs(model.spec().angles)))
+    return {"nan": "NaN"}.get(str(bench.scan().ranges[ahead]), str(bench.scan().ranges[ahead]))
+
+
+def _rate(model: Scanner) -> float:
+    """Scans over the physics steps that they took, of so many that these are whole."""
+    scans = Fraction(model.period_s * STEPS_PER_S).denominator
+    bench = Bench(plate(3.0), model)
+    for _ in range(scans):
+        bench.scan()
+    return scans * STEPS_PER_S / bench.steps
+
+
+def _limit(model: Scanner, limit_m: float) -> float:
+    """Where a plate ahead begins or ends to be measured, by bisection about the limit."""
+    bare = model.only("ideal")
+    ahead = int(np.argmin(np.abs(model.spec().angles)))
+
+    def seen(distance: float) -> bool:
+        sent = Bench(plate(distance, 0.2), bare).scan().ranges[ahead]
+        return bool(np.isfinite(sent))
+
+    low, high = 0.5 * limit_m, 1.5 * limit_m
+    rises = seen(high)
+    for _ in range(18):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if seen(middle) == rises else (middle, high)
+    return 0.5 * (low + high)
+
+
+def _ahead(model: Scanner, distance: float, scans: int) -> tuple[Float, Float]:
+    """(sent, true) m of the beams within 10 degrees of a plate's normal."""
+    bench = Bench(plate(distance), model, seed=1)
+    ahead = np.abs(model.spec().angles) < math.radians(10.0)
+    sent, true = [], []
+    for _ in range(scans):
+        result = bench.scan()
+        sent.append(result.ranges[ahead].astype(np.float64))
+        true.append(result.true_ranges[ahead])
+    return np.concatenate(sent), np.concatenate(true)
+
+
+def _noise(model: Scanner, distance: float) -> float:
+    """Deviation of what is sent, every other error off."""
+    sent, true = _ahead(model.only("noise"), distance, 200)
+    return float((sent - true).std())
+
+
+def _systematic(model: Scanner, distance: float) -> float:
+    """The worst of ``UNITS`` units that look along a wall, from half to one and a half times as
+    far; within the band of that distance."""
+    smooth = replace(model, noise=(), unit_m=0.0)
+    edges = [0.0, *(band.up_to_m for band in model.systematic)]
+    band = max(k for k, edge in enumerate(edges[:-1]) if edge < distance)
+    low, high = max(0.5 * distance, edges[band] + 0.1), min(1.5 * distance, edges[band + 1] - 0.1)
+    worst = 0.0
+    for seed in range(UNITS):
+        result = Bench(box(0.0, 1.05, 40.0, 0.05), smooth, seed).scan()
+        inside = (result.true_ranges > low) & (result.true_ranges < high)
+        error = np.abs(result.ranges[inside] - result.true_ranges[inside])
+        worst = max(worst, float(error.max(initial=0.0)))
+    return worst
+
+
+def _unit(model: Scanner) -> float:
+    """The step of the codes: the largest of which all values sent are multiples."""
+    sent, _ = _ahead(model.only("noise"), 0.5 * model.range_max_m, 20)
+    tick = 2.5e-5  # far finer than any code
+    codes = np.unique(np.rint(sent[np.isfinite(sent)] / tick).astype(np.int64))
+    return float(np.gcd.reduce(np.diff(codes))) * tick
+
+
+def page(name: str, rows: list[Row]) -> str:
+    """The card as Markdown."""
+    lines = [
+        f"# {describe(name).rstrip('.')}: the simulated scanner against its data sheet",
+        "",
+        f"Made by `mobilia sensor-card --scanner {name} --out docs`: every figure is measured on",
+        "the simulated scanner. What the short names of documents mean, and what is not stated, is",
+        f'at the top of `sim/sensors/lidar/models/{name}.py`. "{NOT_STATED}": not by the sources',
+        "read; such a thing is not simulated unless the row says so.",
+        "",
+        "| | what | data sheet | measured | source |",
+        "|---|---|---|---|---|",
+    ]
+    for row in rows:
+        mark = "✓" if row.kept else "✗"
+        lines.append(f"| {mark} | {row.what} | {row.datasheet} | {row.measured} | {row.source} |")
+    return "\n".join([*lines, ""])

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scanner on a robot: any model, scan after scan, each beam cast at its own time.
+
+Every beam is cast from the pose of the laser at its own time, on things where they are then: both
+are linear between physics steps. A scan may begin and end between two steps
+(``sim.sensors.lidar.schedule``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.sensors.lidar.caster import Raycaster
+from sim.sensors.lidar.receiver import ScanResult, SignalModel
+from sim.sensors.lidar.registry import ScannerConfig, scanner_of
+from sim.sensors.lidar.schedule import Window, most_notes, schedule
+from sim.sensors.lidar.surfaces import geom_reflectivity, glass_geoms, polished_geoms
+from slam import se2
+from slam.errors import InvalidValueError
+
+Float = NDArray[np.float64]
+STEPS_PER_S = 300  # physics steps between which poses are noted
+
+__all__ = ["LaserScanner", "ScanResult"]
+
+
+def _planar(position: Float, matrix: Float) -> tuple[float, float, float]:
+    """(x m, y m, yaw rad) of a frame in the world; ``matrix`` (9,) by rows."""
+    rows = matrix.tolist()
+    x, y, _ = position.tolist()
+    return x, y, math.atan2(rows[3], rows[0])
+
+
+class LaserScanner:
+    """The scanner on the site ``robot/laser`` of a model.
+
+    config  a ``Scanner``, a config that gives one, or a registered name; default the LMS-221
+    rng     seeds one stream of draws for each effect; every scan takes the same number from each,
+            whatever is hit, so that a run's noise depends neither on what moves in the world nor
+            on which other effects are on
+
+    Attributes: ``config``; ``scanner``, the model that it gives; ``spec``; ``phase``, the part of a
+    physics step by which the next scan begins before the present one, 0 where scans last whole
+    steps; ``carried``, whether the laser was moved by hand since the scan before: then the part of
+    a scan that lies before the present is as if it had stood here.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        config: ScannerConfig | str | None = None,
+        rng: np.random.Generator | None = None,
+        *,
+        site: str = "robot/laser",
+        robot: str = "robot/base",
+    ) -> None:
+        self.config = scanner_of(config)
+        self.scanner = scanner = self.config.scanner()
+        _check_timestep(model)
+        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, site)
+        if number < 0:
+            raise InvalidValueError(f"LaserScanner.site: the model has no site {site!r}")
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        self.spec = scanner.spec(_mounting(model, data, number, robot))
+        self.caster = Raycaster(
+            model,
+            height=float(data.site_xpos[number][2]),
+            robot=robot,
+            spot=scanner.spot,
+            range_max=scanner.range_max_m,
+            slots=most_notes(scanner, STEPS_PER_S),
+            panes=glass_geoms(model) if scanner.glass else None,
+            site=number,
+        )
+        ids = self.caster.ids
+        polished = polished_geoms(model)[ids] & scanner.bounce
+        bodies = model.geom_bodyid[ids].astype(np.int64)
+        surface = (geom_reflectivity(model)[ids], polished, ids, bodies)
+        self._signal = SignalModel(
+            scanner, surface, np.random.default_rng(0) if rng is None else rng
+        )
+        self._polished = polished
+        bounces = scanner.bounce and (self.caster.layers > 1 or bool(polished.any()))
+        room = self.spec.n_beams if bounces else 0
+        self._mirrored = (np.empty(room), np.empty(room, dtype=np.int64), np.empty(room))
+        self._windows = schedule(scanner, self.spec, STEPS_PER_S)
+        self.phase = Fraction(0)
+        self.window: Window = self._windows(self.phase)
+        # Of the scan before, where the next begins within its last step: the notes of that step.
+        self._before: tuple[Float, Float] | None = None
+        self._after: tuple[Float, Float] | None = None
+        self.carried = False
+
+    @property
+    def streams(self) -> tuple[np.random.Generator, ...]:
+        """The random streams, for who saves and restores the state of a run."""
+        return self._signal.streams
+
+    def observe(self, advance: Callable[[], None], data: mujoco.MjData) -> ScanResult:
+        """Run one scan: calls of ``advance``, each one physics step of 1/300 s.
+
+        ``data`` must have fresh kinematics on entry, and after every ``advance``.
+        """
+        self.begin(data)
+        window = self.window
+        for due in window.marks[window.before + 1 :].tolist():
+            advance()
+            if due:
+                self.caster.note()
+        return self.finish()
+
+    def begin(self, data: mujoco.MjData) -> tuple[Any, ...]:
+        """Start a scan, whose ``window`` is then known.
+
+        Who advances the world calls ``windows.note`` with what is returned at ``window.marks``.
+        """
+        self.caster.start(data, self._before)
+        self.carried = self._after is not None and not self.caster.settle(self._after)
+        if not self.window.repeats:
+            self.window = self._windows(self.phase)
+        return self.caster.noted
+
+    def finish(self) -> ScanResult:
+        """The scan that was begun, once the steps of its ``window`` have passed."""
+        window = self.window
+        self.caster.cast(window.plan)
+        if not window.repeats:
+            self.phase = window.next
+            self._before, self._after = self.caster.last_notes() if self.phase else (None, None)
+        if self._mirrored[0].size:
+            self.caster.mirror(self._polished, self._mirrored)
+        return self._signal.scan(self.caster.hits, self._mirrored)
+
+    def skip(self) -> None:
+        """Go on to the window of the next scan without one: for who only wants the times."""
+        self.phase = self.window.next
+        self.window = self._windows(self.phase)
+
+    # -- state between two scans --------------------------------------------------------------
+
+    def save(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """What decides the next scan beside the random streams: arrays, and JSON words.
+
+        Nothing where scans last whole steps.
+        """
+        if self._before is None:
+            return {}, {}
+        poses, laser = self._before
+        arrays = {"geoms": self.caster.movable_ids, "geom_poses": poses, "laser": laser}
+        return arrays, {"phase": [self.phase.numerator, self.phase.denominator]}
+
+    def load(self, arrays: Mapping[str, NDArray[Any]], words: Mapping[str, Any]) -> None:
+        """Go on from ``save``, also that of a scanner that saw more things.
+
+        Raises ``InvalidValueError`` for a state that is not of this model.
+        """
+        self.phase, self._before, self._after = Fraction(0), None, None
+        self.window = self._windows(self.phase)
+        if not words:
+            return
+        known = {int(geom): row for row, geom in enumerate(arrays["geoms"])}
+        wanted = self.caster.movable_ids.tolist()
+        phase = Fraction(*words["phase"])
+        if any(geom not in known for geom in wanted) or not 0 <= phase < 1:
+            raise InvalidValueError("the state is of another scanner, or of another world")
+        rows = [known[geom] for geom in wanted]
+        self.phase, self.window = phase, self._windows(phase)
+        self._before = (arrays["geom_poses"][rows], arrays["laser"].copy())
+
+
+def _check_timestep(model: mujoco.MjModel) -> None:
+    if not math.isclose(model.opt.timestep, 1.0 / STEPS_PER_S, rel_tol=1e-6):
+        raise InvalidValueError(
+            f"the model's timestep is {model.opt.timestep} s, expected 1/{STEPS_PER_S} s"
+        )
+
+
+def _mounting(model: mujoco.MjModel, data: mujoco.MjData, site: int, robot: str) -> Float:
+    """``T_robot_laser`` from the model."""
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, robot)
+    if body < 0:
+        raise InvalidValueError(f"LaserScanner.robot: the model has no body {robot!r}")
+    T_world_robot = _planar(data.xpos[body], data.xmat[body])
+    return se2.between(T_world_robot, _planar(data.site_xpos[site], data.site_xmat[site]))

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scanner models, one file each; ``sim.sensors.lidar.registry`` lists them."""

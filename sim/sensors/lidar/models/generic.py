@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scanner of no make: ``scanner(fov_deg=270, beams=541, rate_hz=20, sigma_m=0.01)``."""
+
+from __future__ import annotations
+
+from sim.sensors.lidar.registry import register
+from sim.sensors.lidar.scanner import Band, Scanner
+from slam.errors import InvalidValueError
+
+
+@register("scanner")
+def scanner(
+    *,
+    fov_deg: float,
+    beams: int,
+    rate_hz: float,
+    sigma_m: float,
+    range_min_m: float = 0.0,
+    range_max_m: float = 30.0,
+    unit_m: float = 0.0,
+) -> Scanner:
+    """Any scanner: scanner(fov_deg=..., beams=..., rate_hz=..., sigma_m=...).
+
+    A mirror turns evenly, counter-clockwise, once a scan. At 360 degrees the first and the last
+    beam are a step apart, else they are the two ends of the field of view.
+
+    Raises ``InvalidValueError`` that names the setting, its value and what was expected.
+    """
+    if isinstance(beams, bool) or not isinstance(beams, int) or not beams >= 2:
+        raise InvalidValueError(f"scanner: beams must be a whole number >= 2, got {beams!r}")
+    for name, value in (("fov_deg", fov_deg), ("sigma_m", sigma_m)):
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InvalidValueError(f"scanner: {name} must be a number, got {value!r}")
+    if not 0.0 < fov_deg <= 360.0:
+        raise InvalidValueError(f"scanner: fov_deg must be > 0 and at most 360, got {fov_deg}")
+    step_deg = fov_deg / (beams if fov_deg == 360.0 else beams - 1)
+    return Scanner(
+        name="scanner",
+        first_deg=-0.5 * fov_deg if fov_deg < 360.0 else -180.0,
+        step_deg=step_deg,
+        n_beams=beams,
+        rate_hz=rate_hz,
+        range_min_m=range_min_m,
+        range_max_m=range_max_m,
+        unit_m=unit_m,
+        noise=(Band(up_to_m=range_max_m, error_m=sigma_m),) if sigma_m else (),
+    )

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The SICK TiM561: 270 degrees at 1/3 degree, 15 scans a second, 10 m.
+
+OI is SICK's operating instructions TiM55x/TiM56x, 8015886/YDR0/2014-08-27; TI the technical
+information TiM55x/56x/57x, 8015883/YZK8/2016-07-07; SDP the table of devices of SICK's driver
+(SICKAG/sick_scan_xd, README.md), part no. 1071419.
+
+Not stated in the pages read: the least range, the spot, reflectivities needed for a return, the
+direction of the mirror (starting angle and step count upwards, hence counter-clockwise). Panes and
+mirrors are simulated, as for every scanner, by their optics (inferred).
+"""
+
+from __future__ import annotations
+
+from sim.sensors.lidar.registry import register
+from sim.sensors.lidar.scanner import Band, Scanner
+from sim.sensors.lidar.sheet import NOT_STATED, Stated
+
+SHEET = (
+    Stated("field_of_view_deg", 270.0, "-45° to +225°", "TI p25: starting angle"),
+    Stated("n_beams", 811, "270° at 1080 a turn", "TI p25: 16.2 kHz from spot to spot"),
+    Stated("step_deg", 1.0 / 3.0, "0.33° (1/3 of 1°)", "TI p25; SDP"),
+    Stated("rate_hz", 15.0, "15 Hz", "TI p22, p25; SDP"),
+    Stated("beam_to_beam_us", 1e6 / 16_200, "16.2 kHz from spot to spot", "TI p25"),
+    Stated("range_min_m", None, NOT_STATED, ""),
+    Stated("range_max_m", 10.0, "10 m", "SDP: max. range"),
+    Stated("noise_m", 0.020, "20 mm, one sigma, typically", "OI p4: statistical", at_m=5.0),
+    Stated("systematic_m", 0.060, "± 60 mm, typically", "OI p4: systematic", at_m=5.0),
+    Stated("unit_m", None, NOT_STATED + "; 1 mm as LMDscandata of that family", "inferred"),
+    Stated("spot", None, NOT_STATED, ""),
+)
+
+
+@register("tim561")
+def tim561() -> Scanner:
+    """SICK TiM561: 270 degrees, 1/3 degree, 15 Hz, 10 m."""
+    return Scanner(
+        name="tim561",
+        first_deg=-135.0,
+        step_deg=1.0 / 3.0,
+        n_beams=811,
+        rate_hz=15.0,
+        range_max_m=10.0,
+        unit_m=0.001,
+        noise=(Band(up_to_m=10.0, error_m=0.020),),
+        systematic=(Band(up_to_m=10.0, error_m=0.060),),
+        glass=True,
+        bounce=True,
+    )

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a scanner is: its beams, when each is measured, how ranges are coded and how they err.
+
+A model is one ``Scanner``, put together out of parts; a part that is left out is not simulated.
+Nothing here knows of the physics: when a beam is measured is a time, not a number of steps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.core.checks import check_types, instance
+from slam.errors import InvalidValueError
+from slam.frames import NS_PER_S, LaserSpec
+
+Float = NDArray[np.float64]
+
+ERRORS = ("full", "noise", "ideal")  # every error that is known; the statistical one alone; none
+RATE_HZ = (1.0, 300.0)  # of scans; a scan lasts a physics step of 1/300 s or longer
+MAX_BEAMS = 10_000
+MAX_TURNS = 16
+MAX_RANGE_M = 1000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spot:
+    """The disc a beam lights: ``aperture`` radius m at the window, ``divergence`` half angle rad.
+
+    ``offsets`` (k, 2): places of the k rays on the unit disc, (left, up); ``weights`` (k,) their
+    shares of the energy. An ideal beam is the default: one ray in the middle.
+    """
+
+    aperture: float = 0.0
+    divergence: float = 0.0
+    offsets: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    weights: tuple[float, ...] = (1.0,)
+
+    def rays(self) -> Float:
+        """(k, 6): left, up, unit direction (forward, left, up), way up per metre forward."""
+        out = np.empty((len(self.offsets), 6))
+        for k, (u, v) in enumerate(self.offsets):
+            left, up = self.divergence * u, self.divergence * v
+            length = math.sqrt(1.0 + left * left + up * up)
+            out[k] = u, v, 1.0 / length, left / length, up / length, up
+        return out
+
+
+# Radon's seven-point rule for a disc: exact for polynomials up to degree 5. Turned so that the
+# seven lie at even steps sideways, the way in which chair columns and legs are thin.
+_RING, _TURN = math.sqrt(2.0 / 3.0), math.atan(1.0 / (3.0 * math.sqrt(3.0)))
+_DISC = (
+    (0.0, 0.0),
+    *(
+        (_RING * math.cos(_TURN + k * math.pi / 3), _RING * math.sin(_TURN + k * math.pi / 3))
+        for k in range(6)
+    ),
+)
+
+
+def disc(*, aperture: float, divergence: float) -> Spot:
+    """A spot of seven rays: radius m at the window, half angle rad."""
+    weights = (0.25, *(0.125,) * 6)
+    return Spot(aperture=aperture, divergence=divergence, offsets=_DISC, weights=weights)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Band:
+    """An error up to a range: ``error_m`` + ``share`` of the range; the last one holds beyond."""
+
+    up_to_m: float
+    error_m: float
+    share: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_types(self)
+        if not 0.0 < self.up_to_m <= MAX_RANGE_M:
+            raise InvalidValueError(
+                f"Band.up_to_m must be > 0 and at most {MAX_RANGE_M:g} m, got {self.up_to_m}"
+            )
+        for name in ("error_m", "share"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise InvalidValueError(f"Band.{name} must be in 0..1, got {getattr(self, name)}")
+
+
+def error_at(bands: Sequence[Band], range_m: float) -> float:
+    """m, of the band that holds there; 0 without any."""
+    if not bands:
+        return 0.0
+    band = next((b for b in bands if range_m <= b.up_to_m), bands[-1])
+    return band.error_m + band.share * range_m
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scanner:
+    """A scanner model. Angles in degrees, counter-clockwise from straight ahead.
+
+    Beams:
+    name           in metadata and messages
+    first_deg      direction of beam 0, the rightmost; ``step_deg`` from each beam to the next
+    n_beams        number of beams
+    rate_hz        scans per second; a scan is ``turns`` turns of the mirror, evenly one by one
+    turns          beam i is measured in turn i % turns (interlacing)
+    clockwise      the mirror turns that way
+    turn_from_deg  where the mirror points when a turn begins; None: at the first beam it meets
+    beam_times_s   (n_beams,) s after the scan's start, instead of those of an even mirror
+
+    Ranges:
+    range_min_m, range_max_m  limits; closer is sent as an error code (NaN), further as inf
+    unit_m         step of the range code; 0: not rounded
+
+    Parts, each of which may be left out:
+    noise          statistical error of what is sent, one sigma, rounding included
+    systematic     bound of a smooth error of the unit, drawn for each run
+    counter_m      step in which time is counted before corrections and rounding
+    spot           the disc that a beam lights, of which the first pulse counts
+    needed         (range m, reflectivity): a full, square target needs that much to return
+    incidence      oblique surfaces return less (cosine)
+    mixed_pixels   at edges the value may lie between the two surfaces; needs a ``spot``
+    glass          panes let the beam through, except near their normal
+    bounce         panes and polished faces also show what they mirror
+    error_codes    no return is an error code, NaN; else inf, free space
+    dropout_rate   share of values lost, NaN
+    """
+
+    name: str
+    first_deg: float
+    step_deg: float
+    n_beams: int
+    rate_hz: float
+    turns: int = 1
+    clockwise: bool = False
+    turn_from_deg: float | None = None
+    beam_times_s: tuple[float, ...] = ()
+    range_min_m: float = 0.0
+    range_max_m: float
+    unit_m: float = 0.0
+    noise: tuple[Band, ...] = ()
+    systematic: tuple[Band, ...] = ()
+    counter_m: float = 0.0
+    spot: Spot = Spot()
+    needed: tuple[tuple[float, float], ...] = ()
+    incidence: bool = False
+    mixed_pixels: bool = False
+    glass: bool = False
+    bounce: bool = False
+    error_codes: bool = False
+    dropout_rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_types(self)
+        instance("Scanner.spot", self.spot, Spot)
+        limits = {
+            "n_beams": (1, MAX_BEAMS), "rate_hz": RATE_HZ, "turns": (1, MAX_TURNS),
+            "first_deg": (-360.0, 360.0), "step_deg": (1e-3, 360.0),
+            "range_min_m": (0.0, MAX_RANGE_M), "range_max_m": (0.0, MAX_RANGE_M),
+            "unit_m": (0.0, 1.0), "counter_m": (0.0, 1.0), "dropout_rate": (0.0, 1.0),
+        }  # fmt: skip
+        for name, (least, most) in limits.items():
+            value = getattr(self, name)
+            if not least <= value <= most:
+                raise InvalidValueError(
+                    f"Scanner.{name} must be in {least:g}..{most:g}, got {value!r}"
+                )
+        if not self.range_min_m < self.range_max_m:
+            raise InvalidValueError(
+                f"Scanner.range_max_m must be > range_min_m, got {self.range_max_m}"
+            )
+        for name in ("noise", "systematic"):
+            for band in getattr(self, name):
+                instance(f"Scanner.{name}", band, Band)
+        self._check_times()
+
+    def _check_times(self) -> None:
+        if self.beam_times_s and len(self.beam_times_s) != self.n_beams:
+            raise InvalidValueError(
+                f"Scanner.beam_times_s must be {self.n_beams} times, got {len(self.beam_times_s)}"
+            )
+        times = self.times_s
+        if not (times.min() >= 0.0 and times.max() <= float(self.period_s) * (1.0 + 1e-9)):
+            raise InvalidValueError(
+                f"Scanner: beams must be measured within the {float(self.period_s):g} s of a scan, "
+                f"got {times.min():g} to {times.max():g} s after its start"
+            )
+
+    # -- as a config of the device ------------------------------------------------------------
+
+    def scanner(self) -> Scanner:
+        """Itself, as any config of a scanner gives one."""
+        return self
+
+    def only(self, errors: str) -> Scanner:
+        """With the errors named in ``ERRORS``: "full" is the model as it stands."""
+        if errors == "full":
+            return self
+        if errors not in ERRORS:
+            raise InvalidValueError(f"errors must be one of {', '.join(ERRORS)}, got {errors!r}")
+        bare = replace(
+            self, systematic=(), counter_m=0.0, spot=Spot(), needed=(), incidence=False,
+            mixed_pixels=False, glass=False, bounce=False, error_codes=False, dropout_rate=0.0,
+        )  # fmt: skip
+        return bare if errors == "noise" else replace(bare, noise=(), unit_m=0.0)
+
+    # -- beams and their times ----------------------------------------------------------------
+
+    @property
+    def period_s(self) -> Fraction:
+        """s from scan to scan, exactly."""
+        return 1 / Fraction(self.rate_hz).limit_denominator(1_000_000)
+
+    @property
+    def turn_s(self) -> Fraction:
+        """s of one turn of the mirror, exactly."""
+        return self.period_s / self.turns
+
+    @property
+    def turn_of(self) -> NDArray[np.int64]:
+        """(n_beams,) turn of the mirror in which each beam is measured."""
+        return np.arange(self.n_beams, dtype=np.int64) % self.turns
+
+    @property
+    def share_of_turn(self) -> Float:
+        """(n_beams,) when in its turn each beam is measured, 0 to 1."""
+        index = np.arange(self.n_beams, dtype=np.int64)
+        if self.beam_times_s:
+            given = np.array(self.beam_times_s, dtype=np.float64)
+            return np.asarray(given / float(self.turn_s) - self.turn_of, dtype=np.float64)
+        last = self.first_deg + (self.n_beams - 1) * self.step_deg
+        begin = self.turn_from_deg
+        if self.clockwise:
+            mirror = ((last if begin is None else begin) - self.first_deg) - index * self.step_deg
+        else:
+            mirror = (self.first_deg - (self.first_deg if begin is None else begin)) + (
+                index * self.step_deg
+            )
+        return np.asarray(mirror / 360.0, dtype=np.float64)
+
+    @property
+    def times_s(self) -> Float:
+        """(n_beams,) s after the scan's start at which each beam is measured."""
+        if self.beam_times_s:
+            return np.array(self.beam_times_s, dtype=np.float64)
+        times = (self.turn_of + self.share_of_turn) / float(1 / self.turn_s)
+        return np.asarray(times, dtype=np.float64)
+
+    @property
+    def stamp_offset_ns(self) -> int:
+        """From the start of the scan to its earliest beam, ns."""
+        return round(float(self.times_s.min()) * NS_PER_S)
+
+    def spec(self, T_robot_laser: Float | None = None) -> LaserSpec:
+        """Geometry and exact beam times, as in every scan."""
+        times = self.times_s
+        return LaserSpec(
+            n_beams=self.n_beams,
+            angle_min=math.radians(self.first_deg),
+            angle_increment=math.radians(self.step_deg),
+            range_min=self.range_min_m,
+            range_max=self.range_max_m,
+            beam_time_offsets=times - times.min(),
+            T_robot_laser=np.zeros(3) if T_robot_laser is None else T_robot_laser,
+        )
