@@ -16,6 +16,7 @@ from scripts.many import ManyValues
 from scripts.verbs.bench import bench
 from scripts.verbs.blame import blame
 from scripts.verbs.compare import compare
+from scripts.verbs.config import config
 from scripts.verbs.demo import demo
 from scripts.verbs.drive import drive
 from scripts.verbs.export import export
@@ -50,6 +51,7 @@ app.command("generate")(generate)
 app.command("verify")(verify)
 app.command("export")(export)
 app.command("list")(listing)
+app.command("config")(config)
 app.command("bench")(bench)
 app.command("sensor-card")(sensor_card)
 app.command("reproduce")(reproduce)

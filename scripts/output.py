@@ -10,7 +10,7 @@ import platform
 import re
 import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
@@ -37,6 +37,7 @@ from slam.files import (
     write_text,
 )
 from slam.names import NameFromFile
+from slam.system import config_of
 
 RECIPE = "recipe.json"
 # What comparisons and drives consist of: all else in their folders is somebody else's.
@@ -238,11 +239,28 @@ def _processor() -> str:
 
 
 def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> None:
-    """``recipe.json``: the command, its settings, the versions, that of the world too."""
+    """``recipe.json``: the command, its settings, the versions, that of the world too.
+
+    Beside them the numbers of the SLAMs that ``slams`` or ``slam`` of the settings name.
+    """
     recipe = {"schema": 1, "command": command, "settings": _plain(settings), "versions": versions()}
     recipe["world"] = WORLD
+    named = settings.get("slams", [settings["slam"]] if "slam" in settings else [])
+    if configs := configs_of(named):
+        recipe["configs"] = configs
     text = json.dumps(recipe, indent=2, sort_keys=True, allow_nan=False)
     write_text(folder / RECIPE, text + "\n")
+
+
+def configs_of(slams: Iterable[str]) -> dict[str, Any]:
+    """By SLAM: SHA-256 of its config, and by path the numbers that are not the default."""
+    found = {}
+    for name in slams:
+        configs = config_of(name)
+        if configs is not None:
+            config, default = configs
+            found[name] = {"sha256": config.sha256(), "changed": config.differences(default)}
+    return found
 
 
 def _plain(value: Any) -> Any:

@@ -109,7 +109,7 @@ def _check_file(path: Path) -> Finding:
             compared.RunFile(path)
         elif path.suffix == ".npz":
             check_vouched(path)
-            memory.read(path)
+            memory.check(path)
         else:
             raise LogFormatError(path, "no dataset, episode, run, comparison or map")
     except LogFormatError as error:

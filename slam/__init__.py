@@ -21,7 +21,7 @@ from slam.frames import (
     Stream,
     StreamMetadata,
 )
-from slam.system import Estimate, Raster, SlamSystem, create, names, register
+from slam.system import Estimate, Raster, SlamSystem, config_of, create, names, register
 from slam.trajectory import Trajectory
 
 __all__ = [
@@ -38,6 +38,7 @@ __all__ = [
     "Stream",
     "StreamMetadata",
     "Trajectory",
+    "config_of",
     "create",
     "names",
     "register",

@@ -6,7 +6,9 @@ Where no folder for the compile cache can be written (read-only install, no HOME
 compiled anew in each process, which takes some seconds and is said once in the log.
 
 Numba's cache looks at the file of the kernel itself only; a kernel that calls one of another module
-would keep its old code after that module changed. So the files of imported kernels count too.
+would keep its old code after that module changed. So the files of imported kernels count too, and
+the values of the module constants that a kernel and its callees use, which may come from elsewhere
+(a tree of numbers, say).
 """
 
 from __future__ import annotations
@@ -59,22 +61,34 @@ def inner(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _watch_callees(dispatcher: Any, function: Any) -> None:
-    """Make the cached code of ``function`` depend on the files of the kernels it imports."""
+    """Make the cached code of ``function`` depend on the files of the kernels it imports, and on
+    the constants that it and its module's kernels use."""
     own = function.__code__.co_filename
     files: set[str] = set()
+    constants = _constants(function)
     for value in function.__globals__.values():
         if hasattr(value, "py_func"):
             files |= getattr(value, "kernel_files", {value.py_func.__code__.co_filename})
+            constants |= getattr(value, "kernel_constants", set())
     files.discard(own)
     dispatcher.kernel_files = {own, *files}
+    dispatcher.kernel_constants = constants
     index = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if index is None:
         return
     index._load_index = _or_nothing(index._load_index)
     index.save = partial(_save, index)
-    if files:
+    if files or constants:
         digest = hashlib.sha256(b"".join(Path(f).read_bytes() for f in sorted(files)))
+        digest.update("\n".join(sorted(constants)).encode())
         index._source_stamp = (index._source_stamp, digest.hexdigest())
+
+
+def _constants(function: Any) -> set[str]:
+    """The module constants that a kernel names, with their values."""
+    found = ((name, function.__globals__.get(name)) for name in function.__code__.co_names)
+    module = function.__module__
+    return {f"{module}.{k} = {v!r}" for k, v in found if isinstance(v, int | float | str | tuple)}
 
 
 def _save(index: Any, key: Any, data: Any) -> None:

@@ -9,6 +9,7 @@
 
 ``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class,
 ``create("pipe:./my_slam --option")`` a program in any language (``slam.guests.pipe``).
+``create("shunting{matching.reward=7}")`` sets numbers of its config (``slam.variants``).
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ from slam.checked import covariance, frozen, pose
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError
 from slam.frames import Float, Frame
 from slam.names import join_folders, refuse_code
+from slam.settings import Settings
 from slam.trajectory import Trajectory
+from slam.variants import parsed
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,6 +132,19 @@ def describe(name: str) -> str:
     return (inspect.getdoc(_registry[name]) or "").partition("\n")[0]
 
 
+def config_of(name: str) -> tuple[Settings, Settings] | None:
+    """The config of a registered SLAM, or of a variant of one, and its default.
+
+    None for one that has none, or is not ours. Raises as ``create`` does for its numbers.
+    """
+    base, changes = parsed(name)
+    kind = getattr(_registry.get(base), "config_class", None)
+    if kind is None:
+        return None
+    default: Settings = kind()
+    return default.changed(changes), default
+
+
 def create(name: str, **config: Any) -> SlamSystem:
     """A fresh SLAM by registered name, as ``module:Class`` or as ``pipe:COMMAND``.
 
@@ -139,6 +155,13 @@ def create(name: str, **config: Any) -> SlamSystem:
     ``UntrustedNameError`` for a name of code that was read from a file (``slam.names``).
     """
     refuse_code(name, "SLAM")
+    name, changes = parsed(name)
+    if changes:
+        if "config" in config:
+            raise InvalidValueError(f"SLAM '{name}': numbers in its name and a config, not both")
+        if name in _registry and not hasattr(_registry[name], "config_class"):
+            raise InvalidValueError(f"SLAM '{name}' has no numbers to set")
+        config["config"] = changes
     if name.startswith("pipe:"):
         from slam.guests.pipe import PipeSlam  # it imports this module
 

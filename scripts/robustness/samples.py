@@ -27,6 +27,7 @@ from sim.loop import LoopConfig
 from sim.recording.sums import write_sums
 from slam.maps import write_map
 from slam.shunting import ShuntingSlam
+from slam.shunting.config import ShuntingConfig
 from slam.shunting.map import io as memory
 from slam.system import Raster
 
@@ -142,7 +143,7 @@ def _case(path: Path) -> Outcome:
 
 def _loaded(folder: Path) -> Outcome:
     """A map to go on in."""
-    config, state, arrays = memory.read(folder / "map.npz")
+    config, state, arrays = memory.read(folder / "map.npz", ShuntingConfig)
     values = {name: array.tolist() for name, array in arrays.items()}
     return config, state.T_map_robot.tolist(), state.usual, state.supports, values
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -28,6 +29,9 @@ from slam.errors import InvalidValueError
 from slam.evaluation.lost import LOST_RULE
 from slam.frames import BeamClass
 from slam.guests import Limits, limited
+from slam.variants import PIPE, with_set
+
+BETWEEN = re.compile(r",(?![^{]*\})")  # a comma outside braces
 
 
 def compare(
@@ -55,6 +59,10 @@ def compare(
     cluster: Annotated[
         str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
     ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
+    ] = None,
 ) -> None:
     """Run SLAMs on the same simulated runs and write tables of how they bear dynamism.
 
@@ -67,7 +75,7 @@ def compare(
     if isinstance(seeds, bool) or not 1 <= seeds <= 10_000:
         raise InvalidValueError(f"--seeds must be 1 to 10000, got {seeds}")
     plan = Plan(
-        slams=named(slam),
+        slams=with_set(named(slam), set_ or []),
         scenes=named(scene or ["arena", "office"]),
         levels=levels(dynamism or ["0:1:0.25"]),
         seeds=tuple(range(first_seed, first_seed + seeds)),
@@ -88,8 +96,9 @@ def compare(
 
 
 def named(values: list[str]) -> tuple[str, ...]:
-    """Words may also be joined by commas, but for the command of a pipe, which may hold some."""
-    parts = ([value] if value.startswith("pipe:") else value.split(",") for value in values)
+    """Words may also be joined by commas, but for the command of a pipe, which may hold some, and
+    inside the braces of a variant."""
+    parts = ([value] if value.startswith(PIPE) else BETWEEN.split(value) for value in values)
     return tuple(word for words in parts for word in words if word)
 
 

@@ -29,6 +29,7 @@ from slam.errors import InvalidValueError, UnknownNameError
 from slam.evaluation.lost import FOUND_RULE, LOST_RULE
 from slam.files import write_text
 from slam.guests import Limits, limited
+from slam.variants import with_set
 
 SCHEMA = 1
 
@@ -55,6 +56,10 @@ def drive(
     ] = None,
     scanner: Scanner = "full",
     jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
+    ] = None,
 ) -> None:
     """Drive to a goal in every room, steered by what each SLAM believes; truth only scores.
 
@@ -66,7 +71,7 @@ def drive(
     workers.check_jobs(jobs)
     plan = Plan(
         scene=scene,
-        slams=named(slam),
+        slams=with_set(named(slam), set_ or []),
         levels=levels(dynamism or ["0:1:0.25"]),
         seeds=_seeds(named(seeds or ["5"])),
         goals=_goals(named(goals or [])),

@@ -13,6 +13,7 @@ from scripts.film.footage import of_log
 from scripts.scanner_option import Scanner
 from scripts.single_run.session import Outputs, run_session
 from slam.errors import InvalidValueError
+from slam.variants import with_set
 
 
 def run(
@@ -47,6 +48,10 @@ def run(
         bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
     ] = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
+    ] = None,
 ) -> None:
     """Run SLAMs on a log or on a simulated scene and write the same files as the demo.
 
@@ -56,6 +61,7 @@ def run(
     """
     if (log is None) == (scene is None):
         raise InvalidValueError("name exactly one of --log and --scene")
+    slam = list(with_set(slam, set_ or []))
     if log is not None:
         on_log(slam, log, out or Path("out") / f"run-{log.name.split('.')[0]}", overwrite, film)
     elif scene is not None:

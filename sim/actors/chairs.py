@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.scene import Mover
+from sim.actors.config import ACTORS
 from sim.actors.rolling import Rolling, inertia_of
 from sim.core.draws import between, waiting
 from sim.core.dynamism import Dynamism
@@ -24,9 +25,9 @@ from sim.core.seeds import Seeds
 from slam._jit import njit
 
 Float = NDArray[np.float64]
-_TICKS_MIN, _TICKS_MAX = 9, 26  # 0.12 to 0.35 s of shove
+_TICKS_MIN, _TICKS_MAX = ACTORS.chairs.push_least_ticks, ACTORS.chairs.push_most_ticks
 GROUPS = ("chair", "bin", "load")
-IMPULSE_MAX = 45.0  # N s; what is heavier than a chair gets less speed from the same hands
+IMPULSE_MAX = ACTORS.chairs.impulse_max
 
 
 class Shoved(NamedTuple):

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actors.config import ACTORS
 from sim.core.bodies import Bodies
 from sim.core.draws import between, waiting
 from slam._jit import njit
@@ -25,13 +26,13 @@ Float = NDArray[np.float64]
 # columns of the schedule, (m, 4): next event s, end of the present one s, its angle rad, and
 # until when the door is kept open for someone s
 NEXT, UNTIL, ANGLE, KEPT = 0, 1, 2, 3
-OPENED = 1.5  # rad, where a hand opens to
-PASSABLE = 1.15  # rad, as ``sim.actors.people.right_of_way.OPEN``
-RATE_MAX = 1.4  # rad/s, a door pushed open takes a little more than a second
-TORQUE_MAX = 40.0  # N m, against spring and damper too; about 45 N at the handle
-NEAR, FACING = 1.6, 0.3  # m, cosine: a robot this near and facing the doorway is let through
-REST_STEP = 0.75  # rad: closed, ajar, open
-CLEAR = 0.95  # m, a door is not let go of while someone is this near its middle
+# the numbers, as the kernels see them
+_D = ACTORS.doors
+OPENED, PASSABLE, REST_STEP = _D.opened_rad, _D.passable_rad, _D.rest_step
+RATE_MAX, RATE_GAIN = _D.rate_max, _D.rate_gain
+TORQUE_MAX, TORQUE_GAIN = _D.torque_max, _D.torque_gain
+NEAR, FACING, CLEAR = _D.near_m, _D.facing, _D.clear_m
+HELD_S, EVENT_LEAST_S, EVENT_MOST_S = _D.held_s, _D.event_least_s, _D.event_most_s
 
 
 @njit
@@ -49,10 +50,10 @@ def torque_to(target: float, q: float, qd: float, closer: Float) -> float:
 
     closer  (5,) stiffness N m/rad, damping N m s/rad, friction N m, inertia kg m2, rest rad
     """
-    rate = min(max(3.0 * (target - q), -RATE_MAX), RATE_MAX)
+    rate = min(max(RATE_GAIN * (target - q), -RATE_MAX), RATE_MAX)
     friction = math.copysign(closer[2], rate) if abs(rate) > 0.02 else 0.0
     push = closer[0] * (q - closer[4]) + closer[1] * rate + friction
-    torque = push + 8.0 * closer[3] * (rate - qd)
+    torque = push + TORQUE_GAIN * closer[3] * (rate - qd)
     return float(min(max(torque, -TORQUE_MAX), TORQUE_MAX) + 0.0)
 
 
@@ -92,13 +93,13 @@ def swing(time: float, robot: Float, leaves: Leaves, physics: tuple[Float, Float
         if time >= row[NEXT]:  # always three draws
             row[NEXT] = time + waiting(draws, d, rates[d])
             row[ANGLE] = between(draws, d, low, high)
-            row[UNTIL] = time + between(draws, d, 3.0, 9.0)
+            row[UNTIL] = time + between(draws, d, EVENT_LEAST_S, EVENT_MOST_S)
         if (
             passage[d, 1] > 0.0
             or robot_asks(robot, middles[d])
             or (passage[d, 2] > 0.0 and time < row[KEPT])
         ):
-            row[KEPT] = time + 0.5
+            row[KEPT] = time + HELD_S
         if time < row[KEPT]:
             disturbed = time < row[UNTIL] or closer[4] < PASSABLE or qpos[at] < PASSABLE
             target = min(max(OPENED, closer[4]), high)

@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actors.config import ACTORS
 from sim.core.draws import between, uniform
 from slam._jit import njit
 from slam.errors import InvalidValueError
@@ -27,14 +28,11 @@ Float = NDArray[np.float64]
 # columns of the state, (n, 5): number of the turn (-1: none yet), heading rad, speed m/s, spin
 # rad/s, for how long held up s
 TURN, HEADING, SPEED, SPIN, STUCK = 0, 1, 2, 3, 4
-TURN_S = 4.0  # how long a chair is rolled at a time
-BRAKE_S = 0.3  # at the end of a turn it is stopped, else the share would count it rolling out
-SPEEDS = (0.3, 0.9)  # m/s
-SPIN_MAX = 1.0  # rad/s
-PATIENCE_S = 0.25  # held up for this long, it is pushed another way
+_C = ACTORS.chairs
+TURN_S, BRAKE_S, PATIENCE_S = _C.turn_s, _C.brake_s, _C.patience_s
+SPEEDS, SPIN_MAX = (_C.slowest_mps, _C.fastest_mps), _C.spin_max
+TAU_S, ACCEL_MAX = _C.tau_s, _C.accel_max
 GOLDEN = 2.399963229728653  # rad
-TAU_S = 0.08  # time constant of the push
-ACCEL_MAX = 8.0  # m/s2, bounds the force
 
 
 class Rolled(NamedTuple):

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actors.config import ACTORS
 from sim.core.checks import check_types
 from sim.driving.navgrid import NavGrid
 from slam._jit import njit
@@ -21,12 +22,12 @@ from slam.errors import InvalidValueError
 from slam.frames import Float
 
 _FAR = 1e6
-_STEP_S = 0.15  # step of the rollout
-LOOK_AHEAD_M = 0.35  # where the cost-to-go is asked for beside where the robot would be
-_ACCEL, _ALPHA = (
-    1.0,
-    3.0,
-)  # m/s2, rad/s2: what the drive's ramp does (``sim.actors.robot.DriveConfig``)
+_D = ACTORS.driver
+_STEP_S, LOOK_AHEAD_M, _ACCEL, _ALPHA = _D.step_s, _D.look_ahead_m, _D.accel, _D.alpha
+_OVERLAP_M, _RUN_OVER, _AHEAD, _FREE, _FREE_M = (
+    _D.overlap_m, _D.run_over, _D.ahead, _D.free, _D.free_m,
+)  # fmt: skip
+_TURNING, _REVERSE, _STANDING = _D.turning, _D.reverse, _D.standing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,10 +116,11 @@ def _score(
         y += _STEP_S * v * math.sin(theta + 0.5 * _STEP_S * omega)
         theta += _STEP_S * omega
         free = min(_between(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, t)) - radius
-        if free < 0.0 and free <= start + 0.02:  # an overlap at the start may be driven out of
+        # an overlap at the start may be driven out of
+        if free < 0.0 and free <= start + _OVERLAP_M:
             if v_asked != 0.0:
                 return -_FAR
-            run_over = 3.0
+            run_over = _RUN_OVER
         closest = min(closest, free)
     here = _field_at(cost_to_go, x0, y0, cell, x, y)
     ahead = _field_at(
@@ -127,7 +129,8 @@ def _score(
     if here >= _FAR:
         here = 50.0
     ahead = min(ahead, here + 0.5)
-    return -here - 1.5 * ahead + 0.5 * min(closest, 0.35) - 0.02 * abs(omega_asked) - run_over
+    gain = -here - _AHEAD * ahead + _FREE * min(closest, _FREE_M)
+    return gain - _TURNING * abs(omega_asked) - run_over
 
 
 @njit
@@ -144,14 +147,14 @@ def _choose(
     for a in range(-1, 7):
         v = v_max * a / 6.0
         if a < 0:
-            v = -0.3 * v_max
+            v = -_REVERSE * v_max
         for b in range(-6, 7):
             omega = omega_max * b / 6.0
             if a < 0 and abs(b) > 3:
                 continue
             score = _score(pose, now, v, omega, discs, grid)
             if a <= 0:
-                score -= 0.25
+                score -= _STANDING
             if score > best:
                 best_v, best_omega, best = v, omega, score
     return best_v, best_omega, best

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actors.config import ACTORS
 from sim.driving.drive import Driver, TourConfig, tour
 from sim.driving.navgrid import NavGrid
 from sim.world.world import World
@@ -19,13 +20,10 @@ from slam import se2
 from slam._jit import njit
 from slam.frames import NS_PER_S, Float
 
-SIGHT_M = 4.0  # discs further away than this do not matter within the driver's horizon
-AJAR = 0.6  # rad; a leaf less open than this is let open for the robot, a wider one is gone round
-REPLAN_S = 1.0  # at most this often
-DECIDE_S = 0.07  # a command holds for at least this long
-LEAF_DISCS = 6  # a leaf is avoided as this many discs along it
+_D = ACTORS.driver
+SIGHT_M, AJAR, REPLAN_S, DECIDE_S = _D.sight_m, _D.ajar_rad, _D.replan_s, _D.decide_s
+LEAF_DISCS, LEAF_M = _D.leaf_discs, _D.leaf_m
 BODY, DOOR, ROBOT = 0, 1, 2
-LEAF_M = 0.05  # half thickness with which a leaf is planned around
 
 
 class Pilot:

@@ -1,80 +1,86 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The twelve knobs of the EKF, and its presets for corners and for Victoria Park."""
+"""Every number of the EKF, and its presets for corners and for Victoria Park."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from dataclasses import dataclass, field
+from typing import Any
 
-from slam.errors import InvalidValueError
+from slam.frontend.corner_config import CornerConfig
 from slam.landmarks.hypotheses import Gates
+from slam.settings import Settings, number, word
 
-Association = Literal["ipjc", "jcbb", "individual"]
+SEEDS = "training seeds 0-19 (docs/paper.md)"
+MOST_GATE = 1.0 - 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
-class EkfConfig:
-    """Everything a user may turn.
+class LifecycleConfig(Settings):
+    """When an object is a landmark, and when it is none any more."""
 
-    association          "ipjc" (incremental posterior joint compatibility), "jcbb", "individual"
-    individual_gate      a pair alone must lie within this probability of chi-square, 2 dof
-    joint_gate           k pairs together, 2 k dof
-    posterior_gate       a pair given the pairs accepted before it, 2 dof; IPJC alone. All three are
-                         wide: the first pairs carry the whole error of the odometry, and a step
-                         beyond the gate, one of a thousand at 0.999, would be a step without
-                         landmarks
-    noise_scale          factor on the standard deviations of features: the share of linearisation
-                         errors, which a 1 mm sensor after steps of 0.1 m and 0.03 rad needs
-    range_m, fov_deg     what the sensor of features sees; features beyond are not used
-    occluder_m           half width of the things behind which a landmark is hidden, m
-    confirm_looks        observations that make an object a landmark; the paper: re-observed once
-    detection            probability that a landmark in view is seen
-    memory_looks         after this many looks more of them prove nothing: how long a landmark
-                         that was seen for ever outlives its disappearance
-    separation_m         no new object nearer than this to one that is known, m
+    chance: float = number(
+        0.05, "prob", "that something else is seen where it was", low=1e-6, high=0.15
+    )
+    within: float = number(0.95, "share", "of range and field of view: surely in view")
+    beyond: float = number(1.1, "share", "of the same: surely not in view", low=1.0)
+    behind_m: float = number(
+        0.15, "m", "a beam that ends this much before or after the landmark decides"
+    )
+    lost_after: int = number(10, "frames", "that should match and do not: lost", low=1)
+    singular_m2: float = number(1e-12, "m²", "least eigenvalue of a measured feature", low=1e-18)
+    least_m2: float = number(1e-6, "m²", "taken in its place: 1 mm", low=1e-15)
+    reach_sigmas: float = number(3.0, "σ", "by which the pose may be off, for what is in reach")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EkfConfig(Settings):
+    """Everything that can be set; the twelve at the top are the public face.
+
+    The gates are wide: the first pairs carry the whole error of the odometry, and a step beyond the
+    gate, one of a thousand at 0.999, would be a step without landmarks.
     """
 
-    association: Association = "ipjc"
-    individual_gate: float = 0.999999
-    joint_gate: float = 0.999999
-    posterior_gate: float = 0.99999
-    noise_scale: float = 1.25
-    range_m: float = 12.0
-    fov_deg: float = 180.0
-    occluder_m: float = 0.0
-    confirm_looks: int = 2
-    detection: float = 0.9
-    memory_looks: float = 4.0
-    separation_m: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.association not in get_args(Association):
-            raise InvalidValueError(
-                f"EkfConfig.association must be one of {get_args(Association)}, "
-                f"got {self.association!r}"
-            )
-        for name in ("individual_gate", "joint_gate", "posterior_gate"):
-            self._number(name, 0.5, 1.0 - 1e-12)
-        self._number("noise_scale", 1e-3, 1e3)
-        self._number("range_m", 0.1, 1e4)
-        self._number("fov_deg", 1.0, 360.0)
-        self._number("occluder_m", 0.0, 100.0)
-        self._number("detection", 0.2, 0.999)
-        self._number("memory_looks", 1.0, 1e4)
-        self._number("separation_m", 0.0, 100.0)
-        if isinstance(self.confirm_looks, bool) or not isinstance(self.confirm_looks, int):
-            raise InvalidValueError(
-                f"EkfConfig.confirm_looks must be a whole number, got {self.confirm_looks!r}"
-            )
-        self._number("confirm_looks", 1, 100)
-
-    def _number(self, name: str, low: float, high: float) -> None:
-        value = getattr(self, name)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
-            raise InvalidValueError(f"EkfConfig.{name} must be a number, got {value!r}")
-        if not low <= value <= high:
-            raise InvalidValueError(f"EkfConfig.{name} must lie in [{low}, {high}], got {value}")
+    association: str = word(
+        "ipjc", ("ipjc", "jcbb", "individual"), "incremental posterior joint compatibility, "
+        "joint compatibility branch and bound, or each pair alone",
+    )  # fmt: skip
+    individual_gate: float = number(
+        0.999999, "prob", "of chi-square, a pair alone, 2 dof", SEEDS, low=0.5, high=MOST_GATE
+    )
+    joint_gate: float = number(
+        0.999999, "prob", "the same of k pairs together, 2 k dof", SEEDS, low=0.5, high=MOST_GATE
+    )
+    posterior_gate: float = number(
+        0.99999, "prob", "the same of a pair given those before it; IPJC alone", SEEDS,
+        low=0.5, high=MOST_GATE,
+    )  # fmt: skip
+    noise_scale: float = number(
+        1.25, "ratio", "on the deviations of features: linearisation, which a 1 mm sensor after "
+        "steps of 0.1 m and 0.03 rad needs", SEEDS, low=1e-3, high=1e3,
+    )  # fmt: skip
+    range_m: float = number(
+        12.0, "m", "of the sensor of features; beyond, none is used", low=0.1, high=1e4
+    )
+    fov_deg: float = number(180.0, "deg", "its field of view", low=1.0, high=360.0)
+    occluder_m: float = number(
+        0.0, "m", "half width of the things that hide a landmark", high=100.0
+    )
+    confirm_looks: int = number(
+        2, "looks", "that make an object a landmark; the paper: re-observed once", SEEDS,
+        low=1, high=100,
+    )  # fmt: skip
+    detection: float = number(
+        0.9, "prob", "that a landmark in view is seen", SEEDS, low=0.2, high=0.999
+    )
+    memory_looks: float = number(
+        4.0, "looks", "more of them prove nothing: how long a landmark outlives its disappearance",
+        SEEDS, low=1.0, high=1e4,
+    )  # fmt: skip
+    separation_m: float = number(
+        0.0, "m", "no new object nearer than this to a known one", SEEDS, high=100.0
+    )
+    lifecycle: LifecycleConfig = field(default=LifecycleConfig())
+    extractor: CornerConfig = field(default=CornerConfig())
 
     @property
     def gates(self) -> Gates:

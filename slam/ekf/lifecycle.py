@@ -21,10 +21,7 @@ from slam.frames import Float, Scan
 from slam.frontend.corners import answered
 from slam.frontend.polar import hidden, polar
 
-CHANCE = 0.05  # probability that something else is seen where the landmark was
-WITHIN = 0.95  # share of range and field of view within which a landmark is surely in view
-WITHOUT = 1.1  # and beyond which it is surely not
-BEHIND_M = 0.15  # a beam that ends this much before or after the landmark passes judgement
+EKF = EkfConfig()
 
 
 class Lifecycle:
@@ -37,8 +34,8 @@ class Lifecycle:
 
     def __init__(self, config: EkfConfig) -> None:
         self._config = config
-        self._seen_adds = math.log(config.detection / CHANCE)
-        self._missed_adds = math.log((1.0 - config.detection) / (1.0 - CHANCE))
+        self._seen_adds = math.log(config.detection / config.lifecycle.chance)
+        self._missed_adds = math.log((1.0 - config.detection) / (1.0 - config.lifecycle.chance))
         self._next_key = 0
         self.keys: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self.looks: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
@@ -86,8 +83,13 @@ class Lifecycle:
         self.existence = np.delete(self.existence, gone)
 
 
-def in_view(landmarks_robot: Float, config: EkfConfig, rim: float = WITHIN) -> NDArray[np.bool_]:
-    """(n,) landmarks (n, 2), robot frame, within the share ``rim`` of range and field of view."""
+def in_view(
+    landmarks_robot: Float, config: EkfConfig, rim: float | None = None
+) -> NDArray[np.bool_]:
+    """(n,) landmarks (n, 2), robot frame, within the share ``rim`` of range and field of view;
+    None: the share within which they surely are in view.
+    """
+    rim = config.lifecycle.within if rim is None else rim
     distance, bearing = polar(landmarks_robot)
     half = math.radians(config.fov_deg) / 2.0
     inside: NDArray[np.bool_] = (np.abs(bearing) < rim * half) | (config.fov_deg >= 360.0)
@@ -104,7 +106,9 @@ def unhidden_by_features(
     return ~hidden(landmarks_robot, points_robot, config.occluder_m)
 
 
-def unhidden_by_beams(landmarks_laser: Float, scan: Scan) -> NDArray[np.bool_]:
+def unhidden_by_beams(
+    landmarks_laser: Float, scan: Scan, config: EkfConfig = EKF
+) -> NDArray[np.bool_]:
     """(n,) True where every beam at the landmark (laser frame) passes beyond it: it is gone.
 
     A beam that ends before it says that it is hidden; one that ends at it, that something is there
@@ -115,8 +119,8 @@ def unhidden_by_beams(landmarks_laser: Float, scan: Scan) -> NDArray[np.bool_]:
     beam = np.round((bearing - spec.angle_min) / spec.angle_increment).astype(np.int64)
     inside = (beam >= 1) & (beam < spec.n_beams - 1)
     beam = np.clip(beam, 1, max(spec.n_beams - 2, 1))
-    ranges = answered(scan)
+    ranges = answered(scan, config.extractor.failed)
     if spec.n_beams < 3:
         return np.zeros(len(landmarks_laser), dtype=np.bool_)
     shortest = np.minimum(np.minimum(ranges[beam - 1], ranges[beam]), ranges[beam + 1])
-    return inside & (shortest > distance + BEHIND_M)
+    return inside & (shortest > distance + config.lifecycle.behind_m)

@@ -4,17 +4,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
-from slam.ekf.config import EkfConfig
+from slam.ekf.config import EkfConfig, LifecycleConfig
 from slam.ekf.lifecycle import (
-    WITHOUT,
     Lifecycle,
     in_view,
     unhidden_by_beams,
@@ -23,7 +22,8 @@ from slam.ekf.lifecycle import (
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, Odometry
 from slam.frontend import odometry_steps
-from slam.frontend.corners import CornerConfig, corners
+from slam.frontend.corner_config import CornerConfig
+from slam.frontend.corners import corners
 from slam.frontend.odometry_prior import assumed_covariance
 from slam.frontend.polar import polar
 from slam.landmarks.association import METHODS
@@ -31,9 +31,7 @@ from slam.landmarks.filter import MOST_STD_M, EkfFilter
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
 
-SINGULAR_M2 = 1e-12  # least eigenvalue of a feature's covariance: below it, nobody measured it
-LEAST_M2 = 1e-6  # and 1 mm is taken: finer, the filter's linearisation would not keep up
-LOST_AFTER = 10  # frames in a row in which landmarks should be seen and none is
+GROUPS = ("lifecycle", "extractor")  # set by path, not as options
 PRESETS: dict[str, Callable[..., EkfConfig]] = {
     "points": EkfConfig,
     "corners": EkfConfig.corners,
@@ -84,12 +82,15 @@ class EkfSlam:
 
     Takes ``frame.features``; where a frame has only a scan, corners are extracted from it. Options
     are those of ``EkfConfig``; ``preset`` is "points" (the default of ``EkfConfig``), "corners" or
-    "victoria_park", and without it the first frame tells the first two apart.
+    "victoria_park", and without it the first frame tells the first two apart. ``config`` may be
+    numbers by their path instead, which change that preset.
     """
+
+    config_class: ClassVar[type[EkfConfig]] = EkfConfig
 
     def __init__(
         self,
-        config: EkfConfig | None = None,
+        config: EkfConfig | Mapping[str, Any] | None = None,
         *,
         preset: str | None = None,
         corner_config: CornerConfig | None = None,
@@ -97,20 +98,23 @@ class EkfSlam:
     ) -> None:
         if preset is not None and preset not in PRESETS:
             raise InvalidValueError(f"EkfSlam.preset must be of {list(PRESETS)}, got {preset!r}")
+        self._changes = dict(config) if isinstance(config, Mapping) else {}
+        if isinstance(config, Mapping):
+            config = None
         if config is not None and (preset is not None or options):
             raise InvalidValueError("EkfSlam takes a config, or a preset and options, not both")
-        known = EkfConfig.__dataclass_fields__
+        known = [name for name in EkfConfig.__dataclass_fields__ if name not in GROUPS]
         unknown = sorted(set(options) - set(known))
         if unknown:
-            raise InvalidValueError(f"EkfSlam has no option {unknown[0]!r}; it has {list(known)}")
+            raise InvalidValueError(f"EkfSlam has no option {unknown[0]!r}; it has {known}")
         self._options = options
         self._told = config is not None or preset is not None
-        self.corner_config = corner_config or CornerConfig()
+        self._corner_config = corner_config
         self._configure(config or PRESETS[preset or "points"](**options))
         self.reset()
 
     def _configure(self, config: EkfConfig) -> None:
-        self.config = config
+        self.config = config.changed(self._changes)
         self._gates = config.gates
 
     def reset(self) -> None:
@@ -148,7 +152,9 @@ class EkfSlam:
             if frame.scan is None:
                 raise InvalidValueError("the EKF needs a scan or features in every frame")
             twist = frame.odometry.twist
-            features = corners(frame.scan, twist=twist, config=self.corner_config)
+            features = corners(
+                frame.scan, twist=twist, config=self._corner_config or self.config.extractor
+            )
         return self._used(features)
 
     def _used(self, features: Features) -> tuple[Float, Float]:
@@ -161,8 +167,10 @@ class EkfSlam:
         variances = features.covariances.diagonal(axis1=1, axis2=2)
         used &= variances.max(axis=1, initial=0.0) <= MOST_STD_M**2
         if config.fov_deg < 360.0:
-            used &= np.abs(bearing) < WITHOUT * math.radians(config.fov_deg) / 2.0
-        return points[used], _regular(features.covariances[used] * config.noise_scale**2)
+            used &= np.abs(bearing) < config.lifecycle.beyond * math.radians(config.fov_deg) / 2.0
+        return points[used], _regular(
+            features.covariances[used] * config.noise_scale**2, config.lifecycle
+        )
 
     def _predict(self, odometry: Odometry) -> None:
         if self._before is not None:
@@ -193,9 +201,9 @@ class EkfSlam:
 
     def _within_reach(self, chosen: NDArray[np.int64]) -> NDArray[np.bool_]:
         """What could be seen if the pose is off by three standard deviations."""
-        P = self.filter.pose_covariance()
-        reach = self.config.range_m * (1.0 + 3.0 * math.sqrt(max(P[2, 2], 0.0)))
-        reach += 3.0 * math.sqrt(max(P[0, 0] + P[1, 1], 0.0))
+        P, sigmas = self.filter.pose_covariance(), self.config.lifecycle.reach_sigmas
+        reach = self.config.range_m * (1.0 + sigmas * math.sqrt(max(P[2, 2], 0.0)))
+        reach += sigmas * math.sqrt(max(P[0, 0] + P[1, 1], 0.0))
         away = self.filter.landmarks[chosen] - self.filter.pose[:2]
         near: NDArray[np.bool_] = polar(away)[0] < reach
         return near
@@ -208,7 +216,7 @@ class EkfSlam:
         if frame.features is None and frame.scan is not None:
             T_laser_robot = se2.inverse(frame.scan.spec.T_robot_laser)
             landmarks_laser = se2.transform(T_laser_robot, landmarks_robot)
-            return expected & unhidden_by_beams(landmarks_laser, frame.scan)
+            return expected & unhidden_by_beams(landmarks_laser, frame.scan, self.config)
         return expected & unhidden_by_features(landmarks_robot, points, self.config)
 
     def _judge(
@@ -221,7 +229,7 @@ class EkfSlam:
             self._unmatched += 1
         seen = pairs.landmarks[pairs.landmarks >= 0]
         landmarks_robot = se2.transform(se2.inverse(self.filter.pose), self.filter.landmarks)
-        left_behind = ~in_view(landmarks_robot, self.config, WITHOUT)
+        left_behind = ~in_view(landmarks_robot, self.config, self.config.lifecycle.beyond)
         gone = self.lifecycle.judge(seen, expected, left_behind)
         self.lifecycle.remove(gone)
         self.filter.remove(gone)
@@ -239,7 +247,7 @@ class EkfSlam:
         self.lifecycle.add(len(new))
 
     def _report(self, frame: Frame, matched: int, observed: int) -> Estimate:
-        lost = self._unmatched >= LOST_AFTER
+        lost = self._unmatched >= self.config.lifecycle.lost_after
         self._stamps.append(frame.stamp_ns)
         self._poses.append(self.filter.pose.copy())
         return Estimate(
@@ -278,13 +286,13 @@ class EkfSlam:
         )
 
 
-def _regular(covariances: Float) -> Float:
+def _regular(covariances: Float, config: LifecycleConfig) -> Float:
     """(k, 2, 2) with more on the diagonal where they are singular, the others bit for bit: exact
     features, or features exact in one direction, must not end a run."""
     xx, yy, xy = covariances[:, 0, 0], covariances[:, 1, 1], covariances[:, 0, 1]
     half, apart = 0.5 * (xx + yy), 0.5 * (xx - yy)
     scale = np.maximum(half, 1.0)
-    flat = half - np.sqrt(apart * apart + xy * xy) < SINGULAR_M2 * scale
+    flat = half - np.sqrt(apart * apart + xy * xy) < config.singular_m2 * scale
     out = covariances.copy()
-    out[flat] += LEAST_M2 * scale[flat, None, None] * np.eye(2)
+    out[flat] += config.least_m2 * scale[flat, None, None] * np.eye(2)
     return out

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import njit
+from slam.frontend.corner_config import CornerConfig
 
 Float = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-STEPS = 12  # of following a corner
-CUT = 3.5  # standard deviations to which a dot is drawn
-FAINT = 0.01  # pixels below say nothing about where the line is
+CORNERS = CornerConfig()
+STEPS, CUT, FAINT = CORNERS.steps, CORNERS.cut, CORNERS.faint
 
 
 @njit

@@ -11,75 +11,34 @@ field of view, and mixed pixels, whose beam hit two surfaces and measured neithe
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Scan
 from slam.frontend import corner_image
+from slam.frontend.corner_config import CornerConfig
 from slam.frontend.polar import end_points
 
-GRAZING = math.radians(10.0)  # flattest view of a surface that is still taken as one
-FLAT = math.radians(12.0)  # flattest view at which the end of a surface is believed
 FAR_M = 1e6  # stands for no return
-FAILED = 2  # beams in a row that may have failed; a scanner that has no word for "nothing there"
-# says the same code for both, and where more are without an answer nothing is there
-MARGIN_CELLS = 12
-BLOCK = 5  # pixels over which Kanade and Tomasi sum gradients
-IDEAL = 0.14  # their response to one dot of a standard deviation of 1.2 cells (measured)
-MIN_SIGMA_CELLS = 1.2
-WINDOW = 4  # cells each way in which the position is refined
-PEAK_CELLS = 4  # two corners are not nearer than this
 
 
-@dataclass(frozen=True, kw_only=True)
-class CornerConfig:
-    """What is a corner.
-
-    cell_m     edge of a pixel, m
-    range_m    farther returns are not drawn, m
-    response   least response, as a share of that to a lone thin post
-    noise_m    standard deviation of a range, m
-    floor_m    least standard deviation of a feature along each axis, m: round things shift with
-               the point of view
-    """
-
-    cell_m: float = 0.04
-    range_m: float = 12.0
-    response: float = 0.25
-    noise_m: float = 0.01
-    floor_m: float = 0.015
-
-    def __post_init__(self) -> None:
-        limits = {
-            "cell_m": (0.005, 1.0),
-            "range_m": (0.5, 50.0),
-            "response": (1e-3, 10.0),
-            "noise_m": (1e-4, 1.0),
-            "floor_m": (1e-4, 1.0),
-        }
-        for name, (low, high) in limits.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise InvalidValueError(
-                    f"CornerConfig.{name} must lie in [{low}, {high}], got {value}"
-                )
+CORNERS = CornerConfig()
 
 
 def corners(
     scan: Scan, *, twist: Float | None = None, config: CornerConfig | None = None
 ) -> Features:
     """Corners of ``scan`` in the robot frame at its stamp, de-skewed with the body ``twist``."""
-    config = config or CornerConfig()
+    config = config or CORNERS
     points = _points(scan, twist)
-    ranges = answered(scan)
+    ranges = answered(scan, config.failed)
     step = scan.spec.angle_increment
-    joined = corner_image.joined_beams(ranges, scan.valid, points, step, GRAZING, config.noise_m)
+    grazing = math.radians(config.grazing_deg)
+    joined = corner_image.joined_beams(ranges, scan.valid, points, step, grazing, config.noise_m)
     valid, false_ends = _judge_ends(ranges, scan.valid, joined)
-    false_ends |= valid & _flat(points, scan, joined)
+    false_ends |= valid & _flat(points, scan, joined, math.radians(config.flat_deg))
     near = ranges <= config.range_m
     false_ends |= valid & near & _beside(joined, ~near)  # only the limit of drawing
     valid, false_ends = valid & near, false_ends & near
@@ -87,8 +46,8 @@ def corners(
         return _features(scan, [], [])
     image, widths, origin = _draw(points, ranges, valid, joined, step, config)
     found, covariances = [], []
-    for column, row in _peaks(image, config.response):
-        x, y, cells, ok = corner_image.refine(image, widths, column, row, WINDOW)
+    for column, row in _peaks(image, config):
+        x, y, cells, ok = corner_image.refine(image, widths, column, row, config.window)
         point = origin + config.cell_m * np.array([x, y])
         beam = _nearest(point, points, valid)
         if not ok or _misleads(point, beam, points, false_ends, config):
@@ -99,13 +58,13 @@ def corners(
     return _features(scan, found, covariances)
 
 
-def answered(scan: Scan) -> Float:
+def answered(scan: Scan, most_failed: int = CORNERS.failed) -> Float:
     """(n,) m: ranges; ``FAR_M`` where nothing is, -1 where a beam failed."""
     failed = np.isnan(scan.ranges)
     ranges = np.where(failed, -1.0, np.minimum(scan.ranges, FAR_M, dtype=np.float64))
     edges = np.flatnonzero(np.diff(np.concatenate([[False], failed, [False]])))
     for first, past in edges.reshape(-1, 2).tolist():
-        if past - first > FAILED:
+        if past - first > most_failed:
             ranges[first:past] = FAR_M
     return ranges
 
@@ -150,7 +109,7 @@ def _beside(joined: NDArray[np.bool_], these: NDArray[np.bool_]) -> NDArray[np.b
     return out
 
 
-def _flat(points: Float, scan: Scan, joined: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _flat(points: Float, scan: Scan, joined: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
     """Ends of surfaces seen so flat that the next beam may hit the same one far behind."""
     n = len(points)
     index = np.arange(n)
@@ -160,7 +119,7 @@ def _flat(points: Float, scan: Scan, joined: NDArray[np.bool_]) -> NDArray[np.bo
     beams = points - scan.spec.T_robot_laser[:2]
     cross = np.abs(along[:, 0] * beams[:, 1] - along[:, 1] * beams[:, 0])
     dot = np.abs((along * beams).sum(axis=1))
-    flat: NDArray[np.bool_] = (to_previous ^ joined) & (cross < math.tan(FLAT) * dot)
+    flat: NDArray[np.bool_] = (to_previous ^ joined) & (cross < math.tan(least) * dot)
     return flat
 
 
@@ -174,28 +133,29 @@ def _draw(
 ) -> tuple[Float, Float, Float]:
     """The image, the width of its lines (cells), and the point (2,) m of its pixel (0, 0)."""
     cell = config.cell_m
-    origin = points[valid].min(axis=0) - MARGIN_CELLS * cell
+    origin = points[valid].min(axis=0) - config.margin_cells * cell
     width, height = (
-        np.ceil((points[valid].max(axis=0) - origin) / cell).astype(int) + MARGIN_CELLS
+        np.ceil((points[valid].max(axis=0) - origin) / cell).astype(int) + config.margin_cells
     ).tolist()
     image, widths = np.zeros((height, width)), np.ones((height, width))
     # Across the beam a point may lie anywhere within the beam's share of the circle.
     spread = np.sqrt(config.noise_m**2 + (np.maximum(ranges, 0.0) * step) ** 2 / 12.0) / cell
     spread[~valid] = 1.0
-    sigmas = np.maximum(spread, MIN_SIGMA_CELLS)
+    sigmas = np.maximum(spread, config.min_sigma_cells)
     corner_image.draw(image, widths, (points - origin) / cell, sigmas, valid, joined)
     return image, widths, origin
 
 
-def _peaks(image: Float, least: float) -> list[tuple[int, int]]:
+def _peaks(image: Float, config: CornerConfig) -> list[tuple[int, int]]:
     """(column, row) of the local maxima of the smaller eigenvalue, the strongest first.
 
     OpenCV's response changes its last bits with the CPU; what is made of it, which pixel is the
     largest, does not but for ties.
     """
-    response = cv2.cornerMinEigenVal(image.astype(np.float32), BLOCK, ksize=3)
-    around = cv2.dilate(response, np.ones((2 * PEAK_CELLS + 1, 2 * PEAK_CELLS + 1), np.uint8))
-    rows, columns = np.nonzero((response >= around) & (response > least * IDEAL))
+    response = cv2.cornerMinEigenVal(image.astype(np.float32), config.block, ksize=3)
+    side = 2 * config.peak_cells + 1
+    around = cv2.dilate(response, np.ones((side, side), np.uint8))
+    rows, columns = np.nonzero((response >= around) & (response > config.response * config.ideal))
     order = np.argsort(-response[rows, columns], kind="stable")
     return [(int(columns[k]), int(rows[k])) for k in order]
 
@@ -209,7 +169,7 @@ def _misleads(
     point: Float, beam: int, points: Float, false_ends: NDArray[np.bool_], config: CornerConfig
 ) -> bool:
     """Nothing was measured there, or a false end was."""
-    reach = WINDOW * config.cell_m
+    reach = config.window * config.cell_m
     if ((points[beam] - point) ** 2).sum() > reach * reach:
         return True
     away = ((points[false_ends] - point) ** 2).sum(axis=1)

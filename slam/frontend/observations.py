@@ -16,23 +16,20 @@ from numpy.typing import NDArray
 from slam._jit import njit
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, Scan
-from slam.frontend.seen_space import FREE_WITHOUT_RETURN_M
+from slam.frontend.config import FrontendConfig
 from slam.frontend.surfaces import face, join, unveiled
 from slam.frontend.visibility import View, view_of_beams, view_of_features
 
-SIGMA_CELLS = 0.8  # least Gaussian the lattice carries without ripple: 2 exp(-pi^2 s^2) = 0.4 %
-SENSOR_SIGMA_M = 0.010  # LMS-221 statistical error, 1 sigma
-NEAR_JOIN_CELLS = 3.0
 MOST_SWEPT_M = 50.0  # during one sweep; beyond, the beams of a scan belong to no one place
 MOST_STD_M = 3.0  # of a feature; one known worse says nothing, and fills the map in saying it
-SPACING_M, LEAST_WEIGHT = 0.1, 0.3  # beams closer than this share one observation's weight
 
 
 class Grain(Protocol):
     """How finely a map takes observations in, and from how far.
 
-    cell_m   edge of a cell, m: the least spread of an observation follows from it
-    range_m  returns beyond are ignored, m
+    cell_m    edge of a cell, m: the least spread of an observation follows from it
+    range_m   returns beyond are ignored, m
+    frontend  the other numbers
     """
 
     @property
@@ -41,6 +38,10 @@ class Grain(Protocol):
 
     @property
     def range_m(self) -> float:
+        """As above."""
+
+    @property
+    def frontend(self) -> FrontendConfig:
         """As above."""
 
 
@@ -137,13 +138,14 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
     beams = np.empty(n, np.int64)
     use = min(grain.range_m, spec.range_max)
+    config, surfaces = grain.frontend, grain.frontend.surfaces
     count = _deskew(
         scan.ranges,
         spec.angles,
         spec.beam_time_offsets,
         spec.T_robot_laser,
         twist,
-        (spec.range_min, spec.range_max, use, min(use, FREE_WITHOUT_RETURN_M)),
+        (spec.range_min, spec.range_max, use, min(use, config.view.silent_m)),
         points,
         beams,
         bearings,
@@ -158,22 +160,23 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
         in_order = np.argsort(beams)
         points, beams = points.take(in_order, axis=0), beams[in_order]
     onward, tangents = np.zeros(count, np.bool_), np.zeros((count, 2))
-    near = NEAR_JOIN_CELLS * grain.cell_m
-    join(points, beams, spec.T_robot_laser, near, onward, tangents)
+    join(
+        points, beams, spec.T_robot_laser, surfaces.joining(grain.cell_m), onward, tangents,
+    )  # fmt: skip
     clear = np.zeros(count, np.bool_)
-    if unveiled(points, beams, spec.T_robot_laser, onward, clear) < count:
+    if unveiled(points, beams, spec.T_robot_laser, onward, surfaces.mixed_m, clear) < count:
         kept = np.flatnonzero(clear)  # a mask of rows takes ten times as long
         points, onward = points.take(kept, axis=0), onward.take(kept)
         tangents = tangents.take(kept, axis=0)
     facings = np.zeros(len(points), np.uint8)
-    face(points, spec.T_robot_laser, onward, facings)
-    variance = max(SIGMA_CELLS * grain.cell_m, SENSOR_SIGMA_M) ** 2
+    face(points, spec.T_robot_laser, onward, surfaces.face_m, facings)
+    variance = max(config.sigma_cells * grain.cell_m, config.sensor_sigma_m) ** 2
     covariances = np.zeros((len(points), 3))
     covariances[:, 0] = covariances[:, 2] = variance
     x, y = points[:, 0], points[:, 1]
-    shares = np.sqrt(x * x + y * y) * spec.angle_increment / SPACING_M
-    weights = np.minimum(np.maximum(shares, LEAST_WEIGHT), 1.0)
-    view = view_of_beams(bearings, free, spec.angle_increment, grain.cell_m)
+    shares = np.sqrt(x * x + y * y) * spec.angle_increment / config.spacing_m
+    weights = np.minimum(np.maximum(shares, config.least_weight), 1.0)
+    view = view_of_beams(bearings, free, spec.angle_increment, grain.cell_m, config.view)
     return Observations(
         points_robot=points,
         covariances=covariances,
@@ -196,7 +199,7 @@ def from_features(features: Features, grain: Grain) -> Observations:
     near &= (
         features.covariances.diagonal(axis1=1, axis2=2).max(axis=1, initial=0.0) <= MOST_STD_M**2
     )
-    floor = (SIGMA_CELLS * grain.cell_m) ** 2
+    floor = (grain.frontend.sigma_cells * grain.cell_m) ** 2
     given = features.covariances[near]
     covariances = np.stack([given[:, 0, 0] + floor, given[:, 0, 1], given[:, 1, 1] + floor], axis=1)
     return Observations(
@@ -206,7 +209,7 @@ def from_features(features: Features, grain: Grain) -> Observations:
         tangents=np.zeros((len(covariances), 2)),
         joined=np.zeros(len(covariances), np.bool_),
         facings=np.zeros(len(covariances), np.uint8),
-        view=view_of_features(points[near], grain.cell_m),
+        view=view_of_features(points[near], grain.cell_m, grain.frontend.view),
         T_robot_laser=np.zeros(3),
     )
 

@@ -12,13 +12,7 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float
-
-PER_M, PER_RAD = 0.012, 0.03  # standard deviation among robots: rad per m, rad per rad
-LASTS_S = 1000.0  # the time in which a robot may become another one
-INDEPENDENT = 0.3  # share of a match's information that is, from frame to frame
-TOLD = 0.5  # least share of the data in what a match says of the heading; with MATCHED of it all
-MATCHED = 0.3
-OUTLIER = 9.0  # squared deviations: a wheel that slipped, or a wrong match
+from slam.frontend.config import FRONTEND, BiasConfig
 
 
 class TurnBias:
@@ -30,9 +24,10 @@ class TurnBias:
     per_m, per_rad  what the odometry adds, rad for each m driven and each rad turned
     """
 
-    def __init__(self) -> None:
+    def __init__(self, config: BiasConfig = FRONTEND.bias) -> None:
+        self._config = config
         self.per_m, self.per_rad = 0.0, 0.0
-        self._P = [[0.0] * 3, [0.0, PER_M**2, 0.0], [0.0, 0.0, PER_RAD**2]]
+        self._P = [[0.0] * 3, [0.0, config.per_m**2, 0.0], [0.0, 0.0, config.per_rad**2]]
 
     def corrected(self, increment: Float) -> Float:
         """The increment (3,) without the biases."""
@@ -56,23 +51,24 @@ class TurnBias:
         said, given = variances
         self._move(increment, said, elapsed)
         share, off, information = matched
-        told = _of_heading(information)
+        told, config = _of_heading(information, self._config.place_information), self._config
         kept = told * given / (1.0 + told * given)  # of what the data say, beside the prior
-        if share >= MATCHED and kept >= TOLD:
-            self._see(se2.wrap(off) / kept, 1.0 / (INDEPENDENT * told))
+        if share >= config.matched and kept >= config.data_share:
+            self._see(se2.wrap(off) / kept, 1.0 / (config.independent * told))
 
     def _move(self, increment: Float, variance: float, elapsed: float) -> None:
         P, G = self._P, (1.0, float(increment[0]), float(increment[2]))
         row = [G[0] * P[0][k] + G[1] * P[1][k] + G[2] * P[2][k] for k in range(3)]
         P[0] = [row[0] * G[0] + row[1] * G[1] + row[2] * G[2] + variance, row[1], row[2]]
         P[1][0], P[2][0] = row[1], row[2]
-        P[1][1] += PER_M**2 * elapsed / LASTS_S
-        P[2][2] += PER_RAD**2 * elapsed / LASTS_S
+        config = self._config
+        P[1][1] += config.per_m**2 * elapsed / config.lasts_s
+        P[2][2] += config.per_rad**2 * elapsed / config.lasts_s
 
     def _see(self, innovation: float, variance: float) -> None:
         P = self._P
         S = P[0][0] + variance
-        if innovation * innovation > OUTLIER * S:
+        if innovation * innovation > self._config.outlier * S:
             return
         K = [P[j][0] / S for j in range(3)]
         self.per_m -= K[1] * innovation
@@ -80,9 +76,9 @@ class TurnBias:
         self._P = [[P[j][k] - K[j] * P[0][k] for k in range(3)] for j in range(3)]
 
 
-def _of_heading(information: Float) -> float:
+def _of_heading(information: Float, least: float) -> float:
     """Information on the heading that is left with the place unknown, 1/rad^2."""
     (a, b, e), (_, d, f), (_, _, h) = information.tolist()
-    a, d = a + 1e-3, d + 1e-3  # a place unknown by 30 m
+    a, d = a + least, d + least
     left: float = h - (d * e * e - 2.0 * b * e * f + a * f * f) / max(a * d - b * b, 1e-9)
     return max(left, 0.0)

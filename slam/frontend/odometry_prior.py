@@ -11,15 +11,13 @@ import numpy as np
 from slam import se2
 from slam.frames import MOST_TWIST, Float, Odometry
 from slam.frontend import odometry_steps
+from slam.frontend.config import FRONTEND, PriorConfig
 from slam.frontend.odometry_bias import TurnBias
 
-FLOOR_M, FLOOR_RAD = 0.002, 0.0015  # standard deviation per sqrt(0.2 s): skew, a match's own
-# The matcher is given a stated covariance no tighter than this: else the map slips unnoticed.
-LEAST_SCALE, LEAST_M, LEAST_RAD = 2.25, 0.004, 0.003
 IDENTITY = np.eye(3)
-LEAST_VARIANCE = 1e-12  # of an increment, m^2 and rad^2
-# Without a covariance: a worn robot on a log, see ``assumed_covariance``.
-ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
+
+
+SINGULAR = 1e-12  # least variance of a matrix that rounding has left singular, m^2 and rad^2
 
 
 def turned(covariance: Float, theta: float) -> Float:
@@ -43,7 +41,7 @@ def inverted(matrix: Float) -> Float:
     bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
     det = a * aa + b * ab + c * ac
     if det <= 0.0:
-        return np.diag([1.0 / max(v, LEAST_VARIANCE) for v in (a, d, f)])
+        return np.diag([1.0 / max(v, SINGULAR) for v in (a, d, f)])
     adjugate = [[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]
     return np.array([[entry / det for entry in row] for row in adjugate])
 
@@ -85,12 +83,12 @@ class Prediction:
         return self.covariance + self.loosened + self.carried
 
 
-def assumed_covariance(increment: Float) -> Float:
+def assumed_covariance(increment: Float, config: PriorConfig = FRONTEND.prior) -> Float:
     """Covariance (3, 3) of an increment whose log says nothing, in the previous robot frame."""
     distance = math.hypot(float(increment[0]), float(increment[1]))
     turn = abs(float(increment[2]))
-    sd_xy = ASSUMED_SHARE * distance + ASSUMED_TURN_M * turn
-    sd_theta = ASSUMED_RAD_PER_SQRT_M * math.sqrt(distance) + ASSUMED_TURN * turn
+    sd_xy = config.assumed_share * distance + config.assumed_turn_m * turn
+    sd_theta = config.assumed_rad_per_sqrt_m * math.sqrt(distance) + config.assumed_turn * turn
     return np.diag([sd_xy**2, sd_xy**2, sd_theta**2])
 
 
@@ -113,6 +111,7 @@ def predict(
     now: Odometry,
     scales: tuple[float, float] = (1.0, 1.0),
     bias: TurnBias | None = None,
+    config: PriorConfig = FRONTEND.prior,
 ) -> Prediction:
     """Chain the odometry increment on the last pose; covariance from the frame's own.
 
@@ -124,23 +123,27 @@ def predict(
         increment = bias.corrected(increment)
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
     given = now.increment_covariance
-    unscaled = assumed_covariance(increment) if given is None else odometry_steps.invertible(given)
-    unscaled = unscaled + LEAST_VARIANCE * IDENTITY
-    share = min(max(elapsed, 1e-3), 1.0) / 0.2
-    floor = share * FLOOR_M**2, share * FLOOR_RAD**2
+    if given is None:
+        unscaled = assumed_covariance(increment, config)
+    else:
+        unscaled = odometry_steps.invertible(given)
+    unscaled = unscaled + config.least_variance * IDENTITY
+    share = min(max(elapsed, 1e-3), config.floor_most_s) / config.floor_s
+    floor = share * config.floor_m**2, share * config.floor_rad**2
     widths = math.sqrt(scales[0]), math.sqrt(scales[1])
     in_robot = _widened(unscaled, widths, floor)
     loosened = np.zeros((3, 3))
     if given is not None:
         more = (
-            math.sqrt(max(LEAST_SCALE - scales[0], 0.0)),
-            math.sqrt(max(LEAST_SCALE - scales[1], 0.0)),
+            math.sqrt(max(config.least_scale - scales[0], 0.0)),
+            math.sqrt(max(config.least_scale - scales[1], 0.0)),
         )
-        rest = share * LEAST_M**2 - floor[0], share * LEAST_RAD**2 - floor[1]
+        least = share * config.least_m**2, share * config.least_rad**2
+        rest = least[0] - floor[0], least[1] - floor[1]
         loosened = _widened(unscaled, more, rest)
     if now.twist is not None:
         twist = np.asarray(now.twist)
-    elif 0.0 < elapsed < 0.5 and float(np.abs(increment).max()) <= MOST_TWIST * elapsed:
+    elif 0.0 < elapsed < config.twist_s and float(np.abs(increment).max()) <= MOST_TWIST * elapsed:
         twist = se2.log(increment) / elapsed
     else:
         twist = np.zeros(3)

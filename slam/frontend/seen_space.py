@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, Scan
+from slam.frontend.config import FRONTEND
 from slam.system import Raster
 
 # Black or slanted surfaces give no return either: beyond this a silent beam says nothing.
-FREE_WITHOUT_RETURN_M = 30.0
+FREE_WITHOUT_RETURN_M = FRONTEND.view.silent_m
 _CHUNK = 256
 
 

@@ -9,22 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner, njit
+from slam.frontend.config import FRONTEND, Joining
 
-LONGEST_JOIN_M = 1.0
-LINE_HITS = 4  # evidence for a surface between hits farther apart than ``NEAR_JOIN_CELLS``
-LIKE_STEPS = 4.0  # ratio of neighbouring steps along a surface, at most
-LINE_SLACK_M, LINE_SLACK = 0.04, 0.15  # m and share of a step, along the beam
-FACE_M = 0.1  # stretch to either side that tells which way a surface faces
+LINE_HITS = FRONTEND.surfaces.line_hits
 FACES, FACES_SEEN = (
     128,
     0x80,
 )  # directions told apart; a facing is FACES_SEEN | direction, 0: unknown
-MIXED_M = 1.5  # the receiver tells two surfaces farther apart than this from each other
+AWAY = int(FACES * FRONTEND.surfaces.opposite_deg / 360.0)
 
 
 @inner
 def _one_line(
-    points: NDArray[np.float64], beams: NDArray[np.int64], first: int, x: float, y: float
+    points: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    first: int,
+    x: float,
+    y: float,
+    joining: Joining,
 ) -> bool:
     """True where hits ``first`` .. ``first + 3`` lie as on one straight surface seen from (x, y).
 
@@ -36,16 +38,16 @@ def _one_line(
         return False
     ax, ay = points[first, 0] - x, points[first, 1] - y
     ex, ey = points[last, 0] - points[first, 0], points[last, 1] - points[first, 1]
-    before = 0.0
+    before, like = 0.0, joining.like_steps
     for k in range(first, last):
         dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
         step = math.sqrt(dx * dx + dy * dy)
-        if dx * ex + dy * ey <= 0.0 or step > LONGEST_JOIN_M:
+        if dx * ex + dy * ey <= 0.0 or step > joining.longest_m:
             return False
-        if k > first and not before < LIKE_STEPS * step < LIKE_STEPS * LIKE_STEPS * before:
+        if k > first and not before < like * step < like * like * before:
             return False
         before = step
-    slack = max(LINE_SLACK_M, LINE_SLACK * math.sqrt(ex * ex + ey * ey) / (LINE_HITS - 1))
+    slack = max(joining.slack_m, joining.slack * math.sqrt(ex * ex + ey * ey) / (LINE_HITS - 1))
     for k in range(first + 1, last):
         bx, by = points[k, 0] - x, points[k, 1] - y
         cross = bx * ey - by * ex
@@ -62,17 +64,17 @@ def join(
     points: NDArray[np.float64],
     beams: NDArray[np.int64],
     origin: NDArray[np.float64],
-    near: float,
+    joining: Joining,
     out: NDArray[np.bool_],
     tangents: NDArray[np.float64],
 ) -> None:
     """Mark the points whose surface goes on to the next one; fill the tangents.
 
     Hits of neighbouring beams (of index ``beams``, from a laser at ``origin``) are joined when they
-    are within ``near`` m, or when the stretch between them is part of a run of four hits on one
-    line. Less evidence will not do: two table legs and the wall behind them often are in line.
+    are within ``joining.near_m``, or when the stretch between them is part of a run of four hits on
+    one line. Less evidence will not do: two table legs and the wall behind them often are in line.
     """
-    n = len(points)
+    n, near = len(points), joining.near_m
     out[:] = False
     for k in range(n - 1):
         if beams[k + 1] != beams[k] + 1:
@@ -82,7 +84,7 @@ def join(
             out[k] = True
     for k in range(n - LINE_HITS + 1):
         if not (out[k] and out[k + 1] and out[k + 2]) and _one_line(
-            points, beams, k, origin[0], origin[1]
+            points, beams, k, origin[0], origin[1], joining
         ):
             out[k], out[k + 1], out[k + 2] = True, True, True
     for k in range(n):
@@ -99,18 +101,20 @@ def face(
     points: NDArray[np.float64],
     origin: NDArray[np.float64],
     joined: NDArray[np.bool_],
+    stretch: float,
     out: NDArray[np.uint8],
 ) -> None:
     """The way the surface under each hit faces, in robot axes; 0 for a hit joined to none.
 
-    Averaged over ``FACE_M`` to either side: neighbouring hits near by are closer than their noise.
+    Averaged over ``stretch`` m to either side: neighbouring hits near by are closer than their
+    noise.
     """
     n = len(points)
     for k in range(n):
         first, last = k, k
-        while first > 0 and joined[first - 1] and _apart(points, first, k) < FACE_M:
+        while first > 0 and joined[first - 1] and _apart(points, first, k) < stretch:
             first -= 1
-        while last < n - 1 and joined[last] and _apart(points, last, k) < FACE_M:
+        while last < n - 1 and joined[last] and _apart(points, last, k) < stretch:
             last += 1
         out[k] = 0
         if first == last:
@@ -139,7 +143,7 @@ def opposite(one: int, other: int) -> bool:
     if one == 0 or other == 0:
         return False
     apart = (int(one) - int(other)) & (FACES - 1)
-    return 3 * FACES < 8 * apart < 5 * FACES
+    return AWAY < apart < FACES - AWAY
 
 
 @inner
@@ -154,12 +158,14 @@ def unveiled(
     beams: NDArray[np.int64],
     origin: NDArray[np.float64],
     joined: NDArray[np.bool_],
+    distinct: float,
     out: NDArray[np.bool_],
 ) -> int:
     """Mark the hits that are no mixed pixel, and count them.
 
     A spot that lies half on an edge and half on what is behind is ranged somewhere between: between
-    its neighbours' ranges, and joined to neither of them.
+    its neighbours' ranges, and joined to neither of them. ``distinct``: surfaces farther apart than
+    so many m are ranged one by one.
     """
     n, count = len(points), 0
     for k in range(n):
@@ -169,7 +175,7 @@ def unveiled(
             before, here = _range(points, k - 1, origin), _range(points, k, origin)
             after = _range(points, k + 1, origin)
             between = before < here < after or before > here > after
-            out[k] = abs(after - before) > MIXED_M or not between
+            out[k] = abs(after - before) > distinct or not between
         if out[k]:
             count += 1
     return count

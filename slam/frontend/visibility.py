@@ -14,11 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-
-MARGIN_CELLS = 1.5
-GATE_CELLS = 0.6
-FEATURE_BIN = math.radians(1.0)
-FEATURE_GAP = math.radians(60.0)  # between two features no wider apart nothing else was there
+from slam.frontend.config import FRONTEND, ViewConfig
 
 
 class View(NamedTuple):
@@ -76,31 +72,36 @@ def view_of_beams(
     free_ranges: NDArray[np.float64],
     increment: float,
     cell: float,
+    config: ViewConfig = FRONTEND.view,
 ) -> View:
     """Sort beams (bearing rad, free range m; 0: not measured) into bins of about ``increment``."""
     bins = max(8, math.floor(math.tau / increment + 1e-6))
     step = math.tau / bins
     limit, offset = np.empty(bins), np.empty(bins)
     farthest = _fill(bearings, free_ranges, step, limit, offset)
-    return View(step, limit, offset, farthest, MARGIN_CELLS * cell, GATE_CELLS * cell)
+    margin, gate = config.margin_cells * cell, config.gate_cells * cell
+    return View(step, limit, offset, farthest, margin, gate)
 
 
-def view_of_features(points: NDArray[np.float64], cell: float) -> View:
+def view_of_features(
+    points: NDArray[np.float64], cell: float, config: ViewConfig = FRONTEND.view
+) -> View:
     """What a frame of point features (n, 2) m sees: the sectors between neighbours, as far as the
     farther of the two, and nothing behind a feature.
     """
     order = sorted((math.atan2(y, x), math.hypot(x, y)) for x, y in points.tolist())
     bearings: list[float] = []
     ranges: list[float] = []
+    step, widest = math.radians(config.feature_bin_deg), math.radians(config.feature_gap_deg)
     for (b0, r0), (b1, r1) in zip(order, order[1:] + order[:1], strict=True):
         gap = (b1 - b0) % math.tau
         bearings.append(b0)
         ranges.append(r0)
-        if gap <= FEATURE_GAP:
-            between = np.arange(FEATURE_BIN, gap, FEATURE_BIN)
+        if gap <= widest:
+            between = np.arange(step, gap, step)
             bearings += (b0 + between).tolist()
             ranges += [max(r0, r1)] * len(between)
-    view = view_of_beams(np.array(bearings), np.array(ranges), FEATURE_BIN, cell)
+    view = view_of_beams(np.array(bearings), np.array(ranges), step, cell, config)
     return view._replace(gate=math.inf)
 
 

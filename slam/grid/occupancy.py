@@ -8,6 +8,8 @@ the neural map alone, as matcher, prior, search and recovery are shared.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from slam._jit import njit
 from slam.frames import Float
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
+from slam.grid.config import OccupancyConfig
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.grid import FREE_COUNT, MASK, SHIFT, SIDE, Cells
 from slam.shunting.map.network import Network
@@ -22,9 +25,14 @@ from slam.shunting.map.update import in_reach
 from slam.shunting.slam import ShuntingSlam
 from slam.system import Raster, register
 
-# Inverse sensor model, log-odds per scan: p = 0.7 and 0.4, clamped to 0.97 (Hornung et al. 2013).
-HIT, MISS, MOST = 0.85, -0.4, 3.5
-STRUCK = 0.6  # impression of a cell that holds the end of a beam; fainter is only beside it
+
+class Odds(NamedTuple):
+    """The inverse sensor model, as in ``GridConfig``."""
+
+    hit: float
+    miss: float
+    most: float
+    struck: float
 
 
 @njit
@@ -57,7 +65,7 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
 
 @njit
 def integrate(
-    cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, write: bool
+    cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, odds: Odds, write: bool
 ) -> tuple[float, float, int]:
     """Add one scan to the log-odds, which live in ``cells.age``; ``cells.y`` is 2 p - 1 above 0.
 
@@ -89,17 +97,18 @@ def integrate(
                         if not seen_empty(view, c * px + s * py, c * py - s * px):
                             continue
                         contradicted += y
-                        more = MISS
+                        more = odds.miss
                     else:
                         confirmed += y * given
-                        if given < STRUCK:
+                        if given < odds.struck:
                             continue
-                        more = HIT
+                        more = odds.hit
                     visited += 1
                     if write:
-                        odds = min(max(float(cells.age[slot, jj, ii]) + more, -MOST), MOST)
-                        cells.age[slot, jj, ii] = odds
-                        cells.y[slot, jj, ii] = max(math.tanh(0.5 * odds), 0.0)
+                        known = float(cells.age[slot, jj, ii]) + more
+                        known = min(max(known, -odds.most), odds.most)
+                        cells.age[slot, jj, ii] = known
+                        cells.y[slot, jj, ii] = max(math.tanh(0.5 * known), 0.0)
     return confirmed, contradicted, visited
 
 
@@ -120,6 +129,11 @@ def _probabilities(cells: Cells, i0: int, j0: int, out: NDArray[np.float32]) -> 
 class Grid(Network):
     """The same storage, filled with log-odds."""
 
+    def __init__(self, config: OccupancyConfig) -> None:
+        super().__init__(config)
+        numbers = config.grid
+        self._odds = Odds(numbers.hit, numbers.miss, numbers.most, numbers.struck)
+
     def integrate(
         self, view: View, T_map_laser: Float, step: float, *, write: bool
     ) -> tuple[float, float, int]:
@@ -130,7 +144,7 @@ class Grid(Network):
             self.cover(x - reach, y - reach, x + reach, y + reach)
             while not _open(self.cells, view, T_map_laser, self.cell):
                 self.grow()
-        result = integrate(self.cells, view, T_map_laser, self.cell, write)
+        result = integrate(self.cells, view, T_map_laser, self.cell, self._odds, write)
         if write:
             self.release()
         return result
@@ -151,10 +165,20 @@ class Grid(Network):
 class OccupancySlam(ShuntingSlam):
     """An ordinary log-odds occupancy grid, with the matcher of "shunting"."""
 
-    def __init__(self, cell_m: float = 0.03) -> None:
-        super().__init__(ShuntingConfig.robust(cell_m=cell_m))
+    config_class: ClassVar[type[ShuntingConfig]] = OccupancyConfig
+
+    def __init__(
+        self,
+        config: ShuntingConfig | str | Mapping[str, Any] = "robust",
+        *,
+        cell_m: float | None = None,
+    ) -> None:
+        """``cell_m`` replaces that of the config."""
+        given = self.config_class.of(config)
+        super().__init__(given if cell_m is None else given.changed({"cell_m": cell_m}))
 
     def _new_network(self) -> Network:
+        assert isinstance(self.config, OccupancyConfig)
         return Grid(self.config)
 
     def changes(self) -> None:

@@ -18,6 +18,7 @@ from slam.errors import (
 )
 from slam.frames import Float, Frame, LaserSpec, Odometry
 from slam.frontend import odometry_steps
+from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.observations import from_scan
 from slam.frontend.odometry_prior import Prediction, predict
 from slam.system import Estimate, Raster, told
@@ -30,6 +31,7 @@ class _Grain:
 
     cell_m: float = 0.03
     range_m: float = 40.0
+    frontend: FrontendConfig = FRONTEND
 
 
 _GRAIN = _Grain()

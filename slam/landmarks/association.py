@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from slam.frames import Float
 from slam.landmarks import kernels, pairs
 from slam.landmarks.filter import EkfFilter
-from slam.landmarks.hypotheses import MOST_NODES, Association, Best, Effort, Gates, Ints
+from slam.landmarks.hypotheses import Association, Best, Effort, Gates, Ints
 from slam.landmarks.ipjc import CUT_SHORT, NODES, TESTS, Search, visit
 from slam.landmarks.jcbb import Jcbb
 
@@ -77,7 +77,7 @@ def ipjc(
         plausible=np.ascontiguousarray(np.isfinite(costs[order][:, columns])),
         together=np.array([0.0] + [gates.together(n) for n in range(1, k + 1)]),
         added=gates.added(),
-        most_nodes=MOST_NODES,
+        most_nodes=gates.most_nodes,
         chosen=np.full(k, -1),
         taken=np.zeros(len(near), dtype=np.bool_),
         best=np.full(k, -1),

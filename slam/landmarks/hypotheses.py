@@ -9,8 +9,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.settings import Settings, number
+
+MOST_GATE = 1.0 - 1e-15
 Ints = NDArray[np.int64]
-MOST_NODES = 400  # hypotheses looked into; then the best one so far is the answer
 
 
 @lru_cache(maxsize=1024)
@@ -22,17 +24,19 @@ def chi_square(probability: float, degrees: int) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gates:
-    """Probabilities of chi-square.
+class Gates(Settings):
+    """Gates of association, as probabilities of chi-square."""
 
-    individual  a pair under the prior, 2 dof
-    joint       k pairs, 2 k dof
-    posterior   what one more pair adds to the joint cost, 2 dof; only IPJC has this one
-    """
-
-    individual: float = 0.999999
-    joint: float = 0.999999
-    posterior: float = 0.99999
+    individual: float = number(
+        0.999999, "prob", "a pair under the prior, 2 dof", low=0.5, high=MOST_GATE
+    )
+    joint: float = number(0.999999, "prob", "k pairs, 2 k dof", low=0.5, high=MOST_GATE)
+    posterior: float = number(
+        0.99999, "prob", "what one more pair adds, 2 dof; IPJC alone", low=0.5, high=MOST_GATE
+    )
+    most_nodes: int = number(
+        400, "hypotheses", "looked into (JCBB: thousands); then the best one counts", low=1
+    )
 
     def single(self) -> float:
         """Limit of a pair's cost under the prior."""

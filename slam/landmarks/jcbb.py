@@ -15,7 +15,7 @@ from slam.frames import Float
 from slam.landmarks import kernels
 from slam.landmarks.algebra import times, times_transposed
 from slam.landmarks.filter import EkfFilter
-from slam.landmarks.hypotheses import MOST_NODES, Best, Gates, Ints
+from slam.landmarks.hypotheses import Best, Gates, Ints
 
 
 class Jcbb:
@@ -51,7 +51,7 @@ class Jcbb:
         """``L`` Cholesky factor of the pairs' joint covariance, ``white`` = L^-1 innovation."""
         best = self.best
         best.effort.nodes += 1
-        if best.effort.nodes > MOST_NODES * 1000:
+        if best.effort.nodes > self.gates.most_nodes * 1000:
             best.effort.complete = False
             return
         if depth == len(self.order):

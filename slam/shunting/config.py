@@ -1,83 +1,115 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The twelve knobs of the shunting SLAM, and its two presets.
+"""Every number of the shunting SLAM: twelve that a user may turn, the rest by rooms.
 
-Numbers that follow from a frame's own sensor (beam spacing, scan rate, odometry covariance, range)
-are no knobs: they are read from the frame.
+``mobilia config shunting`` prints them all. Numbers that follow from a frame's own sensor (beam
+spacing, scan rate, odometry covariance, range) are none of them: they are read from the frame.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Self
 
 from slam.errors import InvalidValueError
+from slam.frontend.config import FrontendConfig
+from slam.frontend.corner_config import CornerConfig
+from slam.landmarks.hypotheses import Gates
+from slam.settings import Settings, number, word
+from slam.shunting.map.config import MapConfig
+from slam.shunting.matching.config import MatchingConfig
+from slam.shunting.tracking.config import LoopsConfig, TrackingConfig
+from slam.shunting.uncertainty.config import UncertaintyConfig
 
-Objective = Literal["sum", "log"]
+SEEDS = "training seeds"
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShuntingConfig:
-    """Everything a user may turn; the defaults are the preset ``robust()``.
+class FeaturesConfig(Settings):
+    """Point features in the place of beams: "shunting-features" alone."""
 
-    What a value does to the error was measured on training seeds of office, arena and arena without
-    walls at 4.7 Hz; where no source is named, the default was chosen there.
+    least_peak: float = number(0.1, "activity", "lower peaks are no landmark", low=1e-6)
+    peak_cells: float = number(0.15, "cells", "deviation of a peak beside its observations' own")
+    enough_pairs: int = number(2, "pairs", "fewer: the whole map is matched", low=1, high=1000)
+    least_m2: float = number(1e-6, "m²", "variance of a feature, at least", low=1e-15)
+    looks_twice: float = number(1.5, "looks", "peaks looked at more often are associated first")
+    steps: int = number(20, "frames", "whose median step is one look", low=1, high=100_000)
+    corners: CornerConfig = field(default=CornerConfig())
+    gates: Gates = field(default=Gates())
+    corner_gates: Gates = field(default=Gates(individual=0.999, joint=0.99, posterior=0.95))
 
-    cell_m              edge of a neuron's square, m. Sets accuracy and cost: 0.05 is twice as
-                        fast, 0.10 three times less accurate
-    decay_per_s         A of Eq. (8), 1/s (paper: 0.8). Flat between 0.2 and 2
-    lateral_sum         W, sum of a neuron's lateral weights (paper: < 0.2). Must stay below
-                        ``decay_per_s``, else the empty map is unstable. 0 turns diffusion off: it
-                        doubles the cost and gains nothing measurable
-    lateral_reach_cells r0 of w = mu / d for 0 < d < r0 (paper), in cells. Flat
-    threshold           sigma of Eq. (8): activities below it are dropped and do not spread. Flat
-                        between 0.001 and 0.05; lower values keep more neurons alive
-    trace_s             pace of the long-term trace, s of looking at a neuron (never less than
-                        five looks); 0 turns the trace off (paper). Below 1 s things that move
-                        together carry the robot along
-    short_term_weight   share of the short-term activity in a neuron that has no long-term trace.
-                        Flat between 0.1 and 0.3; 1 errs by 15 % more in rooms, 24 % without walls
-    reward              weight of one fully overlapped observation against the odometry prior. Flat
-                        between 2 and 12 in rooms; without walls 2 errs by 90 % more, 12 by 20 less
-    reward_exponent     the weight falls with the matched fraction q as ``reward * q**exponent``.
-                        0: never; above, half of the chairs moving without a wall in sight lead
-                        astray (14 cm at 0, 18 at 1, 28 at 2), below 2 nothing gained
-    objective           "sum": overlapped volumes, as the paper words it; "log": as Eq. (13) prints
-    range_m             returns beyond are ignored, m. 8 errs by 70 % more in rooms
-    freeze_below        nothing is written to the map while the matched fraction is below this
-                        share of its usual value and the map in view is contradicted; 0: never.
-                        Flat between 0 and 0.8 where nobody carries the robot off
+
+@dataclass(frozen=True, kw_only=True)
+class ShuntingConfig(Settings):
+    """Everything that can be set; the defaults are the preset ``robust()``.
+
+    The twelve numbers at the top are the public face. What a value does to the error was measured
+    on training seeds of office, arena and arena without walls at 4.7 Hz. The groups below are for
+    experts: ``changed({"matching.local.points": 90})`` sets one of theirs by its path.
     """
 
-    cell_m: float = 0.03
-    decay_per_s: float = 0.8
-    lateral_sum: float = 0.0
-    lateral_reach_cells: float = 1.5
-    threshold: float = 0.01
-    trace_s: float = 3.0
-    short_term_weight: float = 0.3
-    reward: float = 5.0
-    reward_exponent: float = 0.0
-    objective: Objective = "sum"
-    range_m: float = 40.0
-    freeze_below: float = 0.6
+    cell_m: float = number(
+        0.03, "m", "edge of a neuron's square. 0.05: twice as fast; 0.10: error three times",
+        SEEDS, low=0.005, high=1.0, alias="map.cell_m",
+    )  # fmt: skip
+    decay_per_s: float = number(
+        0.8, "1/s", "A of Eq. (8). Flat between 0.2 and 2", "paper",
+        low=1e-3, high=100.0, alias="map.decay_per_s",
+    )  # fmt: skip
+    lateral_sum: float = number(
+        0.0, "1/s", "W, sum of a neuron's lateral weights (paper: < 0.2), below decay_per_s. "
+        "0: no diffusion, which doubles the cost and gains nothing", SEEDS, alias="map.lateral_sum",
+    )  # fmt: skip
+    lateral_reach_cells: float = number(
+        1.5, "cells", "r0 of w = mu / d for 0 < d < r0. Flat", "paper",
+        low=1.0, high=8.0, alias="map.lateral_reach_cells",
+    )  # fmt: skip
+    threshold: float = number(
+        0.01, "activity", "sigma of Eq. (8): less is dropped. Flat between 0.001 and 0.05",
+        SEEDS, low=1e-6, high=0.5, alias="map.threshold",
+    )  # fmt: skip
+    trace_s: float = number(
+        3.0, "s", "pace of the long-term trace; 0: none (paper). Below 1, things that move "
+        "together carry the robot along", SEEDS, alias="map.trace_s",
+    )  # fmt: skip
+    short_term_weight: float = number(
+        0.3, "share", "of the short-term activity where there is no trace. Flat between 0.1 and "
+        "0.3; 1 errs by 15 % more in rooms, 24 % without walls", SEEDS,
+        high=1.0, alias="map.short_term_weight",
+    )  # fmt: skip
+    reward: float = number(
+        5.0, "weight", "of one overlapped observation against the prior. Rooms: flat between 2 and "
+        "12; without walls 2 errs by 90 % more, 12 by 20 % less", SEEDS,
+        low=1e-3, high=1e3, alias="matching.reward",
+    )  # fmt: skip
+    reward_exponent: float = number(
+        0.0, "1", "the weight falls with the matched fraction q as reward q^exponent. 0: never; "
+        "without walls, half of the chairs moving: 14 cm at 0, 18 at 1, 28 at 2", SEEDS,
+        high=10.0, alias="matching.reward_exponent",
+    )  # fmt: skip
+    objective: str = word(
+        "sum", ("sum", "log"), "overlapped volumes, as the paper words it, or Eq. (13) as it "
+        "prints: their logarithms", "paper", alias="matching.objective",
+    )  # fmt: skip
+    range_m: float = number(
+        40.0, "m", "returns beyond are ignored. 8 errs by 70 % more in rooms", SEEDS,
+        low=0.5, high=1000.0, alias="frontend.range_m",
+    )  # fmt: skip
+    freeze_below: float = number(
+        0.6, "share", "of the usual match: below it, and with the map in view contradicted, nothing"
+        " is written; 0: never. Flat between 0 and 0.8 where nobody moves the robot", SEEDS,
+        high=1.0, alias="tracking.freeze_below",
+    )  # fmt: skip
+    frontend: FrontendConfig = field(default=FrontendConfig())
+    map: MapConfig = field(default=MapConfig())
+    matching: MatchingConfig = field(default=MatchingConfig())
+    tracking: TrackingConfig = field(default=TrackingConfig())
+    loops: LoopsConfig = field(default=LoopsConfig())
+    uncertainty: UncertaintyConfig = field(default=UncertaintyConfig())
+    features: FeaturesConfig = field(default=FeaturesConfig())
 
     def __post_init__(self) -> None:
-        self._number("cell_m", 0.005, 1.0)
-        self._number("decay_per_s", 1e-3, 100.0)
-        self._number("lateral_sum", 0.0, math.inf)
-        self._number("lateral_reach_cells", 1.0, 8.0)
-        self._number("threshold", 1e-6, 0.5)
-        self._number("trace_s", 0.0, 1e6)
-        self._number("short_term_weight", 0.0, 1.0)
-        self._number("reward", 1e-3, 1e3)
-        self._number("reward_exponent", 0.0, 10.0)
-        self._number("range_m", 0.5, 1000.0)
-        self._number("freeze_below", 0.0, 1.0)
-        if self.objective not in get_args(Objective):
-            raise InvalidValueError(
-                f"ShuntingConfig.objective must be 'sum' or 'log', got {self.objective!r}"
-            )
+        super().__post_init__()
         if not self.lateral_sum < self.decay_per_s:
             raise InvalidValueError(
                 "ShuntingConfig.lateral_sum must be below decay_per_s (the empty map is unstable "
@@ -88,22 +120,13 @@ class ShuntingConfig:
                 "ShuntingConfig.short_term_weight must be > 0 when trace_s is 0: nothing is left"
             )
 
-    def _number(self, name: str, low: float, high: float) -> None:
-        value = getattr(self, name)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
-            raise InvalidValueError(f"ShuntingConfig.{name} must be a number, got {value!r}")
-        if not low <= value <= high:
-            raise InvalidValueError(
-                f"ShuntingConfig.{name} must lie in [{low}, {high}], got {value}"
-            )
-
     @classmethod
-    def robust(cls, **changes: Any) -> ShuntingConfig:
+    def robust(cls, **changes: Any) -> Self:
         """The default: sum of overlaps, slow trace beside the short-term memory."""
         return cls(**changes)
 
     @classmethod
-    def paper(cls, **changes: Any) -> ShuntingConfig:
+    def paper(cls, **changes: Any) -> Self:
         """The paper as printed: lateral diffusion, no trace, sum of logarithms, map never frozen.
 
         Decisions where it is ambiguous: A is per second, one sweep a scan (converging would erase
@@ -120,6 +143,25 @@ class ShuntingConfig:
             "freeze_below": 0.0,
         }
         return cls(**(printed | changes))
+
+    @classmethod
+    def of(cls, given: Self | str | Mapping[str, Any]) -> Self:
+        """A config itself, that of a preset's name, or the default with changes by path.
+
+        Raises ``InvalidValueError`` for anything else, ``UnknownNameError`` for an unknown path.
+        """
+        if isinstance(given, cls):
+            return given
+        if isinstance(given, Mapping):
+            return cls().changed(given)
+        if given == "paper":
+            return cls.paper()
+        if given == "robust":
+            return cls.robust()
+        raise InvalidValueError(
+            f"config must be a {cls.__name__}, 'robust' or 'paper', or numbers by path, "
+            f"got {given!r:.80}"
+        )
 
     @property
     def saturation(self) -> float:

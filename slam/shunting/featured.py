@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import deque
+from collections.abc import Mapping
 from statistics import median
 from typing import Any
 
@@ -29,31 +30,24 @@ from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame
 from slam.frontend.corners import corners
-from slam.frontend.observations import SIGMA_CELLS, Observations
+from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.landmarks.association import ipjc
 from slam.landmarks.filter import EkfFilter
-from slam.landmarks.hypotheses import Gates
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.peaks import Peaks, peaks
 from slam.shunting.matching.matcher import Match, seen_by
 from slam.shunting.matching.score import evaluate
-from slam.shunting.slam import FIRST_LOOK_S, LONGEST_LOOK_S, ShuntingSlam
+from slam.shunting.slam import ShuntingSlam
 from slam.shunting.uncertainty.odometry_noise import Increments
 from slam.shunting.uncertainty.pose_covariance import Belief
 from slam.system import Estimate, register
 
-LEAST_PEAK = 0.1  # lower activities are no landmark to associate with
-PEAK_CELLS = 0.15  # standard deviation of a peak's place beside its observations' own
-ENOUGH_PAIRS = 2  # fewer do not say where the robot is: then the whole map is matched
-LEAST_M2 = 1e-6  # variance of a feature, at least
 # Weight of a logarithm of overlap, preset ``paper``. Features are independent, unlike beams (0.3);
 # and the lattice widens the bells of feature and peak to some three times their variances, which
 # takes two thirds of what their overlap says of the pose. 2 to 5 does as well.
 PAPER_REWARD = 3.0
 PRESETS = {"robust": ShuntingConfig.robust, "paper": ShuntingConfig.paper}
-GATES = Gates()  # of points
-CORNER_GATES = Gates(individual=0.999, joint=0.99, posterior=0.95)  # the tuned EKF's on corners
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,9 +67,11 @@ class FeaturedShuntingSlam(ShuntingSlam):
     ``config`` as for "shunting". Uses ``frame.features``; corners where a frame has only a scan.
     """
 
-    def __init__(self, config: ShuntingConfig | str = "robust", **options: Any) -> None:
+    def __init__(
+        self, config: ShuntingConfig | str | Mapping[str, Any] = "robust", **options: Any
+    ) -> None:
         """``options`` replace fields of the preset; ``paper`` has ``PAPER_REWARD`` here."""
-        if isinstance(config, ShuntingConfig):
+        if isinstance(config, (ShuntingConfig, Mapping)):
             if options:
                 raise InvalidValueError("FeaturedShuntingSlam takes a config, or options, not both")
         elif config in PRESETS and set(options) <= set(ShuntingConfig.__dataclass_fields__):
@@ -90,38 +86,39 @@ class FeaturedShuntingSlam(ShuntingSlam):
 
     def update(self, frame: Frame) -> Estimate:
         """As for the scans, with corners in their place."""
-        self._gates = GATES
+        self._gates = self.config.features.gates
         if frame.scan is not None:  # its beams are no features
             features = frame.features
             if features is None:
-                features = corners(frame.scan, twist=frame.odometry.twist)
-                self._gates = CORNER_GATES
+                numbers = self.config.features.corners
+                features = corners(frame.scan, twist=frame.odometry.twist, config=numbers)
+                self._gates = self.config.features.corner_gates
             frame = dataclasses.replace(frame, scan=None, labels=None, features=features)
         return super().update(frame)
 
     def reset(self) -> None:
         """Forget everything; the next frame is the origin."""
         super().reset()
-        self._gates = GATES
-        self._steps_s: deque[float] = deque(maxlen=20)
+        self._gates = self.config.features.gates
+        self._steps_s: deque[float] = deque(maxlen=self.config.features.steps)
         self._first_counts_s = 0.0
-        self._belief = Belief(self.config.cell_m, whole=0.0)
-        exact = self.config.objective == "sum"
-        self._increments = Increments.of_points(None if exact else self.config.cell_m)
+        self._belief = Belief(self.config, of_points=True)
+        overlaps = self.config.objective == "log"
+        self._increments = Increments.of_points(self.config, overlaps=overlaps)
 
     def _first(self, frame: Frame) -> Estimate:
-        self._first_counts_s = FIRST_LOOK_S
+        self._first_counts_s = self.config.map.first_look_s
         return super()._first(frame)
 
     def _match(self, observations: Observations, prediction: Prediction) -> Match:
-        step = min(max(prediction.elapsed, 1e-3), LONGEST_LOOK_S)
+        step = min(max(prediction.elapsed, 1e-3), self.config.map.longest_look_s)
         self._steps_s.append(step)
         if self._first_counts_s > 0.0:  # however long it acted, it was one look
             age = self.network.cells.age
             age *= np.float32(step / self._first_counts_s)
             self._first_counts_s = 0.0
         agreed = self._agreed(observations, prediction)
-        if int(agreed.accepted.sum()) < ENOUGH_PAIRS:
+        if int(agreed.accepted.sum()) < self.config.features.enough_pairs:
             return super()._match(observations, prediction)
         pulling = dataclasses.replace(observations, weights=agreed.accepted.astype(np.float64))
         if self.config.objective == "log":
@@ -156,7 +153,8 @@ class FeaturedShuntingSlam(ShuntingSlam):
         accepted = np.zeros(len(points), dtype=np.bool_)
         before = self._T_map_robot
         reach = self.config.range_m + 1.0
-        marks = peaks(self.network, LEAST_PEAK, centre=before[:2], reach_m=reach)
+        least = self.config.features.least_peak
+        marks = peaks(self.network, least, centre=before[:2], reach_m=reach)
         looks = np.maximum(marks.ages_s / median(self._steps_s), 1.0)
         state = EkfFilter()
         state.pose = before.copy()
@@ -166,7 +164,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
         )
         state.predict(prediction.increment, turned(prediction.prior, -float(before[2])))
         prior = state.pose_covariance()
-        again = looks > 1.5
+        again = looks > self.config.features.looks_twice
         for chosen in (np.flatnonzero(again), np.flatnonzero(~again)):
             free = np.flatnonzero(~accepted)
             if len(chosen) == 0 or len(free) == 0:
@@ -185,12 +183,14 @@ class FeaturedShuntingSlam(ShuntingSlam):
         """(n, 2, 2) how sure the peaks' places are, robot frame: one look's, over their number."""
         R = se2.rotation(-float(self._T_map_robot[2]))
         out: Float = np.einsum("ij,njk,lk->nil", R, marks.spreads / looks[:, None, None], R)
-        lattice = (PEAK_CELLS * self.config.cell_m) ** 2 * np.eye(2)
+        own = self.config.features.peak_cells
+        lattice = (own * self.config.cell_m) ** 2 * np.eye(2)
         return 0.5 * (out + out.transpose(0, 2, 1)) + lattice
 
     def _sensed(self, observations: Observations) -> Float:
         """(n, 2, 2) the features' own covariances: without the width that the lattice needs."""
-        floor = (SIGMA_CELLS * self.config.cell_m) ** 2 - LEAST_M2
+        sigma = self.config.frontend.sigma_cells
+        floor = (sigma * self.config.cell_m) ** 2 - self.config.features.least_m2
         own = observations.covariances - np.array([floor, 0.0, floor])
         out: Float = own[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
         return out

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +23,11 @@ from slam.shunting.map import export
 from slam.shunting.map import io as memory
 from slam.shunting.map.network import Network
 from slam.shunting.map.rasterise import stamp
-from slam.shunting.matching.local_search import WIDEST, SearchWindow
+from slam.shunting.matching.local_search import SearchWindow
 from slam.shunting.matching.matcher import Match, Matcher, unmatched
 from slam.shunting.tracking.loops import Loops
-from slam.shunting.tracking.quality import LOST_AFTER, PATIENCE, Doubt
-from slam.shunting.tracking.relocalise import COARSE, SLIPPED, TELLING, Recovery, slipped
+from slam.shunting.tracking.quality import Doubt
+from slam.shunting.tracking.relocalise import Recovery, coarse, slip, slipped
 from slam.shunting.uncertainty.odometry_noise import Increments
 from slam.shunting.uncertainty.pose_covariance import Belief
 from slam.shunting.uncertainty.residuals import Evidence, look
@@ -34,30 +35,20 @@ from slam.shunting.warmup import warm_up
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
 
-FIRST_LOOK_S = 1.0  # the first frame acts this long, so that the map is usable at once
-RESUMED_LOOK_S = 0.2  # of the first frame with a loaded map
-LONGEST_LOOK_S = 3.0  # however long ago the previous frame was
-GOOD_SHARE = 0.85  # of the usual matched fraction: below it the neighbourhood is searched
-VAGUE_CELLS = 1.0  # a prior wider than this may leave the basin of the right optimum
-GIVE_UP_S = 60.0  # of searching: then the map is written on from where odometry says
-
 
 @register("shunting")
 class ShuntingSlam:
     """Localise on the network, then let the network see the frame (Eqs. 8 and 13).
 
-    ``config`` is a ``ShuntingConfig`` or the name of a preset, "robust" (default) or "paper".
-    Raises ``InvalidValueError`` for frames without observations or out of order.
+    ``config`` is a ``ShuntingConfig``, the name of a preset, "robust" (default) or "paper", or
+    numbers by their path in the tree, ``{"matching.reward": 7}``. Raises ``InvalidValueError`` for
+    frames without observations or out of order.
     """
 
-    def __init__(self, config: ShuntingConfig | str = "robust") -> None:
-        if isinstance(config, str):
-            if config not in ("robust", "paper"):
-                raise InvalidValueError(
-                    f"ShuntingSlam config must be 'robust' or 'paper', got {config!r}"
-                )
-            config = ShuntingConfig.paper() if config == "paper" else ShuntingConfig.robust()
-        self.config: ShuntingConfig = config
+    config_class: ClassVar[type[ShuntingConfig]] = ShuntingConfig
+
+    def __init__(self, config: ShuntingConfig | str | Mapping[str, Any] = "robust") -> None:
+        self.config = self.config_class.of(config)
         warm_up()
         self.reset()
 
@@ -68,9 +59,10 @@ class ShuntingSlam:
         self._before: Odometry | None = None
         self._resumed: Float | None = None
         self._T_map_robot: Float = np.zeros(3)
-        self._belief = Belief(self.config.cell_m)
-        self._increments = Increments.of_beams(self.config.cell_m)
-        self._doubt = Doubt(self.config.freeze_below)
+        self._numbers = self.config.tracking
+        self._belief = Belief(self.config)
+        self._increments = Increments.of_beams(self.config)
+        self._doubt = Doubt(self.config.freeze_below, self._numbers.quality)
         self._recovery: Recovery | None = None
         self._loops = Loops(self.config, self._matcher)
         self._trusted = True  # the pose of the frame before
@@ -103,7 +95,8 @@ class ShuntingSlam:
         observations = observe(frame, moving, self.config)
         stamp(self.network, observations, self._T_map_robot)
         T_map_laser = se2.compose(self._T_map_robot, observations.T_robot_laser)
-        self.network.integrate(observations.view, T_map_laser, FIRST_LOOK_S, write=True)
+        first_s = self.config.map.first_look_s
+        self.network.integrate(observations.view, T_map_laser, first_s, write=True)
         match = unmatched(np.zeros(3), matched=1.0, score=0.0)
         self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
         return self._report(frame, match, "tracking" if len(observations.points_robot) else "blind")
@@ -118,7 +111,7 @@ class ShuntingSlam:
             increment=np.zeros(3),
             covariance=self._resumed,
             twist=np.zeros(3) if odometry.twist is None else np.asarray(odometry.twist),
-            elapsed=RESUMED_LOOK_S,
+            elapsed=self.config.map.resumed_look_s,
         )
 
     def _localise(
@@ -129,7 +122,7 @@ class ShuntingSlam:
         The prior comes back wider where enough is in view to correct what odometry alone told of
         the pose before, and after a slip.
         """
-        if float(observations.weights.sum()) >= TELLING:
+        if float(observations.weights.sum()) >= self._numbers.relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = replace(prediction, carried=self._belief.odometry_part(motion))
         if self._recovery is not None:
@@ -137,7 +130,7 @@ class ShuntingSlam:
             return prediction, match, state
         match = _near(self._match(observations, prediction), prediction)
         if match.slipped:
-            prediction = replace(prediction, covariance=SLIPPED)
+            prediction = replace(prediction, covariance=slip(self._numbers.relocalise))
         return prediction, match, "tracking"
 
     def _match(self, observations: Observations, prediction: Prediction) -> Match:
@@ -147,16 +140,18 @@ class ShuntingSlam:
         precision = inverted(prior)
         start = self._matcher.approach(self.network, observations, predicted, prior)
         match = self._matcher.climb(self.network, observations, start, predicted, precision)
-        near = SearchWindow.about(prior)
-        good = GOOD_SHARE * self._doubt.usual_match()
-        vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > VAGUE_CELLS * self.config.cell_m
-        for window, wanted in ((near, vague or match.matched < good), (WIDEST, True)):
-            if not wanted or (window is WIDEST and match.matched >= 0.7 * good):
+        numbers = self.config.matching.local
+        near, widest = SearchWindow.about(prior, numbers), SearchWindow.widest(numbers)
+        good = numbers.good_share * self._doubt.usual_match()
+        poor = numbers.widest_share * good
+        vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > numbers.vague_cells * self.config.cell_m
+        for window, wanted in ((near, vague or match.matched < good), (widest, True)):
+            if not wanted or (window is widest and match.matched >= poor):
                 break
             found = self._matcher.search(self.network, observations, predicted, precision, window)
             if found.score > match.score:
                 match = found
-        if match.matched >= 0.7 * good or not self._doubt.is_worth_searching():
+        if match.matched >= poor or not self._doubt.is_worth_searching():
             return match
         usual = self._doubt.usual_support()
         shoved = slipped(self.network, self._matcher, observations, prediction, usual)
@@ -173,9 +168,10 @@ class ShuntingSlam:
         if match is not None:
             self._recovery = None
             self._doubt.count(False)
-            self._belief.relocated(COARSE)
+            self._belief.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
-        if recovery.elapsed_s > GIVE_UP_S:  # elsewhere: go on from here, as on the first frame
+        if recovery.elapsed_s > self._numbers.quality.give_up_s:
+            # elsewhere: go on from here, as on the first frame
             self._recovery = None
             self._doubt.give_up()
         return unmatched(predicted, matched=here.matched, score=here.score), "lost"
@@ -187,7 +183,7 @@ class ShuntingSlam:
         if state != "tracking":
             return None
         short_term = self._matcher.reward.short_term
-        step, turn = min(prediction.elapsed, LONGEST_LOOK_S), len(self._poses)
+        step, turn = min(prediction.elapsed, self.config.map.longest_look_s), len(self._poses)
         return look(self.network, short_term, observations, match.T_map_robot, step, turn)
 
     def _update_map(
@@ -198,20 +194,21 @@ class ShuntingSlam:
             return state
         stamp(self.network, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
-        step = min(prediction.elapsed, LONGEST_LOOK_S)
+        step = min(prediction.elapsed, self.config.map.longest_look_s)
         doubt, doubtful = self._doubt, False
-        if float(observations.weights.sum()) >= TELLING and doubt.arises(match.matched):
+        enough = self._numbers.relocalise.least_weight
+        if float(observations.weights.sum()) >= enough and doubt.arises(match.matched):
             confirmed, contradicted, _ = self.network.integrate(
                 observations.view, T_map_laser, step, write=False
             )
             motion = match.T_map_robot - self._T_map_robot
             doubtful = doubt.denied(match.matched, confirmed, contradicted, motion)
         doubt.count(doubtful)
-        if doubtful and doubt.scans <= PATIENCE:
+        if doubtful and doubt.scans <= doubt.config.patience:
             self.network.release()
-            if doubt.scans >= LOST_AFTER and doubt.suspicious:
+            if doubt.scans >= doubt.config.lost_after and doubt.suspicious:
                 self._recovery = Recovery(self.network, self._matcher)
-            return "lost" if doubt.scans > LOST_AFTER else "frozen"
+            return "lost" if doubt.scans > doubt.config.lost_after else "frozen"
         confirmed, contradicted, _ = self.network.integrate(
             observations.view, T_map_laser, step, write=True
         )
@@ -299,7 +296,7 @@ class ShuntingSlam:
         The robot is looked for around where it was, then in the whole map. The trajectory begins
         with the first frame. Raises ``LogFormatError`` for a file that is not one of ``save``.
         """
-        config, state, arrays = memory.read(path)
+        config, state, arrays = memory.read(path, cls.config_class)
         if state.kind != cls.__name__:
             raise LogFormatError(path, f"a map of {state.kind}, not of {cls.__name__}")
         slam = cls.__new__(cls)
@@ -311,7 +308,7 @@ class ShuntingSlam:
         except InvalidValueError as error:  # blocks farther apart than a map can be
             raise LogFormatError(path, str(error)) from error
         slam._T_map_robot = state.T_map_robot
-        slam._resumed = state.covariance + COARSE
+        slam._resumed = state.covariance + coarse(config.tracking.relocalise)
         slam._belief.resumed(state.covariance)
         slam._doubt.resume(state.usual, state.supports, state.tracked_s, state.tracked)
         return slam

@@ -52,7 +52,7 @@ def _run_all() -> None:
         0.0,
     )
     carried(covariance, origin, 0.0, 0.0, np.eye(3))
-    observable(covariance, 0.0, np.eye(3))
+    observable(covariance, 0.0, 2.0, np.eye(3))
     innovation(covariance, covariance, covariance, origin, 1.0)
     for write in (False, True):
         stamp(network, seen, origin)

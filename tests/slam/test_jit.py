@@ -27,8 +27,8 @@ print(outer(1.0))
 """
 
 
-def run(folder: Path, decorator: str, step: float) -> float:
-    (folder / "callee.py").write_text(CALLEE.format(decorator, step))
+def run(folder: Path, decorator: str, step: float, callee: str = CALLEE) -> float:
+    (folder / "callee.py").write_text(callee.format(decorator, step))
     here = Path(__file__).parents[2]
     env = {**os.environ, "PYTHONPATH": f"{here}{os.pathsep}{folder}"}
     env["NUMBA_CACHE_DIR"] = str(folder / "cache")
@@ -48,6 +48,15 @@ def test_a_changed_callee_of_another_module_is_compiled_anew(tmp_path, decorator
     (tmp_path / "caller.py").write_text(CALLER)
     assert run(tmp_path, decorator, 1.0) == 2.0
     assert run(tmp_path, decorator, 2.0) == 3.0
+
+
+def test_a_changed_constant_from_another_module_is_compiled_anew(tmp_path):
+    (tmp_path / "caller.py").write_text(CALLER)
+    callee = "from slam._jit import njit\nfrom numbers_of import STEP\n@njit\n"
+    callee += "def inner(x):\n    return x + STEP\n"
+    for step in (1.0, 2.0):
+        (tmp_path / "numbers_of.py").write_text(f"STEP = {step}\n")
+        assert run(tmp_path, "njit", step, callee) == 1.0 + step
 
 
 def test_a_cache_that_names_types_which_are_gone_is_an_empty_cache(tmp_path):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from sim.actors.config import ACTORS
 from sim.actors.people.right_of_way import (
     BLOCKED,
     BODY,
@@ -29,9 +30,12 @@ from sim.actors.people.right_of_way import (
 from sim.core.flow import Field, clearance_at
 from slam._jit import njit
 
-HORIZON = 2.5  # s, collisions later than this do not matter
-ACCEL = 3.0  # m/s2
-SPARE = 0.05  # m that people leave between themselves and the robot
+_S = ACTORS.steering
+HORIZON, ACCEL, SPARE, SPARE_MPS = _S.horizon_s, _S.accel, _S.spare_m, _S.spare_mps
+APART, TOUCHING, SOON, LEAST_PACE = _S.apart_m, _S.touching, _S.soon_s, _S.least_pace
+HURRY, HURRY_MOST, HURRY_FROM = _S.hurry, _S.hurry_most, _S.hurry_from
+CHANGE, KEEP_RIGHT, SLOW = _S.change, _S.keep_right, _S.slow
+LOOK_S, WALL = _S.look_s, _S.wall
 
 
 @njit
@@ -58,7 +62,7 @@ def danger(i: int, vx: float, vy: float, near: Int, discs: Float, fade: float) -
         weight = 1.0 if other[KIND] == PERSON or other[KIND] == ROBOT else fade
         if weight <= 0.0:
             continue
-        dx, dy, reach = other[X] - x, other[Y] - y, r + other[R] + 0.06
+        dx, dy, reach = other[X] - x, other[Y] - y, r + other[R] + APART
         if other[KIND] == PERSON:  # each takes half of the evasion
             wx, wy = 2.0 * vx - ux - other[U], 2.0 * vy - uy - other[V]
         else:
@@ -66,10 +70,10 @@ def danger(i: int, vx: float, vy: float, near: Int, discs: Float, fade: float) -
         gap2 = dx * dx + dy * dy
         if gap2 < reach * reach:
             closing = (dx * vx + dy * vy) / math.sqrt(max(gap2, 1e-6))
-            cost += weight * 4.0 * max(closing, 0.0)
+            cost += weight * TOUCHING * max(closing, 0.0)
         else:
             when = impact_time(dx, dy, wx, wy, reach)
-            cost += weight * (1.0 / (when + 0.1) - 1.0 / (HORIZON + 0.1))
+            cost += weight * (1.0 / (when + SOON) - 1.0 / (HORIZON + SOON))
     return cost
 
 
@@ -89,8 +93,8 @@ def choose(
     heading = math.atan2(wy, wx)
     here = min(clearance_at(field, x, y), BODY)
     wish = math.sqrt(wx * wx + wy * wy)
-    pace = max(wish, 0.5)
-    hurry = min(1.5 * state[i, BLOCKED], 3.0) if wish > 0.3 else 0.0
+    pace = max(wish, LEAST_PACE)
+    hurry = min(HURRY * state[i, BLOCKED], HURRY_MOST) if wish > HURRY_FROM else 0.0
     best, best_x, best_y = math.inf, 0.0, 0.0
     for k in range(35):
         if k == 0:
@@ -105,14 +109,14 @@ def choose(
             vx, vy = speed * math.cos(angle), speed * math.sin(angle)
         speed = math.sqrt(vx * vx + vy * vy)
         cost = math.sqrt((vx - wx) ** 2 + (vy - wy) ** 2)
-        cost += 0.15 * math.sqrt((vx - state[i, VX]) ** 2 + (vy - state[i, VY]) ** 2)
-        cost += 0.06 * max(0.0, wx * vy - wy * vx)  # people keep right
-        if speed < 0.9 * pace:  # who has been held up steps aside rather than stand
+        cost += CHANGE * math.sqrt((vx - state[i, VX]) ** 2 + (vy - state[i, VY]) ** 2)
+        cost += KEEP_RIGHT * max(0.0, wx * vy - wy * vx)  # people keep right
+        if speed < SLOW * pace:  # who has been held up steps aside rather than stand
             cost += hurry * (1.0 - speed / pace)
         for step in range(1, 3):
-            c = clearance_at(field, x + 0.3 * step * vx, y + 0.3 * step * vy)
+            c = clearance_at(field, x + LOOK_S * step * vx, y + LOOK_S * step * vy)
             if c < here:
-                cost += 25.0 * (here - c)
+                cost += WALL * (here - c)
         if cost < best:
             cost += danger(i, vx, vy, near, discs, fade)
         if cost < best:
@@ -137,6 +141,6 @@ def spare_robot(
         # A person stops at ACCEL; what the robot itself comes nearer is stepped back from.
         approach = vx * ux + vy * uy - (robot[U] * ux + robot[V] * uy)
         allowed = math.sqrt(2.0 * ACCEL * gap) if gap > 0.0 else 4.0 * gap
-        excess = min(max(approach - allowed, 0.0), 2.0)
+        excess = min(max(approach - allowed, 0.0), SPARE_MPS)
         vx, vy = vx - excess * ux, vy - excess * uy
     return vx, vy

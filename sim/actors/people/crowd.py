@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.actors.config import ACTORS
 from sim.actors.people.avoidance import ACCEL, choose, spare_robot
 from sim.actors.people.right_of_way import (
     ANGLE,
@@ -63,7 +64,12 @@ from sim.core.draws import between, uniform, waiting
 from sim.core.flow import FAR, Field, time_at, way_at
 from slam._jit import njit
 
-STILL = 0.1  # m/s, a walker slower than this is blocked
+_W = ACTORS.walking
+STILL, DOORWAY = _W.still_mps, _W.doorway_m
+ARRIVE_LEAST, ARRIVE_MOST = _W.arrive_least_s, _W.arrive_most_s
+LOOK_LEAST, LOOK_MOST = _W.look_least_s, _W.look_most_s
+NEAR_S, NEAR_BLOCKED, NO_PROGRESS = _W.near_s, _W.near_blocked_s, _W.no_progress_s
+GIVES_UP, TURN_GAIN, TURN_MOST = _W.blocked_s, _W.turn_gain, _W.turn_most
 
 
 class People(NamedTuple):
@@ -100,7 +106,7 @@ def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> No
     n_goals = field.times.shape[0]
     offset = 1 + int(uniform(draws, i) * (n_goals - 1))
     goal = task[i, GOAL]
-    state[i, ARRIVE] = between(draws, i, 0.25, 0.8)
+    state[i, ARRIVE] = between(draws, i, ARRIVE_LEAST, ARRIVE_MOST)
     state[i, STAY_UNTIL] = waiting(draws, i, 1.0 / stay)  # a duration until the arrival
     state[i, LOOK] = between(draws, i, -math.pi, math.pi)
     state[i, LUCK] = uniform(draws, i)
@@ -144,9 +150,9 @@ def arrived(i: int, left: float, doors: Float, discs: Float, state: Float) -> bo
     """Near enough to the goal, or held up close to it, and not standing in a doorway."""
     for d in range(doors.shape[0]):
         dx, dy = discs[i, X] - doors[d, CX], discs[i, Y] - doors[d, CY]
-        if dx * dx + dy * dy < 1.44:
+        if dx * dx + dy * dy < DOORWAY * DOORWAY:
             return False
-    return left < state[i, ARRIVE] or (left < 2.0 and state[i, BLOCKED] > 0.8)
+    return left < state[i, ARRIVE] or (left < NEAR_S and state[i, BLOCKED] > NEAR_BLOCKED)
 
 
 @njit
@@ -164,7 +170,7 @@ def plan(
             new_trip(i, time, stay, field, crowd)
         elif task[i, WALKING] == STANDS and time >= state[i, LOOK_UNTIL]:
             state[i, LOOK] = between(draws, look, -math.pi, math.pi)
-            state[i, LOOK_UNTIL] = time + between(draws, look, 4.0, 15.0)
+            state[i, LOOK_UNTIL] = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
         return
     if state[i, SIT] > 0.0:  # getting up
         state[i, BEST_AT] = time
@@ -181,10 +187,10 @@ def plan(
     if arrived(i, left, doors, discs, state):
         task[i, WALKING] = STANDS
         state[i, STAY_UNTIL] += time
-        state[i, LOOK_UNTIL] = time + between(draws, look, 4.0, 15.0)
+        state[i, LOOK_UNTIL] = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
         if task[i, SEAT] < 0:
             may_sit(i, field, crowd)
-    elif state[i, BLOCKED] > 5.0 or time - state[i, BEST_AT] > 12.0:
+    elif state[i, BLOCKED] > GIVES_UP or time - state[i, BEST_AT] > NO_PROGRESS:
         new_trip(i, time, stay, field, crowd)
 
 
@@ -253,7 +259,7 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
     elif crowd.task[i, WALKING] == STANDS:
         heading = state[i, LOOK]
     out[0], out[1] = state[i, VX], state[i, VY]
-    out[2] = min(max(4.0 * wrap(heading - yaw), -3.0), 3.0)
+    out[2] = min(max(TURN_GAIN * wrap(heading - yaw), -TURN_MOST), TURN_MOST)
 
 
 @njit

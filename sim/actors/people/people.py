@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.scene import Scene
+from sim.actors.config import ACTORS
 from sim.actors.doors import Doors
 from sim.actors.people import crowd, gait, right_of_way, sitting
 from sim.actors.people.right_of_way import Addresses, Crowd
@@ -22,7 +23,6 @@ from sim.core.flow import Field, FlowMap, nowhere
 Float = NDArray[np.float64]
 _LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
 _LOOKS = np.uint64(0xD1342543DE82EF95)  # sets the second generator of each person apart
-_FIRST_STAY_MAX = 8.0  # s, so that a short run of a calm room sees someone set off
 
 
 @functools.lru_cache(maxsize=8)
@@ -110,12 +110,15 @@ class People:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand."""
         state, task, draws = self.crowd.state, self.crowd.task, self.crowd.draws
         for i in range(len(self.names)):
-            speed = 1.34 + 0.26 * normal(draws, i)
-            state[i, right_of_way.SPEED] = min(max(speed, 0.8), 1.9)
-            first = min(self._rates[0], _FIRST_STAY_MAX)
+            numbers = ACTORS.walking
+            speed = numbers.speed_mps + numbers.speed_sd * normal(draws, i)
+            state[i, right_of_way.SPEED] = min(max(speed, numbers.speed_least), numbers.speed_most)
+            first = min(self._rates[0], numbers.first_stay_s)
             state[i, right_of_way.STAY_UNTIL] = first * uniform(draws, i)
             state[i, right_of_way.LOOK] = data.qpos[self.table.torsos[i, 0] + 2]
-            state[i, right_of_way.LOOK_UNTIL] = between(draws, i, 4.0, 15.0)
+            state[i, right_of_way.LOOK_UNTIL] = between(
+                draws, i, numbers.look_least_s, numbers.look_most_s
+            )
             n_goals = max(len(self.table.field.times), 1)
             task[i, right_of_way.GOAL] = int(uniform(draws, i) * n_goals)
         self.stand(data)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actors.config import ACTORS
 from sim.core.flow import Field, clearance_at, time_at, way_at
 from slam._jit import njit
 
@@ -35,8 +36,13 @@ PERSON, THING, ROBOT, CHAIR, LEAF = 0.0, 1.0, 2.0, 3.0, 10.0  # LEAF + d: of the
 CX, CY, NX, NY, EX, EY, WIDTH, ANGLE = 0, 1, 2, 3, 4, 5, 6, 7
 TURN, ASKED, INSIDE = 0, 1, 2
 
-BODY = 0.27  # m of clearance a person keeps to walls
-OPEN = 1.15  # rad, a leaf this far open lets a person through
+_R = ACTORS.right_of_way
+BODY, OPEN = _R.body_m, ACTORS.doors.passable_rad
+WANTS, IN_DOORWAY, ON_WAY, SWEPT = _R.wants_m, _R.in_doorway_m, _R.on_way, _R.swept_m2
+CLEAR, IN_FRAME, KEPT = ACTORS.doors.clear_m, _R.in_frame_m, _R.kept_m
+PULL, PUSH, BESIDE, BACK = _R.pull_m, _R.push_m, _R.beside_m, _R.back_m
+WAIT_MPS, WAIT_GAIN, LEAF_M = _R.wait_mps, _R.wait_gain, _R.leaf_m
+PUSH_STOP, QUEUE, HOLD_GAIN, HOLD_MPS = _R.push_stop_m, _R.queue_m, _R.hold_gain, _R.hold_mps
 
 
 class Crowd(NamedTuple):
@@ -81,15 +87,15 @@ def wants_through(i: int, door: Float, field: Field, crowd: Crowd) -> int:
     discs, task = crowd.discs, crowd.task
     dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
     distance = math.sqrt(dx * dx + dy * dy)
-    if task[i, WALKING] != WALKS or distance > 2.2:
+    if task[i, WALKING] != WALKS or distance > WANTS:
         return 0
     goal = task[i, GOAL]
     normal = dx * door[NX] + dy * door[NY]
-    if distance < 0.35:
+    if distance < IN_DOORWAY:
         wx, wy = way_at(field, goal, discs[i, X], discs[i, Y])
         return -1 if wx * door[NX] + wy * door[NY] > 0.0 else 1
     there = time_at(field, goal, door[CX], door[CY])
-    if time_at(field, goal, discs[i, X], discs[i, Y]) - there < 0.8 * distance:
+    if time_at(field, goal, discs[i, X], discs[i, Y]) - there < ON_WAY * distance:
         return 0
     return 1 if normal > 0.0 else -1
 
@@ -110,16 +116,16 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:
             distance = math.sqrt(dx * dx + dy * dy)
             hx = dx + 0.5 * door[WIDTH] * door[EX]
             hy = dy + 0.5 * door[WIDTH] * door[EY]
-            swept = dx * door[NX] + dy * door[NY] > 0.0 and hx * hx + hy * hy < 1.6
-            if distance < 0.95 or swept:  # nobody is hit by a leaf that moves by itself
+            swept = dx * door[NX] + dy * door[NY] > 0.0 and hx * hx + hy * hy < SWEPT
+            if distance < CLEAR or swept:  # nobody is hit by a leaf that moves by itself
                 passage[d, INSIDE] = 1.0
             if side == 0:
                 continue
             across, along = dx * door[NX] + dy * door[NY], dx * door[EX] + dy * door[EY]
-            in_frame = abs(across) < 0.4 and abs(along) < 0.5 * door[WIDTH]
+            in_frame = abs(across) < IN_FRAME and abs(along) < 0.5 * door[WIDTH]
             if in_frame and (inside == 0 or side == int(passage[d, TURN])):
                 inside = side
-            if side == int(passage[d, TURN]) and distance < 1.4:
+            if side == int(passage[d, TURN]) and distance < KEPT:
                 kept = True
             if distance < nearest:
                 nearest, turn = distance, side
@@ -131,7 +137,7 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:
         for i in range(sides.shape[0]):
             if turn != 0 and sides[i, d] == turn:
                 dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
-                reach = 2.1 if turn > 0 else 1.5  # who pulls a door starts earlier
+                reach = PULL if turn > 0 else PUSH  # who pulls a door starts earlier
                 asked = asked or dx * dx + dy * dy < reach * reach
         passage[d, ASKED] = 1.0 if asked else 0.0
 
@@ -140,16 +146,16 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:
 def wait_beside(i: int, door: Float, side: int, field: Field, discs: Float) -> tuple[float, float]:
     """Velocity to a place on one's own side, out of the way of those who come through."""
     dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
-    beside = 0.8 if dx * door[EX] + dy * door[EY] >= 0.0 else -0.8
+    beside = BESIDE if dx * door[EX] + dy * door[EY] >= 0.0 else -BESIDE
     for _ in range(2):
-        tx = door[CX] + 1.2 * side * door[NX] + beside * door[EX]
-        ty = door[CY] + 1.2 * side * door[NY] + beside * door[EY]
+        tx = door[CX] + BACK * side * door[NX] + beside * door[EX]
+        ty = door[CY] + BACK * side * door[NY] + beside * door[EY]
         if clearance_at(field, tx, ty) > BODY:
             break
         beside = -beside
     tx, ty = tx - discs[i, X], ty - discs[i, Y]
     gap = math.sqrt(tx * tx + ty * ty)
-    speed = min(1.0, 1.5 * gap) / max(gap, 1e-6)
+    speed = min(WAIT_MPS, WAIT_GAIN * gap) / max(gap, 1e-6)
     return speed * tx, speed * ty
 
 
@@ -173,10 +179,10 @@ def hold_off(
         rx = dx + 0.5 * door[WIDTH] * door[EX]
         ry = dy + 0.5 * door[WIDTH] * door[EY]
         gap = math.sqrt(rx * rx + ry * ry)
-        rx, ry, stop = rx / gap, ry / gap, door[WIDTH] + 0.32
+        rx, ry, stop = rx / gap, ry / gap, door[WIDTH] + LEAF_M
     else:
-        rx, ry, stop = -door[NX], -door[NY], 0.45
+        rx, ry, stop = -door[NX], -door[NY], PUSH_STOP
         gap = dx * rx + dy * ry
-    excess = -(wanted[0] * rx + wanted[1] * ry) - 2.0 * (gap - stop - 0.65 * first)
-    excess = min(max(excess, 0.0), 2.0)
+    excess = -(wanted[0] * rx + wanted[1] * ry) - HOLD_GAIN * (gap - stop - QUEUE * first)
+    excess = min(max(excess, 0.0), HOLD_MPS)
     return wanted[0] + excess * rx, wanted[1] + excess * ry

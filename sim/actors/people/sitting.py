@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actors.config import ACTORS
 from sim.actors.people.gait import HIP, SEAT_HEIGHT
 from sim.actors.people.right_of_way import (
     BLOCKED,
@@ -41,14 +42,9 @@ from sim.actors.people.right_of_way import (
 from sim.core.flow import Field, clearance_at
 from slam._jit import njit
 
-SHARE = 0.2  # of all arrivals with a free chair at hand end on it
-HAND = 2.5  # m, a chair this near is at hand
-STAY = 3.0  # times longer than who stands
-DOWN_S = 0.8  # s to sit down, and to get up
-NEAR = 0.08  # m between hulls from where one turns and sits down
-ROOM = 0.18  # m of clearance a chair needs, else it is tucked under a desk
-PACE = 0.7  # m/s to the chair
-GIVE_UP_S = 1.5
+_S = ACTORS.sitting
+SHARE, HAND, STAY, DOWN_S = _S.share, _S.hand_m, _S.stay, _S.down_s
+NEAR, ROOM, PACE, GIVE_UP_S = _S.near_m, _S.room_m, _S.pace_mps, _S.give_up_s
 PLANAR_BIT = 2  # contype of chairs, bins and the robot
 
 

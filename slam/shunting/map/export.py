@@ -50,19 +50,20 @@ def changes(network: Network) -> Changes | None:
         return None
     x, y = found
     lately = np.minimum(np.float32(network.config.decay_per_s) * x / (1.0 - x), np.float32(1.0))
-    appeared, gone = lately - _around(y), y - _around(lately)
+    reach = network.config.map.beside_cells
+    appeared, gone = lately - _around(y, reach), y - _around(lately, reach)
     for layer in (appeared, gone):
         np.maximum(layer, np.float32(0.0), out=layer)
         layer[(x == 0.0) & (y == 0.0)] = np.nan
     return Changes(appeared=_raster(network, appeared), gone=_raster(network, gone))
 
 
-def _around(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The largest value within two rows and columns: a wall seen one neuron aside is no change."""
+def _around(values: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
+    """The largest value within ``reach`` neurons: a wall seen one neuron aside is no change."""
     for axis in (0, 1):
-        padded = np.pad(values, [(2, 2) if k == axis else (0, 0) for k in (0, 1)])
+        padded = np.pad(values, [(reach, reach) if k == axis else (0, 0) for k in (0, 1)])
         n = values.shape[axis]
-        values = np.max([padded.take(range(k, k + n), axis) for k in range(5)], axis=0)
+        values = np.max([padded.take(range(k, k + n), axis) for k in range(2 * reach + 1)], axis=0)
     return values
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A SLAM's memory as a file: its knobs, the living neurons, and where the robot was.
+"""A SLAM's memory as a file: its config, the living neurons, and where the robot was.
 
 A NumPy archive (.npz) without pickled objects. ``header`` is JSON text with ``format``, ``version``
 and ``state``; ``places`` (n, 2) are the blocks' indices (x, y); ``x``, ``y``, ``age`` and
@@ -15,7 +15,7 @@ import json
 import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from slam.shunting.map.grid import FREE_COUNT, SIDE, living
 from slam.shunting.map.network import Network
 
 FORMAT, VERSION = "mobilia shunting memory", 1
+Config = TypeVar("Config", bound=ShuntingConfig)
 _ARRAYS = ("places", "x", "y", "age", "facing")
 # What a file may claim.
 MAX_BYTES = 1 << 30  # of all arrays: 1.2 million blocks, 70 000 m^2 of neurons of 3 cm
@@ -93,7 +94,8 @@ def save(path: Path, network: Network, state: State) -> None:
     header: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
-        "config": dataclasses.asdict(network.config),
+        "config": network.config.as_words(),
+        "config_sha256": network.config.sha256(),
         "state": dataclasses.asdict(state)
         | {"T_map_robot": state.T_map_robot.tolist(), "covariance": state.covariance.tolist()},
     }
@@ -122,13 +124,27 @@ def _sum(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> str:
     return found.hexdigest()
 
 
-def read(path: Path) -> tuple[ShuntingConfig, State, dict[str, NDArray[Any]]]:
-    """Knobs, state and arrays of a file that ``save`` wrote.
+def check(path: Path) -> None:
+    """Raise ``LogFormatError`` for a file that is not whole, whatever SLAM wrote it."""
+    _whole(path)
+
+
+def read(path: Path, kind: type[Config]) -> tuple[Config, State, dict[str, NDArray[Any]]]:
+    """Config of that ``kind``, state and arrays of a file that ``save`` wrote.
 
     Raises ``LogFormatError`` for a file that is missing, cut short, damaged, of another kind, of a
     newer version, or that claims more than a map can have (``MAX_BYTES``, checked before anything
     is unpacked).
     """
+    header, state, arrays = _whole(path)
+    try:
+        config = kind.from_words(header["config"])
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise LogFormatError(path, f"damaged {FORMAT}: {error}") from error
+    return config, state, arrays
+
+
+def _whole(path: Path) -> tuple[dict[str, Any], State, dict[str, NDArray[Any]]]:
     arrays = read_arrays(path, ("header", *_ARRAYS), max_bytes=MAX_BYTES)
     header = _header(path, arrays.pop("header"))
     _check(path, arrays)
@@ -137,11 +153,11 @@ def read(path: Path) -> tuple[ShuntingConfig, State, dict[str, NDArray[Any]]]:
     elif header["sha256"] != _sum(header, arrays):
         raise LogFormatError(path, f"damaged {FORMAT}: its content is not what was written")
     try:
-        config, state = ShuntingConfig(**header["config"]), State(**header["state"])
+        state = State(**header["state"])
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise LogFormatError(path, f"damaged {FORMAT}: {error}") from error
     _check_ages(path, arrays["age"], state.kind)
-    return config, state, arrays
+    return header, state, arrays
 
 
 def _header(path: Path, text: NDArray[Any]) -> dict[str, Any]:
@@ -160,7 +176,9 @@ def _header(path: Path, text: NDArray[Any]) -> dict[str, Any]:
         raise LogFormatError(
             path, f"version {header.get('version')!r} of a {FORMAT}; {VERSION} is known"
         )
-    unknown = sorted(set(header) - {"format", "version", "config", "state", "sha256"})
+    unknown = sorted(
+        set(header) - {"format", "version", "config", "config_sha256", "state", "sha256"}
+    )
     if unknown:
         raise LogFormatError(path, f"damaged {FORMAT}: its header has {unknown[0][:40]!r}")
     return header

@@ -35,17 +35,20 @@ class Network:
 
     def law(self, step: float) -> Law:
         """Constants of an update whose input acts for ``step`` s (the time since the last scan)."""
-        pace = max(self.config.trace_s, 5.0 * step)
+        numbers = self.config.map
+        pace = max(self.config.trace_s, numbers.pace_looks * step)
         return Law(
             step=step,
             look=step,
             pace=pace,
-            oldest=13.0 * pace,
+            oldest=numbers.oldest_paces * pace,
             decay=self.config.decay_per_s,
             threshold=self.config.threshold,
             mu=self.mu,
             reach=self.config.lateral_reach_cells,
             trace=self.config.trace_s > 0.0,
+            faded=numbers.faded,
+            unseen=numbers.unseen,
         )
 
     def cover(self, xmin: float, ymin: float, xmax: float, ymax: float) -> None:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from slam._jit import inner, njit
 from slam.frames import Float
-from slam.frontend.observations import SIGMA_CELLS
 from slam.shunting.map.grid import MASK, SHIFT, SIDE, Cells
 from slam.shunting.map.network import Network
 
@@ -40,8 +39,8 @@ def _age(cells: Cells, i: int, j: int) -> float:
 
 
 @inner
-def _spread(near: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """Covariance xx, xy, yy (cells^2) of a bell beyond the lattice's own width, into ``out``.
+def _spread(near: NDArray[np.float64], own: float, out: NDArray[np.float64]) -> None:
+    """Covariance xx, xy, yy (cells^2) of a bell beyond the lattice's ``own`` width, into ``out``.
 
     ``near`` (3, 3) are the logarithms of the neuron and its neighbours: their second differences
     are the inverse covariance of the Gaussian through them.
@@ -55,8 +54,8 @@ def _spread(near: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         return
     mean, half, cross = 0.5 * (a + d) / det, 0.5 * (d - a) / det, -b / det
     radius = math.sqrt(half * half + cross * cross)
-    low = max(mean - radius - SIGMA_CELLS**2, 0.0)
-    high = max(mean + radius - SIGMA_CELLS**2, 0.0)
+    low = max(mean - radius - own**2, 0.0)
+    high = max(mean + radius - own**2, 0.0)
     keep = 0.5 * (high - low) / radius if radius > 0.0 else 0.0
     out[0] = 0.5 * (low + high) + keep * half
     out[1] = keep * cross
@@ -89,6 +88,7 @@ def _peaks(
     least: float,
     centre: NDArray[np.float64],
     reach: float,
+    own: float,
     out: NDArray[np.float64],
 ) -> int:
     """Fill ``out`` (most, 7) with x, y, height, spread xx, xy, yy and age; how many there are."""
@@ -122,7 +122,7 @@ def _peaks(
                 out[count, 0] = (i + 0.5 + _between(near[1, 0], near[1, 1], near[1, 2])) * cell
                 out[count, 1] = (j + 0.5 + _between(near[0, 1], near[1, 1], near[2, 1])) * cell
                 out[count, 2] = here
-                _spread(near, out[count, 3:6])
+                _spread(near, own, out[count, 3:6])
                 out[count, 6] = _age(cells, i, j)
                 count += 1
     return count
@@ -157,7 +157,8 @@ def peaks(
     out = np.empty((MOST, 7))
     around = np.zeros(2) if centre is None else np.asarray(centre, dtype=np.float64)
     short = network.config.short_term_weight / network.config.saturation
-    count = _peaks(network.cells, network.cell, short, least, around, reach_m, out)
+    own = network.config.frontend.sigma_cells
+    count = _peaks(network.cells, network.cell, short, least, around, reach_m, own, out)
     found = out[:count].copy()
     return Peaks(
         points_map=found[:, :2].copy(),

@@ -8,6 +8,7 @@ neuron centres (pixel locking).
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -18,12 +19,18 @@ from slam._jit import inner, njit
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.surfaces import turned_face
+from slam.shunting.map.config import MapConfig
 from slam.shunting.map.grid import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells
 from slam.shunting.map.network import Network
 
-FAINT = 12.0  # squared Mahalanobis distance of I = 0.0025, where an impression ends
-FINE = 512  # entries of the table below for each unit of it: 0.1 % of I
-BELL = np.array([math.exp(-0.5 * k / FINE) for k in range(int(FAINT) * FINE)] + [0.0], np.float32)
+FINE = MapConfig().bell_steps
+
+
+@functools.cache
+def _bell(ends: float) -> NDArray[np.float32]:
+    """I by the squared Mahalanobis distance, ``FINE`` entries for each unit of it."""
+    entries = range(int(ends * FINE))
+    return np.array([math.exp(-0.5 * k / FINE) for k in entries] + [0.0], np.float32)
 
 
 @inner
@@ -62,11 +69,18 @@ def _touch(cells: Cells, column: int, row: int) -> int:
 
 @inner
 def _stamp_point(
-    cells: Cells, u: float, v: float, a: float, b: float, d: float, faced: int
+    cells: Cells,
+    u: float,
+    v: float,
+    cov: tuple[float, float, float],
+    faced: int,
+    ends: float,
+    bell: NDArray[np.float32],
 ) -> bool:
-    """Gaussian with covariance [[a, b], [b, d]] about (u, v), in cells."""
+    """Gaussian with covariance ``cov`` (xx, xy, yy) about (u, v), in cells."""
+    a, b, d = cov
     det = a * d - b * b
-    wide = math.sqrt(FAINT * max(a, d))
+    wide = math.sqrt(ends * max(a, d))
     i0, i1 = math.ceil(u - wide), math.floor(u + wide)
     j0, j1 = math.ceil(v - wide), math.floor(v + wide)
     pa, pb, pd = d / det, -2.0 * b / det, a / det
@@ -76,7 +90,7 @@ def _stamp_point(
             first, last = max(i0, column * SIDE), min(i1, column * SIDE + MASK)
             low, high = max(j0, row * SIDE), min(j1, row * SIDE + MASK)
             du, dv = min(max(u, first), last) - u, min(max(v, low), high) - v
-            if b == 0.0 and pa * du * du + pd * dv * dv >= FAINT:
+            if b == 0.0 and pa * du * du + pd * dv * dv >= ends:
                 continue
             # As below; in a function for both, stamping takes half as long again.
             slot = cells.directory[row - cy, column - cx]
@@ -90,8 +104,8 @@ def _stamp_point(
                 whole, part = pd * dv * dv, pb * dv
                 for i in range(first, last + 1):
                     du = i - u
-                    m = min(whole + du * (part + pa * du), FAINT)
-                    value = BELL[int(m * FINE)]
+                    m = min(whole + du * (part + pa * du), ends)
+                    value = bell[int(m * FINE)]
                     if value > cells.impression[scratch, j & MASK, i & MASK]:
                         cells.impression[scratch, j & MASK, i & MASK] = value
                         cells.faced[scratch, j & MASK, i & MASK] = faced
@@ -100,13 +114,21 @@ def _stamp_point(
 
 @inner
 def _stamp_stretch(
-    cells: Cells, u: float, v: float, du: float, dv: float, variance: float, faced: int
+    cells: Cells,
+    u: float,
+    v: float,
+    du: float,
+    dv: float,
+    variance: float,
+    faced: int,
+    ends: float,
+    bell: NDArray[np.float32],
 ) -> bool:
     """Gaussian ridge about the stretch from (u, v) to (u + du, v + dv), in cells."""
     square = du * du + dv * dv
     flat = abs(du) >= abs(dv)
     slope = dv / du if flat else du / dv
-    across = math.sqrt(FAINT * variance * (1.0 + slope * slope))
+    across = math.sqrt(ends * variance * (1.0 + slope * slope))
     scale = 1.0 / (square * variance)
     cx, cy = cells.corner[0], cells.corner[1]
     start, end = (min(u, u + du), max(u, u + du)) if flat else (min(v, v + dv), max(v, v + dv))
@@ -117,7 +139,7 @@ def _stamp_stretch(
             i, j = (along, aside) if flat else (aside, along)
             cross = (i - u) * dv - (j - v) * du
             m = cross * cross * scale
-            if m >= FAINT:
+            if m >= ends:
                 continue
             if scratch < 0 or i >> SHIFT != column or j >> SHIFT != row:
                 column, row = i >> SHIFT, j >> SHIFT
@@ -127,7 +149,7 @@ def _stamp_stretch(
                     scratch = _touch(cells, column - cx, row - cy)
                     if scratch < 0:
                         return False
-            value = BELL[int(m * FINE)]
+            value = bell[int(m * FINE)]
             if value > cells.impression[scratch, j & MASK, i & MASK]:
                 cells.impression[scratch, j & MASK, i & MASK] = value
                 cells.faced[scratch, j & MASK, i & MASK] = faced
@@ -143,6 +165,8 @@ def _stamp(
     facings: NDArray[np.uint8],
     theta: float,
     cell: float,
+    ends: float,
+    bell: NDArray[np.float32],
     start: int,
 ) -> int:
     """Raise I around the points (map frame) from ``start`` on; the index where room ran out, or n.
@@ -158,11 +182,13 @@ def _stamp(
         d = (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale
         u, v = points[k, 0] / cell - 0.5, points[k, 1] / cell - 0.5
         faced = turned_face(facings[k], theta)
-        if not _stamp_point(cells, u, v, a, b, d, faced):
+        if not _stamp_point(cells, u, v, (a, b, d), faced, ends, bell):
             return k
         if joined[k]:
             du, dv = points[k + 1, 0] / cell - 0.5 - u, points[k + 1, 1] / cell - 0.5 - v
-            if du * du + dv * dv > 1.0 and not _stamp_stretch(cells, u, v, du, dv, a, faced):
+            if du * du + dv * dv > 1.0 and not _stamp_stretch(
+                cells, u, v, du, dv, a, faced, ends, bell
+            ):
                 return k
     return len(points)
 
@@ -178,7 +204,7 @@ def stamp(network: Network, observations: Observations, T_map_robot: Float) -> N
     network.cover(
         float(x.min()) - edge, float(y.min()) - edge, float(x.max()) + edge, float(y.max()) + edge
     )
-    done = 0
+    done, ends = 0, network.config.map.bell_ends
     while done < len(points_map):
         done = _stamp(
             network.cells,
@@ -188,6 +214,8 @@ def stamp(network: Network, observations: Observations, T_map_robot: Float) -> N
             observations.facings,
             float(T_map_robot[2]),
             network.cell,
+            ends,
+            _bell(ends),
             done,
         )
         if done < len(points_map):

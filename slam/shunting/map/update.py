@@ -27,6 +27,7 @@ class Law(NamedTuple):
     mu          w = mu / d
     reach       r0, cells
     trace       whether a long-term trace is kept
+    faded       a trace below ends where the input is below ``unseen``
     """
 
     step: float
@@ -38,6 +39,8 @@ class Law(NamedTuple):
     mu: float
     reach: float
     trace: bool
+    faded: float
+    unseen: float
 
 
 def lateral_mu(total: float, reach: float) -> float:
@@ -147,7 +150,7 @@ def integrate(
                         age = cells.age[slot, jj, ii]
                         y = np.float32(y + (given - y) * law.look / (age + law.look + law.pace))
                         age = np.float32(min(age + law.look, law.oldest))
-                        if y < 0.004 and given < 0.01:
+                        if y < law.faded and given < law.unseen:
                             y, age = np.float32(0.0), np.float32(0.0)
                         cells.y[slot, jj, ii] = y
                         cells.age[slot, jj, ii] = age

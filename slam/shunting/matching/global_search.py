@@ -16,14 +16,9 @@ from slam.frames import Float
 from slam.shunting.map.grid import SIDE
 from slam.shunting.map.network import Network
 from slam.shunting.matching.branch_and_bound import Lattice, Search, levels_of
+from slam.shunting.matching.config import GlobalConfig
 from slam.shunting.matching.local_search import field_of, place
 
-PITCH_M = 0.12  # neurons are pooled up to this edge
-BESIDE = 0.7  # what a place beside structure is worth: poses are only tried every PITCH_M
-FAR_M = 20.0  # returns beyond turn too fast with the heading
-FEW = 120  # returns are enough
-APART_M, APART_RAD = 1.0, 0.5  # between two answers, at least one of them
-WORTH = 0.6  # answers worse than this share of the best are dropped
 STRIP = 16 * SIDE  # neurons pooled at a time, so that little of the map is ever laid out
 MAX_ACROSS = 40  # coarsest blocks along the map
 
@@ -36,24 +31,25 @@ def _pooled(fine: NDArray[np.uint8], pool: int) -> NDArray[np.uint8]:
     return largest
 
 
-def _spread(source: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The source, or ``BESIDE`` times the largest of the eight values around."""
+def _spread(source: NDArray[np.uint8], beside: float) -> NDArray[np.uint8]:
+    """The source, or ``beside`` times the largest of the eight values around."""
     padded = np.pad(source, 1)
     wide = np.maximum(np.maximum(padded[:, :-2], padded[:, 1:-1]), padded[:, 2:])
     around = np.maximum(np.maximum(wide[:-2], wide[1:-1]), wide[2:])
-    return np.maximum(source, (BESIDE * around).astype(np.uint8))
+    return np.maximum(source, (beside * around).astype(np.uint8))
 
 
-def _pooling(cell: float) -> int:
+def _pooling(cell: float, pitch_m: float) -> int:
     pool = 1
-    while pool < SIDE and 2 * pool * cell <= 1.01 * PITCH_M:
+    while pool < SIDE and 2 * pool * cell <= 1.01 * pitch_m:
         pool *= 2
     return pool
 
 
 def coarse_field(network: Network, short_term: float) -> NDArray[np.uint8]:
     """The whole map, pooled; row 0, column 0 at the corner of ``network.extent()``."""
-    extent, pool = network.extent(), _pooling(network.cell)
+    config = network.config.matching.whole
+    extent, pool = network.extent(), _pooling(network.cell, config.pitch_m)
     if extent is None:
         return np.zeros((0, 0), np.uint8)
     i0, j0, i1, j1 = extent
@@ -62,13 +58,14 @@ def coarse_field(network: Network, short_term: float) -> NDArray[np.uint8]:
         rows = min(STRIP, j1 - j0 - row)
         fine = field_of(network, short_term, i0, j0 + row, rows, i1 - i0)
         coarse[row // pool : (row + rows) // pool] = _pooled(fine, pool)
-    return _spread(coarse)
+    return _spread(coarse, config.beside)
 
 
-def _headings(points: Float, pitch: float) -> Float:
+def _headings(points: Float, pitch: float, config: GlobalConfig) -> Float:
     distances = np.sort(np.sqrt((points * points).sum(axis=1)))
     far = float(distances[(3 * len(distances)) // 4])
-    count = math.ceil(math.tau / min(max(pitch / max(far, pitch), 0.01), 0.1))
+    step = min(max(pitch / max(far, pitch), config.finest_rad), config.coarsest_rad)
+    count = math.ceil(math.tau / step)
     return np.asarray(np.arange(count) * (math.tau / count), dtype=np.float64)
 
 
@@ -86,19 +83,20 @@ def places(
     ``coarse_field`` of the network where that is at hand. Answers are good to
     about 0.1 m and 1 degree; to be refined by climbing.
     """
-    near = points_robot[(points_robot * points_robot).sum(axis=1) < FAR_M**2]
+    config = network.config.matching.whole
+    near = points_robot[(points_robot * points_robot).sum(axis=1) < config.far_m**2]
     extent = network.extent()
     if extent is None or len(near) == 0:
         return []
-    chosen = np.ascontiguousarray(near[:: math.ceil(len(near) / FEW)])
-    pool = _pooling(network.cell)
+    chosen = np.ascontiguousarray(near[:: math.ceil(len(near) / config.points)])
+    pool = _pooling(network.cell, config.pitch_m)
     pitch = pool * network.cell
     if field is None:
         field = coarse_field(network, short_term)
     i0, j0, i1, j1 = extent
     middle = np.array([0.5 * (i0 + i1) * network.cell, 0.5 * (j0 + j1) * network.cell, 0.0])
     reach = math.ceil(0.5 * max(field.shape))
-    turns = _headings(chosen, pitch)
+    turns = _headings(chosen, pitch, config)
     if about is not None:
         middle, reach = np.array(about[0]), math.ceil(about[1] / pitch)
         step = float(turns[1])
@@ -123,9 +121,9 @@ def places(
         pitch=pitch,
         precision=np.zeros((3, 3)),
         gain=1.0 / (255.0 * len(chosen)),
-        apart=(APART_M / pitch, APART_RAD),
+        apart=(config.apart_m / pitch, config.apart_rad),
     )
-    return _answers(Search(lattice), lattice, middle, most)
+    return _answers(Search(lattice), lattice, middle, most, config.worth)
 
 
 def _cut(field: NDArray[np.uint8], row: int, column: int, side: int) -> NDArray[np.uint8]:
@@ -138,14 +136,16 @@ def _cut(field: NDArray[np.uint8], row: int, column: int, side: int) -> NDArray[
     return out
 
 
-def _answers(search: Search, lattice: Lattice, middle: Float, most: int) -> list[Float]:
+def _answers(
+    search: Search, lattice: Lattice, middle: Float, most: int, worth: float
+) -> list[Float]:
     found: list[Float] = []
     floor, taken = -math.inf, np.zeros((0, 3))
     for _ in range(most):
         best = search.best(floor, taken)
         if best.heading < 0:
             break
-        floor = max(floor, WORTH * best.score)
+        floor = max(floor, worth * best.score)
         turn = float(lattice.turns[best.heading])
         taken = np.vstack([taken, [float(best.column), float(best.row), turn]])
         pitch = lattice.pitch

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from slam._jit import njit
 from slam.compiling import announced
 from slam.frames import Float
-from slam.frontend.observations import SIGMA_CELLS, Observations
+from slam.frontend.observations import Observations
 from slam.shunting.map.grid import MASK, SHIFT, SIDE, Cells, no_cells
 from slam.shunting.map.network import Network
 from slam.shunting.matching.branch_and_bound import Lattice, Search, levels_of
+from slam.shunting.matching.config import LocalConfig
 
 LEVELS = 3  # coarsest block of offsets: 8 x 8 neurons
 FULL = 255.0  # integer that stands for the field's value 1
-MAX_POINTS = 180  # more add cost, not certainty
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,17 +36,19 @@ class SearchWindow:
     turn_rad: float
 
     @classmethod
-    def about(cls, prior: Float) -> SearchWindow:
-        """Three standard deviations of a (3, 3) prior, within ``WIDEST``."""
-        reach_m = 3.0 * math.sqrt(max(prior[0, 0], prior[1, 1]))
-        turn_rad = 3.0 * math.sqrt(prior[2, 2])
+    def about(cls, prior: Float, config: LocalConfig) -> SearchWindow:
+        """Some standard deviations of a (3, 3) prior, within the widest."""
+        reach_m = config.sigmas * math.sqrt(max(prior[0, 0], prior[1, 1]))
+        turn_rad = config.sigmas * math.sqrt(prior[2, 2])
         return cls(
-            reach_m=min(max(reach_m, 0.1), WIDEST.reach_m),
-            turn_rad=min(max(turn_rad, 0.05), WIDEST.turn_rad),
+            reach_m=min(max(reach_m, config.least_m), config.reach_m),
+            turn_rad=min(max(turn_rad, config.least_rad), config.turn_rad),
         )
 
-
-WIDEST = SearchWindow(reach_m=0.6, turn_rad=0.5)
+    @classmethod
+    def widest(cls, config: LocalConfig) -> SearchWindow:
+        """As far as is ever searched around a prediction."""
+        return cls(reach_m=config.reach_m, turn_rad=config.turn_rad)
 
 
 @njit
@@ -120,13 +122,11 @@ def place(
             out[h, k, 1] = math.floor(y / cell) - j0
 
 
-def _kernel() -> Float:
+@functools.cache
+def _kernel(sigma: float) -> Float:
     """Gaussian taps such that a lone landmark's field is 1 at its centre."""
-    taps = np.array([math.exp(-0.5 * (m / SIGMA_CELLS) ** 2) for m in (-2, -1, 0, 1, 2)])
-    return taps / math.sqrt(math.pi * SIGMA_CELLS**2)
-
-
-KERNEL = _kernel()
+    taps = np.array([math.exp(-0.5 * (m / sigma) ** 2) for m in (-2, -1, 0, 1, 2)])
+    return taps / math.sqrt(math.pi * sigma**2)
 
 
 @functools.cache
@@ -134,7 +134,7 @@ def _get_ready() -> None:
     """Run every kernel of a search once, the first time in a process."""
     with announced("the kernels of the wide search"):
         field, bases = np.zeros((2 * SIDE, 2 * SIDE), np.uint8), np.empty((1, 1, 2), np.int32)
-        _field(no_cells(), 0.3, 0, 0, KERNEL, field)
+        _field(no_cells(), 0.3, 0, 0, _kernel(1.0), field)
         place(np.ones((1, 2)), np.zeros(3), np.zeros(1), 0.2, 0, 0, bases)
         lattice = Lattice(
             levels=levels_of(field, 1), bases=bases, turns=np.zeros(1), reach=1, pitch=0.2,
@@ -149,15 +149,17 @@ def field_of(
     """(rows, columns) smoothed activities from neuron (i0, j0) on, which begins a block."""
     _get_ready()
     field = np.zeros((rows, columns), np.uint8)
-    _field(network.cells, short_term, i0, j0, KERNEL, field)
+    sigma = network.config.frontend.sigma_cells
+    _field(network.cells, short_term, i0, j0, _kernel(sigma), field)
     return field
 
 
-def headings(points: Float, window: SearchWindow, cell: float) -> Float:
-    """Turns to try, rad: a far point moves at most about 1.5 neurons between two of them."""
+def headings(points: Float, window: SearchWindow, cell: float, config: LocalConfig) -> Float:
+    """Turns to try, rad: a far point moves little between two of them."""
     distances = np.sqrt((points * points).sum(axis=1))
     far = float(np.sort(distances)[(3 * len(distances)) // 4])
-    step = min(max(1.5 * cell / max(far, cell), 0.003), 0.03)
+    step = config.heading_cells * cell / max(far, cell)
+    step = min(max(step, config.finest_rad), config.coarsest_rad)
     half = math.ceil(window.turn_rad / step)
     return np.asarray(np.arange(-half, half + 1) * step, dtype=np.float64)
 
@@ -172,13 +174,13 @@ def search(
     gain: float,
 ) -> tuple[Float, int]:
     """Best pose on the lattice of the window, and how many candidates were scored."""
-    cell = network.cell
+    cell, config = network.cell, network.config.matching.local
     points = observations.points_robot
     if len(points) == 0:
         return prediction, 0
-    every = math.ceil(len(points) / MAX_POINTS)
+    every = math.ceil(len(points) / config.points)
     chosen = np.ascontiguousarray(points[::every])
-    turns = headings(chosen, window, cell)
+    turns = headings(chosen, window, cell, config)
     reach = math.ceil(window.reach_m / cell)
     radius = math.sqrt(float((chosen * chosen).sum(axis=1).max()))
     # Offsets may overshoot by a block of the coarsest level.

@@ -15,10 +15,7 @@ from slam.frontend.odometry_prior import inverted, turned
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
 from slam.shunting.matching.local_search import SearchWindow, search
-from slam.shunting.matching.score import Reward, Seen, refine
-
-FEW = 90  # observations are enough to come near
-WIDEST_CELLS = 3.0  # standard deviation an observation is blurred to while coming near, at most
+from slam.shunting.matching.score import Climb, Reward, Seen, refine
 
 
 def _spread(points_robot: Float, T_map_robot: Float, covariance: Float) -> Float:
@@ -87,7 +84,14 @@ class Matcher:
             cell=config.cell_m,
             short_term=config.short_term_weight / config.saturation,
             logarithm=config.objective == "log",
+            matched_overlap=config.matching.matched_overlap,
+            log_floor=config.matching.log_floor,
+            tail=config.matching.tail,
+            tail_cells=config.matching.tail_cells,
         )
+        self.numbers = config.matching
+        steps = self.numbers.climb
+        self._climb = Climb(*(getattr(steps, name) for name in Climb._fields))
 
     def climb(
         self,
@@ -107,6 +111,7 @@ class Matcher:
             rewarded, prior, count = refine(
                 network.cells,
                 self.reward,
+                self._climb,
                 seen,
                 pose,
                 prediction,
@@ -116,8 +121,9 @@ class Matcher:
             )
             matched = count / full
             score = self.config.reward * rewarded + prior
-            tempered = max(self.config.reward * matched**self.config.reward_exponent, 1e-6)
-            if tau < self.config.reward or tempered > 0.9 * tau:
+            tempered = self.config.reward * matched**self.config.reward_exponent
+            tempered = max(tempered, self.numbers.climb.least_weight)
+            if tau < self.config.reward or tempered > self.numbers.climb.tempered * tau:
                 break
             tau = tempered
         pose[2] = se2.wrap(float(pose[2]))
@@ -135,15 +141,16 @@ class Matcher:
         points = observations.points_robot
         if len(points) == 0:
             return prediction
-        least = (0.5 * self.config.cell_m) ** 2
+        numbers = self.numbers.climb
+        least = (numbers.moved_cells * self.config.cell_m) ** 2
         (xx, _, _), (_, yy, _), (_, _, tt) = covariance.tolist()
         farthest = float((points[:, 0] ** 2 + points[:, 1] ** 2).max())
         if 2.0 * (xx + yy + farthest * tt) < least:  # (a + b)^2 <= 2 (a^2 + b^2)
             return prediction
-        every = max(1, math.ceil(len(points) / FEW))
+        every = max(1, math.ceil(len(points) / numbers.few))
         few = points[::every]
         spread = _spread(few, prediction, covariance)
-        most = (WIDEST_CELLS * self.config.cell_m) ** 2
+        most = (numbers.widest_cells * self.config.cell_m) ** 2
         widths = spread[:, 0] + spread[:, 2]
         if not (widths > least).any():
             return prediction
@@ -152,6 +159,7 @@ class Matcher:
         refine(
             network.cells,
             self.reward,
+            self._climb,
             Seen(
                 np.ascontiguousarray(few),
                 observations.covariances[::every] + spread,

@@ -18,13 +18,9 @@ from slam._jit import inner, njit
 from slam.frontend.surfaces import opposite, turned_face
 from slam.shunting.map.grid import MASK, SHIFT, Cells
 
-MATCHED_OVERLAP = 0.15  # an observation that overlaps the map less is not matched
-ENOUGH = 3e-3  # expected rise of the score below which a step is the last
-LOG_FLOOR = 0.1  # added to an overlap before its logarithm is taken
-
 
 class Reward(NamedTuple):
-    """How overlaps are rewarded.
+    """How overlaps are rewarded; the last four as in ``MatchingConfig``.
 
     cell        m
     short_term  weight of x in v = y + (1 - y) * short_term * x
@@ -34,6 +30,23 @@ class Reward(NamedTuple):
     cell: float
     short_term: float
     logarithm: bool
+    matched_overlap: float
+    log_floor: float
+    tail: float
+    tail_cells: float
+
+
+class Climb(NamedTuple):
+    """How the optimum is climbed to; fields as in ``ClimbConfig``."""
+
+    steps: int
+    enough: float
+    damping: float
+    damping_falls: float
+    damping_grows: float
+    damping_least: float
+    damping_again: float
+    damping_most: float
 
 
 class Seen(NamedTuple):
@@ -68,7 +81,8 @@ def _overlap(
     if det <= 0.0:  # rounding has left nothing across
         b, det = 0.0, a * d
     pa, pb, pd = d / det, -b / det, a / det
-    wide, high = max(3.0, 3.3 / math.sqrt(pa)), max(3.0, 3.3 * math.sqrt(d))
+    wide = max(reward.tail_cells, reward.tail / math.sqrt(pa))
+    high = max(reward.tail_cells, reward.tail * math.sqrt(d))
     lean = b / d  # each row's Gaussian is centred at u + lean * dv, with precision pa,
     j0, j1 = math.ceil(v - high), math.floor(v + high)
     weight = math.exp(-0.5 * (j0 - v) * (j0 - v) / d)  # and weighs exp(-dv^2 / 2 d);
@@ -161,13 +175,13 @@ def evaluate(
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
         _overlap(cells, reward, u, v, cov, turned_face(seen.facings[k], pose[2]), out)
         f = out[0]
-        if f > MATCHED_OVERLAP:
+        if f > reward.matched_overlap:
             matched += seen.weights[k]
         gx, gy = out[1] * scale, out[2] * scale
         a, b, d = out[3] * scale * scale, out[4] * scale * scale, out[5] * scale * scale
         if reward.logarithm:
-            inverse = 1.0 / (LOG_FLOOR + f)
-            score += seen.weights[k] * math.log(LOG_FLOOR + f)
+            inverse = 1.0 / (reward.log_floor + f)
+            score += seen.weights[k] * math.log(reward.log_floor + f)
             gx, gy = gx * inverse, gy * inverse
             a, b, d = a * inverse + gx * gx, b * inverse + gx * gy, d * inverse + gy * gy
         else:
@@ -243,6 +257,7 @@ def _solve(
 def refine(
     cells: Cells,
     reward: Reward,
+    climb: Climb,
     seen: Seen,
     pose: NDArray[np.float64],
     prediction: NDArray[np.float64],
@@ -263,14 +278,14 @@ def refine(
     trial_information, H = np.empty((3, 3)), np.empty((3, 3))
     rewarded, matched = evaluate(cells, reward, seen, pose, gradient, along, information)
     prior = _prior(pose, prediction, precision, slope)
-    damping = 1e-3
-    for _ in range(20):
+    damping = climb.damping
+    for _ in range(climb.steps):
         for a in range(3):
             for b in range(3):
                 H[a, b] = tau * information[a, b] + precision[a, b]
             slope[a] += tau * (gradient[a] - along[a])
         _solve(H, slope, damping, step)
-        if step[0] * slope[0] + step[1] * slope[1] + step[2] * slope[2] < ENOUGH:
+        if step[0] * slope[0] + step[1] * slope[1] + step[2] * slope[2] < climb.enough:
             for a in range(3):
                 pose[a] += step[a]  # so little that it needs no look at the score
             break
@@ -287,10 +302,10 @@ def refine(
                 pose[a], gradient[a], along[a] = trial[a], trial_gradient[a], trial_along[a]
                 for b in range(3):
                     information[a, b] = trial_information[a, b]
-            damping = max(0.2 * damping, 1e-6)
+            damping = max(climb.damping_falls * damping, climb.damping_least)
         else:
-            damping = max(10.0 * damping, 0.1)
-            if damping > 1e6:
+            damping = max(climb.damping_grows * damping, climb.damping_again)
+            if damping > climb.damping_most:
                 break
         _prior(pose, prediction, precision, slope)
     return rewarded, prior, matched

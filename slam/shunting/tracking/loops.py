@@ -26,24 +26,9 @@ from slam.shunting.map.network import Network
 from slam.shunting.map.rasterise import stamp
 from slam.shunting.matching.global_search import coarse_field, places
 from slam.shunting.matching.matcher import Match, Matcher
-from slam.shunting.tracking.relocalise import COARSE, support
+from slam.shunting.tracking.relocalise import coarse, spread, support
 
 _log = logging.getLogger(__name__)
-KEY_M, KEY_RAD = 1.0, 0.6  # between key frames
-LONG_M = 100.0  # way from which on loops are looked for
-AFTER_M = 15.0  # way between the ends of a loop
-GATE_M, GATE_SHARE, WIDEST_M = 1.5, 0.02, 6.0  # how far off a loop may be, + share of the way,
-GATE_RAD = 0.5  # and how far turned
-MOST = 4  # places looked at for one loop
-AGAIN_M, PASSAGES = 3.0, 3  # the second look: how far off, and to how many passages at most
-RECENT = 6  # key frames that a step is measured against,
-SLACK = np.diag([0.05**2, 0.05**2, 0.01**2])  # and how much better than online it may know
-SUBMAP, EVERY = 4, 4  # key frames on either side of a little network's middle; between two middles
-LOOK_S = 1.0
-GOOD_STEP, GOOD_MATCH, GOOD_SUPPORT, ALIAS = 0.5, 0.6, 0.5, 0.9
-CHAIN_M, CHAIN_RAD = 0.02, 0.0015  # standard deviation of a step from key frame to key frame, and
-LOOP_M, LOOP_RAD = 0.03, 0.003  # of a loop, beside what their matches say
-INFORMATION_SHARE = 0.3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,6 +54,9 @@ class Loops:
 
     def __init__(self, config: ShuntingConfig, matcher: Matcher) -> None:
         self._config = config
+        self._numbers = config.loops
+        self._slack = spread(config.loops.slack_m, config.loops.slack_rad)
+        self._coarse = coarse(config.tracking.relocalise)
         self._matcher = matcher
         self.keys: list[KeyFrame] = []
         self.edges: list[Edge] = []  # loops found so far
@@ -90,7 +78,11 @@ class Loops:
         self._step = se2.compose(self._step, motion)
         self._way_m += math.hypot(float(motion[0]), float(motion[1]))
         moved = math.hypot(float(self._step[0]), float(self._step[1]))
-        if self.keys and moved < KEY_M and abs(float(self._step[2])) < KEY_RAD:
+        if (
+            self.keys
+            and moved < self._numbers.key_m
+            and abs(float(self._step[2])) < self._numbers.key_rad
+        ):
             return
         self.keys.append(
             KeyFrame(
@@ -98,7 +90,7 @@ class Loops:
                 T_map_robot=T_map_robot,
                 observations=seen,
                 step=self._step,
-                covariance=self._covariance + SLACK,
+                covariance=self._covariance + self._slack,
                 way_m=self._way_m,
             )
         )
@@ -106,7 +98,7 @@ class Loops:
 
     def corrected(self, poses: Float) -> Float:
         """All (n, 3) online poses, moved with the graph; the same where no loop was found."""
-        if self._way_m < LONG_M or len(self.keys) < 3:
+        if self._way_m < self._numbers.long_m or len(self.keys) < 3:
             return poses
         if self._tried < len(self.keys):
             _log.info("closing loops over %d key frames", len(self.keys))
@@ -143,22 +135,25 @@ class Loops:
             return
         self.edges.append(edge)
         off = edge.T_a_b - predicted
-        if math.hypot(off[0], off[1]) > LOOP_M or abs(se2.wrap(float(off[2]))) > LOOP_RAD:
+        if (
+            math.hypot(off[0], off[1]) > self._numbers.loop_m
+            or abs(se2.wrap(float(off[2]))) > self._numbers.loop_rad
+        ):
             self._optimise()
 
     def _stepped(self, j: int) -> Edge:
         """The step to key frame ``j``, matched to the few before it; as online where in doubt."""
         key = self.keys[j]
         step, covariance = key.step, key.covariance
-        network = self._network(range(max(0, j - RECENT), j), j - 1)
+        network = self._network(range(max(0, j - self._numbers.recent), j), j - 1)
         start = self._matcher.approach(network, key.observations, step, covariance)
         precision = inverted(covariance)
         match = self._matcher.climb(network, key.observations, start, step, precision)
-        if match.matched >= GOOD_STEP:
+        if match.matched >= self._numbers.good_step:
             step = match.T_map_robot
-            information = INFORMATION_SHARE * match.tau * match.information
+            information = self._numbers.information_share * match.tau * match.information
             covariance = inverted(information + precision)
-        covariance = covariance + np.diag([CHAIN_M**2, CHAIN_M**2, CHAIN_RAD**2])
+        covariance = covariance + spread(self._numbers.chain_m, self._numbers.chain_rad)
         return Edge(a=j - 1, b=j, T_a_b=step, information=inverted(covariance))
 
     def _look_again(self) -> None:
@@ -179,39 +174,44 @@ class Loops:
 
     def _passages(self, j: int, poses: Float, ways: Float) -> list[int]:
         """Middles near key frame ``j``, one of each time the robot came along there."""
-        middles = np.arange(SUBMAP, len(poses) - SUBMAP, EVERY)
-        middles = middles[np.abs(ways[middles] - ways[j]) > AFTER_M]
+        middles = np.arange(
+            self._numbers.submap, len(poses) - self._numbers.submap, self._numbers.every
+        )
+        middles = middles[np.abs(ways[middles] - ways[j]) > self._numbers.after_m]
         apart = poses[middles, :2] - poses[j, :2]
         squares = (apart * apart).sum(axis=1)
         found: list[int] = []
         for k in np.argsort(squares, kind="stable"):
-            if squares[k] > AGAIN_M**2 or len(found) == PASSAGES:
+            if squares[k] > self._numbers.again_m**2 or len(found) == self._numbers.passages:
                 break
             middle = int(middles[k])
-            if all(abs(ways[middle] - ways[other]) > AFTER_M for other in found):
+            if all(abs(ways[middle] - ways[other]) > self._numbers.after_m for other in found):
                 found.append(middle)
         return found
 
     def _tie(self, middle: int, j: int, predicted: Float) -> Edge | None:
         """Key frame ``j`` matched to the network about ``middle``, near where it is predicted."""
         network, seen = self._submap(middle), self.keys[j].observations
-        start = self._matcher.approach(network, seen, predicted, COARSE)
-        match = self._matcher.climb(network, seen, start, predicted, inverted(COARSE))
+        start = self._matcher.approach(network, seen, predicted, self._coarse)
+        match = self._matcher.climb(network, seen, start, predicted, inverted(self._coarse))
         return self._edge(middle, j, match, support(network, seen, match))
 
     def _gate(self, j: int, middle: int) -> float:
         way = self.keys[j].way_m - self.keys[middle].way_m
-        return min(GATE_M + GATE_SHARE * way, WIDEST_M)
+        return min(self._numbers.gate_m + self._numbers.gate_share * way, self._numbers.widest_m)
 
     def _nearest(self, j: int) -> int | None:
         """Middle of the little network nearest to where key frame ``j`` should be."""
         best, nearest = None, math.inf
-        for middle in range(SUBMAP, j - SUBMAP, EVERY):
-            if self.keys[j].way_m - self.keys[middle + SUBMAP].way_m < AFTER_M:
+        for middle in range(self._numbers.submap, j - self._numbers.submap, self._numbers.every):
+            if (
+                self.keys[j].way_m - self.keys[middle + self._numbers.submap].way_m
+                < self._numbers.after_m
+            ):
                 break
             d = self._poses[middle] - self._poses[j]
             distance = math.hypot(float(d[0]), float(d[1])) - self._gate(j, middle)
-            if distance < min(nearest, 1.0):
+            if distance < min(nearest, self._numbers.near_m):
                 best, nearest = middle, distance
         return best
 
@@ -220,34 +220,36 @@ class Loops:
         network, seen = self._submap(middle), self.keys[j].observations
         short_term = self._matcher.reward.short_term
         found: list[tuple[float, Match]] = []
-        about = (predicted, gate, GATE_RAD)
+        about = (predicted, gate, self._numbers.gate_rad)
         if middle not in self._fields:
             self._fields[middle] = coarse_field(network, short_term)
         field = self._fields[middle]
-        for place in places(network, short_term, seen.points_robot, MOST, about, field):
-            start = self._matcher.approach(network, seen, place, COARSE)
-            match = self._matcher.climb(network, seen, start, place, inverted(COARSE))
+        for place in places(
+            network, short_term, seen.points_robot, self._numbers.most, about, field
+        ):
+            start = self._matcher.approach(network, seen, place, self._coarse)
+            match = self._matcher.climb(network, seen, start, place, inverted(self._coarse))
             found.append((support(network, seen, match), match))
         if not found:
             return None
         found.sort(key=lambda one: -one[0])
         (best, match), others = found[0], found[1:]
-        alike = any(other > ALIAS * best for other, _ in others)
+        alike = any(other > self._numbers.alias * best for other, _ in others)
         return None if alike else self._edge(middle, j, match, best)
 
     def _edge(self, middle: int, j: int, match: Match, backing: float) -> Edge | None:
-        if backing < GOOD_SUPPORT or match.matched < GOOD_MATCH:
+        if backing < self._numbers.good_support or match.matched < self._numbers.good_match:
             return None
-        information = INFORMATION_SHARE * match.tau * match.information
-        covariance = inverted(information + np.diag([1.0, 1.0, 1.0]))
-        covariance = covariance + np.diag([LOOP_M**2, LOOP_M**2, LOOP_RAD**2])
+        information = self._numbers.information_share * match.tau * match.information
+        covariance = inverted(information + self._numbers.loose * np.eye(3))
+        covariance = covariance + spread(self._numbers.loop_m, self._numbers.loop_rad)
         T_a_b = match.T_map_robot
         return Edge(a=middle, b=j, T_a_b=T_a_b, information=inverted(covariance), robust=True)
 
     def _submap(self, middle: int) -> Network:
         """What the key frames about ``middle`` saw, in the frame of that one."""
         if middle not in self._submaps:
-            about = range(middle - SUBMAP, middle + SUBMAP + 1)
+            about = range(middle - self._numbers.submap, middle + self._numbers.submap + 1)
             self._submaps[middle] = self._network(about, middle)
         return self._submaps[middle]
 
@@ -258,5 +260,5 @@ class Loops:
             key, pose = self.keys[k], se2.between(self._chained[origin], self._chained[k])
             stamp(network, key.observations, pose)
             T_map_laser = se2.compose(pose, key.observations.T_robot_laser)
-            network.integrate(key.observations.view, T_map_laser, LOOK_S, write=True)
+            network.integrate(key.observations.view, T_map_laser, self._numbers.look_s, write=True)
         return network

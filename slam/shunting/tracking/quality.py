@@ -14,15 +14,7 @@ from statistics import median
 
 from slam import se2
 from slam.frames import Float
-
-LOST_AFTER, PATIENCE = 3, 30  # doubtful frames in a row: then lost; then the map is written anew
-WORTH_SEARCHING = 0.6  # usual support by the map from which on a lost robot searches it,
-GROWN_S, GROWN_SCANS = 10.0, 10  # once the map has been tracked on this long
-KNOWN = 0.5  # of that time: from then on the map may be frozen
-SUSPICIOUS, DENIED, STILL = 0.70, 0.30, 0.20  # of the usual match; share of the map in view
-# contradicted that raises doubt, and that keeps it up
-SUDDEN, NEAR_M, NEAR_RAD = 0.3, 0.5, 0.5  # of the usual match; so little all at once, within such
-# a step, is no new place but a robot carried to where what is in view hides the map
+from slam.shunting.tracking.config import QualityConfig
 
 
 class Doubt:
@@ -34,10 +26,10 @@ class Doubt:
     scans         doubtful frames in a row
     """
 
-    def __init__(self, freeze_below: float) -> None:
-        self.freeze_below = freeze_below
-        self.matches: deque[float] = deque(maxlen=50)
-        self.supports: deque[float] = deque(maxlen=50)
+    def __init__(self, freeze_below: float, config: QualityConfig) -> None:
+        self.freeze_below, self.config = freeze_below, config
+        self.matches: deque[float] = deque(maxlen=config.remembered)
+        self.supports: deque[float] = deque(maxlen=config.remembered)
         self.tracked_s, self.tracked, self.scans = 0.0, 0, 0
 
     def resume(
@@ -58,8 +50,9 @@ class Doubt:
 
     def is_worth_searching(self, share: float = 1.0) -> bool:
         """Grown (or to that share), and explains what is seen: else it cannot deny it either."""
-        grown = self.tracked_s >= share * GROWN_S and self.tracked >= GROWN_SCANS
-        return grown and self.usual_support() >= WORTH_SEARCHING
+        config = self.config
+        grown = self.tracked_s >= share * config.grown_s and self.tracked >= config.grown_scans
+        return grown and self.usual_support() >= config.worth_searching
 
     @property
     def suspicious(self) -> bool:
@@ -68,7 +61,8 @@ class Doubt:
 
     def arises(self, matched: float) -> bool:
         """Whether a match is so poor that the map in view is to be asked."""
-        return self._share(matched) < max(self.freeze_below, SUSPICIOUS if self.suspicious else 0.0)
+        least = self.config.suspicious if self.suspicious else 0.0
+        return self._share(matched) < max(self.freeze_below, least)
 
     def _share(self, matched: float) -> float:
         return matched / max(self.usual_match(), 1e-9)
@@ -78,15 +72,15 @@ class Doubt:
 
         ``motion`` (x m, y m, theta rad) since the frame before.
         """
-        share, suspicious = self._share(matched), self.suspicious
-        doubtful = self.is_worth_searching(KNOWN) and contradicted > confirmed
+        share, suspicious, config = self._share(matched), self.suspicious, self.config
+        doubtful = self.is_worth_searching(config.known) and contradicted > confirmed
         doubtful &= share < self.freeze_below
-        denied = STILL if self.scans else DENIED
+        denied = config.still_denied if self.scans else config.denied
         # A corridor looked at the other way round still fits by two thirds.
         doubtful |= suspicious and contradicted > denied * (confirmed + contradicted)
         x, y, turn = motion.tolist()
-        near = math.hypot(x, y) < NEAR_M and abs(se2.wrap(turn)) < NEAR_RAD
-        return doubtful or (suspicious and share < SUDDEN and near)
+        near = math.hypot(x, y) < config.sudden_m and abs(se2.wrap(turn)) < config.sudden_rad
+        return doubtful or (suspicious and share < config.sudden and near)
 
     def count(self, doubtful: bool) -> None:
         """Another frame in doubt, or one that is not."""
@@ -101,5 +95,5 @@ class Doubt:
 
     def give_up(self) -> None:
         """The next frame is written, as the first on this map."""
-        self.scans = PATIENCE
+        self.scans = self.config.patience
         self.tracked_s, self.tracked = 0.0, 0

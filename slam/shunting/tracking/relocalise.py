@@ -21,30 +21,27 @@ from slam.shunting.map.rasterise import stamp
 from slam.shunting.matching.global_search import places
 from slam.shunting.matching.local_search import SearchWindow
 from slam.shunting.matching.matcher import Match, Matcher
-
-MOST = 6  # hypotheses from one search of the map
-AGAIN_S = 1.0  # between two searches of the map
-COARSE = np.diag([0.1**2, 0.1**2, math.radians(1.5) ** 2])  # of what that search finds
-ENOUGH = 0.8  # of the usual support: what an accepted hypothesis has on average,
-ENOUGH_LATER, LATER = 0.65, 3.0  # or this much after so many times the least evidence
-HOPELESS = 0.6  # of the usual support: below it on average, or of the best one's, it is dropped
-ALIAS = 0.9  # a second hypothesis with this share of the best one's support: wait
-SCANS, ON_M, ON_RAD, ON_S = 5, 0.3, 0.35, 1.0  # least evidence: scans, and way or turn or time
-SAME_M, SAME_RAD = 0.3, 0.2  # nearer hypotheses are one
-# Weight in view from which on a frame can deny the map, or tell a place; less may be a few things
-# that moved, and fits in many places. The weight is that of ``Observations``: 4 m of surface, less
-# of near ones, as no return counts for less than 0.3. So 134 returns always are enough, fewer of a
-# small room are not, nor are fewer than 40 features.
-TELLING = 40.0
-SLIPPED = np.diag([0.2**2, 0.2**2, 0.2**2])  # of a motion that odometry did not see,
-SHOVED_MPS, SHOVED_RADPS = 2.0, 3.5  # which is no faster,
-FARTHEST_M, FARTHEST_RAD = 0.6, 0.5  # and not searched for farther,
-SURE = 0.9  # and leads to a place with so much of the usual support
+from slam.shunting.tracking.config import RelocaliseConfig
 
 
-def _near(one: Float, other: Float) -> bool:
+def spread(m: float, rad: float) -> Float:
+    """Covariance (3, 3) of these standard deviations of position and heading."""
+    return np.diag([m**2, m**2, rad**2])
+
+
+def coarse(config: RelocaliseConfig) -> Float:
+    """Covariance (3, 3) of what a search of the whole map finds."""
+    return spread(config.coarse_m, math.radians(config.coarse_deg))
+
+
+def slip(config: RelocaliseConfig) -> Float:
+    """Covariance (3, 3) of a motion that odometry did not see."""
+    return spread(config.slipped_m, config.slipped_rad)
+
+
+def _near(one: Float, other: Float, config: RelocaliseConfig) -> bool:
     x, y, turn = (one - other).tolist()
-    return bool(x * x + y * y < SAME_M**2 and abs(se2.wrap(turn)) < SAME_RAD)
+    return bool(x * x + y * y < config.same_m**2 and abs(se2.wrap(turn)) < config.same_rad)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,14 +61,16 @@ class Hypothesis:
     turned_rad: float = 0.0
     elapsed_s: float = 0.0
 
-    def tried(self, times: float = 1.0) -> bool:
+    def tried(self, config: RelocaliseConfig, times: float = 1.0) -> bool:
         """Seen from enough places, or for long enough, ``times`` as much as the least."""
-        moved = max(self.way_m / ON_M, self.turned_rad / ON_RAD, self.elapsed_s / ON_S)
-        return min(self.scans / SCANS, moved) >= times
+        moved = max(
+            self.way_m / config.on_m, self.turned_rad / config.on_rad, self.elapsed_s / config.on_s
+        )
+        return min(self.scans / config.scans, moved) >= times
 
-    def same_as(self, other: Hypothesis) -> bool:
+    def same_as(self, other: Hypothesis, config: RelocaliseConfig) -> bool:
         """Whether both are the same place."""
-        return _near(self.match.T_map_robot, other.match.T_map_robot)
+        return _near(self.match.T_map_robot, other.match.T_map_robot, config)
 
 
 class Recovery:
@@ -80,6 +79,7 @@ class Recovery:
     def __init__(self, network: Network, matcher: Matcher) -> None:
         self._network = network
         self._matcher = matcher
+        self._config = matcher.config.tracking.relocalise
         self.hypotheses: list[Hypothesis] = []
         self.elapsed_s = 0.0
         self._since_search_s = math.inf
@@ -95,13 +95,14 @@ class Recovery:
         self._since_search_s += prediction.elapsed
         found = [self._carried(h, observations, prediction) for h in self.hypotheses]
         found.append(self._new(observations, here))
-        if self._since_search_s >= AGAIN_S and len(observations.points_robot) > 0:
+        if self._since_search_s >= self._config.again_s and len(observations.points_robot) > 0:
             self._since_search_s = 0.0
             short_term = self._matcher.reward.short_term
-            for place in places(self._network, short_term, observations.points_robot, MOST):
-                match = self._climb(observations, place, COARSE)
+            points, most = observations.points_robot, self._config.most
+            for place in places(self._network, short_term, points, most):
+                match = self._climb(observations, place, coarse(self._config))
                 found.append(self._new(observations, match))
-        self.hypotheses = _kept(found, usual)
+        self.hypotheses = _kept(found, usual, self._config)
         return self._accepted(usual, prediction.T_map_robot)
 
     def _new(self, observations: Observations, match: Match) -> Hypothesis:
@@ -116,15 +117,15 @@ class Recovery:
         """
         if not self.hypotheses:
             return None
-        best = self.hypotheses[0]
-        rivals = [h for h in self.hypotheses if h.support > ALIAS * best.support]
-        going_on = [h for h in rivals if _near(h.match.T_map_robot, predicted)]
+        best, config = self.hypotheses[0], self._config
+        rivals = [h for h in self.hypotheses if h.support > config.alias * best.support]
+        going_on = [h for h in rivals if _near(h.match.T_map_robot, predicted, config)]
         if going_on:
             best = going_on[0]
         elif len(rivals) > 1:
             return None
-        enough = ENOUGH_LATER if best.tried(LATER) else ENOUGH
-        told = best.tried() and best.seen >= TELLING
+        enough = config.enough_later if best.tried(config, config.later) else config.enough
+        told = best.tried(config) and best.seen >= config.least_weight
         return best.match if told and best.support >= enough * usual else None
 
     def _carried(
@@ -183,25 +184,26 @@ def slipped(
     A robot that is shoved, or whose wheels slip, moves far beyond what its odometry says; under
     that prior the right place is out of reach. None where too little is in view to tell.
     """
-    if float(observations.weights.sum()) < TELLING:
+    config = matcher.config.tracking.relocalise
+    if float(observations.weights.sum()) < config.least_weight:
         return None
     elapsed = prediction.elapsed
     window = SearchWindow(
-        reach_m=min(SHOVED_MPS * elapsed, FARTHEST_M),
-        turn_rad=min(SHOVED_RADPS * elapsed, FARTHEST_RAD),
+        reach_m=min(config.pushed_mps * elapsed, config.farthest_m),
+        turn_rad=min(config.pushed_radps * elapsed, config.farthest_rad),
     )
-    loose = inverted(SLIPPED)
+    loose = inverted(slip(config))
     match = matcher.search(network, observations, prediction.T_map_robot, loose, window)
-    sure = support(network, observations, match) >= SURE * usual
+    sure = support(network, observations, match) >= config.sure * usual
     return replace(match, slipped=True) if sure else None
 
 
-def _kept(found: list[Hypothesis], usual: float) -> list[Hypothesis]:
+def _kept(found: list[Hypothesis], usual: float, config: RelocaliseConfig) -> list[Hypothesis]:
     """The best first; one of each place, the longest followed; none that is hopeless."""
     kept: list[Hypothesis] = []
     for one in sorted(found, key=lambda h: -h.scans):
-        if not any(one.same_as(other) for other in kept):
+        if not any(one.same_as(other, config) for other in kept):
             kept.append(one)
     kept.sort(key=lambda h: -h.support)
-    least = HOPELESS * max(usual, kept[0].support)
+    least = config.hopeless * max(usual, kept[0].support)
     return [h for h in kept if h.support >= least]

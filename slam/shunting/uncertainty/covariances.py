@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from slam._jit import inner, njit
 
-NOISY = 2.0  # times what the noise of beams alone feigns: less information along an axis is none
 LEAST = 1e-12  # no variance of a singular matrix is taken for less
 
 
@@ -62,9 +61,9 @@ def _sum(a: NDArray[np.float64], share: float, b: NDArray[np.float64]) -> NDArra
 
 @njit
 def observable(
-    geometry: NDArray[np.float64], feigned: float, out: NDArray[np.float64]
+    geometry: NDArray[np.float64], feigned: float, noisy: float, out: NDArray[np.float64]
 ) -> tuple[int, float]:
-    """``geometry`` without what noise feigns of it (``out``).
+    """``geometry`` without ``noisy`` times what noise feigns of it (``out``).
 
     Returns the number of directions of position in which nothing is left, and the angle (rad) of
     the first one. The rest is scaled so that the matrix stays positive semidefinite.
@@ -77,8 +76,8 @@ def observable(
     lost = 0
     for k in range(2):
         value = mean + radius if k == 0 else mean - radius
-        if value > NOISY * feigned and value > 0.0:
-            keep[k] = math.sqrt(1.0 - NOISY * feigned / value)
+        if value > noisy * feigned and value > 0.0:
+            keep[k] = math.sqrt(1.0 - noisy * feigned / value)
         else:
             lost += 1
     T = np.zeros((3, 3))

@@ -15,22 +15,17 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float, Odometry
-from slam.frontend.observations import SENSOR_SIGMA_M, SIGMA_CELLS
 from slam.frontend.odometry_bias import TurnBias
 from slam.frontend.odometry_prior import Prediction, predict
+from slam.shunting.config import ShuntingConfig
 from slam.shunting.matching.matcher import Match
 from slam.shunting.uncertainty.covariances import innovation
 
-STATED, ASSUMED = 2.0, 1.0  # times the variance at first: statements tend to be optimistic
-LEAST_STATED, LEAST_ASSUMED, MOST = 0.25, 0.01, 100.0
-AT_FIRST = 20.0  # frames that these count as
-MEMORY, MEMORY_S = 100.0, 20.0  # frames, or s if that is longer, that are averaged
-WILD = 16.0  # a squared innovation counts up to so many times its expectation
 
-
-def _noise_share(cell_m: float) -> float:
+def _noise_share(config: ShuntingConfig) -> float:
     """Variance of a match by the noise of its beams over what the overlaps' curvature claims."""
-    return (SENSOR_SIGMA_M / (SIGMA_CELLS * cell_m)) ** 2 / 2.0
+    numbers = config.frontend
+    return (numbers.sensor_sigma_m / (numbers.sigma_cells * config.cell_m)) ** 2 / 2.0
 
 
 class Increments:
@@ -41,10 +36,18 @@ class Increments:
     bias    what odometry adds to the heading by itself; taken out of it. None: not learnt
     """
 
-    def __init__(self, noise_share: float, *, least_stated: float, bias: TurnBias | None) -> None:
+    def __init__(
+        self,
+        config: ShuntingConfig,
+        noise_share: float,
+        *,
+        least_stated: float,
+        bias: TurnBias | None,
+    ) -> None:
         """``noise_share``: variance of a match by the noise of what was seen, over what the match's
         information claims; ``least_stated``: least scale of a covariance that a log states.
         """
+        self._config, self._prior = config.uncertainty.odometry, config.frontend.prior
         self._noise_share, self._least_stated = noise_share, least_stated
         self.scales: Float = np.ones(2)
         self.nis: float | None = None
@@ -55,33 +58,35 @@ class Increments:
         self._expected: Float = np.zeros(2)
 
     @classmethod
-    def of_beams(cls, cell_m: float) -> Self:
+    def of_beams(cls, config: ShuntingConfig) -> Self:
         """Matches of scans, whose information is the curvature of overlaps between bells."""
-        return cls(_noise_share(cell_m), least_stated=LEAST_STATED, bias=TurnBias())
+        least, bias = config.uncertainty.odometry.least_stated, TurnBias(config.frontend.bias)
+        return cls(config, _noise_share(config), least_stated=least, bias=bias)
 
     @classmethod
-    def of_points(cls, cell_m: float | None = None) -> Self:
+    def of_points(cls, config: ShuntingConfig, *, overlaps: bool) -> Self:
         """Matches of points, whose information is what the covariances of points say, or with
-        ``cell_m`` the curvature of overlaps.
+        ``overlaps`` the curvature of those.
 
         A point is off in the same way for many frames (which side of a trunk is seen): odometry
         looks too good beside such matches, and a bias learnt from them is theirs. So a stated
         covariance is never made smaller, and no bias is learnt.
         """
-        share = 1.0 if cell_m is None else _noise_share(cell_m)
-        return cls(share, least_stated=1.0, bias=None)
+        share = _noise_share(config) if overlaps else 1.0
+        return cls(config, share, least_stated=1.0, bias=None)
 
     def predict(self, T_map_before: Float, before: Odometry, now: Odometry) -> Prediction:
         """The prior of a frame."""
         stated = now.increment_covariance is not None
-        self._least = self._least_stated if stated else LEAST_ASSUMED
+        self._least = self._least_stated if stated else self._config.least_assumed
         if self._expected[0] == 0.0:
-            self._expected[:] = AT_FIRST
-            self._squares[:] = AT_FIRST * (STATED if stated else ASSUMED)
+            self._expected[:] = self._config.at_first
+            first = self._config.stated if stated else self._config.assumed
+            self._squares[:] = self._config.at_first * first
             self.scales = self._squares / self._expected
         scales = float(self.scales[0]), float(self.scales[1])
         self._stated = stated
-        return predict(T_map_before, before, now, scales, self.bias)
+        return predict(T_map_before, before, now, scales, self.bias, self._prior)
 
     def learn(self, prediction: Prediction, match: Match) -> None:
         """Compare the increment with a match that is believed."""
@@ -101,19 +106,21 @@ class Increments:
         (a, _, _), (_, b, _), (_, _, c) = prediction.unscaled.tolist()
         (x, _, _), (_, y, _), (_, _, t) = prediction.carried.tolist()
         floor_m2, floor_rad2 = prediction.floor
-        keep = math.exp(-1.0 / max(MEMORY, MEMORY_S / max(prediction.elapsed, 1e-3)))
+        config = self._config
+        frames = max(config.memory, config.memory_s / max(prediction.elapsed, 1e-3))
+        keep = math.exp(-1.0 / frames)
         for k, unit, rest in (
             (0, a + b, 2.0 * floor_m2 + x + y + found[2]),
             (1, c, floor_rad2 + t + found[3]),
         ):
             expected = float(self.scales[k]) * unit + rest
-            square = min(found[k], WILD * expected)
+            square = min(found[k], config.wild * expected)
             # Least squares of square = scale * unit + rest, weighed by what scatter to expect.
             weight = unit / expected**2
             self._squares[k] = keep * self._squares[k] + weight * (square - rest)
             self._expected[k] = keep * self._expected[k] + weight * unit
             scale = float(self._squares[k]) / max(float(self._expected[k]), 1e-9)
-            self.scales[k] = min(max(scale, self._least), MOST)
+            self.scales[k] = min(max(scale, self._least), config.most)
 
     def skip(self) -> None:
         """The match of this frame is not believed."""

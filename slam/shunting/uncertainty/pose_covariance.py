@@ -22,25 +22,10 @@ import numpy as np
 
 from slam.frames import Float
 from slam.frontend.odometry_prior import Prediction
+from slam.shunting.config import ShuntingConfig
 from slam.shunting.matching.matcher import Match
 from slam.shunting.uncertainty.covariances import advance, carried, observable
 from slam.shunting.uncertainty.residuals import Evidence
-
-LATTICE_CELLS = 0.055  # what surfaces are off by without any shared residual, 1 sigma
-SHARED_TIMES = 2.6  # the pose's error in units of the residual that surfaces share
-NEW_TIMES = 0.25  # ... of which so much stays, when a map is all written anew
-TURN_TIMES = 0.7  # ... of which so much turns it: surfaces do not all err the same way
-SHARED_S, VIEW_S = 20.0, 1.0  # over which shared residuals and directions of surfaces are averaged
-AT_FIRST = 200.0  # pairs of points that the scanner's usual residual counts as
-USUAL_M = 0.002  # that residual
-# Weight of the surfaces in view of a room, for which the constants above hold (a beam counts for
-# one where it stands for 0.1 m of surface), and the least share of it.
-WHOLE, LEAST_SHARE = 75.0, 0.005
-# Of what a match takes off odometry's error the map keeps so many times the share of it that this
-# look writes.
-WRITTEN = 2.4
-FORGOTTEN = 1e-6  # a sum that faded to less holds nothing
-CORRELATED_S = 1.0  # for so long the shared error of a scan stays the same
 
 
 class Belief:
@@ -53,17 +38,17 @@ class Belief:
     along_rad     direction in the map of the one that is not observable, None unless it is one
     """
 
-    def __init__(self, cell_m: float, *, whole: float = WHOLE) -> None:
-        """``whole``: weight in view from which on shared errors average out as in a room; 0 for
-        points, which share none.
-        """
+    def __init__(self, config: ShuntingConfig, *, of_points: bool = False) -> None:
+        """``of_points``: they share no errors, so none averages out less than in a room."""
+        numbers = config.uncertainty.pose
+        self._config = numbers
         self.covariance: Float = np.zeros((3, 3))
         self.newest_drift: Float = np.zeros((3, 3))
         self.unobservable = 0
         self.along_rad: float | None = None
-        self._whole = whole
-        self._lattice = (LATTICE_CELLS * cell_m) ** 2
-        self._products, self._pairs = AT_FIRST * USUAL_M**2, AT_FIRST
+        self._whole = 0.0 if of_points else numbers.room_weight
+        self._lattice = (numbers.lattice_cells * config.cell_m) ** 2
+        self._products, self._pairs = numbers.at_first * numbers.usual_m**2, numbers.at_first
         self._geometry: Float = np.zeros((3, 3))
         self._feigned, self._weighed = 0.0, 0.0
         self._in_view, self._looks = 0.0, 0.0
@@ -75,7 +60,8 @@ class Belief:
     def shared_m2(self) -> float:
         """Variance, m^2, of the residual that neighbouring points of a surface share."""
         # the usual one where nothing was seen for so long that the sums are used up
-        return (max(self._products, 0.0) + FORGOTTEN * USUAL_M**2) / (self._pairs + FORGOTTEN)
+        least = self._config.forgotten
+        return (max(self._products, 0.0) + least * self._config.usual_m**2) / (self._pairs + least)
 
     def relocated(self, covariance: Float) -> None:
         """Found again somewhere in the map, to within ``covariance`` (3, 3)."""
@@ -106,23 +92,23 @@ class Belief:
 
         Without ``evidence`` the match was not believed: odometry alone moved the robot.
         """
-        data = np.zeros((3, 3))
+        config, data = self._config, np.zeros((3, 3))
         strength, new = 0.0, 0.0
         if evidence is not None:
             self._learn(evidence, prediction.elapsed)
             strength = match.tau * float(match.information[0, 0] + match.information[1, 1])
             new = evidence.new / max(evidence.weighed, 1e-9)
-        if strength > 0.0 and self._weighed > FORGOTTEN:
+        if strength > 0.0 and self._weighed > config.forgotten:
             feigned = self._feigned / self._weighed
             geometry = self._geometry * (1.0 / self._weighed)
-            self.unobservable, along = observable(geometry, feigned, data)
+            self.unobservable, along = observable(geometry, feigned, config.noisy, data)
             self.along_rad = along if self.unobservable == 1 else None
             data *= strength
         else:
             self.unobservable, self.along_rad = 2, None
             self._blind = self._blind + self._shared
-        variance = (self._lattice + SHARED_TIMES**2 * self.shared_m2) * self._fewer()
-        frames = max(1.0, CORRELATED_S / max(prediction.elapsed, 1e-3))
+        variance = (self._lattice + config.shared_times**2 * self.shared_m2) * self._fewer()
+        frames = max(1.0, config.correlated_s / max(prediction.elapsed, 1e-3))
         advance(
             self._drift,
             self._blind,
@@ -131,21 +117,27 @@ class Belief:
             prediction.T_map_robot - T_map_before,
             prediction.covariance,
             data,
-            (variance * strength, NEW_TIMES**2 * new * variance * strength, frames, TURN_TIMES),
-            min(WRITTEN * new, 1.0),
+            (
+                variance * strength,
+                config.new_times**2 * new * variance * strength,
+                frames,
+                config.turn_times,
+            ),
+            min(config.written * new, 1.0),
         )
         self.covariance = self._drift + self._blind + self._shared
 
     def _fewer(self) -> float:
         """By how much the shared errors of surfaces average out less than in a whole room."""
-        seen = self._in_view / max(self._looks, FORGOTTEN)
-        return max(self._whole / max(seen, LEAST_SHARE * WHOLE), 1.0)
+        config = self._config
+        seen = self._in_view / max(self._looks, config.forgotten)
+        return max(self._whole / max(seen, config.least_share * config.room_weight), 1.0)
 
     def _learn(self, evidence: Evidence, elapsed: float) -> None:
-        keep = math.exp(-elapsed / SHARED_S)
+        keep = math.exp(-elapsed / self._config.shared_s)
         self._products = keep * self._products + evidence.shared
         self._pairs = keep * self._pairs + evidence.paired
-        keep = math.exp(-elapsed / VIEW_S)
+        keep = math.exp(-elapsed / self._config.view_s)
         self._geometry = keep * self._geometry + evidence.geometry
         self._feigned = keep * self._feigned + evidence.feigned
         self._weighed = keep * self._weighed + evidence.weighed

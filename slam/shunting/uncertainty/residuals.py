@@ -14,26 +14,39 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner, njit
 from slam.frames import Float
-from slam.frontend.observations import SENSOR_SIGMA_M, Observations
+from slam.frontend.observations import Observations
 from slam.shunting.map.grid import MASK, SHIFT, Cells
 from slam.shunting.map.network import Network
 
-APART_CELLS, LONGEST_CELLS = 3.5, 35.0  # the two points of a pair: across the beams, and at most
-SAMPLES = 16  # points looked at in one frame, each with a partner
-FAINT_OVERLAP = 0.15  # a point that overlaps the map less is off it
-BENT = 0.2  # of a chord's length: a surface that leaves it by more is not straight
 SHARED, PAIRED, FEIGNED, NEW, WEIGHED = range(5)  # places in the sums of ``_look``
+
+
+class Pairing(NamedTuple):
+    """How points are paired and compared; lengths in m, the others as in ``ResidualConfig``."""
+
+    apart: float
+    longest: float
+    faint_overlap: float
+    bent: float
+    sensor_sigma: float
 
 
 @inner
 def _offset(
-    cells: Cells, short_term: float, u: float, v: float, variance: float, out: NDArray[np.float64]
+    cells: Cells,
+    short_term: float,
+    u: float,
+    v: float,
+    variance: float,
+    faint_overlap: float,
+    out: NDArray[np.float64],
 ) -> bool:
     """How far the point (u, v) lies off the mapped surface (``out``); False where there is none.
 
@@ -67,7 +80,7 @@ def _offset(
             kernel *= ratio
             ratio *= falling
             du += 1.0
-    if m0 < FAINT_OVERLAP * math.pi * variance:
+    if m0 < faint_overlap * math.pi * variance:
         return False
     out[0], out[1] = -2.0 * mu / m0, -2.0 * mv / m0
     return True
@@ -89,7 +102,7 @@ def _age(cells: Cells, u: float, v: float) -> float:
 @inner
 def _partner(
     points: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64],
-    first: int, cell: float,
+    first: int, pairing: Pairing,
 ) -> int:  # fmt: skip
     """A point of the same straight surface, far enough from ``first``; -1: there is none."""
     n = len(points)
@@ -99,16 +112,16 @@ def _partner(
         return -1
     k, aside, onward, dx, dy = first, 0.0, 0.0, 0.0, 0.0
     # Across the beams: along the wall, the noise of the two would decide which are paired.
-    while k + 1 < n and joined[k] and aside < APART_CELLS * cell:
+    while k + 1 < n and joined[k] and aside < pairing.apart:
         k += 1
         dx, dy = points[k, 0] - points[first, 0], points[k, 1] - points[first, 1]
         aside = abs(ax * dy - ay * dx) / away
     onward = math.sqrt(dx * dx + dy * dy)
-    if aside < APART_CELLS * cell or onward > LONGEST_CELLS * cell:
+    if aside < pairing.apart or onward > pairing.longest:
         return -1
     for m in range(first + 1, k):
         ex, ey = points[m, 0] - points[first, 0], points[m, 1] - points[first, 1]
-        if abs(dx * ey - dy * ex) > BENT * onward * onward:
+        if abs(dx * ey - dy * ex) > pairing.bent * onward * onward:
             return -1
     return k
 
@@ -138,7 +151,7 @@ def _look(
     cells: Cells, short_term: float, cell: float,
     points: NDArray[np.float64], covariances: NDArray[np.float64], weights: NDArray[np.float64],
     joined: NDArray[np.bool_], laser: NDArray[np.float64], pose: NDArray[np.float64],
-    start: int, step: int, times: tuple[float, float],
+    start: int, step: int, times: tuple[float, float], pairing: Pairing,
     geometry: NDArray[np.float64], sums: NDArray[np.float64],
 ) -> None:  # fmt: skip
     """Add up what ``Evidence`` holds; ``times``: s of one look, and of a trace's prior age."""
@@ -151,9 +164,9 @@ def _look(
         u = (c * points[first, 0] - s * points[first, 1] + pose[0]) / cell - 0.5
         v = (s * points[first, 0] + c * points[first, 1] + pose[1]) / cell - 0.5
         variance = covariances[first, 0] / (cell * cell)
-        if not _offset(cells, short_term, u, v, variance, off):
+        if not _offset(cells, short_term, u, v, variance, pairing.faint_overlap, off):
             continue
-        k = _partner(points, joined, laser, first, cell)
+        k = _partner(points, joined, laser, first, pairing)
         if k < 0 and surfaces and not _free_standing(points, joined, laser, first):
             continue
         w = weights[first]
@@ -169,10 +182,10 @@ def _look(
             first_off = off[0] * nx + off[1] * ny
             u = (c * points[k, 0] - s * points[k, 1] + pose[0]) / cell - 0.5
             v = (s * points[k, 0] + c * points[k, 1] + pose[1]) / cell - 0.5
-            if _offset(cells, short_term, u, v, variance, off):
+            if _offset(cells, short_term, u, v, variance, pairing.faint_overlap, off):
                 sums[SHARED] += w * first_off * (off[0] * nx + off[1] * ny) * cell * cell
                 sums[PAIRED] += w
-            sums[FEIGNED] += w * min(2.0 * (SENSOR_SIGMA_M / length) ** 2, 0.5)
+            sums[FEIGNED] += w * min(2.0 * (pairing.sensor_sigma / length) ** 2, 0.5)
         a, b, d = w * a, w * b, w * d
         geometry[0, 0] += a
         geometry[0, 1] += b
@@ -220,13 +233,21 @@ def look(
 
     ``elapsed`` s since the last frame; ``turn`` counts frames: others are looked at each time.
     """
-    step = max(1, len(seen.points_robot) // SAMPLES)
+    config, cell = network.config.uncertainty.residuals, network.cell
+    step = max(1, len(seen.points_robot) // config.samples)
+    pairing = Pairing(
+        apart=config.apart_cells * cell,
+        longest=config.longest_cells * cell,
+        faint_overlap=config.faint_overlap,
+        bent=config.bent,
+        sensor_sigma=network.config.frontend.sensor_sigma_m,
+    )
     law = network.law(elapsed)
     geometry, sums = np.zeros((3, 3)), np.zeros(5)
     _look(
         network.cells, short_term, network.cell,
         seen.points_robot, seen.covariances, seen.weights, seen.joined, seen.T_robot_laser,
-        T_map_robot, turn % step, step, (law.look, law.pace), geometry, sums,
+        T_map_robot, turn % step, step, (law.look, law.pace), pairing, geometry, sums,
     )  # fmt: skip
     shared, paired, feigned, new, weighed = sums.tolist()
     return Evidence(

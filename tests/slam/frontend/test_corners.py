@@ -16,7 +16,8 @@ from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Features, LaserSpec, Scan
 from slam.frontend import corner_image
-from slam.frontend.corners import IDEAL, CornerConfig, answered, corners
+from slam.frontend.corner_config import CornerConfig
+from slam.frontend.corners import answered, corners
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import world2d
@@ -79,7 +80,7 @@ def test_a_line_is_no_point():
     corner_image.draw(image, widths, line, np.full(2, 1.2), both, np.array([True, False]))
     assert not corner_image.refine(image, widths, 30, 28, 4)[3]
     response = cv2.cornerMinEigenVal(image.astype(np.float32), 5, ksize=3)
-    assert response[15:45, 15:45].max() < 0.01 * IDEAL
+    assert response[15:45, 15:45].max() < 0.01 * CornerConfig().ideal
 
 
 def test_the_unit_of_response_is_a_lone_dot():
@@ -87,7 +88,7 @@ def test_the_unit_of_response_is_a_lone_dot():
     one = np.ones(1, dtype=bool)
     corner_image.draw(image, widths, np.array([[20.2, 20.1]]), np.array([1.2]), one, ~one)
     peak = cv2.cornerMinEigenVal(image.astype(np.float32), 5, ksize=3).max()
-    assert peak == pytest.approx(IDEAL, rel=0.1)
+    assert peak == pytest.approx(CornerConfig().ideal, rel=0.1)
 
 
 @pytest.mark.parametrize("n", [181, 361])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Features
-from slam.frontend.observations import SIGMA_CELLS, Observations, from_features
+from slam.frontend.observations import Observations, from_features
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
 from slam.shunting.map.rasterise import stamp
@@ -40,7 +40,7 @@ def inspired(observations: Observations, pose: Array) -> Array:
 
 def gaussian(point: Array, covariance: Array) -> Array:
     """exp(-d^2 / 2) at the neurons' centres, with the width that the lattice needs added."""
-    whole = covariance + (SIGMA_CELLS * CELL) ** 2 * np.eye(2)
+    whole = covariance + (CONFIG.frontend.sigma_cells * CELL) ** 2 * np.eye(2)
     dx, dy = np.meshgrid(CENTRES - point[0], CENTRES - point[1])
     away = np.stack([dx, dy], axis=-1)
     return np.exp(-0.5 * np.einsum("rci,ij,rcj->rc", away, np.linalg.inv(whole), away))

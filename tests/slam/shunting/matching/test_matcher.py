@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Features, Odometry, Scan
+from slam.frontend.config import Joining
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.frontend.odometry_prior import inverted, predict, turned
 from slam.frontend.surfaces import join
@@ -24,6 +25,10 @@ from tests.world2d import World2D, arena, laser, rectangle
 
 Array = NDArray[np.float64]
 CONFIG = ShuntingConfig(cell_m=0.05)
+
+
+def joining(near_m: float) -> Joining:
+    return CONFIG.frontend.surfaces.joining(CONFIG.cell_m)._replace(near_m=near_m)
 
 
 def room_scan(pose: Array, n_beams: int = 181) -> Scan:
@@ -119,13 +124,13 @@ def test_returns_of_one_wall_are_joined_and_those_across_a_gap_are_not() -> None
     post = np.array([[4.4, 1.0], [4.8, 3.5]])
     points = np.vstack([wall, post])
     joined, tangents = np.zeros(13, np.bool_), np.zeros((13, 2))
-    join(points, np.arange(13), np.array([2.0, 0.0, 0.0]), 0.1, joined, tangents)
+    join(points, np.arange(13), np.array([2.0, 0.0, 0.0]), joining(0.1), joined, tangents)
     assert joined[:10].all()
     assert not joined[10:].any()
     np.testing.assert_allclose(tangents[1:10], np.tile([1.0, 0.0], (9, 1)))
     beams = np.arange(13)
     beams[5:] += 1  # a beam without a return between the fifth and the sixth
-    join(points, beams, np.array([2.0, 0.0, 0.0]), 0.1, joined, tangents)
+    join(points, beams, np.array([2.0, 0.0, 0.0]), joining(0.1), joined, tangents)
     assert not joined[4]
 
 
@@ -133,7 +138,7 @@ def test_table_legs_in_line_with_a_wall_are_not_joined_to_it() -> None:
     """A near leg, a far leg and the wall, nearly radial and evenly spaced: three hits in line."""
     points = np.array([[1.00, 0.0], [1.60, 0.02], [2.25, 0.04], [2.25, 0.09], [2.25, 0.14]])
     joined, tangents = np.zeros(5, np.bool_), np.zeros((5, 2))
-    join(points, np.arange(5), np.zeros(3), 0.06, joined, tangents)
+    join(points, np.arange(5), np.zeros(3), joining(0.06), joined, tangents)
     assert joined.tolist() == [False, False, True, True, False]
 
 

@@ -16,11 +16,10 @@ from slam.posegraph import Edge
 from slam.replay import Track
 from slam.shunting import ShuntingConfig
 from slam.shunting.matching.matcher import Matcher
-from slam.shunting.tracking import loops as loops_module
 from slam.shunting.tracking.loops import Loops
 from tests.world2d import Drive, World2D, frames, laser, office, office_loop, rectangle
 
-CONFIG = ShuntingConfig(cell_m=0.05)
+CONFIG = ShuntingConfig().changed({"cell_m": 0.05, "loops.long_m": 50.0})
 
 
 def seen(frame: Frame) -> Observations:
@@ -56,11 +55,6 @@ def filled(graph: Loops, drifted: Drifted) -> Loops:
 
 def errors(poses: np.ndarray, truth: np.ndarray) -> np.ndarray:
     return np.asarray(np.hypot(*(poses - truth)[:, :2].T))
-
-
-@pytest.fixture(autouse=True)
-def loops_from_50_m_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loops_module, "LONG_M", 50.0)
 
 
 def test_a_drifted_way_is_bent_back_onto_itself(drifted: Drifted) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from slam import se2
 from slam.frames import Float, Frame, Odometry, Scan
-from slam.frontend.observations import SENSOR_SIGMA_M, SIGMA_CELLS, from_scan
+from slam.frontend.observations import from_scan
 from slam.frontend.odometry_prior import Prediction
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.map.network import Network
@@ -101,7 +101,9 @@ def test_matches_scatter_as_their_information_says() -> None:
     network, scans = mapped(World2D(arena()))
     matcher, flat = Matcher(CONFIG), np.diag([1.0, 1.0, 1.0])
     poses, claimed = [], []
-    share = (SENSOR_SIGMA_M / (SIGMA_CELLS * CONFIG.cell_m)) ** 2 / 2.0
+    share = (
+        CONFIG.frontend.sensor_sigma_m / (CONFIG.frontend.sigma_cells * CONFIG.cell_m)
+    ) ** 2 / 2.0
     for scan in scans:
         seen = from_scan(scan, np.zeros(3), CONFIG)
         match = matcher.climb(network, seen, np.zeros(3), np.zeros(3), flat)
@@ -137,7 +139,7 @@ def test_what_noise_feigns_is_taken_out_of_the_geometry() -> None:
         geometry = np.diag([0.0, 0.0, 4.0])
         geometry[:2, :2] = R @ np.diag([small, 0.9]) @ R.T
         geometry[0, 2] = geometry[2, 0] = 0.02
-        count, along = observable(geometry, 0.01, out)
+        count, along = observable(geometry, 0.01, CONFIG.uncertainty.pose.noisy, out)
         assert count == lost
         assert np.linalg.eigvalsh(out).min() > -1e-12
         values = np.linalg.eigvalsh(out[:2, :2])
@@ -194,7 +196,7 @@ def test_scales_of_odometry_are_found_whatever_is_stated(stated: float | None) -
     """``stated`` times the true standard deviations, or nothing: the NIS settles near 3."""
     true = np.array([0.01, 0.006, 0.012])
     given = None if stated is None else np.diag((stated * true) ** 2)
-    increments, rng = Increments.of_beams(0.05), np.random.default_rng(6)
+    increments, rng = Increments.of_beams(CONFIG), np.random.default_rng(6)
     values = [corrected(increments, rng, given, true) for _ in range(1200)]
     settled = np.array([v for v in values[400:] if v is not None])
     assert 0.6 < settled.mean() / 3.0 < 1.6
@@ -210,7 +212,7 @@ def test_nees_is_right_when_the_errors_are_what_the_belief_was_told() -> None:
     Q = np.diag([0.01**2, 0.005**2, 0.01**2])
     root = np.linalg.cholesky(Q)
     for _ in range(300):
-        belief, estimate, truth = Belief(0.05), np.zeros(3), np.zeros(3)
+        belief, estimate, truth = Belief(CONFIG), np.zeros(3), np.zeros(3)
         for _ in range(20):
             c, s = math.cos(estimate[2]), math.sin(estimate[2])
             R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -237,7 +239,7 @@ def test_nees_is_right_when_the_errors_are_what_the_belief_was_told() -> None:
 def standing(shared_m: float, in_view: float) -> tuple[Float, Float]:
     """Covariances of a robot that stands and sees the same surfaces, after 300 and 600 scans."""
     geometry = np.diag([0.5, 0.5, 4.0])
-    belief = Belief(0.03)
+    belief = Belief(ShuntingConfig())
     evidence = Evidence(
         geometry=20.0 * geometry,
         weighed=20.0,
@@ -286,7 +288,7 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
     geometry = np.diag([0.5, 0.5, 4.0])
     left = {}
     for new in (0.0, 0.2):
-        belief = Belief(0.03)
+        belief = Belief(ShuntingConfig())
         T = np.zeros(3)
         drive = Prediction(
             T_map_robot=T,
@@ -321,7 +323,7 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
 @pytest.mark.parametrize("blind_s", [700.0, 16000.0])
 def test_long_blindness_leaves_a_covariance_that_can_be(blind_s: float) -> None:
     """Faded sums come to stand at the smallest numbers there are; they must count as nothing."""
-    belief, T = Belief(0.05), np.zeros(3)
+    belief, T = Belief(CONFIG), np.zeros(3)
     nothing = Evidence(
         geometry=np.zeros((3, 3)),
         weighed=0.0,

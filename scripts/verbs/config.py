@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia config``: every number of a SLAM, of the actors or of the scanner."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from itertools import groupby
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from slam.settings import Row, Settings
+
+BY_DEVICE = "TD: technical description 8008970/06-2003, TL: telegram listing 8007954"
+ROOMS = ("actors", "lms221")  # trees that belong to no SLAM
+
+
+def config(
+    what: Annotated[
+        str, typer.Argument(help="A SLAM (or a variant, SLAM{PATH=VALUE}), actors or lms221.")
+    ],
+    group: Annotated[
+        str, typer.Argument(help="Only the numbers whose path begins so: matching.local.")
+    ] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="For programs, with bounds.")] = False,
+) -> None:
+    """Print every number with path, value, unit, meaning and source.
+
+    Any of a SLAM's may be set: [bold]mobilia run shunting --set matching.reward=7[/bold].
+
+    [bold]mobilia config shunting matching[/bold]
+    """
+    tree, default = (None, None) if what == "lms221" else _trees(what)
+    rows = _chosen(_of_scanner() if tree is None else list(tree.rows()), group)
+    if as_json:
+        digest = {} if tree is None else {"sha256": tree.sha256()}
+        words = {**digest, "numbers": [_plain(row) for row in rows]}
+        print(json.dumps(words, indent=1, ensure_ascii=False))
+        return
+    changed = {} if tree is None or default is None else tree.differences(default)
+    _print(rows, changed)
+
+
+def _of_scanner() -> list[Row]:
+    """The options of the scanner and its effects, in the words of their docstrings."""
+    from sim.sensors.lidar.models.lms221 import Lms221Config
+    from slam.settings import About, Row
+
+    found, units = [], {"deg": "deg", "m": "m"}
+    of_device = Lms221Config()
+    for prefix, group in (("", of_device), ("effects.", of_device.effects)):
+        lines = [line.strip() for line in (type(group).__doc__ or "").splitlines()]
+        words = {line.partition(" ")[0]: line.partition(" ")[2].strip() for line in lines}
+        for field in dataclasses.fields(group):
+            if field.name == "effects":
+                continue
+            about = About(
+                unit=units.get(field.name.rpartition("_")[2], "word"),
+                meaning=words.get(field.name, ""), source=BY_DEVICE, fixed=False,
+            )  # fmt: skip
+            found.append(Row(prefix + field.name, getattr(group, field.name), about))
+    return found
+
+
+def _trees(what: str) -> tuple[Settings, Settings]:
+    """That tree and its default."""
+    from slam.errors import UnknownNameError
+
+    if what == "actors":
+        from sim.actors.config import ACTORS
+
+        return ACTORS, ACTORS
+    from slam import config_of, names
+
+    found = config_of(what)
+    if found is None:
+        known = [name for name in names() if config_of(name) is not None]
+        raise UnknownNameError(
+            f"'{what}' has no numbers to set. These have: {', '.join([*known, *ROOMS])}"
+        )
+    return found
+
+
+def _chosen(rows: list[Row], group: str) -> list[Row]:
+    import difflib
+
+    from slam.errors import UnknownNameError
+
+    def within(path: str) -> bool:
+        return not group or f"{path}.".startswith(f"{group}.")
+
+    chosen = [row for row in rows if within(row.path) or within(row.about.alias or row.path)]
+    if not chosen:
+        groups = sorted({row.path.rpartition(".")[0] for row in rows} - {""})
+        near = difflib.get_close_matches(group, [*groups, *(r.path for r in rows)], n=1, cutoff=0.5)
+        hint = f" Did you mean '{near[0]}'?" if near else f" Groups: {', '.join(groups)}"
+        raise UnknownNameError(f"no number's path begins with '{group}'.{hint}")
+    return chosen
+
+
+def _plain(row: Row) -> dict[str, Any]:
+    about = row.about
+    words: dict[str, Any] = {
+        "path": row.path, "value": row.value, "unit": about.unit, "meaning": about.meaning,
+        "source": about.source, "fixed": about.fixed,
+    }  # fmt: skip
+    if about.fixed or about.source == BY_DEVICE:
+        return words
+    if about.options:
+        return words | {"options": list(about.options)}
+    return words | {"low": about.low, "high": about.high}
+
+
+def _print(rows: list[Row], changed: dict[str, Any]) -> None:
+    from rich.markup import escape
+    from rich.table import Table
+
+    from scripts.console import console
+    from slam.settings import BY_HAND
+
+    table = Table(box=None, pad_edge=False, show_header=False, width=min(console.width, 110))
+    table.add_column(no_wrap=True)
+    table.add_column(justify="right", no_wrap=True)
+    table.add_column(no_wrap=True)
+    table.add_column(ratio=1)
+    all_fixed = all(row.about.fixed for row in rows)
+    for group, members in groupby(rows, key=lambda row: row.path.rpartition(".")[0]):
+        table.add_row(f"[bold]{escape(group)}[/bold]" if group else "")
+        for row in members:
+            about = row.about
+            source = "" if about.source in (BY_HAND, BY_DEVICE) else f" ({about.source})"
+            fixed = " Fixed." if about.fixed and not all_fixed else ""
+            value = f"[bold]{row.value}[/bold]" if row.path in changed else f"{row.value}"
+            unit = "" if about.unit in ("word", "1") else about.unit
+            name = row.path.rpartition(".")[2]
+            said = escape(f"{about.meaning}.{source}{fixed}")
+            table.add_row(f"  {escape(name)}", value, escape(unit), said)
+    console.print(table)
+    fixed = " All are fixed: compiled into kernels." if all_fixed else ""
+    console.print(
+        f"{len(rows)} numbers.{fixed} Without a source in brackets: "
+        f"{rows[0].about.source if rows[0].about.source == BY_DEVICE else BY_HAND}.",
+        highlight=False,
+    )

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers of everything that moves: doors, people, chairs, and the robot's driver.
+
+``mobilia config actors`` prints them. They are part of what a seed means, and compiled into the
+kernels of the world: so they are fixed, and the same in every run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from slam.settings import BY_HAND, Settings, number
+
+
+def _fixed(default: float, unit: str, meaning: str, source: str = BY_HAND) -> Any:
+    return number(default, unit, meaning, source, low=-1e6, fixed=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoorConfig(Settings):
+    """Doors, and for whom they open."""
+
+    opened_rad: float = _fixed(1.5, "rad", "where a hand opens to")
+    passable_rad: float = _fixed(1.15, "rad", "a leaf this far open lets a person through")
+    rate_max: float = _fixed(1.4, "rad/s", "a door pushed open takes little more than a second")
+    rate_gain: float = _fixed(3.0, "1/s", "rate by what is left to turn")
+    torque_gain: float = _fixed(8.0, "1/s", "torque by the missing rate, over inertia")
+    torque_max: float = _fixed(40.0, "N m", "against spring and damper; 45 N at the handle")
+    rest_step: float = _fixed(0.75, "rad", "between closed, ajar and open")
+    near_m: float = _fixed(1.6, "m", "a robot this near that faces the doorway is let through")
+    facing: float = _fixed(0.3, "cosine", "of facing it")
+    clear_m: float = _fixed(0.95, "m", "no door is let go with someone this near its middle")
+    held_s: float = _fixed(0.5, "s", "it is kept open after someone asked")
+    event_least_s: float = _fixed(3.0, "s", "an event lasts, at least")
+    event_most_s: float = _fixed(9.0, "s", "an event lasts, at most")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RightOfWayConfig(Settings):
+    """Who passes a door first, and where the others wait."""
+
+    body_m: float = _fixed(0.27, "m", "clearance a person keeps to walls")
+    wants_m: float = _fixed(2.2, "m", "a door this near may be on one's way")
+    in_doorway_m: float = _fixed(0.35, "m", "one is in the doorway: the flow field decides")
+    on_way: float = _fixed(0.8, "s/m", "less time saved by the distance: not on the way")
+    swept_m2: float = _fixed(1.6, "m²", "nobody within this of the moving leaf's middle")
+    in_frame_m: float = _fixed(0.4, "m", "across the door: in its frame")
+    kept_m: float = _fixed(1.4, "m", "whose turn it is keeps it this near")
+    pull_m: float = _fixed(2.1, "m", "who pulls a door asks for it from here")
+    push_m: float = _fixed(1.5, "m", "who pushes it from here")
+    beside_m: float = _fixed(0.8, "m", "beside the door, where one waits")
+    back_m: float = _fixed(1.2, "m", "and this far before it")
+    wait_mps: float = _fixed(1.0, "m/s", "speed to that place, at most")
+    wait_gain: float = _fixed(1.5, "1/s", "speed by what is left")
+    leaf_m: float = _fixed(0.32, "m", "beyond the leaf's circle for who pulls")
+    push_stop_m: float = _fixed(0.45, "m", "before the leaf for who pushes")
+    queue_m: float = _fixed(0.65, "m", "for each one who is ahead")
+    hold_gain: float = _fixed(2.0, "1/s", "speed towards the leaf by the distance left")
+    hold_mps: float = _fixed(2.0, "m/s", "taken off one's speed, at most")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteeringConfig(Settings):
+    """How people choose their velocity among others; weights are costs per unit."""
+
+    horizon_s: float = _fixed(2.5, "s", "collisions later than this do not matter")
+    accel: float = _fixed(3.0, "m/s²", "of a person")
+    spare_m: float = _fixed(0.05, "m", "between people and the robot")
+    spare_mps: float = _fixed(2.0, "m/s", "taken off one's speed for it, at most")
+    apart_m: float = _fixed(0.06, "m", "added to the hulls of two that meet")
+    touching: float = _fixed(4.0, "s/m", "weight of closing in on what one touches")
+    soon_s: float = _fixed(0.1, "s", "added to the time of a collision: bounds its cost")
+    least_pace: float = _fixed(0.5, "m/s", "of the velocities that are tried")
+    hurry: float = _fixed(1.5, "1/s", "weight of slowness by the time held up")
+    hurry_most: float = _fixed(3.0, "cost", "of it")
+    hurry_from: float = _fixed(0.3, "m/s", "slower wishes are in no hurry")
+    change: float = _fixed(0.15, "s/m", "weight of a change of velocity")
+    keep_right: float = _fixed(0.06, "s²/m²", "weight of passing on the left")
+    slow: float = _fixed(0.9, "share", "of the pace: below it one is slow")
+    look_s: float = _fixed(0.3, "s", "between the two looks at walls ahead")
+    wall: float = _fixed(25.0, "1/m", "weight of clearance lost")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WalkingConfig(Settings):
+    """Trips of people, and their patience."""
+
+    speed_mps: float = _fixed(1.34, "m/s", "preferred speed, mean", "PedSim")
+    speed_sd: float = _fixed(0.26, "m/s", "preferred speed, standard deviation", "PedSim")
+    speed_least: float = _fixed(0.8, "m/s", "preferred speed, at least")
+    speed_most: float = _fixed(1.9, "m/s", "preferred speed, at most")
+    first_stay_s: float = _fixed(8.0, "s", "the first stay, at most: a short run sees people go")
+    arrive_least_s: float = _fixed(0.25, "s", "from the goal one has arrived, at least")
+    arrive_most_s: float = _fixed(0.8, "s", "from the goal one has arrived, at most")
+    look_least_s: float = _fixed(4.0, "s", "one looks one way while standing, at least")
+    look_most_s: float = _fixed(15.0, "s", "one looks one way while standing, at most")
+    still_mps: float = _fixed(0.1, "m/s", "a walker slower than this is blocked")
+    doorway_m: float = _fixed(1.2, "m", "nearer to a door nobody arrives")
+    near_s: float = _fixed(2.0, "s", "from the goal, a blocked one has arrived")
+    near_blocked_s: float = _fixed(0.8, "s", "blocked for so long")
+    blocked_s: float = _fixed(5.0, "s", "blocked: another goal")
+    no_progress_s: float = _fixed(12.0, "s", "without progress: another goal")
+    turn_gain: float = _fixed(4.0, "1/s", "turn rate by the angle left")
+    turn_most: float = _fixed(3.0, "rad/s", "turn rate, at most")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SittingConfig(Settings):
+    """Chairs that people sit down on."""
+
+    share: float = _fixed(0.2, "share", "of arrivals with a free chair at hand that end on it")
+    hand_m: float = _fixed(2.5, "m", "a chair this near is at hand")
+    stay: float = _fixed(3.0, "ratio", "of a stay, over that of who stands")
+    down_s: float = _fixed(0.8, "s", "to sit down, and to get up")
+    near_m: float = _fixed(0.08, "m", "between hulls from where one turns and sits down")
+    room_m: float = _fixed(0.18, "m", "clearance of a chair, else it is tucked under a desk")
+    pace_mps: float = _fixed(0.7, "m/s", "to the chair")
+    give_up_s: float = _fixed(1.5, "s", "held up on the way: then not")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChairConfig(Settings):
+    """Chairs that are pushed or rolled by nobody in sight."""
+
+    push_least_ticks: int = _fixed(9, "ticks", "of a push, at least: 0.12 s")
+    push_most_ticks: int = _fixed(26, "ticks", "of a push, at most: 0.35 s")
+    impulse_max: float = _fixed(45.0, "N s", "what is heavier gets less speed")
+    turn_s: float = _fixed(4.0, "s", "a chair is rolled at a time")
+    brake_s: float = _fixed(0.3, "s", "at the end of it, in which it is stopped")
+    slowest_mps: float = _fixed(0.3, "m/s", "of rolling, at least")
+    fastest_mps: float = _fixed(0.9, "m/s", "of rolling, at most")
+    spin_max: float = _fixed(1.0, "rad/s", "of rolling")
+    patience_s: float = _fixed(0.25, "s", "held up: pushed another way")
+    tau_s: float = _fixed(0.08, "s", "time constant of the push")
+    accel_max: float = _fixed(8.0, "m/s²", "bounds the force")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriverConfig(Settings):
+    """How the robot's driver scores a command, and when it plans anew."""
+
+    step_s: float = _fixed(0.15, "s", "of the rollout; 14 of them")
+    look_ahead_m: float = _fixed(0.35, "m", "where the cost-to-go is asked for as well")
+    accel: float = _fixed(1.0, "m/s²", "ramp of the drive", "sim.actors.robot.DriveConfig")
+    alpha: float = _fixed(3.0, "rad/s²", "ramp of the drive", "sim.actors.robot.DriveConfig")
+    overlap_m: float = _fixed(0.02, "m", "a start in overlap may be driven out of")
+    run_over: float = _fixed(3.0, "cost", "of being run over while standing")
+    ahead: float = _fixed(1.5, "weight", "of the cost-to-go ahead")
+    free: float = _fixed(0.5, "1/m", "weight of clearance")
+    free_m: float = _fixed(0.35, "m", "clearance beyond this gains nothing")
+    turning: float = _fixed(0.02, "s/rad", "weight of turning")
+    reverse: float = _fixed(0.3, "share", "of the speed limit, backwards")
+    standing: float = _fixed(0.25, "cost", "of standing or reversing")
+    sight_m: float = _fixed(4.0, "m", "discs farther away do not matter")
+    ajar_rad: float = _fixed(0.6, "rad", "a leaf less open is let open for the robot")
+    replan_s: float = _fixed(1.0, "s", "between two plans, at least")
+    decide_s: float = _fixed(0.07, "s", "a command holds, at least")
+    leaf_discs: int = _fixed(6, "discs", "along a leaf that is avoided")
+    leaf_m: float = _fixed(0.05, "m", "half thickness of a leaf in plans")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActorsConfig(Settings):
+    """All of them."""
+
+    doors: DoorConfig = field(default=DoorConfig())
+    right_of_way: RightOfWayConfig = field(default=RightOfWayConfig())
+    steering: SteeringConfig = field(default=SteeringConfig())
+    walking: WalkingConfig = field(default=WalkingConfig())
+    sitting: SittingConfig = field(default=SittingConfig())
+    chairs: ChairConfig = field(default=ChairConfig())
+    driver: DriverConfig = field(default=DriverConfig())
+
+
+ACTORS = ActorsConfig()

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers of the occupancy grid, beside those that it shares with "shunting"."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from slam.settings import Settings, number
+from slam.shunting.config import ShuntingConfig
+
+OCTOMAP = "Hornung et al. 2013"
+
+
+@dataclass(frozen=True, kw_only=True)
+class GridConfig(Settings):
+    """The inverse sensor model, log-odds per scan."""
+
+    hit: float = number(0.85, "log-odds", "of a cell where a beam ends: p = 0.7", OCTOMAP)
+    miss: float = number(
+        -0.4, "log-odds", "of a cell that a beam passes: p = 0.4", OCTOMAP, low=-1e6, high=0.0
+    )
+    most: float = number(3.5, "log-odds", "either way: p = 0.97", OCTOMAP, low=1e-3)
+    struck: float = number(0.6, "input", "of a cell that holds the end; fainter is beside it")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OccupancyConfig(ShuntingConfig):
+    """As ``ShuntingConfig``, of whose map only ``cell_m`` counts here, and the grid's own."""
+
+    grid: GridConfig = field(default=GridConfig())

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia config`` prints every number, and ``--set`` reaches recipes."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sim
+from scripts.output import read_recipe_words, write_recipe
+from scripts.verbs.compare import named
+from scripts.verbs.config import config
+from sim.actors.config import ACTORS
+from slam import config_of
+from slam.errors import UnknownNameError
+from slam.variants import with_set
+
+
+def numbers(capsys: pytest.CaptureFixture[str], what: str, group: str = "") -> list[dict]:
+    config(what, group, as_json=True)
+    words = json.loads(capsys.readouterr().out)
+    return words["numbers"]
+
+
+def test_every_number_of_a_tree_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    found = config_of("shunting")
+    assert found is not None
+    assert [n["path"] for n in numbers(capsys, "shunting")] == [row.path for row in found[1].rows()]
+    (reward,) = numbers(capsys, "shunting{reward=7}", "matching.reward")
+    assert (reward["path"], reward["value"], reward["low"]) == ("reward", 7.0, 1e-3)
+    local = numbers(capsys, "shunting", "matching.local")
+    assert all(n["path"].startswith("matching.local.") for n in local)
+
+
+@pytest.mark.parametrize("what", ["actors", "lms221", "ekf", "occupancy"])
+def test_other_trees_say_unit_meaning_and_source(
+    capsys: pytest.CaptureFixture[str], what: str
+) -> None:
+    for row in numbers(capsys, what):
+        assert row["unit"], row
+        assert row["meaning"], row
+        assert row["source"], row
+
+
+def test_actors_are_what_a_seed_means_so_none_can_be_set() -> None:
+    assert all(row.about.fixed for row in ACTORS.rows())
+
+
+def test_every_number_of_the_actors_is_read_by_a_kernel_or_its_caller() -> None:
+    files = [p for p in Path(sim.__file__).parent.rglob("*.py") if p.name != "config.py"]
+    read = set(re.findall(r"\.([a-z_0-9]+)\b", "\n".join(p.read_text() for p in files)))
+    assert {row.path.rpartition(".")[2] for row in ACTORS.rows()} <= read
+
+
+def test_the_table_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    config("shunting", "loops", as_json=False)
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 110
+    assert any("key_m" in line and "between key frames" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("what", "group", "match"),
+    [
+        ("kiss-icp", "", r"'kiss-icp' has no numbers to set. These have: ekf, .*actors, lms221"),
+        ("shunting", "matchin.local", r"Did you mean 'matching.local'"),
+        ("shunting{rewrad=7}", "", r"Did you mean 'reward'"),
+    ],
+)
+def test_what_there_is_not_is_refused_with_a_hint(what: str, group: str, match: str) -> None:
+    with pytest.raises(UnknownNameError, match=match):
+        config(what, group)
+
+
+def test_the_numbers_of_a_slam_need_no_simulator() -> None:
+    code = "import slam, sys; slam.config_of('shunting')[0].sha256(); print(sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "'slam.shunting.config'" in done.stdout
+    assert "'mujoco'" not in done.stdout
+
+
+def test_commas_inside_braces_part_no_names() -> None:
+    assert named(["shunting{cell_m=0.1,reward=7},ekf", "pipe:a,b"]) == (
+        "shunting{cell_m=0.1,reward=7}", "ekf", "pipe:a,b",
+    )  # fmt: skip
+
+
+def test_recipes_name_the_config_of_every_slam(tmp_path: Path) -> None:
+    slams = with_set(["shunting", "odometry"], ["matching.reward=7"])
+    write_recipe(tmp_path, "run", {"slams": slams})
+    configs = read_recipe_words(tmp_path / "recipe.json")["configs"]
+    assert list(configs) == ["shunting{matching.reward=7}"]
+    assert configs[slams[0]]["changed"] == {"reward": 7.0}
+    (config, _), (_, default) = config_of(slams[0]), config_of("shunting")  # type: ignore[misc]
+    assert configs[slams[0]]["sha256"] == config.sha256() != default.sha256()
+    write_recipe(tmp_path, "blame", {"slam": "shunting"})
+    again = read_recipe_words(tmp_path / "recipe.json")["configs"]
+    assert again == {"shunting": {"changed": {}, "sha256": default.sha256()}}

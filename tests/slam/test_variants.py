@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""SLAMs named with numbers: in ``create``, in maps on file, and by ``--set``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import slam
+from slam.errors import InvalidValueError, UnknownNameError
+from slam.frames import Frame
+from slam.odometry import OdometrySlam
+from slam.settings import Settings, number
+from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.variants import named, parsed, with_set
+from tests.world2d import Drive, World2D, arena, frames, laser
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnConfig(Settings):
+    gain: float = number(0.5, "1", "of the correction", "my data sheet, p. 3", high=1.0)
+
+
+class Own(OdometrySlam):
+    config_class = OwnConfig
+
+    def __init__(self, config: dict[str, Any] | None = None) -> None:
+        super().__init__()
+        self.config = OwnConfig().changed(config or {})
+
+
+def tour() -> list[Frame]:
+    drive = Drive((0.0, 0.0, 0.0), ((0.3, 0.4, 1.0),))
+    return frames(World2D(arena()), drive, rate_hz=5.0, spec=laser(91), seed=3)
+
+
+def test_a_name_carries_numbers_there_and_back() -> None:
+    name = "shunting{matching.local.points=90,objective=log,reward=7.5}"
+    base, changes = parsed(name)
+    assert (base, changes) == (
+        "shunting", {"matching.local.points": 90, "objective": "log", "reward": 7.5}
+    )  # fmt: skip
+    assert named(base, changes) == name
+    assert parsed("pipe:./slam {a=1}") == ("pipe:./slam {a=1}", {})
+    for wrong in ("shunting{", "shunting{}", "shunting{a}", "shunting{a=1,a=2}", "shunting{=1}"):
+        with pytest.raises(InvalidValueError, match=r"SLAM 'shunting\{"):
+            parsed(wrong)
+
+
+@pytest.mark.parametrize("name", ["shunting", "shunting-features", "occupancy"])
+def test_create_sets_the_numbers_of_a_name(name: str) -> None:
+    system = slam.create(name + "{cell_m=0.1,tracking.relocalise.most=3}")
+    assert isinstance(system, ShuntingSlam)
+    assert system.config.cell_m == 0.1
+    assert system.config.tracking.relocalise.most == 3
+    same = slam.create(name, config={"cell_m": 0.1, "tracking.relocalise.most": 3})
+    assert isinstance(same, ShuntingSlam)
+    assert same.config == system.config
+
+
+def test_the_ekf_takes_numbers_on_top_of_the_preset_that_the_frames_ask_for() -> None:
+    system = slam.create("ekf{lifecycle.lost_after=4}")
+    system.update(tour()[0])
+    assert system.config.confirm_looks == 8  # type: ignore[attr-defined]
+    assert system.config.lifecycle.lost_after == 4  # type: ignore[attr-defined]
+
+
+def test_what_cannot_be_set_is_said() -> None:
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'matching.reward'"):
+        slam.create("shunting{matching.rewards=7}")
+    with pytest.raises(InvalidValueError, match="'odometry' has no numbers to set"):
+        slam.create("odometry{a=1}")
+    with pytest.raises(InvalidValueError, match="numbers in its name and a config"):
+        slam.create("shunting{reward=7}", config="paper")
+    with pytest.raises(InvalidValueError, match=r"'map.bell_steps' is fixed at 512"):
+        slam.create("shunting{map.bell_steps=256}")
+
+
+def test_a_slam_of_ones_own_takes_numbers_too() -> None:
+    system = slam.create(f"{__name__}:Own{{gain=0.7}}")
+    assert system.config.gain == 0.7  # type: ignore[attr-defined]
+    with pytest.raises(UnknownNameError, match=r"OwnConfig has no 'gian'. Did you mean 'gain'"):
+        slam.create(f"{__name__}:Own{{gian=0.7}}")
+
+
+def test_set_is_for_the_slam_it_names() -> None:
+    assert with_set(["shunting", "odometry"], ["matching.reward=7"]) == (
+        "shunting{matching.reward=7}", "odometry",
+    )  # fmt: skip
+    two = ["shunting", "ekf", "shunting{reward=3}"]
+    assert with_set(two, ["shunting.cell_m=0.1", "ekf.detection=0.5"]) == (
+        "shunting{cell_m=0.1}", "ekf{detection=0.5}", "shunting{cell_m=0.1,reward=3}",
+    )  # fmt: skip
+    assert with_set(two, []) == tuple(two)
+    with pytest.raises(InvalidValueError, match="which SLAM"):
+        with_set(two, ["reward=7"])
+    with pytest.raises(InvalidValueError, match="expected PATH=VALUE"):
+        with_set(["shunting"], ["reward"])
+    with pytest.raises(InvalidValueError, match="set twice"):
+        with_set(["shunting"], ["reward=7", "shunting.reward=8"])
+
+
+def test_a_nested_number_reaches_the_estimate() -> None:
+    stream = tour()
+    ends = []
+    for name in ("shunting{cell_m=0.1}", "shunting{cell_m=0.1,frontend.sigma_cells=1.0}"):
+        system = slam.create(name)
+        ends.append([system.update(frame.without_truth()).T_map_robot for frame in stream][-1])
+    assert not np.array_equal(*ends)
+
+
+def test_a_map_file_keeps_every_number_and_an_older_one_has_the_defaults(tmp_path: Path) -> None:
+    config = ShuntingConfig().changed({"cell_m": 0.1, "matching.local.points": 90})
+    ShuntingSlam(config).save(tmp_path / "map.npz")
+    assert ShuntingSlam.load(tmp_path / "map.npz").config == config
+    with np.load(tmp_path / "map.npz") as archive:
+        content = dict(archive)
+    header = json.loads(str(content["header"]))
+    assert header["config_sha256"] == config.sha256()
+    groups = [key for key, value in header["config"].items() if isinstance(value, dict)]
+    for key in groups:  # as files were written when there were twelve numbers
+        del header["config"][key]
+    del header["config_sha256"]
+    content["header"] = np.array(json.dumps(header))
+    np.savez(tmp_path / "old.npz", **content)
+    assert ShuntingSlam.load(tmp_path / "old.npz").config == ShuntingConfig(cell_m=0.1)
