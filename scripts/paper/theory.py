@@ -22,7 +22,7 @@ from slam.frames import Float, Frame
 from slam.frontend.observations import from_features, from_scan
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.featured import FeaturedShuntingSlam
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from slam.shunting.slam import ShuntingSlam
 
 RED, BLUE, GREEN, GREY = "#ce2c3c", "#1f61be", "#168c5a", "#5b6472"
@@ -221,7 +221,7 @@ def _about_nearest(
     pose = se2.compose(slam.trajectory().poses[-1], step)
     nearest = int(np.argmin(np.hypot(*features.points_robot.T)))
     at = se2.transform(pose, features.points_robot[nearest])
-    stamp(slam.network, from_features(features, slam.config), pose)
+    rasterise(slam.network, from_features(features, slam.config), pose)
     cell, reach = slam.config.cell_m, 6
     i0, j0 = (int(np.floor(v / cell)) - reach for v in at)
     size = 2 * reach + 1

@@ -19,7 +19,7 @@ from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.energy import energy
 from slam.shunting.map.grid import SIDE
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from slam.shunting.map.update import lateral_mu
 from slam.shunting.matching.matcher import Matcher
 from slam.shunting.slam import ShuntingSlam
@@ -50,7 +50,7 @@ def lyapunov(
     values: list[float] = []
     changes: list[float] = []
     for k in range(sweeps + 1):
-        stamp(network, seen, pose)
+        rasterise(network, seen, pose)
         extent = network.extent()
         assert extent is not None
         i0, j0, i1, j1 = extent
@@ -139,7 +139,7 @@ def _place(k: int) -> Float:
 
 
 def _look(network: Network, seen: Observations, pose: Float) -> tuple[float, float, int]:
-    stamp(network, seen, pose)
+    rasterise(network, seen, pose)
     return network.integrate(seen.view, se2.compose(pose, seen.T_robot_laser), 0.2, write=True)
 
 
@@ -189,7 +189,7 @@ def bell(looks: Sequence[int], every_s: float = 0.2) -> tuple[Float, dict[int, F
     seen = from_features(features, config)
     out: dict[int, Float] = {}
     for k in range(1, max(looks) + 1):
-        stamp(network, seen, np.zeros(3))
+        rasterise(network, seen, np.zeros(3))
         network.integrate(seen.view, np.zeros(3), every_s, write=True)
         if k in looks:
             x, _ = network.window(1.0, 0.0, 3.0, 0.05)
@@ -206,14 +206,14 @@ def library_sweeps(
     """Activities of a new network before and after each sweep of ``Network.integrate`` under one
     fixed observation, and the input I that this was (all dense, row 0 lowest)."""
     network, pose = Network(config), np.zeros(3)
-    stamp(network, seen, pose)
+    rasterise(network, seen, pose)
     extent = network.extent()
     assert extent is not None
     i0, j0, i1, j1 = extent
     given = inputs_of(network, (j1 - j0, i1 - i0), i0, j0)
     out = [_dense(network, extent)]
     for _ in range(sweeps):
-        stamp(network, seen, pose)
+        rasterise(network, seen, pose)
         network.integrate(seen.view, seen.T_robot_laser, step, write=True)
         out.append(_dense(network, extent))
     return out, given

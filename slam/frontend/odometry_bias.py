@@ -15,7 +15,7 @@ from slam.frames import Float
 from slam.frontend.config import FRONTEND, BiasConfig
 
 
-class TurnBias:
+class HeadingBias:
     """A Kalman filter of three: the heading's error against the map, and the two biases.
 
     Each match gives it what the data alone say of the heading. It learns nothing where they tell

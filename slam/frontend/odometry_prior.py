@@ -12,7 +12,7 @@ from slam import se2
 from slam.frames import MOST_TWIST, Float, Odometry
 from slam.frontend import odometry_steps
 from slam.frontend.config import FRONTEND, PriorConfig
-from slam.frontend.odometry_bias import TurnBias
+from slam.frontend.odometry_bias import HeadingBias
 
 IDENTITY = np.eye(3)
 
@@ -110,7 +110,7 @@ def predict(
     before: Odometry,
     now: Odometry,
     scales: tuple[float, float] = (1.0, 1.0),
-    bias: TurnBias | None = None,
+    bias: HeadingBias | None = None,
     config: PriorConfig = FRONTEND.prior,
 ) -> Prediction:
     """Chain the odometry increment on the last pose; covariance from the frame's own.

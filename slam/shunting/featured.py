@@ -39,8 +39,8 @@ from slam.shunting.map.peaks import Peaks, peaks
 from slam.shunting.matching.matcher import Match, seen_by
 from slam.shunting.matching.score import evaluate
 from slam.shunting.slam import ShuntingSlam
-from slam.shunting.uncertainty.odometry_noise import Increments
-from slam.shunting.uncertainty.pose_covariance import Belief
+from slam.shunting.uncertainty.odometry_noise import OdometryNoise
+from slam.shunting.uncertainty.pose_covariance import PoseCovariance
 from slam.system import Estimate, register
 
 # Weight of a logarithm of overlap, preset ``paper``. Features are independent, unlike beams (0.3);
@@ -102,9 +102,9 @@ class FeaturedShuntingSlam(ShuntingSlam):
         self._gates = self.config.features.gates
         self._steps_s: deque[float] = deque(maxlen=self.config.features.steps)
         self._first_counts_s = 0.0
-        self._belief = Belief(self.config, of_points=True)
+        self._pose_covariance = PoseCovariance(self.config, of_points=True)
         overlaps = self.config.objective == "log"
-        self._increments = Increments.of_points(self.config, overlaps=overlaps)
+        self._odometry_noise = OdometryNoise.of_points(self.config, overlaps=overlaps)
 
     def _first(self, frame: Frame) -> Estimate:
         self._first_counts_s = self.config.map.first_look_s

@@ -22,14 +22,14 @@ from slam.shunting.config import ShuntingConfig
 from slam.shunting.map import export
 from slam.shunting.map import io as memory
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from slam.shunting.matching.local_search import SearchWindow
 from slam.shunting.matching.matcher import Match, Matcher, unmatched
 from slam.shunting.tracking.loops import Loops
-from slam.shunting.tracking.quality import Doubt
-from slam.shunting.tracking.relocalise import Recovery, coarse, slip, slipped
-from slam.shunting.uncertainty.odometry_noise import Increments
-from slam.shunting.uncertainty.pose_covariance import Belief
+from slam.shunting.tracking.quality import TrackingQuality
+from slam.shunting.tracking.relocalise import Relocalisation, coarse, slip, slipped
+from slam.shunting.uncertainty.odometry_noise import OdometryNoise
+from slam.shunting.uncertainty.pose_covariance import PoseCovariance
 from slam.shunting.uncertainty.residuals import Evidence, look
 from slam.shunting.warmup import warm_up
 from slam.system import Estimate, Raster, register
@@ -60,10 +60,10 @@ class ShuntingSlam:
         self._resumed: Float | None = None
         self._T_map_robot: Float = np.zeros(3)
         self._numbers = self.config.tracking
-        self._belief = Belief(self.config)
-        self._increments = Increments.of_beams(self.config)
-        self._doubt = Doubt(self.config.freeze_below, self._numbers.quality)
-        self._recovery: Recovery | None = None
+        self._pose_covariance = PoseCovariance(self.config)
+        self._odometry_noise = OdometryNoise.of_beams(self.config)
+        self._quality = TrackingQuality(self.config.freeze_below, self._numbers.quality)
+        self._relocalisation: Relocalisation | None = None
         self._loops = Loops(self.config, self._matcher)
         self._trusted = True  # the pose of the frame before
         self._stamps: list[int] = []
@@ -93,7 +93,7 @@ class ShuntingSlam:
         twist = frame.odometry.twist
         moving = np.zeros(3) if twist is None else np.asarray(twist)
         observations = observe(frame, moving, self.config)
-        stamp(self.network, observations, self._T_map_robot)
+        rasterise(self.network, observations, self._T_map_robot)
         T_map_laser = se2.compose(self._T_map_robot, observations.T_robot_laser)
         first_s = self.config.map.first_look_s
         self.network.integrate(observations.view, T_map_laser, first_s, write=True)
@@ -104,7 +104,7 @@ class ShuntingSlam:
     def _predict(self, odometry: Odometry) -> Prediction:
         """By odometry; on the first frame with a loaded map, where the robot was before."""
         if self._before is not None:
-            return self._increments.predict(self._T_map_robot, self._before, odometry)
+            return self._odometry_noise.predict(self._T_map_robot, self._before, odometry)
         assert self._resumed is not None
         return Prediction(
             T_map_robot=self._T_map_robot,
@@ -124,9 +124,9 @@ class ShuntingSlam:
         """
         if float(observations.weights.sum()) >= self._numbers.relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
-            prediction = replace(prediction, carried=self._belief.odometry_part(motion))
-        if self._recovery is not None:
-            match, state = self._recover(self._recovery, observations, prediction)
+            prediction = replace(prediction, carried=self._pose_covariance.odometry_part(motion))
+        if self._relocalisation is not None:
+            match, state = self._recover(self._relocalisation, observations, prediction)
             return prediction, match, state
         match = _near(self._match(observations, prediction), prediction)
         if match.slipped:
@@ -142,7 +142,7 @@ class ShuntingSlam:
         match = self._matcher.climb(self.network, observations, start, predicted, precision)
         numbers = self.config.matching.local
         near, widest = SearchWindow.about(prior, numbers), SearchWindow.widest(numbers)
-        good = numbers.good_share * self._doubt.usual_match()
+        good = numbers.good_share * self._quality.usual_match()
         poor = numbers.widest_share * good
         vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > numbers.vague_cells * self.config.cell_m
         for window, wanted in ((near, vague or match.matched < good), (widest, True)):
@@ -151,29 +151,29 @@ class ShuntingSlam:
             found = self._matcher.search(self.network, observations, predicted, precision, window)
             if found.score > match.score:
                 match = found
-        if match.matched >= poor or not self._doubt.is_worth_searching():
+        if match.matched >= poor or not self._quality.is_worth_searching():
             return match
-        usual = self._doubt.usual_support()
+        usual = self._quality.usual_support()
         shoved = slipped(self.network, self._matcher, observations, prediction, usual)
         return match if shoved is None else shoved
 
     def _recover(
-        self, recovery: Recovery, observations: Observations, prediction: Prediction
+        self, recovery: Relocalisation, observations: Observations, prediction: Prediction
     ) -> tuple[Match, str]:
         """Dead reckoning, until one hypothesis alone explains what is seen."""
         predicted = prediction.T_map_robot
         precision = inverted(prediction.prior)
         here = self._matcher.climb(self.network, observations, predicted, predicted, precision)
-        match = recovery.step(observations, prediction, here, self._doubt.usual_support())
+        match = recovery.step(observations, prediction, here, self._quality.usual_support())
         if match is not None:
-            self._recovery = None
-            self._doubt.count(False)
-            self._belief.relocated(coarse(self._numbers.relocalise))
+            self._relocalisation = None
+            self._quality.count(False)
+            self._pose_covariance.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
         if recovery.elapsed_s > self._numbers.quality.give_up_s:
             # elsewhere: go on from here, as on the first frame
-            self._recovery = None
-            self._doubt.give_up()
+            self._relocalisation = None
+            self._quality.give_up()
         return unmatched(predicted, matched=here.matched, score=here.score), "lost"
 
     def _compare(
@@ -192,10 +192,10 @@ class ShuntingSlam:
         """Let the network see the frame, unless the map in view contradicts it; the state."""
         if state != "tracking":
             return state
-        stamp(self.network, observations, match.T_map_robot)
+        rasterise(self.network, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
         step = min(prediction.elapsed, self.config.map.longest_look_s)
-        doubt, doubtful = self._doubt, False
+        doubt, doubtful = self._quality, False
         enough = self._numbers.relocalise.least_weight
         if float(observations.weights.sum()) >= enough and doubt.arises(match.matched):
             confirmed, contradicted, _ = self.network.integrate(
@@ -207,7 +207,7 @@ class ShuntingSlam:
         if doubtful and doubt.scans <= doubt.config.patience:
             self.network.release()
             if doubt.scans >= doubt.config.lost_after and doubt.suspicious:
-                self._recovery = Recovery(self.network, self._matcher)
+                self._relocalisation = Relocalisation(self.network, self._matcher)
             return "lost" if doubt.scans > doubt.config.lost_after else "frozen"
         confirmed, contradicted, _ = self.network.integrate(
             observations.view, T_map_laser, step, write=True
@@ -221,18 +221,18 @@ class ShuntingSlam:
     def _update_uncertainty(
         self, prediction: Prediction, match: Match, evidence: Evidence | None, state: str
     ) -> None:
-        self._belief.update(self._T_map_robot, prediction, match, evidence)
+        self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
         if state == "tracking" and not match.slipped:
-            self._increments.learn(prediction, match)
+            self._odometry_noise.learn(prediction, match)
         else:
-            self._increments.skip()
+            self._odometry_noise.skip()
 
     def _add_to_path(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
     ) -> None:
         """For closing loops: motion as matched, or by odometry where an end of it is in doubt."""
         motion = se2.between(self._T_map_robot, match.T_map_robot)
-        covariance = self._belief.newest_drift
+        covariance = self._pose_covariance.newest_drift
         if state != "tracking" or not self._trusted:
             motion, covariance = prediction.increment, prediction.covariance
         self._trusted = state in ("tracking", "relocated")
@@ -247,16 +247,16 @@ class ShuntingSlam:
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=match.T_map_robot,
-            covariance=self._belief.covariance,
+            covariance=self._pose_covariance.covariance,
             converged=state in ("tracking", "relocated"),
             diagnostics={
                 "state": state,
                 "matched": match.matched,
                 "searched": match.searched,
                 "evaluations": match.evaluations,
-                "unobservable": self._belief.unobservable,
-                "unobservable_rad": self._belief.along_rad,
-                "nis": self._increments.nis,
+                "unobservable": self._pose_covariance.unobservable,
+                "unobservable_rad": self._pose_covariance.along_rad,
+                "nis": self._odometry_noise.nis,
             },
         )
 
@@ -281,11 +281,11 @@ class ShuntingSlam:
         state = memory.State(
             kind=type(self).__name__,
             T_map_robot=self._T_map_robot,
-            covariance=self._belief.covariance,
-            usual=tuple(self._doubt.matches),
-            supports=tuple(self._doubt.supports),
-            tracked_s=self._doubt.tracked_s,
-            tracked=self._doubt.tracked,
+            covariance=self._pose_covariance.covariance,
+            usual=tuple(self._quality.matches),
+            supports=tuple(self._quality.supports),
+            tracked_s=self._quality.tracked_s,
+            tracked=self._quality.tracked,
         )
         memory.save(path, self.network, state)
 
@@ -309,8 +309,8 @@ class ShuntingSlam:
             raise LogFormatError(path, str(error)) from error
         slam._T_map_robot = state.T_map_robot
         slam._resumed = state.covariance + coarse(config.tracking.relocalise)
-        slam._belief.resumed(state.covariance)
-        slam._doubt.resume(state.usual, state.supports, state.tracked_s, state.tracked)
+        slam._pose_covariance.resumed(state.covariance)
+        slam._quality.resume(state.usual, state.supports, state.tracked_s, state.tracked)
         return slam
 
     def trajectory(self) -> Trajectory:

@@ -18,7 +18,7 @@ from slam.frames import LaserSpec, Scan
 from slam.frontend.observations import from_scan
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from slam.shunting.matching.matcher import Matcher
 from slam.shunting.uncertainty.covariances import advance, carried, innovation, observable
 from slam.shunting.uncertainty.residuals import look
@@ -55,7 +55,7 @@ def _run_all() -> None:
     observable(covariance, 0.0, 2.0, np.eye(3))
     innovation(covariance, covariance, covariance, origin, 1.0)
     for write in (False, True):
-        stamp(network, seen, origin)
+        rasterise(network, seen, origin)
         network.integrate(seen.view, origin, 1.0, write=write)
     start = matcher.approach(network, seen, origin, covariance)
     matcher.climb(network, seen, start, origin, np.linalg.inv(covariance))

@@ -68,7 +68,7 @@ def _touch(cells: Cells, column: int, row: int) -> int:
 
 
 @inner
-def _stamp_point(
+def _rasterise_point(
     cells: Cells,
     u: float,
     v: float,
@@ -113,7 +113,7 @@ def _stamp_point(
 
 
 @inner
-def _stamp_stretch(
+def _rasterise_stretch(
     cells: Cells,
     u: float,
     v: float,
@@ -182,18 +182,18 @@ def _stamp(
         d = (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale
         u, v = points[k, 0] / cell - 0.5, points[k, 1] / cell - 0.5
         faced = turned_face(facings[k], theta)
-        if not _stamp_point(cells, u, v, (a, b, d), faced, ends, bell):
+        if not _rasterise_point(cells, u, v, (a, b, d), faced, ends, bell):
             return k
         if joined[k]:
             du, dv = points[k + 1, 0] / cell - 0.5 - u, points[k + 1, 1] / cell - 0.5 - v
-            if du * du + dv * dv > 1.0 and not _stamp_stretch(
+            if du * du + dv * dv > 1.0 and not _rasterise_stretch(
                 cells, u, v, du, dv, a, faced, ends, bell
             ):
                 return k
     return len(points)
 
 
-def stamp(network: Network, observations: Observations, T_map_robot: Float) -> None:
+def rasterise(network: Network, observations: Observations, T_map_robot: Float) -> None:
     """Write the impressions of ``observations`` seen from ``T_map_robot`` onto the network."""
     points_map = se2.transform(T_map_robot, observations.points_robot)
     if len(points_map) == 0:

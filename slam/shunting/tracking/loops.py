@@ -23,7 +23,7 @@ from slam.frontend.odometry_prior import inverted
 from slam.posegraph import Edge, carried, optimise
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from slam.shunting.matching.global_search import coarse_field, places
 from slam.shunting.matching.matcher import Match, Matcher
 from slam.shunting.tracking.relocalise import coarse, spread, support
@@ -258,7 +258,7 @@ class Loops:
         network = Network(self._config)
         for k in members:
             key, pose = self.keys[k], se2.between(self._chained[origin], self._chained[k])
-            stamp(network, key.observations, pose)
+            rasterise(network, key.observations, pose)
             T_map_laser = se2.compose(pose, key.observations.T_robot_laser)
             network.integrate(key.observations.view, T_map_laser, self._numbers.look_s, write=True)
         return network

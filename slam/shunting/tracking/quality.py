@@ -17,7 +17,7 @@ from slam.frames import Float
 from slam.shunting.tracking.config import QualityConfig
 
 
-class Doubt:
+class TrackingQuality:
     """What frames so far were like, and whether the next one fits.
 
     freeze_below  share of the usual match, see ``ShuntingConfig``; 0: never in doubt

@@ -17,7 +17,7 @@ from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from slam.shunting.matching.global_search import places
 from slam.shunting.matching.local_search import SearchWindow
 from slam.shunting.matching.matcher import Match, Matcher
@@ -73,7 +73,7 @@ class Hypothesis:
         return _near(self.match.T_map_robot, other.match.T_map_robot, config)
 
 
-class Recovery:
+class Relocalisation:
     """Follows hypotheses from the scan on that found the robot lost."""
 
     def __init__(self, network: Network, matcher: Matcher) -> None:
@@ -164,7 +164,7 @@ def support(network: Network, observations: Observations, match: Match) -> float
     The second factor is what tells a corridor from the room beside it: there the beams pass where
     walls are known to be.
     """
-    stamp(network, observations, match.T_map_robot)
+    rasterise(network, observations, match.T_map_robot)
     T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
     confirmed, contradicted, _ = network.integrate(observations.view, T_map_laser, 0.0, write=False)
     network.release()

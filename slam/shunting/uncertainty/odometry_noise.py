@@ -15,7 +15,7 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float, Odometry
-from slam.frontend.odometry_bias import TurnBias
+from slam.frontend.odometry_bias import HeadingBias
 from slam.frontend.odometry_prior import Prediction, predict
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.matching.matcher import Match
@@ -28,7 +28,7 @@ def _noise_share(config: ShuntingConfig) -> float:
     return (numbers.sensor_sigma_m / (numbers.sigma_cells * config.cell_m)) ** 2 / 2.0
 
 
-class Increments:
+class OdometryNoise:
     """Predicts, and learns from what became of it.
 
     scales  (2,) of the variances of translation and rotation
@@ -42,7 +42,7 @@ class Increments:
         noise_share: float,
         *,
         least_stated: float,
-        bias: TurnBias | None,
+        bias: HeadingBias | None,
     ) -> None:
         """``noise_share``: variance of a match by the noise of what was seen, over what the match's
         information claims; ``least_stated``: least scale of a covariance that a log states.
@@ -60,7 +60,7 @@ class Increments:
     @classmethod
     def of_beams(cls, config: ShuntingConfig) -> Self:
         """Matches of scans, whose information is the curvature of overlaps between bells."""
-        least, bias = config.uncertainty.odometry.least_stated, TurnBias(config.frontend.bias)
+        least, bias = config.uncertainty.odometry.least_stated, HeadingBias(config.frontend.bias)
         return cls(config, _noise_share(config), least_stated=least, bias=bias)
 
     @classmethod

@@ -28,7 +28,7 @@ from slam.shunting.uncertainty.covariances import advance, carried, observable
 from slam.shunting.uncertainty.residuals import Evidence
 
 
-class Belief:
+class PoseCovariance:
     """The covariance of the pose.
 
     covariance    (3, 3) of (x, y, theta) in the map frame; zero at the known start

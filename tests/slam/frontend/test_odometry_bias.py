@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from slam.frontend.odometry_bias import TurnBias
+from slam.frontend.odometry_bias import HeadingBias
 
 SAID = math.radians(0.3)  # per step, by odometry
 WELL = np.diag([1e4, 1e4, 1e6])
 
 
 def drive(
-    bias: TurnBias, per_m: float, per_rad: float, information: NDArray[np.float64], noise: float
+    bias: HeadingBias, per_m: float, per_rad: float, information: NDArray[np.float64], noise: float
 ) -> None:
     """300 steps of a robot whose heading the map corrects after each."""
     rng = np.random.default_rng(1)
@@ -34,14 +34,14 @@ def drive(
 
 
 def test_it_finds_what_the_wheels_add() -> None:
-    bias = TurnBias()
+    bias = HeadingBias()
     drive(bias, 0.015, -0.03, WELL, SAID)
     assert bias.per_m == pytest.approx(0.015, abs=0.006)  # 2 sigma
     assert bias.per_rad == pytest.approx(-0.03, abs=0.02)
 
 
 def test_it_learns_nothing_where_the_map_tells_nothing() -> None:
-    bias = TurnBias()
+    bias = HeadingBias()
     drive(bias, 0.015, -0.03, np.diag([1e4, 1e4, 1.0]), SAID)
     assert (bias.per_m, bias.per_rad) == (0.0, 0.0)
     # A heading that a shift aside explains as well is not told either.
@@ -51,7 +51,7 @@ def test_it_learns_nothing_where_the_map_tells_nothing() -> None:
 
 
 def test_a_wheel_that_slips_teaches_nothing() -> None:
-    bias = TurnBias()
+    bias = HeadingBias()
     drive(bias, 0.0, 0.0, WELL, 0.0)
     before = bias.per_m
     bias.learn(np.array([0.15, 0.0, 0.0]), 0.2, (SAID**2, SAID**2), (1.0, 10.0 * SAID, WELL))

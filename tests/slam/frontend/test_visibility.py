@@ -16,7 +16,7 @@ from slam.frontend.seen_space import FREE_WITHOUT_RETURN_M
 from slam.frontend.visibility import View
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from tests.world2d import World2D, laser, rectangle
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ def seen_from(pose: Array, n_beams: int) -> Observations:
 
 
 def look(network: Network, seen: Observations, pose: Array, *, write: bool) -> tuple[float, float]:
-    stamp(network, seen, pose)
+    rasterise(network, seen, pose)
     T_map_laser = se2.compose(pose, seen.T_robot_laser)
     confirmed, contradicted, _ = network.integrate(seen.view, T_map_laser, 0.2, write=write)
     network.release()
@@ -73,7 +73,7 @@ def cleared(ranges: Array, at: Array) -> NDArray[np.bool_]:
     points = Features(
         stamp_ns=0, points_robot=at, covariances=np.tile(1e-4 * np.eye(2), (len(at), 1, 1))
     )
-    stamp(network, from_features(points, CONFIG), np.zeros(3))
+    rasterise(network, from_features(points, CONFIG), np.zeros(3))
     blind = View(math.tau / 8, np.zeros(8), np.zeros(8), 50.0, 0.0, math.inf)
     network.integrate(blind, np.zeros(3), 1.0, write=True)
     before = [float(network.window(*p, *p)[0].sum()) for p in at]

@@ -20,7 +20,7 @@ from slam.shunting.config import ShuntingConfig
 from slam.shunting.featured import PAPER_REWARD, FeaturedShuntingSlam
 from slam.shunting.map.network import Network
 from slam.shunting.map.peaks import peaks
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from slam.shunting.matching.matcher import Match
 from slam.trajectory import Trajectory
 
@@ -31,7 +31,7 @@ def network_of(points: np.ndarray, **options: float) -> Network:
     covariances = np.repeat(1e-4 * np.eye(2)[None], len(points), axis=0)
     features = Features(stamp_ns=0, points_robot=points, covariances=covariances)
     seen = from_features(features, config)
-    stamp(network, seen, np.zeros(3))
+    rasterise(network, seen, np.zeros(3))
     network.integrate(seen.view, np.zeros(3), 1.0, write=True)
     return network
 
@@ -67,7 +67,7 @@ def test_a_peak_is_as_wide_as_what_was_seen_and_as_old_as_it_was_looked_at():
     network, at = Network(config), np.array([[3.01, 1.02]])
     features = Features(stamp_ns=0, points_robot=at, covariances=told[None])
     for _ in range(4):
-        stamp(network, from_features(features, config), np.zeros(3))
+        rasterise(network, from_features(features, config), np.zeros(3))
         seen = from_features(features, config)
         network.integrate(seen.view, np.zeros(3), 0.5, write=True)
     there = peaks(network, 0.05)
@@ -152,8 +152,8 @@ def test_odometry_is_never_trusted_more_than_it_states_beside_points():
     system = FeaturedShuntingSlam(cell_m=0.01, range_m=12.5, freeze_below=0.0)
     for frame in frames:
         system.update(frame.without_truth())
-        assert (system._increments.scales >= 1.0).all()
-    assert system._increments.bias is None
+        assert (system._odometry_noise.scales >= 1.0).all()
+    assert system._odometry_noise.bias is None
 
 
 def poses_of(frames: list[Frame], **options: Any) -> np.ndarray:

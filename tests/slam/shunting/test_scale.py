@@ -14,7 +14,7 @@ from slam.frontend.observations import from_scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.map.grid import FREE_COUNT, TOUCHED_COUNT, living
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from slam.shunting.matching.branch_and_bound import Search
 from slam.shunting.matching.local_search import SearchWindow
 from slam.shunting.matching.matcher import Matcher
@@ -88,7 +88,7 @@ def test_blocks_of_impressions_that_are_forgotten_die() -> None:
     observations = from_scan(STREAM[0].scan, np.zeros(3), CONFIG)
     slots = len(network.cells.free)
     for k in range(20):
-        stamp(network, observations, np.array([30.0 + k, 0.3 * k, 0.1 * k]))
+        rasterise(network, observations, np.array([30.0 + k, 0.3 * k, 0.1 * k]))
         network.release()
     _, places = living(network.cells)
     assert len(places) == (directory >= 0).sum()
@@ -107,7 +107,7 @@ def test_every_slot_is_either_free_or_lives_once() -> None:
         assert frame.scan is not None
         observations = from_scan(frame.scan, np.zeros(3), CONFIG)
         pose = rng.uniform([-6.0, -6.0, -3.0], [6.0, 6.0, 3.0])
-        stamp(network, observations, pose)
+        rasterise(network, observations, pose)
         T_map_laser = se2.compose(pose, observations.T_robot_laser)
         network.integrate(observations.view, T_map_laser, 2.0, write=bool(rng.random() < 0.7))
         network.release()

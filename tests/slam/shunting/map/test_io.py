@@ -83,7 +83,7 @@ def test_a_robot_that_was_carried_off_finds_itself_in_the_loaded_map(
     saved: tuple[Path, ShuntingSlam, list[Frame]],
 ) -> None:
     slam = ShuntingSlam.load(saved[0])
-    slam._doubt.tracked_s = max(slam._doubt.tracked_s, 10.0)
+    slam._quality.tracked_s = max(slam._quality.tracked_s, 10.0)
     drive = Drive((2.0, -2.0, 2.0), ((0.2, 0.3, 6.0),))
     for frame in frames(ROOMS, drive, rate_hz=5.0, seed=9):
         estimate = slam.update(frame.without_truth())

@@ -18,7 +18,7 @@ from slam.frontend.visibility import View, view_of_beams, view_of_features
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.energy import energy, shunting_terms
 from slam.shunting.map.network import SIDE, Network, lateral_mu
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 
 Array = NDArray[np.float64]
 ORIGIN = np.zeros(3)
@@ -43,7 +43,7 @@ def point(x: float, y: float, cell: float, view: View = BLIND) -> Observations:
 def look(network: Network, observations: Observations | None, step: float) -> None:
     """One update, with an observation or with an empty view over everything."""
     if observations is not None:
-        stamp(network, observations, ORIGIN)
+        rasterise(network, observations, ORIGIN)
     view = OPEN if observations is None else observations.view
     network.integrate(view, np.array([-5.0, 0.0, 0.0]), step, write=True)
 

@@ -14,7 +14,7 @@ from slam.frames import Features
 from slam.frontend.observations import Observations, from_features
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 
 Array = NDArray[np.float64]
 CELL, N = 0.1, 20  # the field of N x N neurons from the origin on
@@ -31,7 +31,7 @@ def inspired(observations: Observations, pose: Array) -> Array:
     """(N, N) I, found from the activities after a step of 1 s in an empty network: x = I / (1 + A +
     I), so I = (1 + A) x / (1 - x)."""
     network = Network(CONFIG)
-    stamp(network, observations, pose)
+    rasterise(network, observations, pose)
     network.integrate(observations.view, pose, 1.0, write=True)
     x, _ = network.window(CENTRES[0], CENTRES[0], CENTRES[-1], CENTRES[-1])
     wide = x.astype(np.float64)

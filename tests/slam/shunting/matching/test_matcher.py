@@ -17,7 +17,7 @@ from slam.frontend.odometry_prior import inverted, predict, turned
 from slam.frontend.surfaces import join
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from slam.shunting.matching.local_search import SearchWindow
 from slam.shunting.matching.matcher import Matcher, seen_by
 from slam.shunting.matching.score import evaluate
@@ -42,7 +42,7 @@ def room(T_map_robot: Array | None = None) -> Network:
     pose = np.zeros(3) if T_map_robot is None else T_map_robot
     network = Network(CONFIG)
     observations = from_scan(room_scan(pose), np.zeros(3), CONFIG)
-    stamp(network, observations, pose)
+    rasterise(network, observations, pose)
     T_map_laser = se2.compose(pose, observations.T_robot_laser)
     network.integrate(observations.view, T_map_laser, 1.0, write=True)
     return network
@@ -109,7 +109,7 @@ def test_features_match_through_the_same_interface() -> None:
     landmarks = rng.uniform(-8.0, 8.0, (25, 2))
     network, matcher = Network(CONFIG), Matcher(CONFIG)
     seen = from_features(features_at(landmarks, 0.05), CONFIG)
-    stamp(network, seen, np.zeros(3))
+    rasterise(network, seen, np.zeros(3))
     network.integrate(seen.view, np.zeros(3), 1.0, write=True)
     truth = np.array([0.05, 0.04, -0.006])
     again = features_at(se2.transform(se2.inverse(truth), landmarks), 0.05)
@@ -227,14 +227,14 @@ def test_the_other_face_of_a_thin_wall_does_not_count() -> None:
     matcher = Matcher(CONFIG)
     known = seen_from(south)
     for _ in range(20):
-        stamp(network, known, south)
+        rasterise(network, known, south)
         laser_pose = se2.compose(south, known.T_robot_laser)
         network.integrate(known.view, laser_pose, 0.2, write=True)
     firm = 1e6 * np.eye(3)
     moved = north - np.array([0.0, 0.08, 0.0])  # where its two faces fall into one
     assert matcher.climb(network, known, south, south, firm).matched > 0.95
     assert matcher.climb(network, seen_from(north), moved, moved, firm).matched < 0.05
-    stamp(network, seen_from(north), moved)
+    rasterise(network, seen_from(north), moved)
     confirmed, _, _ = network.integrate(
         known.view, se2.compose(moved, spec.T_robot_laser), 0.2, write=False
     )

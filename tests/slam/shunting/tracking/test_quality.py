@@ -7,23 +7,23 @@ import numpy as np
 import pytest
 
 from slam.shunting.tracking.config import QualityConfig
-from slam.shunting.tracking.quality import Doubt
+from slam.shunting.tracking.quality import TrackingQuality
 
 QUALITY = QualityConfig()
 
 STEP, JUMP = np.array([0.1, 0.0, 0.05]), np.array([0.0, 0.6, 0.0])
 
 
-def grown(freeze_below: float = 0.35) -> Doubt:
+def grown(freeze_below: float = 0.35) -> TrackingQuality:
     """After 12.5 s in which 0.8 of each scan matched and 0.9 of the map in view was confirmed."""
-    doubt = Doubt(freeze_below, QUALITY)
+    doubt = TrackingQuality(freeze_below, QUALITY)
     for _ in range(50):
         doubt.learn(0.8, 9.0, 1.0, 0.25)
     return doubt
 
 
 def test_a_young_map_cannot_deny_and_a_grown_one_can():
-    assert not Doubt(0.35, QUALITY).suspicious
+    assert not TrackingQuality(0.35, QUALITY).suspicious
     assert grown().suspicious
     assert grown().usual_match() == pytest.approx(0.8)
     assert grown().usual_support() == pytest.approx(0.72)
@@ -33,10 +33,10 @@ def test_a_young_map_cannot_deny_and_a_grown_one_can():
 def test_only_a_match_far_below_the_usual_raises_the_question():
     assert not grown().arises(0.57)  # 0.71 of the usual match
     assert grown().arises(0.55)
-    assert not Doubt(0.35, QUALITY).arises(
+    assert not TrackingQuality(0.35, QUALITY).arises(
         0.36
     )  # nothing is known yet: the usual match is taken to be 1
-    assert Doubt(0.35, QUALITY).arises(0.34)
+    assert TrackingQuality(0.35, QUALITY).arises(0.34)
 
 
 def test_a_third_of_the_map_in_view_denied_raises_doubt_and_a_fifth_keeps_it_up():

@@ -15,11 +15,11 @@ from slam.frontend.observations import from_scan
 from slam.frontend.odometry_prior import Prediction
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import stamp
+from slam.shunting.map.rasterise import rasterise
 from slam.shunting.matching.matcher import Match, Matcher
 from slam.shunting.uncertainty.covariances import innovation, observable
-from slam.shunting.uncertainty.odometry_noise import Increments
-from slam.shunting.uncertainty.pose_covariance import Belief
+from slam.shunting.uncertainty.odometry_noise import OdometryNoise
+from slam.shunting.uncertainty.pose_covariance import PoseCovariance
 from slam.shunting.uncertainty.residuals import Evidence, look
 from slam.system import Estimate
 from tests.world2d import Drive, World2D, arena, frames, laser, rectangle, wander
@@ -91,7 +91,7 @@ def mapped(world: World2D) -> tuple[Network, list[Scan]]:
     for scan in scans[:80]:
         assert scan is not None
         seen = from_scan(scan, np.zeros(3), CONFIG)
-        stamp(network, seen, np.zeros(3))
+        rasterise(network, seen, np.zeros(3))
         network.integrate(seen.view, seen.T_robot_laser, 0.2, write=True)
     return network, [scan for scan in scans[80:] if scan is not None]
 
@@ -164,7 +164,7 @@ def test_innovations_have_the_nis_of_prior_and_match_together() -> None:
 
 
 def corrected(
-    increments: Increments, rng: np.random.Generator, given: Float | None, true: Float
+    increments: OdometryNoise, rng: np.random.Generator, given: Float | None, true: Float
 ) -> float | None:
     """One step of 0.2 m whose odometry errs by ``true`` (3,) standard deviations; its NIS."""
     before = Odometry(stamp_ns=0, T_odom_robot=np.zeros(3))
@@ -196,7 +196,7 @@ def test_scales_of_odometry_are_found_whatever_is_stated(stated: float | None) -
     """``stated`` times the true standard deviations, or nothing: the NIS settles near 3."""
     true = np.array([0.01, 0.006, 0.012])
     given = None if stated is None else np.diag((stated * true) ** 2)
-    increments, rng = Increments.of_beams(CONFIG), np.random.default_rng(6)
+    increments, rng = OdometryNoise.of_beams(CONFIG), np.random.default_rng(6)
     values = [corrected(increments, rng, given, true) for _ in range(1200)]
     settled = np.array([v for v in values[400:] if v is not None])
     assert 0.6 < settled.mean() / 3.0 < 1.6
@@ -212,7 +212,7 @@ def test_nees_is_right_when_the_errors_are_what_the_belief_was_told() -> None:
     Q = np.diag([0.01**2, 0.005**2, 0.01**2])
     root = np.linalg.cholesky(Q)
     for _ in range(300):
-        belief, estimate, truth = Belief(CONFIG), np.zeros(3), np.zeros(3)
+        belief, estimate, truth = PoseCovariance(CONFIG), np.zeros(3), np.zeros(3)
         for _ in range(20):
             c, s = math.cos(estimate[2]), math.sin(estimate[2])
             R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -239,7 +239,7 @@ def test_nees_is_right_when_the_errors_are_what_the_belief_was_told() -> None:
 def standing(shared_m: float, in_view: float) -> tuple[Float, Float]:
     """Covariances of a robot that stands and sees the same surfaces, after 300 and 600 scans."""
     geometry = np.diag([0.5, 0.5, 4.0])
-    belief = Belief(ShuntingConfig())
+    belief = PoseCovariance(ShuntingConfig())
     evidence = Evidence(
         geometry=20.0 * geometry,
         weighed=20.0,
@@ -288,7 +288,7 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
     geometry = np.diag([0.5, 0.5, 4.0])
     left = {}
     for new in (0.0, 0.2):
-        belief = Belief(ShuntingConfig())
+        belief = PoseCovariance(ShuntingConfig())
         T = np.zeros(3)
         drive = Prediction(
             T_map_robot=T,
@@ -323,7 +323,7 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
 @pytest.mark.parametrize("blind_s", [700.0, 16000.0])
 def test_long_blindness_leaves_a_covariance_that_can_be(blind_s: float) -> None:
     """Faded sums come to stand at the smallest numbers there are; they must count as nothing."""
-    belief, T = Belief(CONFIG), np.zeros(3)
+    belief, T = PoseCovariance(CONFIG), np.zeros(3)
     nothing = Evidence(
         geometry=np.zeros((3, 3)),
         weighed=0.0,
