@@ -17,6 +17,7 @@ CALLS = {"eval", "exec", "compile", "__import__", "joblib.load", "joblib.dump", 
 IMPORTERS = {
     "slam/system.py": "module:Class, refused for names from files",
     "scenes/registry.py": "module:function, the same",
+    "sim/sensors/lidar/registry.py": "the models of our own folder",
     "slam/guests/guest.py": "the two guests, by constants",
     "sim/view/camera.py": "the GL libraries, by constants",
     "scripts/workers.py": "Dask",

@@ -149,7 +149,7 @@ def without_timings(rows):
 def test_killed_and_resumed_and_one_slam_more(tmp_path):
     """Kill -9 after the first result; the same command ends with the same numbers and frames."""
     command = (
-        "from pathlib import Path; from scripts.comparison import verb; "
+        "from pathlib import Path; from scripts.verbs import compare as verb; "
         "from scripts.comparison.plan import Plan; "
         "verb.carry_out(Plan(slams=('odometry', 'occupancy'), scenes=('arena',), levels=(1.0,),"
         f" seeds=(7,), seconds={SECONDS}), Path({str(tmp_path / 'a')!r}))"
