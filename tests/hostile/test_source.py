@@ -33,6 +33,7 @@ STARTERS = {
     "slam/guests/wire.py": "pipe:COMMAND, refused for names from files; our own Python",
     "slam/guests/guarding.py": "the guard, a file of ours",
     "sim/view/gl.py": "our own Python, without the working folder",
+    "scripts/film/encode.py": "ffmpeg",
     "scripts/robustness/kills.py": "our own Python",
     "scripts/quotes/results.py": "git, for the commit of a results file",
     "scripts/experiments/compare_irsim.py": "an interpreter that the user names",
