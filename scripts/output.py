@@ -19,6 +19,7 @@ from typing import Any
 from sim.core.versions import WORLD
 from sim.recording.sums import check_vouched, write_sums
 from slam import locks
+from slam.bounded import check_file
 from slam.errors import LogFormatError, OutputError
 from slam.files import (
     PART,
@@ -276,6 +277,7 @@ def _plain(value: Any) -> Any:
 
 def read_recipe_words(path: Path) -> dict[str, Any]:
     """The object in a ``recipe.json`` of whatever command; ``LogFormatError`` for anything else."""
+    check_file(path)
     try:
         with path.open("rb") as file:
             raw = file.read(MAX_RECIPE_BYTES + 1)

@@ -17,6 +17,7 @@ from scripts.single_run.session import file_name
 from sim.recording.dataset import PLAN, check_dataset
 from sim.recording.sums import SUMS, Fault, check_vouched, faults
 from sim.recording.verify import METADATA, Finding, check_hashes, finding, listed_in
+from slam.bounded import check_file
 from slam.errors import LogFormatError
 from slam.maps import read_map
 from slam.shunting.map import io as memory
@@ -76,16 +77,19 @@ def _check_result(folder: Path) -> list[Finding]:
                 why = f"{folder / SUMS} does not list {name}"
                 found.append(Fault(kind="damaged", name=name, why=why))
     inner = [path.parent for path in sorted(folder.glob(f"*/{SUMS}"))]
+    inner = [path for path in inner if not path.is_symlink()]  # foreign, and may lead back here
     return [finding(folder.resolve().name, found), *(f for one in inner for f in check(one))]
 
 
 def _wanted(folder: Path) -> list[str]:
     """What must be in it, as far as its recipe and its table can be read."""
+    names = [RECIPE]
     try:
+        check_file(folder / RECIPE)
         with (folder / RECIPE).open("rb") as file:
             recipe: Any = json.loads(file.read(MAX_RECIPE_BYTES))
         command = str(recipe["command"])
-        names = [RECIPE, *_ALWAYS.get(command, ())]
+        names += _ALWAYS.get(command, ())
         if command in ("run", "demo"):
             slams = recipe["settings"].get("slams", [])
             names += [f"trajectory_{file_name(str(slam))}.tum" for slam in slams]
@@ -95,7 +99,7 @@ def _wanted(folder: Path) -> list[str]:
             names += [f"runs/{Run(scene=s, dynamism=d, seed=k).name}.npz" for s, d, k in runs]
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return [RECIPE]  # damaged, which its hash says
-    except LogFormatError:
+    except LogFormatError:  # the same
         return names
     return sorted(names)
 

@@ -40,6 +40,8 @@ from slam.frames import (
     StreamMetadata,
 )
 
+MOST_FRAMES = 1 << 31  # of one simulation: almost two years
+
 
 class Simulation:
     """A world seen by its robot: each ``observe`` is one whole scan and the frame it makes.
@@ -279,7 +281,11 @@ def n_frames(seconds: float, period_s: float) -> int:
     """Whole scans in ``seconds``."""
     if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds > 0.0):
         raise InvalidValueError(f"seconds must be > 0 and finite, got {seconds!r}")
-    return max(1, round(seconds / period_s))
+    count = seconds / period_s
+    if count > MOST_FRAMES:
+        most_s = MOST_FRAMES * period_s
+        raise InvalidValueError(f"seconds must be at most {most_s:g}, got {seconds!r}")
+    return max(1, round(count))
 
 
 def stream(

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import stat
 import struct
 import zipfile
 import zlib
@@ -16,6 +15,7 @@ from typing import IO, Any
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from slam.bounded import check_file
 from slam.errors import LogFormatError
 
 MAX_BYTES = 1 << 31  # of all arrays unpacked: more than any file of ours
@@ -43,7 +43,7 @@ def read_arrays(
     the archive claims. Objects (pickles) are refused. Raises ``LogFormatError``, which names the
     file, for one that is missing, torn, damaged, too large or lacks a name.
     """
-    _check_is_file(path)
+    check_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
             members = _members(path, archive)
@@ -62,17 +62,6 @@ def read_arrays(
     except BROKEN as error:
         why = f"{type(error).__name__}: {error}"
         raise LogFormatError(path, f"no whole NumPy archive ({why})") from error
-
-
-def _check_is_file(path: Path) -> None:
-    """Before it is opened: a named pipe would wait for ever."""
-    try:
-        mode = path.stat().st_mode
-    except (OSError, ValueError) as error:  # the last: a null byte in the name
-        why = getattr(error, "strerror", None) or error
-        raise LogFormatError(path, f"cannot be read: {why}") from error
-    if not stat.S_ISREG(mode):
-        raise LogFormatError(path, "cannot be read: not a file")
 
 
 def _members(path: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:

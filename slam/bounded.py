@@ -9,18 +9,26 @@ from pathlib import Path
 from slam.errors import LogFormatError
 
 
-def bytes_of(path: Path, most: int) -> bytes:
-    """``path.read_bytes``; ``LogFormatError`` unless it is a file of at most ``most`` bytes."""
+def check_file(path: Path) -> None:
+    """``LogFormatError`` for what is no file: a named pipe, once opened, would wait for ever."""
     try:
-        found = path.stat()  # before it is opened: a named pipe would wait for ever
-        if not stat.S_ISREG(found.st_mode):
+        if not stat.S_ISREG(path.stat().st_mode):
             raise LogFormatError(path, "cannot be read: not a file")
-        if found.st_size > most:
-            raise LogFormatError(path, f"has {found.st_size} bytes; at most {most} are allowed")
-        return path.read_bytes()
     except (OSError, ValueError) as error:  # the last: a null byte in the name
         why = getattr(error, "strerror", None) or error
         raise LogFormatError(path, f"cannot be read: {why}") from error
+
+
+def bytes_of(path: Path, most: int) -> bytes:
+    """``path.read_bytes``; ``LogFormatError`` unless it is a file of at most ``most`` bytes."""
+    check_file(path)
+    try:
+        size = path.stat().st_size
+        if size > most:
+            raise LogFormatError(path, f"has {size} bytes; at most {most} are allowed")
+        return path.read_bytes()
+    except OSError as error:
+        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
 
 
 def text_of(path: Path, most: int) -> str:

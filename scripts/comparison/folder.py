@@ -27,6 +27,7 @@ from scripts.comparison.plan import Run
 from scripts.output import check_whole
 from sim.recording.sums import check_vouched
 from slam.archives import read_arrays
+from slam.bounded import check_file
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing, write_text
 from slam.frames import Float
@@ -224,6 +225,7 @@ _WORDS = frozenset(
 
 def read_csv(path: Path) -> list[Row]:
     """The rows of a table: numbers as floats, empty cells as None; vouched for, if by anything."""
+    check_file(path)
     check_vouched(path)
     try:
         with path.open(newline="", encoding="utf-8") as file:
@@ -245,6 +247,7 @@ def _value(column: str, cell: str) -> Any:
 
 def read_json(path: Path) -> Row:
     """The object of a JSON file; vouched for, if by anything."""
+    check_file(path)
     check_vouched(path)
     try:
         data: Row = json.loads(path.read_text(encoding="utf-8"))

@@ -18,6 +18,7 @@ from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
 from sim.recording.verify import Finding, check_hashes, finding, listed_in
 from sim.twins.twins import TWINS
 from slam import locks
+from slam.bounded import check_file
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import PART, is_part, make_folder, reason, write_text
 
@@ -244,6 +245,7 @@ def _claim(path: Path, plan: Plan) -> None:
     """Leave the plan in an empty folder; refuse one that has another."""
     file = path / PLAN
     if file.exists():
+        check_file(file)
         if file.read_text(encoding="utf-8", errors="replace") != plan.text():
             raise OutputError(f"{file} is of another dataset: choose another --out")
         return

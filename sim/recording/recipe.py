@@ -25,6 +25,7 @@ from sim.sensors.odometry.config import PRESETS
 from sim.simulation import Simulation
 from sim.twins.twins import TWINS
 from sim.world.world import World
+from slam.bounded import check_file
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.files import write_text
 from slam.names import NameFromFile
@@ -202,6 +203,7 @@ def read_recipe(path: Path) -> Made:
     The scene's name is one from a file: no code runs by it (``slam.names``). The recipe may be of
     another version of the world: ``sim.core.versions.check_world`` before it is simulated.
     """
+    check_file(path)
     try:
         with path.open("rb") as file:
             raw = file.read(MAX_BYTES + 1)

@@ -19,6 +19,7 @@ from pathlib import Path, PurePosixPath
 from typing import Literal, NoReturn
 
 from slam import locks
+from slam.bounded import check_file
 from slam.errors import LogFormatError
 from slam.files import write_text
 
@@ -41,6 +42,7 @@ class Fault:
 
 def sha256(path: Path) -> str:
     """Of a file, read in pieces; ``LogFormatError`` when it cannot be read."""
+    check_file(path)
     digest = hashlib.sha256()
     try:
         with path.open("rb") as file:
@@ -153,15 +155,17 @@ def _digest(path: Path) -> str:
         return sha256(path)
 
 
-def tree(folder: Path) -> tuple[set[str], set[str]]:
+def tree(folder: Path, *, results: bool = True) -> tuple[set[str], set[str]]:
     """Names of all files in the folder and below, and of what is neither file nor folder.
 
-    Links are such, and not followed; so are empty folders. A folder in it that has a SHA256SUMS of
-    its own is another result and left out. Raises ``LogFormatError`` for one that cannot be read.
+    results  whether a folder right in it that has a SHA256SUMS is another result and left out
+
+    Links are such, and not followed; so are empty folders. Raises ``LogFormatError`` for one that
+    cannot be read.
     """
     files, others = set(), set()
     for here, folders, names in os.walk(folder, onerror=_unreadable):
-        if here != os.fspath(folder) and SUMS in names:
+        if results and os.path.dirname(here) == os.fspath(folder) and SUMS in names:
             folders.clear()
             continue
         above = Path(here).relative_to(folder)
@@ -184,9 +188,12 @@ def _unreadable(error: OSError) -> NoReturn:
     raise LogFormatError(error.filename, f"cannot be read: {error.strerror}") from error
 
 
-def faults(folder: Path, listed: Mapping[str, str]) -> list[Fault]:
-    """What is wrong with a folder by the hashes that its SHA256SUMS lists, links unfollowed."""
-    files, others = tree(folder)
+def faults(folder: Path, listed: Mapping[str, str], *, results: bool = True) -> list[Fault]:
+    """What is wrong with a folder by the hashes that its SHA256SUMS lists, links unfollowed.
+
+    results  as of ``tree``
+    """
+    files, others = tree(folder, results=results)
     found = []
     for name, wanted in listed.items():
         path = folder / name

@@ -87,7 +87,7 @@ def check_hashes(folder: Path, planned: Recipe | None = None) -> Finding:
     if not listed:
         return finding(folder.name, found)
     try:
-        found = faults(folder, listed)
+        found = faults(folder, listed, results=False)
         made = read_recipe(folder / RECIPE)
     except LogFormatError as error:
         if not any(fault.name == RECIPE for fault in found):

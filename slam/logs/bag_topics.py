@@ -13,6 +13,7 @@ from rosbags.rosbag1 import Reader as ReaderOfRos1
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from slam.bounded import check_file
 from slam.errors import LogFormatError, MobiliaError
 from slam.logs import unpacking
 
@@ -67,6 +68,9 @@ class Bag:
         self.is_ros1 = path.suffix == ".bag" and not path.is_dir()
         if not path.exists():
             raise LogFormatError(path, "no such file")
+        for file in path.iterdir() if path.is_dir() else [path]:
+            if file.exists() and not file.is_dir():
+                check_file(file)
         with failing_as_ours(path):
             self._reader: Any = ReaderOfRos1(path) if self.is_ros1 else Reader(_storage(path))
         self._decode = ROS1.deserialize_ros1 if self.is_ros1 else ROS2.deserialize_cdr

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Named pipes, links and nested lists where files are expected: told, never waited for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from scripts.compare.folder import read_csv, read_json
+
+from scripts import results
+from scripts.output import read_recipe_words, write_recipe
+from sim.recording.episode import record
+from sim.recording.recipe import Recipe, read_recipe
+from sim.recording.sums import SUMS, check_vouched, write_sums
+from sim.recording.verify import check_hashes
+from sim.simulation import n_frames
+from slam.errors import InvalidValueError, LogFormatError
+from slam.logs.bag_topics import Bag
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Of some verb, whole."""
+    write_recipe(tmp_path, "other", {})
+    write_sums(tmp_path)
+    return tmp_path
+
+
+def piped(path: Path) -> Path:
+    path.unlink(missing_ok=True)
+    os.mkfifo(path)
+    return path
+
+
+def nested(folder: Path) -> None:
+    """A file that nobody lists, in a folder that claims to be a result."""
+    folder.mkdir(parents=True)
+    (folder / "strange.bin").write_bytes(b"x")
+    (folder / SUMS).write_text("0" * 64 + "  other.bin\n")
+
+
+@pytest.mark.parametrize(
+    ("read", "name"),
+    [
+        (read_recipe, "recipe.json"),
+        (read_recipe_words, "recipe.json"),
+        (check_vouched, "recipe.json"),
+        (read_csv, "runs.csv"),
+        (read_json, "runs.json"),
+        (Bag, "a.mcap"),
+    ],
+)
+def test_a_named_pipe_is_refused(read: Callable[[Path], object], name: str, folder: Path):
+    with pytest.raises(LogFormatError, match="not a file"):
+        read(piped(folder / name))
+
+
+def test_a_named_pipe_in_the_folder_of_a_bag_is_refused(tmp_path: Path):
+    piped(tmp_path / "a.mcap")
+    with pytest.raises(LogFormatError, match="not a file"):
+        Bag(tmp_path)
+
+
+def test_verify_tells_a_named_pipe_in_the_place_of_the_recipe(folder: Path):
+    piped(folder / "recipe.json")
+    assert [found.verdict for found in results.check(folder)] == ["incomplete"]
+
+
+@pytest.mark.parametrize("where", ["a/b", ".a/b", "a/b/c"])
+def test_a_nested_list_hides_nothing_of_a_result(where: str, folder: Path):
+    nested(folder / where)
+    assert [found.verdict for found in results.check(folder)] == ["foreign"]
+
+
+@pytest.mark.parametrize("where", ["a", "a/b"])
+def test_a_nested_list_hides_nothing_of_an_episode(where: str, tmp_path: Path):
+    recipe = Recipe(scene="arena", seed=1, dynamism=0.5, seconds=0.1)
+    record(recipe, tmp_path)
+    episode = tmp_path / recipe.name
+    assert check_hashes(episode).ok
+    nested(episode / where)
+    assert check_hashes(episode).verdict == "foreign"
+
+
+def test_links_back_to_the_folder_are_not_followed(folder: Path):
+    for name in ("one", "other"):
+        (folder / name).symlink_to(".")
+    assert [found.verdict for found in results.check(folder)] == ["foreign"]
+
+
+@pytest.mark.parametrize("seconds", [1e308, 1e30])
+def test_seconds_that_no_simulation_can_have_are_refused(seconds: float):
+    with pytest.raises(InvalidValueError, match="seconds must be at most"):
+        n_frames(seconds, 1.0 / 37.5)
