@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from scripts.compare.folder import read_csv, read_json
 
 from scripts import results
+from scripts.comparison.folder import read_csv, read_json
 from scripts.output import read_recipe_words, write_recipe
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe, read_recipe
