@@ -204,6 +204,11 @@ def _numbers(yaml: Path, fields: dict[str, str], key: str, count: int) -> list[f
     return values
 
 
+def has_sums(yaml: Path) -> bool:
+    """Whether the map holds the sums that ``write_map`` notes, which ``read_map`` checks."""
+    return _checked_sums(yaml, text_of(yaml, _MAX_YAML_BYTES)) is not None
+
+
 def _checked_sums(yaml: Path, text: str) -> str | None:
     """The image's sum that ``write_map`` noted, None where there is none; checks the fields'."""
     first, _, rest = text.partition("\n")

@@ -221,7 +221,7 @@ def _top(name: str, ours: set[str]) -> str:
 def _stranger(folder: Path, name: str) -> str:
     shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in name)
     last = PurePosixPath(name).name
-    if last in locks.NAMES or (last.startswith(".") and PART in last):
+    if last in locks.NAMES or last.startswith(".tables.") or (last[0] == "." and PART in last):
         return f"{folder}/{shown} is left of a run that was killed, or is being written"
     if (folder / name).is_symlink():
         return f"{folder}/{shown} is a link, which no run leaves and nothing vouches for"
