@@ -23,6 +23,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from unittest import mock
@@ -321,17 +322,42 @@ def cases(*, film: bool = True) -> list[Case]:
     ]  # fmt: skip
 
 
-def syncing_costs(scratch: Path, pairs: int, seconds: float) -> tuple[list[float], list[float]]:
-    """Seconds that ``generate`` takes as it is and without syncing, ``pairs`` of each in turn."""
+def syncing_costs(
+    scratch: Path, pairs: int, seconds: float
+) -> tuple[list[float], list[float], list[float]]:
+    """Seconds that ``generate`` takes as it is and without syncing, ``pairs`` of each in turn, and
+    how many of the former it waits for the disk."""
     spent: tuple[list[float], list[float]] = ([], [])
+    waits = []
     for k in range(2 * pairs):
         without = (k + k // 2) % 2  # with, without, without, with
-        with mock.patch.object(os, "fsync", int if without else os.fsync):  # int does nothing
+        with (
+            mock.patch.object(os, "fsync", int if without else os.fsync),  # int does nothing
+            _timed("sync_tree") as trees,
+            _timed("sync_names") as names,
+        ):
             started = time.perf_counter()
             generate("arena", scratch / f"cost{k}", episodes=2, seconds=seconds)
             spent[without].append(time.perf_counter() - started)
+        if not without:
+            waits.append(sum(trees) + sum(names))
         files.remove(scratch / f"cost{k}")
-    return spent
+    return *spent, waits
+
+
+@contextmanager
+def _timed(name: str) -> Iterator[list[float]]:
+    """How long each call of a function of ``slam.files`` takes, s."""
+    calls: list[float] = []
+    function = getattr(files, name)
+
+    def timed(path: Path) -> None:
+        started = time.perf_counter()
+        function(path)
+        calls.append(time.perf_counter() - started)
+
+    with mock.patch.object(files, name, timed):
+        yield calls
 
 
 def main() -> None:
@@ -377,13 +403,17 @@ def _tell(outcomes: list[Outcome]) -> None:
             console.print(f"{outcome.name}: {line}", markup=False, soft_wrap=True)
 
 
-def _tell_cost(with_s: list[float], without_s: list[float], seconds: float) -> None:
+def _tell_cost(
+    with_s: list[float], without_s: list[float], waits_s: list[float], seconds: float
+) -> None:
+    waited = [100.0 * wait / whole for wait, whole in zip(waits_s, with_s, strict=True)]
     shares = [100.0 * (a / b - 1.0) for a, b in zip(with_s, without_s, strict=True)]
     middle, low, high = statistics.median(shares), min(shares), max(shares)
     console.print(
         f"generate arena --episodes 2 --seconds {seconds:g}: {statistics.median(with_s):.2f} s as "
         f"it is, {statistics.median(without_s):.2f} s without syncing; cost of {len(shares)} pairs "
-        f"{middle:+.1f} % ({low:+.1f} to {high:+.1f}); {machine()['processor']}, "
+        f"{middle:+.1f} % ({low:+.1f} to {high:+.1f}), of which it waited for the disk "
+        f"{statistics.median(waited):.1f} % (at most {max(waited):.1f}); {machine()['processor']}, "
         f"{os.cpu_count()} cores",
         markup=False,
         soft_wrap=True,
