@@ -104,6 +104,24 @@ def test_every_link_leads_somewhere(page: Path):
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(REPO).as_posix())
+def test_every_file_of_code_that_a_page_names_exists(page: Path):
+    for name in re.findall(r"`((?:slam|sim|scenes|scripts|tests)/[\w/.]+)`", page.read_text()):
+        assert (REPO / name).exists(), f"{page.name} names {name}"
+
+
+def test_the_claims_name_code_and_tests_that_exist():
+    text = (DOCS / "paper" / "claims.md").read_text()
+    for name in re.findall(r"`((?:map|matching|tracking)/\w+\.py|featured\.py)`", text):
+        assert (REPO / "slam" / "shunting" / name).exists(), name
+    tests = sorted((REPO / "tests").rglob("test_*.py"))
+    code = "\n".join(path.read_text() for path in tests)
+    for name in re.findall(r"`(test_\w+\.py)`", text):
+        assert name in {path.name for path in tests}, name
+    for name in re.findall(r"`(test_\w+)`", text):
+        assert f"def {name}(" in code, name
+
+
 def test_the_dataset_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """As printed, but shorter episodes and no film."""
     from typer.testing import CliRunner
