@@ -36,7 +36,7 @@ _log = logging.getLogger(__name__)
 app = typer.Typer(
     name="mobilia",
     help=(
-        "A testbed where rooms do not sit still, and the SLAM that copes with it.\n\n"
+        "A testbed of rooms in which things move, and a SLAM for them.\n\n"
         "Start with [bold]mobilia demo[/bold]; every verb explains itself with --help."
     ),
     no_args_is_help=True,

@@ -158,7 +158,7 @@ def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float
 
 @styled()
 def changes_picture(path: Path, raster: Raster, changes: Changes, track: Trajectory) -> None:
-    """What changed lately over what is there: appeared green, gone red, the rest grey."""
+    """Recent changes over the present map: appeared green, gone red, the rest grey."""
     height, width = raster.values.shape
     figure, axes = _axes(min(11.0, max(5.0, 5.5 * width / height + 2.0)), 6.5)
     ax: Axes = axes[0]
@@ -178,6 +178,6 @@ def changes_picture(path: Path, raster: Raster, changes: Changes, track: Traject
                           interpolation="nearest")  # fmt: skip
         figure.colorbar(image, ax=ax, shrink=0.6, pad=0.02, label=label)
     ax.plot(track.poses[:, 0], track.poses[:, 1], "k-", lw=0.9, label="trajectory")
-    ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title="What changed lately")
+    ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title="Recent changes of the map")
     ax.legend(loc="upper left", frameon=False)
     save(figure, path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The README does what it says: every Python block runs, and the two commands come early."""
+"""README and docs do what they say: their Python blocks run, their links lead somewhere."""
 
 from __future__ import annotations
 
@@ -13,7 +13,13 @@ import pytest
 
 REPO = Path(__file__).resolve().parents[1]
 README = (REPO / "README.md").read_text()
-BLOCKS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+DOCS = REPO / "docs"
+PAGES = [REPO / "README.md", REPO / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
+
+
+def blocks(page: str) -> list[str]:
+    """The Python of a page in ``docs``."""
+    return re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(), flags=re.DOTALL)
 
 
 def run(*command: str, cwd: Path = REPO) -> str:
@@ -26,24 +32,33 @@ def run(*command: str, cwd: Path = REPO) -> str:
     return done.stdout
 
 
-def test_the_two_commands_come_within_forty_lines():
+def test_the_readme_is_short_and_shows_how_to_start():
+    assert len(README.splitlines()) <= 90
     lines = README.splitlines()[:40]
     assert any("make demo" in line for line in lines)
     assert any("make test" in line for line in lines)
 
 
 def test_the_environment_example_runs():
-    run("-c", next(block for block in BLOCKS if "gymnasium.make" in block))
+    (block,) = blocks("gymnasium.md")
+    run("-c", block)
+
+
+def test_the_vector_environment_example_runs():
+    page = (DOCS / "gymnasium.md").read_text()
+    (call,) = re.findall(r"^    (gymnasium\.make_vec\(.*\))$", page, flags=re.MULTILINE)
+    run("-c", f"import gymnasium, sim\n{call}.reset(seed=1)")
 
 
 def test_the_stream_example_ends_near_the_truth():
-    printed = run("-c", next(block for block in BLOCKS if "sim.simulation" in block))
+    (block,) = blocks("streams.md")
+    printed = run("-c", block)
     numbers = [float(word) for word in re.findall(r"-?\d+\.?\d*(?:e[-+]?\d+)?", printed)]
     assert max(abs(a - b) for a, b in zip(numbers[:3], numbers[3:], strict=True)) < 0.05
 
 
 def test_a_slam_of_twenty_lines_plugs_in(tmp_path: Path):
-    block = next(block for block in BLOCKS if "class MySlam" in block)
+    block = next(block for block in blocks("bring_your_own.md") if "class MySlam" in block)
     code = [line for line in block.splitlines() if line.strip()]
     assert len(code) <= 20
     (tmp_path / "my_slam.py").write_text(block)
@@ -68,16 +83,43 @@ def test_every_dependency_is_explained():
     import tomllib
 
     project = tomllib.loads((REPO / "pyproject.toml").read_text())["project"]
-    section = README.split("## Why each dependency")[1].split("##")[0]
-    for requirement in project["dependencies"]:
-        assert f"`{re.split('[<>=]', requirement)[0]}`" in section
+    explained = re.findall(
+        r"^\| `([\w.-]+)` \| \w.* \|$", (DOCS / "dependencies.md").read_text(), re.M
+    )
+    needed = [re.split("[<>=]", requirement)[0] for requirement in project["dependencies"]]
+    assert sorted(explained) == sorted(needed)
+    assert "](docs/dependencies.md)" in README
 
 
-@pytest.mark.parametrize("page", [REPO / "README.md", *sorted((REPO / "docs").glob("*.md"))])
+def test_the_index_lists_every_page():
+    linked = set(re.findall(r"\]\(([\w/]+\.md)\)", (DOCS / "index.md").read_text()))
+    pages = {page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")}
+    assert pages - linked == {"index.md"}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(REPO).as_posix())
 def test_every_link_leads_somewhere(page: Path):
     for target in re.findall(r"\]\(([^)#]+)", page.read_text()):
         if "://" not in target:
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(REPO).as_posix())
+def test_every_file_of_code_that_a_page_names_exists(page: Path):
+    for name in re.findall(r"`((?:slam|sim|scenes|scripts|tests)/[\w/.]+)`", page.read_text()):
+        assert (REPO / name).exists(), f"{page.name} names {name}"
+
+
+def test_the_claims_name_code_and_tests_that_exist():
+    text = (DOCS / "paper" / "claims.md").read_text()
+    for name in re.findall(r"`((?:map|matching|tracking)/\w+\.py|featured\.py)`", text):
+        assert (REPO / "slam" / "shunting" / name).exists(), name
+    tests = sorted((REPO / "tests").rglob("test_*.py"))
+    code = "\n".join(path.read_text() for path in tests)
+    for name in re.findall(r"`(test_\w+\.py)`", text):
+        assert name in {path.name for path in tests}, name
+    for name in re.findall(r"`(test_\w+)`", text):
+        assert f"def {name}(" in code, name
 
 
 def test_the_dataset_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -86,7 +128,7 @@ def test_the_dataset_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
     from scripts.cli import app
 
-    section = README.split("## Make a dataset")[1].split("\n## ")[0]
+    section = (DOCS / "datasets.md").read_text().split("## Make one")[1].split("\n## ")[0]
     assert len(section.strip().splitlines()) <= 10
     commands = re.findall(r"\.venv/bin/mobilia ([^#\n]+)", section)
     assert [command.split()[0] for command in commands] == ["generate", "verify", "export", "run"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The dynamism curve: error and losses against the knob.
+"""The dynamism curve: error and losses against dynamism.
 
 ``python -m scripts.experiments.dynamism_curve out/compare --out dynamism.png``.
 

@@ -176,18 +176,18 @@ def page(outcome: Outcome, stand_in: TagCameraConfig) -> str:
         [
             "# Ceiling tags",
             "",
-            "By default the simulator's truth is the truth. `sim.sensors.tag_cameras` stands "
-            "in for what",
-            "cameras on the ceiling would deliver of it: a rate, a latency, gaps while somebody or",
-            "something stands between tag and camera, and noise.",
+            "Get the truth as cameras on the ceiling would measure it. By default, the truth is",
+            "the simulator's. `sim.sensors.tag_cameras` is a stand-in for such cameras: it has a",
+            "rate, a latency, noise, and gaps while somebody or something is between tag and",
+            "camera. This command compares the stand-in with rendered pictures:",
             "",
-            "Made by `python -m scripts.experiments.tag_experiment --out docs`: an AprilTag 36h11 "
-            "of "
-            f"{100 * TAG_M:.0f} cm on the",
-            f"robot, a camera of {WIDTH} × {HEIGHT} px at {CEILING_M} m in the `office`, "
-            f"{outcome.tried} random poses within",
-            "1.6 × 1.2 m of the middle, somebody 0.4 to 0.9 m from the robot in every other one,",
-            "OpenCV's detector.",
+            "    python -m scripts.experiments.tag_experiment --out docs",
+            "",
+            f"The robot carries an AprilTag 36h11 of {100 * TAG_M:.0f} cm. A camera of "
+            f"{WIDTH} × {HEIGHT} px hangs at",
+            f"{CEILING_M} m in the `office`. The robot has {outcome.tried} random poses within "
+            "1.6 × 1.2 m of the middle. In",
+            "every other one, somebody stands 0.4 to 0.9 m from it. The detector is OpenCV's.",
             "",
             "![Tags](pictures/tags.png)",
             "",
@@ -211,13 +211,16 @@ def page(outcome: Outcome, stand_in: TagCameraConfig) -> str:
 
 
 VERDICT = (
-    "**Is the stand-in honest?** Where a camera is perfect it is too pessimistic: rendering has no",
-    "lens distortion, no blur, no sensor noise, and the camera's pose is known exactly, so what is",
-    "left is the detector's sub-pixel error. What a real installation adds, calibration to about a",
-    "centimetre, is the stand-in's noise and its constant error of each camera; those two numbers",
-    "are assumed, not measured. Whether a tag is seen, all four corners through the scene's own",
-    "geometry, is as honest as the table says; something that crosses the middle of a tag only, or",
-    "cuts the white border that the detector needs, is what it can miss.",
+    "**Is the stand-in honest?** It is too pessimistic where a camera is perfect.",
+    "Rendered pictures have no lens distortion, no blur and no sensor noise, and the pose",
+    "of the camera is known exactly. Only the detector's sub-pixel error remains. A real",
+    "installation adds calibration to about a centimetre. The stand-in's noise and the",
+    "constant error of each camera stand for that. These two numbers are assumed, not",
+    "measured.",
+    "",
+    "Whether a tag is detected is as honest as the table says. The stand-in checks all",
+    "four corners against the geometry of the scene. It can miss something that covers",
+    "only the middle of a tag, or that cuts the white border which the detector needs.",
     "",
 )
 

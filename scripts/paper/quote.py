@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Results into a page: ``python -m scripts.paper.quote out/reproduce docs/paper.md``.
+"""Results into the pages: ``python -m scripts.paper.quote out/reproduce docs/paper``.
 
-Between ``<!-- landmarks -->`` and ``<!-- /landmarks -->`` (and so on) the page gets what the
-experiment's ``summary.md`` says, and its figures as small PNGs in ``pictures/paper`` beside the
-page; between the marks of ``all`` what all took together. Experiments that were not run keep what
-is there.
+Between ``<!-- landmarks -->`` and ``<!-- /landmarks -->`` (and so on) the page of the folder that
+has these marks gets what the experiment's ``summary.md`` says. The figures become small PNGs in
+``../pictures/paper``. Between the marks of ``all`` stands what all took together. The text of an
+experiment that was not run stays.
 """
 
 from __future__ import annotations
@@ -19,16 +19,21 @@ from PIL import Image
 
 from scripts.marks import filled
 from scripts.verbs.reproduce import EXPERIMENTS
+from slam.errors import InvalidValueError
 from slam.files import write_bytes, write_text
 
-PICTURES = "pictures/paper"
+PICTURES = "../pictures/paper"
 MOST_BYTES = 150_000
 _PICTURE = re.compile(r"\]\(([\w-]+\.png)\)")
 
 
-def quote(results: Path, page: Path) -> list[str]:
-    """Fill in the page; which experiments it now quotes anew."""
-    text, found = page.read_text(), {}
+def quote(results: Path, folder: Path) -> list[str]:
+    """Fill in the pages of the folder; return the names of the experiments that they quote anew.
+
+    Raises ``InvalidValueError`` where an experiment's marks do not stand once on just one page.
+    """
+    texts = {page: page.read_text() for page in sorted(folder.glob("*.md"))}
+    found = {}
     for name in ("all", *EXPERIMENTS):
         summary = results / ("" if name == "all" else name) / "summary.md"
         if not summary.exists():
@@ -36,11 +41,22 @@ def quote(results: Path, page: Path) -> list[str]:
         told = summary.read_text().strip()
         found[name] = _PICTURE.findall(told)
         told = _PICTURE.sub(rf"]({PICTURES}/{name}-\1)", told)
-        text = filled(text, name, told, page)
+        page = _page_of(name, texts, folder)
+        texts[page] = filled(texts[page], name, told, page)
     for name, files in found.items():
-        _take_pictures(results / name, files, page.parent / PICTURES, name)
-    write_text(page, text)
+        _take_pictures(results / name, files, folder / PICTURES, name)
+    for page, text in texts.items():
+        write_text(page, text)
     return list(found)
+
+
+def _page_of(name: str, texts: dict[Path, str], folder: Path) -> Path:
+    """The one page that has the mark."""
+    pages = [page for page, text in texts.items() if f"<!-- {name} -->" in text]
+    if len(pages) != 1:
+        have = ", ".join(page.name for page in pages) or "no page"
+        raise InvalidValueError(f"{folder}: {have} has <!-- {name} -->, must be one page")
+    return pages[0]
 
 
 def _take_pictures(source: Path, files: list[str], folder: Path, name: str) -> None:
@@ -67,12 +83,12 @@ def compact(picture: Path, most: int = MOST_BYTES) -> bytes:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Say what was quoted."""
+    """Print what was quoted."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("results", type=Path, help="folder that reproduce wrote")
-    parser.add_argument("page", type=Path, help="Markdown page with the marks")
+    parser.add_argument("folder", type=Path, help="folder of the Markdown pages with the marks")
     wanted = parser.parse_args(arguments)
-    print("quoted:", ", ".join(quote(wanted.results, wanted.page)) or "nothing")
+    print("quoted:", ", ".join(quote(wanted.results, wanted.folder)) or "nothing")
     return 0
 
 

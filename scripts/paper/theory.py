@@ -248,7 +248,7 @@ def fig5(activity: Float, given: Float, corner: tuple[int, int], cell: float) ->
     axes[0].set(title="(a) activities (grey), input (contours)")
     shared = np.minimum(activity, given)
     image = axes[1].imshow(shared, origin="lower", extent=extent, cmap="YlOrRd", vmin=0.0, vmax=1.0)
-    axes[1].set(title="(b) what they share")
+    axes[1].set(title="(b) overlap of both")
     figure.colorbar(image, ax=axes[1], shrink=0.7)
     for ax in axes[:2]:
         ax.grid(visible=False)

@@ -18,7 +18,7 @@ from scripts.quotes.texts import texts
 from slam.errors import InvalidValueError, MobiliaError
 from slam.files import write_text
 
-PAGES = ("README.md", "docs/comparing.md", "docs/comparison.md")
+PAGES = ("README.md", "docs/comparing.md", "docs/comparison.md", "docs/films.md")
 
 
 def quoted(text: str, told: dict[str, str], page: object) -> tuple[str, list[str]]:

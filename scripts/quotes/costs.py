@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the README says that things cost: ``python -m scripts.quotes.costs``.
+"""What README and docs say that things cost: ``python -m scripts.quotes.costs``.
 
 Processor time of commands, each in a fresh process with everything that it starts, after a call
 that warms the caches of compiled code: the least of a few, since other work on a machine can only

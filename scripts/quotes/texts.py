@@ -32,7 +32,7 @@ def texts(results: Path) -> dict[str, str]:
     costs = load(results / "costs.json")
     return {
         "readme.comparison": _wrapped(readme_comparison(full, noise)),
-        "readme.film": _wrapped(film(costs)),
+        "films.cost": _wrapped(film(costs)),
         "readme.demo": f"{costs['costs']['demo']['s']:.0f} s of processor time",
         "comparing.made": _wrapped(comparing_made(full)),
         "comparing.errors": errors(full),

@@ -142,7 +142,7 @@ def _count(row: Row | None) -> Cell:
 
 
 def messages(study: Study) -> list[tuple[str, int]]:
-    """What the failed said, and in how many runs it was that, most frequent first."""
+    """Error messages of SLAMs that failed, each with its number of runs, most frequent first."""
     said = Counter(str(row["failure"]) for row in study.compared.runs if row["failure"])
     return said.most_common(12)
 

@@ -42,33 +42,35 @@ def blame(
         ),
     ] = None,
     slam: Annotated[
-        str | None, typer.Option(help="Whose error; default the run's first, or shunting.")
+        str | None, typer.Option(help="SLAM to examine; default the run's first, or shunting.")
     ] = None,
     scene: Annotated[str | None, typer.Option(help="Instead of RUN: a scene to simulate.")] = None,
-    dynamism: Annotated[float, typer.Option(help="Of the scene, 0 to 1.")] = 0.5,
+    dynamism: Annotated[float, typer.Option(help="How much the scene moves, 0 to 1.")] = 0.5,
     seed: Annotated[int, typer.Option(help="Of the simulated run, whole number >= 0.")] = 0,
     seconds: Annotated[float, typer.Option(help="Length of the simulated tour, s.")] = 60.0,
     scanner: Scanner = "full",
     option: Annotated[
-        list[str] | None, typer.Option(help="Of the scene: NAME=VALUE, e.g. n_chairs=6.")
+        list[str] | None, typer.Option(help="Option of the scene: NAME=VALUE, e.g. n_chairs=6.")
     ] = None,
     every: Annotated[int, typer.Option(help="The SLAM gets one scan in so many.")] = 1,
     threshold: Annotated[
         float, typer.Option(help="Rise of the error that counts as a divergence, m.")
     ] = Rule.threshold_m,
-    within: Annotated[float, typer.Option(help="In how long it rises, s.")] = Rule.within_s,
+    within: Annotated[float, typer.Option(help="Time within which it rises, s.")] = Rule.within_s,
     at: Annotated[
-        float | None, typer.Option(help="Look at this time instead of searching, s.")
+        float | None, typer.Option(help="Examine this time instead of searching, s.")
     ] = None,
     lead: Annotated[
-        float, typer.Option(help="From the checkpoint to the divergence, s.")
+        float, typer.Option(help="Time from the checkpoint to the divergence, s.")
     ] = Question.lead_s,
     horizon: Annotated[
-        float, typer.Option(help="From the divergence to the end of the re-runs, s.")
+        float, typer.Option(help="Time from the divergence to the end of the re-runs, s.")
     ] = Question.horizon_s,
-    top: Annotated[int, typer.Option(help="Try only the likeliest; 0: all seen.")] = Question.top,
+    top: Annotated[
+        int, typer.Option(help="Try only this many of the likeliest; 0: all observed.")
+    ] = Question.top,
     repeats: Annotated[
-        int, typer.Option(help="Of original and cure with other noise.")
+        int, typer.Option(help="Repeats of original and cure with other noise.")
     ] = Question.repeats,
     out: Annotated[Path | None, typer.Option(help="Folder; default out/blame-...")] = None,
     overwrite: Annotated[
@@ -76,7 +78,7 @@ def blame(
     ] = False,
     trust: Trust = False,
 ) -> None:
-    """Find which mover led a SLAM astray, by running the world again without it.
+    """Find which mover misled a SLAM, by running the world again without it.
 
     The first divergence of the run is found, world and SLAM are put back to some seconds before,
     and run on from there with one mover taken out or frozen at a time. Writes blame.png, blame.json

@@ -49,11 +49,11 @@ def compare(
     ] = 100,
     seconds: Annotated[float, typer.Option(help="Length of a run, s.")] = 60.0,
     every: Annotated[
-        int | None, typer.Option(help="One scan in so many is used; default about 4.7 a second.")
+        int | None, typer.Option(help="Use one scan in N; default about 4.7 a second.")
     ] = None,
     scanner: Scanner = "full",
     scan_limit: Annotated[
-        float, typer.Option(help="After which a SLAM from outside counts as hung at a scan, s.")
+        float, typer.Option(help="Time limit of a scan for a SLAM from outside, s.")
     ] = Limits.scan_s,
     jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
     cluster: Annotated[
@@ -64,9 +64,9 @@ def compare(
         typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
     ] = None,
 ) -> None:
-    """Run SLAMs on the same simulated runs and write tables of how they bear dynamism.
+    """Run SLAMs on the same simulated runs; write tables of error against dynamism.
 
-    Killed at any time, the same command goes on from there; so does one with a SLAM more.
+    If it is killed, the same command continues. With a SLAM added, only that SLAM runs.
 
     [bold]mobilia compare --slam shunting ekf odometry --scene arena --dynamism 0:1:0.5 --seeds 3
     --out out/compare[/bold]

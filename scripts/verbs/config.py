@@ -24,7 +24,9 @@ def config(
     group: Annotated[
         str, typer.Argument(help="Only the numbers whose path begins so: matching.local.")
     ] = "",
-    as_json: Annotated[bool, typer.Option("--json", help="For programs, with bounds.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON for programs, with bounds.")
+    ] = False,
 ) -> None:
     """Print every number with path, value, unit, meaning and source.
 

@@ -22,14 +22,16 @@ def demo(
         float, typer.Option(help="How much the room moves: 0 nothing, 1 most.")
     ] = 0.5,
     seed: Annotated[int, typer.Option(help="Seed of everything, whole number >= 0.")] = 0,
-    scan_height: Annotated[float, typer.Option(help="Of the scanner above the floor, m.")] = 0.36,
+    scan_height: Annotated[
+        float, typer.Option(help="Height of the scanner above the floor, m.")
+    ] = 0.36,
     scanner: Scanner = "full",
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
     ] = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
 ) -> None:
-    """Drive a robot round an office that moves, and see what SLAM makes of it.
+    """Drive a robot through a moving office, and compare SLAM with odometry.
 
     Writes a film, the map (PNG, and PGM + YAML for ROS map_server), trajectories (TUM, for evo),
     errors over time, all numbers as JSON and the recipe that made them. About a minute, and half a

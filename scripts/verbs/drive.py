@@ -42,17 +42,17 @@ def drive(
         list[str] | None, typer.Option(help="Levels, start:stop:step or one by one; 0:1:0.25.")
     ] = None,
     seeds: Annotated[
-        list[str] | None, typer.Option(help="How many seeds from 100 on; several words: which.")
+        list[str] | None, typer.Option(help="How many seeds, from 100 on; or several seeds.")
     ] = None,
     plan_on: Annotated[
-        str, typer.Option(help="Ways are planned on the layout, or on the SLAM's own map.")
+        str, typer.Option(help="Plan paths on the layout, or on the SLAM's own map.")
     ] = "layout",
-    seconds: Annotated[float, typer.Option(help="Limit of each goal, s.")] = 90.0,
+    seconds: Annotated[float, typer.Option(help="Time limit of each goal, s.")] = 90.0,
     goals: Annotated[
-        list[str] | None, typer.Option(help="How many, or which by name; default all rooms'.")
+        list[str] | None, typer.Option(help="How many goals, or which by name; default all.")
     ] = None,
     every: Annotated[
-        int | None, typer.Option(help="One scan in so many is used; default about 9.4 a second.")
+        int | None, typer.Option(help="Use one scan in N; default about 9.4 a second.")
     ] = None,
     scanner: Scanner = "full",
     jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
@@ -61,9 +61,9 @@ def drive(
         typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
     ] = None,
 ) -> None:
-    """Drive to a goal in every room, steered by what each SLAM believes; truth only scores.
+    """Drive to a goal in every room, steered by each SLAM's estimate; truth only scores.
 
-    Every SLAM gets the same worlds. Killed at any time, the same command goes on from there.
+    Every SLAM gets the same worlds. If it is killed, the same command continues.
 
     [bold]mobilia drive arena --slam shunting odometry --dynamism 0:1:0.5 --seeds 3 --out
     out/drive[/bold]

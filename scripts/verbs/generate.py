@@ -35,9 +35,10 @@ def generate(
     ] = "",
     episodes: Annotated[int, typer.Option(help="Episodes (at each dynamism).")] = 1,
     seconds: Annotated[float, typer.Option(help="Length of an episode, s.")] = 60.0,
-    seed: Annotated[int, typer.Option(help="Of the first episode; the next has the next.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the first episode; each next one adds 1.")] = 0,
     twins: Annotated[
-        bool, typer.Option("--twins", help="Each episode also semi-static and static, same path.")
+        bool,
+        typer.Option("--twins", help="Each episode also semi-static and static, with one path."),
     ] = False,
     jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
     cluster: Annotated[
@@ -47,8 +48,8 @@ def generate(
 ) -> None:
     """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
 
-    Killed at any time, the same command goes on: whole episodes stay, and the folder ends with the
-    same bytes.
+    If it is killed, the same command continues: finished episodes stay, and the folder ends with
+    the same bytes.
 
     [bold]mobilia generate office --dynamism 0.5 --episodes 4 --seconds 20 --out data[/bold]
     """

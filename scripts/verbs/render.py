@@ -52,10 +52,12 @@ def render(
     rerun: Annotated[
         Path | None, typer.Option(help="Also a recording for the Rerun viewer (.rrd).")
     ] = None,
-    view: Annotated[str, typer.Option(help="Of the 3D camera: follow, top or persp.")] = "follow",
+    view: Annotated[
+        str, typer.Option(help="View of the 3D camera: follow, top or persp.")
+    ] = "follow",
     no_3d: Annotated[bool, typer.Option("--no-3d", help="Leave the 3D view out.")] = False,
     fps: Annotated[float, typer.Option(help="Pictures per second.")] = FPS,
-    size: Annotated[str, typer.Option(help="Of the film, px.")] = "1280x720",
+    size: Annotated[str, typer.Option(help="Size of the film, px.")] = "1280x720",
     from_s: Annotated[float, typer.Option("--from", help="First moment shown, s.")] = 0.0,
     to_s: Annotated[
         float | None, typer.Option("--to", help="Last moment shown, s; default the end.")
@@ -66,7 +68,7 @@ def render(
     ] = None,
     trust: Trust = False,
 ) -> None:
-    """Film a run: 3D view, scan by what each beam hit, map, errors with what happened.
+    """Film a run: 3D view, scan by what each beam hit, map, errors, events.
 
     Needs no screen. With [bold]--strip[/bold] or [bold]--rerun[/bold] and no [bold]--out[/bold],
     only these are made.

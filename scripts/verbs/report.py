@@ -18,10 +18,10 @@ def report(
     ],
     drive: Annotated[
         list[Path] | None,
-        typer.Option(help="Folders that mobilia drive wrote; DIR/drive* are found without."),
+        typer.Option(help="Folders that mobilia drive wrote; DIR/drive* need not be named."),
     ] = None,
 ) -> None:
-    """Write DIR/report.html: one page with everything in it, that opens from disk and prints.
+    """Write DIR/report.html: one page, self-contained, that opens from disk and prints.
 
     [bold]mobilia report out/compare[/bold]
     """

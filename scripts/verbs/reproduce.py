@@ -40,7 +40,7 @@ def reproduce(
 ) -> None:
     """Reproduce the paper's experiments: figures, tables with its numbers beside ours, recipes.
 
-    Runs that are whole are kept: killed and called again, it goes on where it was.
+    Finished runs are kept: if it is killed, the same command continues.
 
     [bold]mobilia reproduce landmarks[/bold]
     """

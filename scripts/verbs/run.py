@@ -38,7 +38,7 @@ def run(
     ] = 0.5,
     seed: Annotated[int, typer.Option(help="Seed of the simulated run, whole number >= 0.")] = 0,
     scan_height: Annotated[
-        float, typer.Option(help="Of the simulated scanner above the floor, m.")
+        float, typer.Option(help="Height of the simulated scanner above the floor, m.")
     ] = 0.36,
     scanner: Scanner = "full",
     out: Annotated[

@@ -37,7 +37,7 @@ def verify(
     seed: Annotated[int, typer.Option(help="Which ones: seed of that choice.")] = 0,
     trust: Trust = False,
 ) -> None:
-    """Hash every file again; with --regenerate also make episodes anew from their recipes.
+    """Check every file by its hash; with --regenerate also make episodes again.
 
     Exit status: 0 all well. 1 damaged: a file is not what it was, or an episode comes out otherwise
     on the very CPU and versions that made it (on others it may: that is said, and is no failure).

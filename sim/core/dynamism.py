@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """One number in [0, 1] for how much a room moves, and the table of what it means.
 
-| rate                                | at knob d        | d = 0 | 0.25  | 0.5   | 0.75  | 1     |
+| rate                                | at dynamism d    | d = 0 | 0.25  | 0.5   | 0.75  | 1     |
 |-------------------------------------|------------------|-------|-------|-------|-------|-------|
 | shoves of each chair, 1/s           | 0.15 d           | 0     | 0.038 | 0.075 | 0.113 | 0.15  |
 | kicks of each bin, 1/s              | 0.06 d           | 0     | 0.015 | 0.03  | 0.045 | 0.06  |
 | moves of each trolley, pallet, 1/s  | 0.06 d           | 0     | 0.015 | 0.03  | 0.045 | 0.06  |
-| each door moved by nobody, 1/s      | 0.04 d           | 0     | 0.01  | 0.02  | 0.03  | 0.04  |
+| draughts that move each door, 1/s   | 0.04 d           | 0     | 0.01  | 0.02  | 0.03  | 0.04  |
 | mean stay of a person at a goal, s  | 12 / d - 10      | never | 38    | 14    | 6     | 2     |
 | walking pace, times a person's own  | 0.7 + 0.3 d      | -     | 0.775 | 0.85  | 0.925 | 1     |
 
-The rates are set so that what is on the move rises in proportion to the knob: a shove keeps a
-chair rolling for about a second, so at 1 one office chair in seven moves at any time; a way
+The rates are set so that the share of moving things rises in proportion to d. A shove keeps a
+chair rolling for about a second, so at 1 one office chair in seven moves at any time. A path
 between two goals takes a person about ten seconds, so at 1 five in six are walking, and a stay of
-12 / d - 10 seconds makes that (5 / 6) d. ``scripts.experiments.dynamism_curve`` shows what the
-scanner sees of it.
+12 / d - 10 seconds makes that (5 / 6) d. ``scripts.experiments.dynamism_curve`` shows the share
+that the scanner observes.
 
 At 0 nothing moves by itself: people are present and stand perfectly still, chairs and bins are
 never pushed and doors stay at their angle of rest (a door still gives way to the robot). How hard
-a shove is does not depend on the knob: 0.25 to 1.5 m/s, which for a 13 kg chair is 3 to 20 N s
+a shove is does not depend on d: 0.25 to 1.5 m/s, which for a 13 kg chair is 3 to 20 N s
 (design range for invisible shoves; a person at a desk rolls a chair at walking speed at most).
 Heavier things get the speed that 45 N s give them.
 

@@ -126,7 +126,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     | `start`                   | (x, y, heading) of the robot; refused where it does not fit   |
     | `n_chairs`, `n_people`    | counts, for scenes that have them                             |
     | `scene`                   | any options of the scene recipe, e.g. ``{"n_chairs": 8}``     |
-    | `dynamism`                | the knob, or a ``sim.core.dynamism.Dynamism`` |
+    | `dynamism`                | 0 to 1, or a ``sim.core.dynamism.Dynamism`` |
     | `moving_share`            | share of chairs on the move at any time                       |
     | `rates`                   | single rates of ``Dynamism``, e.g. ``{"door_rate": 0.1}``     |
     | `scan_height_m`           | of the scanner above the floor                                |

@@ -33,7 +33,7 @@ class Plan:
     """Which episodes a dataset has: ``episodes`` of them at each dynamism, of the same seeds.
 
     recipe      of the first one; the k-th episode has its seed plus k
-    dynamisms   knobs in [0, 1]
+    dynamisms   numbers in [0, 1]
     twins       whether each episode is one drive in three versions
     """
 

@@ -44,7 +44,7 @@ class Recipe:
     scene       registered name or ``module:function``; ``options`` of it, e.g. n_chairs, and
                 ``scan_height_m``, but nothing that ``Simulation`` or ``Recipe`` has a name for
     seed        whole number >= 0
-    dynamism    knob in [0, 1]
+    dynamism    number in [0, 1]
     seconds     of driving
     scanner     registered name, and which errors: "utm30lx:noise" (``sim.sensors.lidar.registry``);
                 "full", "noise" and "ideal" are those of the LMS-221

@@ -43,7 +43,7 @@ class World:
 
     scene     a built ``Scene``, or the name of one; a name is built from the "layout" stream
     seed      whole number or ``Seeds``
-    dynamism  knob in [0, 1] (see ``sim.core.dynamism``), or the rates themselves
+    dynamism  number in [0, 1] (see ``sim.core.dynamism``), or the rates themselves
     moving_share  in [0, 1]: keep that share of chairs and loads on the move, instead of shoves
     drive     limits of the robot
     start     (x m, y m, heading rad) of the robot instead of the scene's

@@ -15,29 +15,57 @@ from scripts.paper.paper_numbers import TABLE_3
 from scripts.paper.quote import compact, quote
 from scripts.paper.report import Report, new_figure
 from scripts.paper.runs import Plan
+from scripts.verbs.reproduce import EXPERIMENTS
 from slam.errors import InvalidValueError
+
+ROOT = Path(__file__).parents[3]
 
 
 def test_a_page_quotes_what_was_run_and_keeps_the_rest(tmp_path):
     (tmp_path / "office").mkdir()
     (tmp_path / "office" / "summary.md").write_text("new \\1 numbers\n")
-    page = tmp_path / "page.md"
+    (folder := tmp_path / "docs").mkdir()
+    page = folder / "page.md"
     page.write_text("<!-- office -->\nold\n<!-- /office -->\nby hand\n<!-- chairs -->\nkept\n")
-    assert quote(tmp_path, page) == ["office"]
+    assert quote(tmp_path, folder) == ["office"]
     told = page.read_text()
     assert told.startswith("<!-- office -->\n\nnew \\1 numbers\n\n<!-- /office -->\nby hand\n")
     assert told.endswith("<!-- chairs -->\nkept\n")
-    assert quote(tmp_path, page) == ["office"]
+    assert quote(tmp_path, folder) == ["office"]
     assert page.read_text() == told
     (tmp_path / "chairs").mkdir()
     (tmp_path / "chairs" / "summary.md").write_text("more\n")
     with pytest.raises(InvalidValueError, match="/chairs"):
-        quote(tmp_path, page)
+        quote(tmp_path, folder)
     page.write_text(mixed_up := "<!-- /chairs -->\nby hand\n<!-- chairs -->\nthe rest\n")
     (tmp_path / "office" / "summary.md").unlink()
     with pytest.raises(InvalidValueError, match="<!-- chairs --> before <!-- /chairs -->"):
-        quote(tmp_path, page)
+        quote(tmp_path, folder)
     assert page.read_text() == mixed_up
+
+
+def test_each_experiment_goes_to_the_one_page_that_marks_it(tmp_path: Path):
+    for name in ("office", "chairs"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "summary.md").write_text(f"{name} anew\n")
+    (folder := tmp_path / "docs").mkdir()
+    one, other = folder / "a.md", folder / "b.md"
+    one.write_text("<!-- office -->\n<!-- /office -->\n")
+    other.write_text("<!-- chairs -->\n<!-- /chairs -->\n")
+    assert quote(tmp_path, folder) == ["chairs", "office"]
+    assert one.read_text() == "<!-- office -->\n\noffice anew\n\n<!-- /office -->\n"
+    assert other.read_text() == "<!-- chairs -->\n\nchairs anew\n\n<!-- /chairs -->\n"
+    for text in ("", one.read_text()):
+        other.write_text(text)
+        with pytest.raises(InvalidValueError, match="must be one page"):
+            quote(tmp_path, folder)
+
+
+def test_the_real_pages_mark_every_experiment_once():
+    pages = [page.read_text() for page in (ROOT / "docs" / "paper").glob("*.md")]
+    for name in ("all", *EXPERIMENTS):
+        assert sum(text.count(f"<!-- {name} -->") for text in pages) == 1, name
+        assert sum(text.count(f"<!-- /{name} -->") for text in pages) == 1, name
 
 
 def test_its_figures_come_along_and_those_of_before_go(tmp_path: Path):
@@ -46,13 +74,14 @@ def test_its_figures_come_along_and_those_of_before_go(tmp_path: Path):
     axes[0].plot([0.0, 1.0])
     report.figure("rmse", figure, "RMSE of every seed")
     report.finish("Office")
-    (page := tmp_path / "page.md").write_text("<!-- office -->\n<!-- /office -->\n")
-    pictures = tmp_path / "pictures" / "paper"
+    (folder := tmp_path / "docs" / "paper").mkdir(parents=True)
+    (page := folder / "page.md").write_text("<!-- office -->\n<!-- /office -->\n")
+    pictures = tmp_path / "docs" / "pictures" / "paper"
     pictures.mkdir(parents=True)
     for name in ("office-gone.png", "chairs-rmse.png"):
         (pictures / name).write_bytes(b"")
-    quote(tmp_path / "out", page)
-    shown = "![RMSE of every seed](pictures/paper/office-rmse.png)\n\n*RMSE of every seed*\n"
+    quote(tmp_path / "out", folder)
+    shown = "![RMSE of every seed](../pictures/paper/office-rmse.png)\n\n*RMSE of every seed*\n"
     assert shown in page.read_text()
     names = ["chairs-rmse.png", "office-rmse.png"]
     assert sorted(path.name for path in pictures.iterdir()) == names
