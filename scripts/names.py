@@ -10,6 +10,8 @@ from scenes import registry
 from slam import system
 
 RUNS = "runs"  # of a comparison: the folder of its runs
+# Endings of logs, which are no part of their names.
+LOGS = (".gz", ".xz", ".log", ".clf", ".txt", ".mat", ".bag", ".mcap", ".db3", ".npz")
 
 
 def check(slams: Sequence[str], *scenes: str | None) -> None:
@@ -30,8 +32,16 @@ def is_run(path: Path) -> bool:
 
 
 def run_name(path: Path) -> str:
-    """What outputs about the run, episode or log at ``path`` are called."""
-    return path.stem if is_run(path) else path.resolve().name.split(".")[0]
+    """What outputs about the run, episode or log at ``path`` are called.
+
+    A folder's name is whole (``office-d0.5-s0001``); a file's is without the endings of logs.
+    """
+    path = path.resolve()
+    if path.is_dir():
+        return path.name
+    while path.suffix.lower() in LOGS:
+        path = path.with_suffix("")
+    return path.name
 
 
 def file_name(name: str) -> str:

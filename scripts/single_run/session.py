@@ -66,7 +66,12 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
     replay = show.replay
     if outputs.film:
         require_ffmpeg()
-    with whole_folder(outputs.folder, overwrite=outputs.overwrite) as folder:
+    with whole_folder(
+        outputs.folder,
+        overwrite=outputs.overwrite,
+        command=outputs.command,
+        settings=outputs.settings,
+    ) as folder:
         show.pace = Pace.within_a_minute(show.duration_s, outputs.film_fps)
         reel = film(folder / "film.mp4", show.pace.fps) if outputs.film else nullcontext()
         started = time.perf_counter()

@@ -108,12 +108,13 @@ def blame(
         raise InvalidValueError(f"--at must lie in 0..{case.seconds:g} s, got {at:g}")
     name = run_name(run) if run is not None else f"{scene}-{seed}"
     folder = out or Path("out") / f"blame-{file_name(name)}-{file_name(case.slam)}"
-    with whole_folder(folder, overwrite=overwrite) as part:
+    recipe = _recipe(case, question)
+    with whole_folder(folder, overwrite=overwrite, command="blame", settings=recipe) as part:
         found = _inquest(case, question)
         blame_picture(part / "blame.png", found)
         text = json.dumps(as_json(found), indent=1, allow_nan=False)
         write_text(part / "blame.json", text + "\n")
-        write_recipe(part, "blame", _recipe(case, question))
+        write_recipe(part, "blame", recipe)
     _tell(found, folder)
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from scripts.names import check
+from scripts.names import check, run_name
 from scripts.scanner_option import Scanner
 from slam.errors import InvalidValueError
 from slam.variants import with_set
@@ -63,7 +63,7 @@ def run(
     slam = list(with_set(slam, set_ or []))
     check(slam, scene)
     if log is not None:
-        on_log(slam, log, out or Path("out") / f"run-{log.name.split('.')[0]}", overwrite, film)
+        on_log(slam, log, out or Path("out") / f"run-{run_name(log)}", overwrite, film)
     elif scene is not None:
         from scripts.single_run.live import on_scene
         from scripts.single_run.session import Outputs
