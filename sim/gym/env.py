@@ -148,7 +148,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         "render_fps": 37,
     }
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (settings by keyword)
         self,
         scene: str = "office",
         *,
