@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench lock clean
+.PHONY: help demo test coverage check bench lock clean
 
 help:            ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -16,9 +16,14 @@ demo: $(STAMP)   ## 60 s of a moving office, SLAM against odometry, a map and a 
 test: $(STAMP)   ## the whole test suite, on up to four cores
 	@$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
-check: $(STAMP)  ## lint, format and strict types
+coverage: $(STAMP)  ## the same suite with a table of the lines that no test runs; takes longer
+	@$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder \
+	  --cov --cov-report=term-missing
+
+check: $(STAMP)  ## lint, format, spelling and strict types
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
+	@$(BIN)/codespell slam sim scenes scripts tests docs .ci Makefile pyproject.toml *.md
 	@$(BIN)/mypy
 
 bench: $(STAMP)  ## speed figures of this machine, as a table

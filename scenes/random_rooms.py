@@ -46,7 +46,7 @@ GRID_M = 0.1
 
 
 @register("random-rooms")
-def random_rooms(
+def random_rooms(  # noqa: PLR0913 (options of a scene)
     seed: int,
     *,
     size_m: float = 14.0,

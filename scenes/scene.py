@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.footprint import static_raster
+from scenes.registry import SCAN_HEIGHT
 from slam.errors import InvalidValueError
 from slam.system import Raster
-
-SCAN_HEIGHT = 0.36
-"""Usual height of the scan plane above the floor, m (where parts/robot.xml has its laser)."""
 
 Kind = Literal[
     "chair_swivel", "chair_visitor", "bin", "trolley", "pallet", "person", "door", "robot"

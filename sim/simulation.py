@@ -66,7 +66,7 @@ class Simulation:
     began between two steps, row 0 is the step before.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (settings by keyword)
         self,
         scene: str = "office",
         *,

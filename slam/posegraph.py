@@ -82,7 +82,7 @@ def _residuals(poses: Float, a: Float, b: Float, measured: Float) -> tuple[Float
     return out, by_a, by_b
 
 
-def _step(
+def _step(  # noqa: PLR0913 (arrays of one problem)
     n: int, a: Float, b: Float, residuals: Float, to_a: Float, to_b: Float, information: Float
 ) -> Float:
     """Gauss-Newton step of poses 1..n-1, flat."""

@@ -42,7 +42,7 @@ class About:
     alias: str = ""
 
 
-def number(
+def number(  # noqa: PLR0913 (the facts of one number)
     default: float,
     unit: str,
     meaning: str,

@@ -55,7 +55,7 @@ def curves(path: Path, levels: Sequence[Row]) -> None:
     save(figure, path)
 
 
-def _line(
+def _line(  # noqa: PLR0913 (a curve and its style)
     ax: Axes,
     rows: Sequence[Row],
     aside: float,

@@ -20,7 +20,7 @@ from slam.errors import LogFormatError, SlamFailedError
 from slam.guests import Limits, limited
 
 
-def run_one(
+def run_one(  # noqa: PLR0913 (the arguments of a job)
     path: Path,
     *,
     scene: str,

@@ -76,7 +76,8 @@ class Places:
         near_static: Callable[[Float], Float],
         believes: Callable[[Float], bool | None],
     ) -> None:
-        """
+        """A tally over one drive.
+
         near_static  m from points (n, 2) in the world to the nearest thing that never moves
         believes     whether the latest map holds such points; None before the first map
         """

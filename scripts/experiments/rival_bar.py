@@ -48,6 +48,7 @@ class Bar:
     met: bool
 
     def line(self) -> str:
+        """A row of Markdown."""
         return f"| {self.what} | {self.value} | {'yes' if self.met else '**no**'} |"
 
 

@@ -125,6 +125,7 @@ class Show:
     # -- what the panes are told ----------------------------------------------------------
 
     def track(self) -> Track:
+        """What the filmed system has estimated so far."""
         return self.replay.tracks[self.primary]
 
     def _truth_map(self, frame: Frame) -> Float | None:

@@ -99,6 +99,7 @@ def headings_off(track: Trajectory, graph: Trajectory, gps: GpsTrack) -> Float:
 
 
 def pose_numbers(track: Trajectory, graph: Trajectory, gps: GpsTrack) -> dict[str, Any]:
+    """Errors of a track against GPS and against the graph, by name: m and rad."""
     good, here = good_fixes(gps), at_fixes(track, gps)
     e = (se2.transform(first_fit(track, gps), here) - gps.points)[good]
     shape = (se2.transform(shape_fit(track, gps), here) - gps.points)[good]

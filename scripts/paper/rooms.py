@@ -34,7 +34,7 @@ SYSTEMS: dict[str, tuple[str, dict[str, Any]]] = {
 EVERY_SCAN, EVERY_BEAM = 8, 4  # of the raw points kept for the figure
 
 
-def run_one(
+def run_one(  # noqa: PLR0913 (the arguments of a job)
     path: Path,
     *,
     scene: str,

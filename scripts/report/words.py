@@ -26,7 +26,7 @@ def listed(words: list[str]) -> str:
 
 
 def levels_text(levels: list[float], of: list[float]) -> str:
-    """ "at dynamism 0 and 0.5", "at every level"."""
+    """Of levels: "at dynamism 0 and 0.5", "at every level"."""
     if len(levels) == len(of):
         return "at every level" if len(of) > 1 else f"at dynamism {levels[0]:g}"
     return "at dynamism " + listed([f"{level:g}" for level in levels])

@@ -95,7 +95,7 @@ def _node_time(a: float, b: float, step: float) -> float:
 
 
 @njit
-def travel_time(slow: Float, cell: float, gi: float, gj: float) -> Float:
+def travel_time(slow: Float, cell: float, gi: float, gj: float) -> Float:  # noqa: C901 (kernel)
     """T at each node for the goal at node coordinates (gi, gj); ``FAR`` where there is no way."""
     rows, columns = slow.shape
     T = np.full((rows, columns), FAR)
@@ -133,7 +133,7 @@ def _slope(before: float, here: float, after: float) -> float:
 
 
 @njit
-def directions(T: Float, clearance: Float) -> Float:
+def directions(T: Float, clearance: Float) -> Float:  # noqa: C901 (kernel)
     """(rows, columns, 2) unit vectors down T, averaged over 3 x 3 nodes; off walls inside them."""
     rows, columns = T.shape
     raw = np.zeros((rows, columns, 2))

@@ -113,7 +113,7 @@ class Pilot:
 
 
 @njit
-def _surroundings(
+def _surroundings(  # noqa: PLR0913 (kernel)
     poses: Float,
     before: Float,
     kinds: NDArray[np.int64],

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from scenes.scene import SCAN_HEIGHT
+from scenes.registry import SCAN_HEIGHT
 from sim.core.checks import instance, number, one_of, whole_numbers
 from sim.core.seeds import Seeds
 from sim.gym.actions import clipped
@@ -148,7 +148,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         "render_fps": 37,
     }
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (settings by keyword)
         self,
         scene: str = "office",
         *,

@@ -74,7 +74,7 @@ class Sight:
 
 
 @njit
-def _scanned(
+def _scanned(  # noqa: PLR0913 (kernel)
     ranges: NDArray[np.float32],
     valid: NDArray[np.bool_],
     offsets: Float,
@@ -121,7 +121,7 @@ def _scanned(
 
 
 @njit
-def _judge(
+def _judge(  # noqa: C901 (kernel)
     points: Float, things: NDArray[np.int64], old: Float, T_odom_robot: Float, wide: Float
 ) -> None:
     """Give thin things their radius and note where wide ones are.

@@ -45,7 +45,9 @@ class Physics(NamedTuple):
 
 
 class Robot(NamedTuple):
-    """at      first qpos and first dof
+    """The robot in the arrays of the engine.
+
+    at         first qpos and first dof
     push       ``qfrc_constraint``: anything but 0 at the robot's dofs is a touch
     touches    where these are collected
     drive      (8,) state, see ``sim.actors.robot.Drive``; tyres  (2,) actuators left, right
@@ -173,7 +175,7 @@ def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:
 
 
 @njit
-def _advance(
+def _advance(  # noqa: PLR0913 (kernel)
     first: int,
     last: int,
     resumed: bool,

@@ -54,7 +54,7 @@ class World:
     Raises ``InvalidValueError`` for a dynamism outside [0, 1], ``UnknownNameError`` for a scene.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (settings by keyword)
         self,
         scene: Scene | str,
         *,

@@ -28,7 +28,10 @@ BEGUN = 0.2  # of the threshold: from there back to the beginning of the rise
 
 @dataclass(frozen=True, kw_only=True)
 class Rule:
-    """threshold_m  of the rise        within_s  in which it rises       stays_s  for how long"""
+    """What counts as a divergence.
+
+    threshold_m  of the rise        within_s  in which it rises       stays_s  for how long
+    """
 
     threshold_m: float = 0.25
     within_s: float = 2.0

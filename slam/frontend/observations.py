@@ -71,7 +71,7 @@ class Observations:
 
 
 @njit
-def _deskew(
+def _deskew(  # noqa: PLR0913 (kernel)
     ranges: NDArray[np.float32],
     angles: NDArray[np.float64],
     offsets: NDArray[np.float64],

@@ -64,7 +64,7 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
 
 
 @njit
-def integrate(
+def integrate(  # noqa: C901 (kernel)
     cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, odds: Odds, write: bool
 ) -> tuple[float, float, int]:
     """Add one scan to the log-odds, which live in ``cells.age``; ``cells.y`` is 2 p - 1 above 0.

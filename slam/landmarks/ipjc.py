@@ -52,7 +52,7 @@ def _better(search: Search, pairs: int, cost: float) -> bool:
 
 
 @inner
-def _judge(
+def _judge(  # noqa: PLR0913 (kernel)
     search: Search, pose: Float, landmarks: Float, P: Float, first: int, pairs: int, cost: float
 ) -> Float:
     """(k, n) what each pair of a point from ``first`` on with a landmark not taken would add."""
@@ -82,7 +82,7 @@ def _next(costs: Float, after: float, j: int) -> int:
 
 
 @njit
-def visit(
+def visit(  # noqa: C901, PLR0913 (kernel)
     search: Search, pose: Float, landmarks: Float, P: Float, first: int, pairs: int, cost: float
 ) -> None:
     """All hypotheses that begin with the ``pairs`` chosen among the points before ``first``.

@@ -21,7 +21,7 @@ from slam.landmarks.hypotheses import Best, Gates, Ints
 class Jcbb:
     """Interpretation tree over the points in order; the joint cost by an incremental Cholesky."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (arrays of one problem)
         self,
         state: EkfFilter,
         chosen: Ints,

@@ -108,7 +108,7 @@ def disturb(P: Float, pose: Float, landmarks: Float, n: int, heading: float, Q: 
 
 
 @njit
-def linearise(
+def linearise(  # noqa: C901, PLR0912 (kernel)
     pose: Float, landmarks: Float, P: Float, matched: NDArray[np.int64], z: Float, R: Float
 ) -> tuple[Float, Float, Float, float]:
     """Gauss-Newton on the m matched landmarks and the pose alone, which is exact: P is Gaussian.
@@ -177,7 +177,7 @@ def gather(P: Float, chosen: NDArray[np.int64]) -> Float:
 
 
 @njit
-def absorb(
+def absorb(  # noqa: PLR0913 (kernel)
     pose: Float,
     landmarks: Float,
     n: int,

@@ -13,7 +13,7 @@ Float = NDArray[np.float64]
 
 
 @njit
-def distances(
+def distances(  # noqa: C901, PLR0913 (kernel)
     pose: Float,
     landmarks: Float,
     P: Float,

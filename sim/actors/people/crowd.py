@@ -156,7 +156,7 @@ def arrived(i: int, left: float, doors: Float, discs: Float, state: Float) -> bo
 
 
 @njit
-def plan(
+def plan(  # noqa: C901, PLR0913 (kernel)
     i: int, time: float, tick: float, stay: float, doors: Float, field: Field, crowd: Crowd
 ) -> None:
     """Stay, set off, arrive or give up; keeps the account of time walked and blocked."""

@@ -155,7 +155,7 @@ def stand(qpos: Float, addresses: Int, feet: Float) -> None:
 
 
 @njit
-def walk(
+def walk(  # noqa: PLR0913 (kernel)
     dt: float,
     physics: tuple[Float, Float],
     addresses: Int,

@@ -101,7 +101,7 @@ def wants_through(i: int, door: Float, field: Field, crowd: Crowd) -> int:
 
 
 @njit
-def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:
+def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:  # noqa: C901 (kernel)
     """Who may pass each door, and whether it shall open. Fills ``ways.sides``."""
     doors, passage, sides, discs = ways.doors, ways.passage, ways.sides, crowd.discs
     for d in range(doors.shape[0]):

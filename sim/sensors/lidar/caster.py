@@ -68,7 +68,7 @@ class Raycaster:
     beams in the world; after ``start``, ``noted``, the fields of ``windows.Noted``.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (settings by keyword)
         self,
         model: mujoco.MjModel,
         *,

@@ -83,7 +83,7 @@ def _between(a: Pose, b: Pose, t: float) -> Pose:
 
 
 @njit
-def _ray(c: float, s: float, x: float, y: float, z: float, lever: Vec3, way: Vec3) -> Ray:
+def _ray(c: float, s: float, x: float, y: float, z: float, lever: Vec3, way: Vec3) -> Ray:  # noqa: PLR0913 (kernel)
     """Origin and unit direction in the world of a ray of the beam that leaves (x, y, z).
 
     c, s   direction of the beam; ``lever`` (_, left m, up m) and ``way`` (forward, left, up) of
@@ -94,7 +94,7 @@ def _ray(c: float, s: float, x: float, y: float, z: float, lever: Vec3, way: Vec
 
 
 @njit
-def _cast_windows(
+def _cast_windows(  # noqa: PLR0913, PLR0915 (kernel)
     table: Float,
     poses: Float,
     bounds: Float,
@@ -168,7 +168,7 @@ def _cast_windows(
 
 
 @njit
-def sweep(
+def sweep(  # noqa: PLR0913 (kernel)
     table: Float,
     movable: Int,
     poses: Float,
@@ -212,7 +212,7 @@ def sweep(
 
 
 @njit
-def cast_one(
+def cast_one(  # noqa: PLR0913 (kernel)
     table: Float, poses: Float, bounds: Float, fan: Float, i: int, origin: Vec3, vec: Vec3
 ) -> tuple[float, int, float]:
     """(distance, candidate, |cos|) of one ray at the time of beam i, (inf, -1, NaN) for a miss.
@@ -238,7 +238,7 @@ def cast_one(
 
 
 @njit
-def reflect(
+def reflect(  # noqa: PLR0913 (kernel)
     table: Float,
     polished: NDArray[np.bool_],
     poses: Float,

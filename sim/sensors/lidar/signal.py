@@ -80,7 +80,7 @@ def _next_pulse(
 
 
 @njit
-def detect(
+def detect(  # noqa: PLR0913 (kernel)
     distances: Float,
     energies: Float,
     surfaces: Int,
@@ -121,7 +121,7 @@ def _single(distances: Float, surfaces: Int) -> bool:
 
 
 @njit
-def receive(
+def receive(  # noqa: PLR0913, PLR0915 (kernel)
     hits: tuple[Float, Int, Float],
     mirrored: tuple[Float, Int, Float],
     surface: tuple[Float, Bool],
@@ -215,7 +215,7 @@ def _correction(error: tuple[Float, float], place: float, brightness: float) -> 
 
 
 @njit
-def send(
+def send(  # noqa: C901, PLR0913 (kernel)
     received: tuple[Float, Int],
     reflectivity: Float,
     owner: Int,

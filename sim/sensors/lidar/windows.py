@@ -210,7 +210,7 @@ def _origins(fan: Float) -> Vec3:
 
 
 @njit
-def find_windows(
+def find_windows(  # noqa: PLR0913 (kernel)
     table: Float,
     poses: Float,
     bounds: Float,

@@ -113,7 +113,7 @@ def _draw(
 
 
 @njit
-def update(
+def update(  # noqa: PLR0913 (kernel)
     travel: tuple[float, float],
     contact: bool,
     p: Float,
@@ -181,7 +181,7 @@ def _at(travel: Float, step: float) -> tuple[float, float]:
 
 
 @njit
-def over_scan(
+def over_scan(  # noqa: PLR0913 (kernel)
     travel: Float,
     span: tuple[float, float],
     contact: bool,

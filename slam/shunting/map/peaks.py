@@ -81,7 +81,7 @@ def _reached(centre: float, reach: float, size: float, corner: int, blocks: int)
 
 
 @njit
-def _peaks(
+def _peaks(  # noqa: PLR0913 (kernel)
     cells: Cells,
     cell: float,
     short: float,

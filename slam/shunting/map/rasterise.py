@@ -68,7 +68,7 @@ def _touch(cells: Cells, column: int, row: int) -> int:
 
 
 @inner
-def _rasterise_point(
+def _rasterise_point(  # noqa: PLR0913 (kernel)
     cells: Cells,
     u: float,
     v: float,
@@ -113,7 +113,7 @@ def _rasterise_point(
 
 
 @inner
-def _rasterise_stretch(
+def _rasterise_stretch(  # noqa: PLR0913 (kernel)
     cells: Cells,
     u: float,
     v: float,
@@ -157,7 +157,7 @@ def _rasterise_stretch(
 
 
 @njit
-def _stamp(
+def _stamp(  # noqa: PLR0913 (kernel)
     cells: Cells,
     points: NDArray[np.float64],
     covariances: NDArray[np.float64],

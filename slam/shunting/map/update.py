@@ -88,7 +88,7 @@ def in_reach(
 
 
 @njit
-def integrate(
+def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
     cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, law: Law, write: bool
 ) -> tuple[float, float, int]:
     """One semi-implicit Gauss-Seidel sweep of Eq. (8) over the neurons in view.

@@ -94,7 +94,7 @@ def _sum(level: NDArray[np.uint8], base: NDArray[np.int32], di: int, dj: int) ->
 
 
 @njit
-def _bound(
+def _bound(  # noqa: PLR0913 (kernel)
     level: NDArray[np.uint8],
     bases: NDArray[np.int32],
     costs: NDArray[np.float64],
@@ -125,7 +125,7 @@ def _is_apart(
 
 
 @njit
-def _descend(
+def _descend(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
     levels: NDArray[np.uint8],
     bases: NDArray[np.int32],
     turns: NDArray[np.float64],

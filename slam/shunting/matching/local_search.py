@@ -52,7 +52,7 @@ class SearchWindow:
 
 
 @njit
-def _field(
+def _field(  # noqa: C901, PLR0912 (kernel)
     cells: Cells,
     short_term: float,
     i0: int,
@@ -103,7 +103,7 @@ def _field(
 
 
 @njit
-def place(
+def place(  # noqa: PLR0913 (kernel)
     points: NDArray[np.float64],
     prediction: NDArray[np.float64],
     turns: NDArray[np.float64],
@@ -164,7 +164,7 @@ def headings(points: Float, window: SearchWindow, cell: float, config: LocalConf
     return np.asarray(np.arange(-half, half + 1) * step, dtype=np.float64)
 
 
-def search(
+def search(  # noqa: PLR0913 (arrays of one problem)
     network: Network,
     short_term: float,
     observations: Observations,

@@ -60,7 +60,7 @@ class Seen(NamedTuple):
 
 
 @inner
-def _overlap(
+def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
     cells: Cells,
     reward: Reward,
     u: float,
@@ -141,7 +141,7 @@ def _overlap(
 
 
 @njit
-def evaluate(
+def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     cells: Cells,
     reward: Reward,
     seen: Seen,
@@ -254,7 +254,7 @@ def _solve(
 
 
 @njit
-def refine(
+def refine(  # noqa: C901, PLR0913 (kernel)
     cells: Cells,
     reward: Reward,
     climb: Climb,

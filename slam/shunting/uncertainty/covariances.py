@@ -90,7 +90,7 @@ def observable(
 
 
 @njit
-def advance(
+def advance(  # noqa: PLR0913 (kernel)
     drift: NDArray[np.float64],
     blind: NDArray[np.float64],
     shared: NDArray[np.float64],

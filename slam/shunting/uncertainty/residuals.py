@@ -39,7 +39,7 @@ class Pairing(NamedTuple):
 
 
 @inner
-def _offset(
+def _offset(  # noqa: PLR0913 (kernel)
     cells: Cells,
     short_term: float,
     u: float,
@@ -147,7 +147,7 @@ def _free_standing(
 
 
 @njit
-def _look(
+def _look(  # noqa: PLR0913 (kernel)
     cells: Cells, short_term: float, cell: float,
     points: NDArray[np.float64], covariances: NDArray[np.float64], weights: NDArray[np.float64],
     joined: NDArray[np.bool_], laser: NDArray[np.float64], pose: NDArray[np.float64],

@@ -9,7 +9,7 @@ from slam.errors import InvalidValueError
 
 
 @register("scanner")
-def scanner(
+def scanner(  # noqa: PLR0913 (settings of a model)
     *,
     fov_deg: float,
     beams: int,
@@ -19,7 +19,7 @@ def scanner(
     range_max_m: float = 30.0,
     unit_m: float = 0.0,
 ) -> Scanner:
-    """Any scanner: scanner(fov_deg=..., beams=..., rate_hz=..., sigma_m=...).
+    """Any scanner: its field of view, beams, rate and noise, as its arguments say.
 
     A mirror turns evenly, counter-clockwise, once a scan. At 360 degrees the first and the last
     beam are a step apart, else they are the two ends of the field of view.
