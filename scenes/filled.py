@@ -22,7 +22,7 @@ from scenes.recipe import (
     scatter,
     seat_chairs,
 )
-from scenes.scene import Scene
+from scenes.scene import Pose, Scene
 
 
 def filled(
@@ -30,6 +30,7 @@ def filled(
     seed: int,
     *,
     parts: Sequence[str | Path] = (),
+    put: Sequence[tuple[str | Path, Pose]] = (),
     n_chairs: int = 0,
     n_people: int = 0,
     doors: str = "open",
@@ -38,13 +39,15 @@ def filled(
 
     plan    path of an MJCF file, or the name of one of ``scenes/plans``
     parts   paths of MJCF files of furniture: each is put wherever a mark starts with its name
+    put     furniture where no mark is: (path or name, (x m, y m, yaw rad)), its back to +y
     doors   how they rest: "open", "ajar", "closed" or "mixed"
 
     Chairs take the ``seat:...`` marks first, then free floor. Raises ``InvalidValueError`` for a
     file, mark, material or number that cannot be.
     """
     n_chairs, n_people = count("n_chairs", n_chairs, 0), count("n_people", n_people, 0)
-    walls = _plan(str(plan), tuple(map(str, parts)))
+    more = tuple((str(part), (pose[0], pose[1], pose[2])) for part, pose in put)
+    walls = _plan(str(plan), tuple(map(str, parts)), more)
     builder, draws = Builder(walls), Draws(seed)
     hang_doors(builder, draws.doors, doors)
     put_bins(builder, draws.bins)
@@ -56,8 +59,10 @@ def filled(
 
 
 @cache
-def _plan(source: str, parts: tuple[str, ...]) -> Plan:
+def _plan(source: str, parts: tuple[str, ...], put: tuple[tuple[str, Pose], ...]) -> Plan:
     plan = Plan(source)
     plan.furnish_marks([*parts, *furniture()])
+    for part, pose in put:
+        plan.furnish(part, pose)
     plan.frame_doors()
     return plan.finish()
