@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from scenes.filling import filled
     from scenes.mounting import at_scan_height
     from scenes.registry import SCAN_HEIGHT, build, describe, names, register
     from scenes.scene import Mover, Scene
@@ -20,6 +21,7 @@ _WHERE = {
     **dict.fromkeys(("SCAN_HEIGHT", "build", "describe", "names", "register"), "registry"),
     **dict.fromkeys(("Mover", "Scene"), "scene"),
     "at_scan_height": "mounting",
+    "filled": "filling",
 }
 
 __all__ = [
@@ -29,6 +31,7 @@ __all__ = [
     "at_scan_height",
     "build",
     "describe",
+    "filled",
     "names",
     "register",
 ]

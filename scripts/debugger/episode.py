@@ -83,11 +83,7 @@ def case_of(folder: Path, slam: str | None, every: int, trust: bool = False) -> 
         raise LogFormatError(path, "no recipe of a run: it has no settings")
     if "scene" not in settings:
         raise LogFormatError(path, "this run was on a log: only a simulated one can be run again")
-    unknown = sorted({"drive", "name", "start"}.intersection(settings))
-    if unknown:
-        raise LogFormatError(path, f"no recipe of a run: settings.{unknown[0]} is none of them")
-    if not isinstance(settings.get("laser", ""), str):
-        raise LogFormatError(path, "no recipe of a run: settings.laser must be a scanner's name")
+    _check_settings(path, settings)
     check_world(path, world_of(path, words))
     slams = slams_of(path, settings)
     if slam is None:
@@ -102,6 +98,14 @@ def case_of(folder: Path, slam: str | None, every: int, trust: bool = False) -> 
     check_vouched(online)
     recorded = read_tum(online).poses if every == 1 and online.exists() else None
     return Case(settings=world, seconds=seconds, slam=slam, every=every, recorded=recorded)
+
+
+def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:
+    unknown = sorted({"drive", "name", "start"}.intersection(settings))
+    if unknown:
+        raise LogFormatError(path, f"no recipe of a run: settings.{unknown[0]} is none of them")
+    if not isinstance(settings.get("laser", ""), str):
+        raise LogFormatError(path, "no recipe of a run: settings.laser must be a scanner's name")
 
 
 def _compared(path: Path, slam: str | None, every: int, trust: bool) -> Case:
