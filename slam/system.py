@@ -110,6 +110,7 @@ class SlamSystem(Protocol):
 Factory = Callable[..., object]
 F = TypeVar("F", bound=Callable[..., Any])
 _registry: dict[str, Factory] = {}
+_prefixes: dict[str, Callable[..., object]] = {}
 
 
 def register(name: str) -> Callable[[F], F]:
@@ -117,6 +118,22 @@ def register(name: str) -> Callable[[F], F]:
 
     def add(factory: F) -> F:
         _registry[name] = factory
+        return factory
+
+    return add
+
+
+def register_prefix(prefix: str) -> Callable[[F], F]:
+    """Class or factory decorator: ``create(prefix + rest)`` calls it with ``rest`` and the options.
+
+    Raises ``InvalidValueError`` unless ``prefix`` ends in a colon: what a name of it runs is not
+    registered, so such a name out of a file must count as code (``slam.names.is_code``).
+    """
+    if not prefix.endswith(":"):
+        raise InvalidValueError(f"a prefix of SLAM names must end in ':', got {prefix!r}")
+
+    def add(factory: F) -> F:
+        _prefixes[prefix] = factory
         return factory
 
     return add
@@ -162,21 +179,7 @@ def create(name: str, **config: Any) -> SlamSystem:
         if name in _registry and not hasattr(_registry[name], "config_class"):
             raise InvalidValueError(f"SLAM '{name}' has no numbers to set")
         config["config"] = changes
-    if name.startswith("pipe:"):
-        from slam.guests.pipe import PipeSlam  # it imports this module
-
-        factory: Factory = partial(PipeSlam, name.removeprefix("pipe:"))
-    elif ":" in name:
-        factory = _load(name)
-    elif name in _registry:
-        factory = _registry[name]
-    else:
-        near = difflib.get_close_matches(name, _registry, n=1)
-        hint = f" Did you mean '{near[0]}'?" if near else ""
-        raise UnknownNameError(
-            f"no SLAM is called '{name}'.{hint} Known: {', '.join(names())}, or module:Class, "
-            "or pipe:COMMAND."
-        )
+    factory = _factory(name)
     _check_options(name, factory, config)
     try:
         system = factory(**config)
@@ -190,6 +193,23 @@ def create(name: str, **config: Any) -> SlamSystem:
         missing = [m for m in ("reset", "update", "map", "trajectory") if not hasattr(system, m)]
         raise UnknownNameError(f"'{name}' is no SlamSystem: it has no {', '.join(missing)}()")
     return system
+
+
+def _factory(name: str) -> Factory:
+    """What makes the SLAM of that name: behind a prefix, in a module, or registered."""
+    prefix, colon, rest = name.partition(":")
+    if prefix + colon in _prefixes:
+        return partial(_prefixes[prefix + colon], rest)
+    if colon:
+        return _load(name)
+    if name in _registry:
+        return _registry[name]
+    near = difflib.get_close_matches(name, _registry, n=1)
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    raise UnknownNameError(
+        f"no SLAM is called '{name}'.{hint} Known: {', '.join(names())}, or module:Class, "
+        "or pipe:COMMAND."
+    )
 
 
 def told(error: BaseException) -> str:

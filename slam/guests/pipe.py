@@ -26,10 +26,9 @@ from slam.frontend import odometry_steps
 from slam.guests import protocol
 from slam.guests.wire import Wire
 from slam.names import child_environment, join_folders, refuse_code
-from slam.system import Estimate, Raster, SlamSystem, create
+from slam.system import Estimate, Raster, SlamSystem, create, register_prefix
 from slam.trajectory import Trajectory
-
-PREFIX = "pipe:"
+from slam.variants import PIPE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +50,7 @@ class Limits:
                 raise InvalidValueError(f"Limits.{name} must be > 0 s and finite, got {value!r}")
 
 
+@register_prefix(PIPE)
 class PipeSlam:
     """The system behind a command. After a failure it is over; ``reset`` starts it anew.
 
@@ -176,9 +176,9 @@ def _words(command: str | Sequence[str]) -> list[str]:
     try:
         words = shlex.split(command) if isinstance(command, str) else list(command)
     except ValueError as error:
-        raise InvalidValueError(f"'{PREFIX}{command}': {error}") from error
+        raise InvalidValueError(f"'{PIPE}{command}': {error}") from error
     if not words:
-        raise InvalidValueError(f"'{PREFIX}' needs a command, as in {PREFIX}./my_slam --option")
+        raise InvalidValueError(f"'{PIPE}' needs a command, as in {PIPE}./my_slam --option")
     return words
 
 
@@ -209,6 +209,6 @@ def limited(name: str, limits: Limits | None) -> SlamSystem:
     """``create(name)`` for comparisons: with limits, whatever is not ours runs in a child."""
     if limits is None or ":" not in name:
         return create(name)
-    if name.startswith(PREFIX):
+    if name.startswith(PIPE):
         return create(name, scan_limit_s=limits.scan_s, first_limit_s=limits.first_s)
     return guarded(name, limits)
