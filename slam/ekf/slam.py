@@ -28,6 +28,7 @@ from slam.frontend.odometry_prior import assumed_covariance
 from slam.frontend.polar import polar
 from slam.landmarks.association import METHODS
 from slam.landmarks.filter import MOST_STD_M, EkfFilter
+from slam.path import PosePath
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
 
@@ -123,8 +124,7 @@ class EkfSlam:
         self.lifecycle = Lifecycle(self.config)
         self._before: Odometry | None = None
         self._unmatched = 0
-        self._stamps: list[int] = []
-        self._poses: list[Float] = []
+        self._path = PosePath()
 
     def update(self, frame: Frame) -> Estimate:
         """One frame in six steps: from odometry and points to pose, covariance and landmarks."""
@@ -140,8 +140,8 @@ class EkfSlam:
 
     def _begin(self, frame: Frame) -> None:
         """Refuse a frame out of order; let the first one tell which preset is meant."""
-        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
-        if not self._stamps and not self._told:
+        self._path.check_order(frame.stamp_ns)
+        if not len(self._path) and not self._told:
             name = "points" if frame.features is not None else "corners"
             self._configure(PRESETS[name](**self._options))
             self.lifecycle = Lifecycle(self.config)
@@ -248,8 +248,7 @@ class EkfSlam:
 
     def _report(self, frame: Frame, matched: int, observed: int) -> Estimate:
         lost = self._unmatched >= self.config.lifecycle.lost_after
-        self._stamps.append(frame.stamp_ns)
-        self._poses.append(self.filter.pose.copy())
+        self._path.add(frame.stamp_ns, self.filter.pose)
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=self.filter.pose,
@@ -280,10 +279,7 @@ class EkfSlam:
 
     def trajectory(self) -> Trajectory:
         """The online poses: a filter does not revise its past."""
-        return Trajectory(
-            stamps_ns=np.array(self._stamps, dtype=np.int64),
-            poses=np.array(self._poses).reshape(-1, 3),
-        )
+        return self._path.trajectory()
 
 
 def _regular(covariances: Float, config: LifecycleConfig) -> Float:

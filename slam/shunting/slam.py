@@ -18,6 +18,7 @@ from slam.frames import Float, Frame, Odometry
 from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.path import PosePath
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map import export
 from slam.shunting.map import io as memory
@@ -66,8 +67,7 @@ class ShuntingSlam:
         self._relocalisation: Relocalisation | None = None
         self._loops = Loops(self.config, self._matcher)
         self._trusted = True  # the pose of the frame before
-        self._stamps: list[int] = []
-        self._poses: list[Float] = []
+        self._path = PosePath()
 
     def _new_network(self) -> Network:
         return Network(self.config)
@@ -79,7 +79,7 @@ class ShuntingSlam:
         """
         if self._before is None and self._resumed is None:
             return self._first(frame)
-        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
+        self._path.check_order(frame.stamp_ns)
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
         prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
@@ -183,7 +183,7 @@ class ShuntingSlam:
         if state != "tracking":
             return None
         short_term = self._matcher.reward.short_term
-        step, turn = min(prediction.elapsed, self.config.map.longest_look_s), len(self._poses)
+        step, turn = min(prediction.elapsed, self.config.map.longest_look_s), len(self._path)
         return look(self.network, short_term, observations, match.T_map_robot, step, turn)
 
     def _update_map(
@@ -237,13 +237,12 @@ class ShuntingSlam:
             motion, covariance = prediction.increment, prediction.covariance
         self._trusted = state in ("tracking", "relocated")
         covariance = turned(covariance, -float(self._T_map_robot[2]))
-        self._loops.add(len(self._poses), match.T_map_robot, motion, covariance, observations)
+        self._loops.add(len(self._path), match.T_map_robot, motion, covariance, observations)
 
     def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
         self._before = frame.odometry
         self._T_map_robot = match.T_map_robot
-        self._stamps.append(frame.stamp_ns)
-        self._poses.append(match.T_map_robot)
+        self._path.add(frame.stamp_ns, match.T_map_robot)
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=match.T_map_robot,
@@ -315,10 +314,7 @@ class ShuntingSlam:
 
     def trajectory(self) -> Trajectory:
         """The poses with loops closed; the online ones up to 100 m of way, or without a loop."""
-        return Trajectory(
-            stamps_ns=np.array(self._stamps, dtype=np.int64),
-            poses=self._loops.corrected(np.array(self._poses).reshape(-1, 3)),
-        )
+        return self._path.trajectory(self._loops.corrected(self._path.poses()))
 
 
 def _near(match: Match, prediction: Prediction) -> Match:
