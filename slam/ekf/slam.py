@@ -20,6 +20,7 @@ from slam.ekf.lifecycle import (
     unhidden_by_features,
 )
 from slam.errors import InvalidValueError
+from slam.estimate import Estimate, Landmarks, Raster
 from slam.frames import Features, Float, Frame, Odometry
 from slam.frontend import odometry_steps
 from slam.frontend.corner_config import CornerConfig
@@ -29,7 +30,7 @@ from slam.frontend.polar import polar
 from slam.landmarks.association import METHODS
 from slam.landmarks.filter import MOST_STD_M, EkfFilter
 from slam.path import PosePath
-from slam.system import Estimate, Raster, register
+from slam.system import register
 from slam.trajectory import Trajectory
 
 GROUPS = ("lifecycle", "extractor")  # set by path, not as options
@@ -38,29 +39,6 @@ PRESETS: dict[str, Callable[..., EkfConfig]] = {
     "corners": EkfConfig.corners,
     "victoria_park": EkfConfig.victoria_park,
 }
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Landmarks:
-    """What the EKF has for a map.
-
-    keys         (n,) int64 names, never used twice
-    points_map   (n, 2) m
-    covariances  (n, 2, 2) m^2 in the map frame
-    looks        (n,) int64 how often each was seen
-    """
-
-    keys: NDArray[np.int64]
-    points_map: Float
-    covariances: Float
-    looks: NDArray[np.int64]
-
-    def ellipses(self, sigmas: float = 3.0) -> Float:
-        """(n, 5) for drawing: centre x, y (m), half axes (m), direction of the first axis (rad)."""
-        values, vectors = np.linalg.eigh(self.covariances)
-        axes = sigmas * np.sqrt(np.maximum(values[:, ::-1], 0.0))
-        angles = np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1])
-        return np.column_stack([self.points_map, axes, angles])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

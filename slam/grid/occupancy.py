@@ -166,6 +166,7 @@ class OccupancySlam(ShuntingSlam):
     """An ordinary log-odds occupancy grid, with the matcher of "shunting"."""
 
     config_class: ClassVar[type[ShuntingConfig]] = OccupancyConfig
+    cells_hold = "probabilities"
 
     def __init__(
         self,

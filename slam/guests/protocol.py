@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.errors import FAILURES, InvalidValueError, NotFiniteError, SlamFailedError
+from slam.estimate import Estimate, Raster
 from slam.frames import Features, Float, Frame, LaserSpec, Odometry, Scan
-from slam.system import Estimate, Raster
 from slam.trajectory import Trajectory
 
 PROTOCOL, VERSION = "mobilia-slam", 1

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.errors import InvalidValueError, LogFormatError
+from slam.estimate import Changes, Estimate, Raster
 from slam.frames import Float, Frame, Odometry
 from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations, observe
@@ -33,7 +34,7 @@ from slam.shunting.uncertainty.odometry_noise import OdometryNoise
 from slam.shunting.uncertainty.pose_covariance import PoseCovariance
 from slam.shunting.uncertainty.residuals import Evidence, look
 from slam.shunting.warmup import warm_up
-from slam.system import Estimate, Raster, register
+from slam.system import register
 from slam.trajectory import Trajectory
 
 
@@ -47,6 +48,7 @@ class ShuntingSlam:
     """
 
     config_class: ClassVar[type[ShuntingConfig]] = ShuntingConfig
+    cells_hold = "activities"
 
     def __init__(self, config: ShuntingConfig | str | Mapping[str, Any] = "robust") -> None:
         self.config = self.config_class.of(config)
@@ -265,7 +267,7 @@ class ShuntingSlam:
         """
         return export.existence(self.network)
 
-    def changes(self) -> export.Changes | None:
+    def changes(self) -> Changes | None:
         """What appeared and what is gone lately; None without a map or a long-term memory."""
         return export.changes(self.network)
 
