@@ -17,6 +17,7 @@ from slam._jit import njit
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, Scan
 from slam.frontend.config import FrontendConfig
+from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import face, join, unveiled
 from slam.frontend.visibility import View, view_of_beams, view_of_features
 
@@ -71,7 +72,7 @@ class Observations:
 
 
 @njit
-def _deskew(
+def _scanned(
     ranges: NDArray[np.float32],
     angles: NDArray[np.float64],
     offsets: NDArray[np.float64],
@@ -102,14 +103,7 @@ def _deskew(
         reach = min(r, use) if hit else silent
         px = lx + reach * math.cos(angles[k] + T_robot_laser[2])
         py = ly + reach * math.sin(angles[k] + T_robot_laser[2])
-        turn = twist[2] * offsets[k]
-        if offsets[k] != 0.0:
-            # Motion since the stamp: mid-point rule, exact to third order in the turned angle.
-            c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
-            mx = (c * twist[0] - s * twist[1]) * offsets[k]
-            my = (s * twist[0] + c * twist[1]) * offsets[k]
-            c, s = math.cos(turn), math.sin(turn)
-            px, py = c * px - s * py + mx, s * px + c * py + my
+        px, py = deskewed(px, py, offsets[k], twist)
         dx, dy = px - lx, py - ly
         bearings[k] = math.atan2(lc * dy - ls * dx, lc * dx + ls * dy)
         free[k] = math.sqrt(dx * dx + dy * dy)
@@ -139,7 +133,7 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     beams = np.empty(n, np.int64)
     use = min(grain.range_m, spec.range_max)
     config, surfaces = grain.frontend, grain.frontend.surfaces
-    count = _deskew(
+    count = _scanned(
         scan.ranges,
         spec.angles,
         spec.beam_time_offsets,
