@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from slam._jit import njit
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, Scan
-from slam.frontend.config import FrontendConfig
+from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import face, join, unveiled
 from slam.frontend.visibility import View, view_of_beams, view_of_features
@@ -59,6 +59,7 @@ class Observations:
     facings       (n,) uint8: the way the surface faces, see ``surfaces.face``; 0: unknown
     view          what is seen to be empty
     T_robot_laser (3,) origin of ``view``
+    sensor_sigma_m  standard deviation of a range: the scanner's own, or that of the config
     """
 
     points_robot: Float
@@ -69,6 +70,7 @@ class Observations:
     facings: NDArray[np.uint8]
     view: View
     T_robot_laser: Float
+    sensor_sigma_m: float = FRONTEND.sensor_sigma_m
 
 
 @njit
@@ -164,7 +166,8 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
         tangents = tangents.take(kept, axis=0)
     facings = np.zeros(len(points), np.uint8)
     face(points, spec.T_robot_laser, onward, surfaces.face_m, facings)
-    variance = max(config.sigma_cells * grain.cell_m, config.sensor_sigma_m) ** 2
+    sensor_sigma_m = spec.range_sigma_m or config.sensor_sigma_m
+    variance = max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2
     covariances = np.zeros((len(points), 3))
     covariances[:, 0] = covariances[:, 2] = variance
     x, y = points[:, 0], points[:, 1]
@@ -180,6 +183,7 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
         facings=facings,
         view=view,
         T_robot_laser=spec.T_robot_laser,
+        sensor_sigma_m=sensor_sigma_m,
     )
 
 
@@ -205,6 +209,7 @@ def from_features(features: Features, grain: Grain) -> Observations:
         facings=np.zeros(len(covariances), np.uint8),
         view=view_of_features(points[near], grain.cell_m, grain.frontend.view),
         T_robot_laser=np.zeros(3),
+        sensor_sigma_m=grain.frontend.sensor_sigma_m,
     )
 
 
@@ -234,4 +239,5 @@ def joined(first: Observations, second: Observations) -> Observations:
         facings=np.concatenate([first.facings, second.facings]),
         view=first.view,
         T_robot_laser=first.T_robot_laser,
+        sensor_sigma_m=first.sensor_sigma_m,
     )

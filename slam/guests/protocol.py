@@ -126,6 +126,7 @@ def _laser_message(spec: LaserSpec) -> dict[str, Any]:
         "range_max": spec.range_max,
         "beam_time_offsets": spec.beam_time_offsets.tolist(),
         "T_robot_laser": spec.T_robot_laser.tolist(),
+        **({"range_sigma_m": spec.range_sigma_m} if spec.range_sigma_m else {}),
     }
 
 

@@ -87,7 +87,9 @@ class ShuntingSlam:
         prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
         evidence = self._compare(observations, match, prediction, state)  # 4 residuals
         state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
-        self._update_uncertainty(prediction, match, evidence, state)  # 6 pose, odometry noise
+        self._update_uncertainty(
+            observations, prediction, match, evidence, state
+        )  # 6 pose, odometry noise
         self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
         return self._report(frame, match, state)
 
@@ -221,11 +223,16 @@ class ShuntingSlam:
         return "lost" if doubtful else "tracking"
 
     def _update_uncertainty(
-        self, prediction: Prediction, match: Match, evidence: Evidence | None, state: str
+        self,
+        observations: Observations,
+        prediction: Prediction,
+        match: Match,
+        evidence: Evidence | None,
+        state: str,
     ) -> None:
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
         if state == "tracking" and not match.slipped:
-            self._odometry_noise.learn(prediction, match)
+            self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m)
         else:
             self._odometry_noise.skip()
 

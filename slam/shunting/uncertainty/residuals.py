@@ -240,7 +240,7 @@ def look(
         longest=config.longest_cells * cell,
         faint_overlap=config.faint_overlap,
         bent=config.bent,
-        sensor_sigma=network.config.frontend.sensor_sigma_m,
+        sensor_sigma=seen.sensor_sigma_m,
     )
     law = network.law(elapsed)
     geometry, sums = np.zeros((3, 3)), np.zeros(5)
