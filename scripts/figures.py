@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from slam import se2
+from slam.estimate import Changes
 from slam.files import replacing
 from slam.frames import NS_PER_S, Float
-from slam.shunting.map.export import Changes
 from slam.system import Raster
 from slam.trajectory import Trajectory
 

@@ -38,6 +38,7 @@ MOST_RANGE_M = float(np.finfo(np.float32).max)  # ranges are such numbers
 MOST_SWEEP_S = 100.0  # from a scan's first beam to its last
 MOST_FEATURE_M = 1e9  # from the robot: their squares must not overflow
 MOST_MOUNT_M = 30.0  # from the robot's origin to its laser
+MOST_SIGMA_M = 10.0  # of a range; a scanner that is off by more measures nothing
 
 
 def to_ns(seconds: float) -> int:
@@ -63,6 +64,8 @@ class LaserSpec(ByContent):
                        neighbours are one mirror turn (13.3 ms) apart. All zero where a log does
                        not say.
     T_robot_laser      (3,) pose of the laser on the robot (m, m, rad), within 30 m of its origin
+    range_sigma_m      m, standard deviation of a range at 5 m, rounding included; 0 where nobody
+                       states it: logs and bags do not
 
     Raises ``InvalidValueError`` for anything else.
     """
@@ -74,9 +77,15 @@ class LaserSpec(ByContent):
     range_max: float = 80.0
     beam_time_offsets: Float = field(default_factory=lambda: np.zeros(0))
     T_robot_laser: Float = field(default_factory=lambda: np.zeros(3))
+    range_sigma_m: float = 0.0
 
     def __post_init__(self) -> None:
         self._check_angles()
+        if not 0.0 <= self.range_sigma_m <= MOST_SIGMA_M:
+            raise InvalidValueError(
+                f"LaserSpec.range_sigma_m must be 0 (not stated) to {MOST_SIGMA_M:g} m, "
+                f"got {self.range_sigma_m}"
+            )
         if not 0.0 <= self.range_min < self.range_max <= MOST_RANGE_M:
             raise InvalidValueError(
                 f"LaserSpec needs 0 <= range_min < range_max <= {MOST_RANGE_M:.3g}, "
@@ -101,7 +110,7 @@ class LaserSpec(ByContent):
                 f"LaserSpec.n_beams must be a whole number >= 1 and <= {MOST_BEAMS}, "
                 f"got {self.n_beams!r}"
             )
-        for name in ("angle_min", "angle_increment", "range_min", "range_max"):
+        for name in ("angle_min", "angle_increment", "range_min", "range_max", "range_sigma_m"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, (float, int, np.number)):
                 raise InvalidValueError(f"LaserSpec.{name} must be a number, got {value!r}")

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError, LogFormatError, OutputError
+from slam.estimate import Raster
 from slam.files import part_of, put, replacing, sync, sync_names, unfinished, write_bytes
-from slam.system import Raster
 
 OCCUPIED_THRESHOLD = 0.65
 # ROS 1's value. nav2's map_saver writes 0.25, with which a map_server takes the unknown gray 205

@@ -8,6 +8,7 @@ import numpy as np
 from slam import se2
 from slam.frames import Float, Frame, Odometry
 from slam.frontend import odometry_steps
+from slam.path import PosePath
 from slam.system import Estimate, Raster, register
 from slam.trajectory import Trajectory
 
@@ -29,8 +30,7 @@ class OdometrySlam:
         self._before: Odometry | None = None
         self._T_map_robot: Float = np.zeros(3)
         self._covariance: Float = np.zeros((3, 3))
-        self._stamps: list[int] = []
-        self._poses: list[Float] = []
+        self._path = PosePath()
 
     def update(self, frame: Frame) -> Estimate:
         """The odometry pose relative to the first frame.
@@ -38,7 +38,7 @@ class OdometrySlam:
         Raises ``InvalidValueError`` for a frame that does not come after the last one and where a
         step is none (``slam.frontend.odometry_steps``), as all SLAMs here do.
         """
-        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
+        self._path.check_order(frame.stamp_ns)
         now = frame.odometry
         if self._first is None or self._before is None:
             self._first = self._before = now
@@ -46,7 +46,7 @@ class OdometrySlam:
         self._before = now
         T_map_robot = se2.between(self._first.T_odom_robot, now.T_odom_robot)
         increment_covariance = now.increment_covariance
-        if increment_covariance is not None and self._stamps:
+        if increment_covariance is not None and len(self._path):
             T_before_now = se2.between(self._T_map_robot, T_map_robot)
             self._covariance = se2.propagate(
                 self._covariance,
@@ -55,8 +55,7 @@ class OdometrySlam:
                 odometry_steps.known(increment_covariance),
             )
         self._T_map_robot = T_map_robot
-        self._stamps.append(frame.stamp_ns)
-        self._poses.append(T_map_robot)
+        self._path.add(frame.stamp_ns, T_map_robot)
         return Estimate(
             stamp_ns=frame.stamp_ns, T_map_robot=T_map_robot, covariance=self._covariance
         )
@@ -67,7 +66,4 @@ class OdometrySlam:
 
     def trajectory(self) -> Trajectory:
         """The online poses."""
-        return Trajectory(
-            stamps_ns=np.array(self._stamps, dtype=np.int64),
-            poses=np.array(self._poses).reshape(-1, 3),
-        )
+        return self._path.trajectory()

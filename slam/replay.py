@@ -7,13 +7,15 @@ import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.errors import InvalidValueError, NotFiniteError, SlamFailedError
+from slam.errors import InvalidValueError, MobiliaError, NotFiniteError, SlamFailedError
+from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame
-from slam.system import Estimate, Raster, SlamSystem, told
+from slam.system import CanSave, HasChanges, HasLandmarks, SaysCells, SlamSystem, told
 from slam.trajectory import Trajectory
 
 
@@ -45,6 +47,24 @@ def asked_map(system: SlamSystem) -> Raster | None:
             "bad",
         )
     return raster if raster.values.size else None
+
+
+def asked_landmarks(system: HasLandmarks) -> Landmarks:
+    """Its landmarks now; ``SlamFailedError`` for what cannot be any."""
+    with judged():
+        found: object = system.landmarks()
+    if not isinstance(found, Landmarks):
+        raise SlamFailedError(f"returned no Landmarks but {found!r:.80}", "bad")
+    return found
+
+
+def asked_changes(system: HasChanges) -> Changes | None:
+    """What moved lately; ``SlamFailedError`` for what cannot be that."""
+    with judged():
+        found: object = system.changes()
+    if found is not None and not isinstance(found, Changes):
+        raise SlamFailedError(f"returned no Changes or None but {found!r:.80}", "bad")
+    return found
 
 
 def asked_trajectory(system: SlamSystem, stamps_ns: NDArray[np.int64]) -> Trajectory:
@@ -113,6 +133,38 @@ class Track:
         """The map now; raises ``SlamFailedError`` for what no map can be."""
         with self._named("map()"):
             return asked_map(self.system)
+
+    def landmarks(self) -> Landmarks | None:
+        """Its landmarks, None for a system without; raises ``SlamFailedError`` as ``map`` does."""
+        if not isinstance(self.system, HasLandmarks):
+            return None
+        with self._named("landmarks()"):
+            return asked_landmarks(self.system)
+
+    def changes(self) -> Changes | None:
+        """What moved lately, None where it cannot say; raises ``SlamFailedError`` as ``map``."""
+        if not isinstance(self.system, HasChanges):
+            return None
+        with self._named("changes()"):
+            return asked_changes(self.system)
+
+    def save(self, path: Path) -> bool:
+        """Let it write its map; whether it can. Raises ``OutputError``, ``SlamFailedError``."""
+        if not isinstance(self.system, CanSave):
+            return False
+        with self._named("save()"):
+            try:
+                self.system.save(path)
+            except MobiliaError:
+                raise
+            except Exception as error:  # somebody else's code raises whatever it likes
+                raise SlamFailedError(f"raised {told(error)}") from error
+        return True
+
+    def cells_hold(self) -> str:
+        """What the cells of its map hold, "" where it does not say."""
+        system = self.system
+        return str(system.cells_hold) if isinstance(system, SaysCells) else ""
 
     def covariances(self) -> Float:
         """(n, 3, 3) online covariances in the map frame."""

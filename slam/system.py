@@ -7,6 +7,9 @@
         def map(self) -> Raster | None: ...
         def trajectory(self) -> Trajectory: ...
 
+A SLAM may have more: ``HasLandmarks``, ``HasChanges``, ``CanSave`` and ``SaysCells`` are optional.
+Who wants one of these asks whether it is there (``slam.replay.Track``), never for a class.
+
 ``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class,
 ``create("pipe:./my_slam --option")`` a program in any language (``slam.guests.pipe``).
 ``create("shunting{matching.reward=7}")`` sets numbers of its config (``slam.variants``).
@@ -19,75 +22,23 @@ import importlib
 import inspect
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
-from slam.checked import covariance, frozen, pose
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError
-from slam.frames import Float, Frame
+from slam.estimate import Changes, Estimate, Landmarks, Raster
+from slam.frames import Frame
 from slam.names import first_line, join_folders, refuse_code
 from slam.settings import Settings
 from slam.trajectory import Trajectory
 from slam.variants import parsed
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Estimate:
-    """Where a SLAM believes the robot is.
-
-    stamp_ns     the frame's stamp
-    T_map_robot  (3,) m, m, rad; the map frame is the robot's frame at the first update
-    covariance   (3, 3) of (x, y, theta) in the map frame
-    converged    False when the system does not trust this estimate; never a plausible stand-in
-    diagnostics  JSON-serialisable numbers and words, e.g. {"state": "tracking", "matched": 0.97}.
-                 "unobservable": number of directions of position (0, 1 or 2) about which the sensor
-                 says nothing now, as along a bare corridor; "unobservable_rad": the one direction,
-                 in the map frame. ``converged`` stays True then: nothing is wrong, the estimate is
-                 odometry's there, and the covariance grows along it
-    """
-
-    stamp_ns: int
-    T_map_robot: Float
-    covariance: Float
-    converged: bool = True
-    diagnostics: Mapping[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "T_map_robot", pose("Estimate", "T_map_robot", self.T_map_robot))
-        object.__setattr__(
-            self, "covariance", covariance("Estimate", "covariance", self.covariance)
-        )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Raster:
-    """A map as an image of existence.
-
-    values        (height, width) float32 in [0, 1], NaN unknown; row 0 is the lowest y
-    resolution_m  edge of a cell, m
-    T_map_origin  (3,) pose of the outer corner of values[0, 0] in the map frame
-    """
-
-    values: NDArray[np.float32]
-    resolution_m: float
-    T_map_origin: Float
-
-    def __post_init__(self) -> None:
-        values = frozen("Raster", "values", self.values, (None, None), np.float32)
-        known = values[~np.isnan(values)]
-        if known.size and (known.min() < 0.0 or known.max() > 1.0):
-            raise InvalidValueError(
-                f"Raster.values must lie in [0, 1] or be NaN, got {known.min()}..{known.max()}"
-            )
-        if not 0.0 < self.resolution_m < np.inf:
-            raise InvalidValueError(f"Raster.resolution_m must be > 0 m, got {self.resolution_m}")
-        object.__setattr__(self, "values", values)
-        object.__setattr__(self, "T_map_origin", pose("Raster", "T_map_origin", self.T_map_origin))
+__all__ = [
+    "CanSave", "Changes", "Estimate", "HasChanges", "HasLandmarks", "Landmarks", "Raster",
+    "SaysCells", "SlamSystem", "config_of", "create", "describe", "names", "register",
+    "register_prefix", "told",
+]  # fmt: skip
 
 
 @runtime_checkable
@@ -107,6 +58,37 @@ class SlamSystem(Protocol):
         """Final poses of all frames so far; the online ones where nothing better exists."""
 
 
+@runtime_checkable
+class HasLandmarks(Protocol):
+    """Optional: a map of points. The film draws its ellipses, the paper's figures count them."""
+
+    def landmarks(self) -> Landmarks:
+        """The landmarks now."""
+
+
+@runtime_checkable
+class HasChanges(Protocol):
+    """Optional: a map that knows what moved. A run draws it as ``changes.png``."""
+
+    def changes(self) -> Changes | None:
+        """What appeared and what is gone lately, None where nothing can be said."""
+
+
+@runtime_checkable
+class CanSave(Protocol):
+    """Optional: a map that can be kept. A run writes it as ``map.npz``."""
+
+    def save(self, path: Path) -> None:
+        """Write the map; raises ``OutputError``."""
+
+
+@runtime_checkable
+class SaysCells(Protocol):
+    """Optional: what the cells of ``map()`` hold, for titles: "probabilities", "activities"."""
+
+    cells_hold: str
+
+
 Factory = Callable[..., object]
 F = TypeVar("F", bound=Callable[..., Any])
 _registry: dict[str, Factory] = {}
@@ -120,6 +102,9 @@ OWN = {
     "shunting-features": "slam.shunting.featured:FeaturedShuntingSlam",
 }
 """This project's SLAMs by name, as ``module:Class``: imported when one is asked for."""
+OWN_PREFIXES = {"pipe:": "slam.guests.pipe:PipeSlam"}
+"""This project's prefixes of names, the same way."""
+_prefixes: dict[str, Callable[..., object]] = {}
 
 
 def register(name: str) -> Callable[[F], F]:
@@ -127,6 +112,22 @@ def register(name: str) -> Callable[[F], F]:
 
     def add(factory: F) -> F:
         _registry[name] = factory
+        return factory
+
+    return add
+
+
+def register_prefix(prefix: str) -> Callable[[F], F]:
+    """Class or factory decorator: ``create(prefix + rest)`` calls it with ``rest`` and the options.
+
+    Raises ``InvalidValueError`` unless ``prefix`` ends in a colon: what a name of it runs is not
+    registered, so such a name out of a file must count as code (``slam.names.is_code``).
+    """
+    if not prefix.endswith(":"):
+        raise InvalidValueError(f"a prefix of SLAM names must end in ':', got {prefix!r}")
+
+    def add(factory: F) -> F:
+        _prefixes[prefix] = factory
         return factory
 
     return add
@@ -199,17 +200,7 @@ def create(name: str, **config: Any) -> SlamSystem:
         if ":" not in name and (own := _registered(name)) and not hasattr(own, "config_class"):
             raise InvalidValueError(f"SLAM '{name}' has no numbers to set")
         config["config"] = changes
-    if name.startswith("pipe:"):
-        from slam.guests.pipe import PipeSlam  # it imports this module
-
-        factory: Factory = partial(PipeSlam, name.removeprefix("pipe:"))
-    elif ":" in name:
-        factory = _load(name)
-    else:
-        check_name(name)
-        registered = _registered(name)
-        assert registered is not None
-        factory = registered
+    factory = _factory(name)
     _check_options(name, factory, config)
     try:
         system = factory(**config)
@@ -223,6 +214,21 @@ def create(name: str, **config: Any) -> SlamSystem:
         missing = [m for m in ("reset", "update", "map", "trajectory") if not hasattr(system, m)]
         raise UnknownNameError(f"'{name}' is no SlamSystem: it has no {', '.join(missing)}()")
     return system
+
+
+def _factory(name: str) -> Factory:
+    """What makes the SLAM of that name: behind a prefix, in a module, or registered."""
+    prefix, colon, rest = name.partition(":")
+    if prefix + colon in OWN_PREFIXES:  # a module that registers itself
+        importlib.import_module(OWN_PREFIXES[prefix + colon].partition(":")[0])
+    if prefix + colon in _prefixes:
+        return partial(_prefixes[prefix + colon], rest)
+    if colon:
+        return _load(name)
+    check_name(name)
+    registered = _registered(name)
+    assert registered is not None
+    return registered
 
 
 def told(error: BaseException) -> str:

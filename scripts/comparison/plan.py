@@ -22,8 +22,8 @@ from sim.recording.recipe import Recipe
 from sim.simulation import n_frames
 from slam.errors import InvalidValueError
 from slam.guests import Limits
-from slam.guests.pipe import PREFIX
 from slam.names import join_folders
+from slam.variants import PIPE
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
@@ -148,7 +148,7 @@ def source_of(slam: str) -> tuple[Path, ...]:
     kind, _, command = slam.partition(":")
     if not command:
         return ()
-    if slam.startswith(PREFIX):
+    if slam.startswith(PIPE):
         named = [path for path in map(Path, shlex.split(command)) if path.is_file()]
         return tuple(file for path in named for file in _whole(path, path.stem))
     join_folders()

@@ -22,6 +22,7 @@ from slam.trajectory import Trajectory
 
 NOTHING, STATIC = -2, -1  # of ``Recording.hit``
 _SPEC = ("n_beams", "angle_min", "angle_increment", "range_min", "range_max")
+_SPEC_LATER = ("range_sigma_m",)  # recordings of before have none: not stated
 _SPEC_ARRAYS = ("beam_time_offsets", "T_robot_laser")
 
 
@@ -119,7 +120,7 @@ def _row(moment: Moment, mover: NDArray[np.int64]) -> dict[str, Any]:
 
 
 def _spec_arrays(spec: LaserSpec) -> dict[str, Any]:
-    return {f"laser_{name}": getattr(spec, name) for name in (*_SPEC, *_SPEC_ARRAYS)}
+    return {f"laser_{name}": getattr(spec, name) for name in (*_SPEC, *_SPEC_LATER, *_SPEC_ARRAYS)}
 
 
 def load(path: Path) -> Recording:
@@ -134,7 +135,8 @@ def load(path: Path) -> Recording:
 
 
 def _recording(a: Mapping[str, Any]) -> Recording:
-    scalars = {name: a[f"laser_{name}"].item() for name in _SPEC}
+    there = [name for name in _SPEC_LATER if f"laser_{name}" in a]
+    scalars = {name: a[f"laser_{name}"].item() for name in (*_SPEC, *there)}
     spec = LaserSpec(**scalars, **{name: a[f"laser_{name}"] for name in _SPEC_ARRAYS})
     frames = [
         Frame(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scripts.comparison.recording import Recording
 from slam import se2
 from slam.frames import Float, Scan
+from slam.frontend.deskew import end_points
 
 BEYOND_M = 0.3  # a beam that goes this much farther than a point has seen that nothing is there
 ALONG_M = 0.1  # of a beam beyond its hit that still counts as meeting a doorway
@@ -63,13 +64,10 @@ class Sight:
 def _hits(scan: Scan, truth: Float, twist: Float) -> Float:
     spec = scan.spec
     ranges = np.where(scan.valid, scan.ranges.astype(np.float64), np.nan)
-    rays = np.stack([ranges * np.cos(spec.angles), ranges * np.sin(spec.angles)], axis=1)
-    points = se2.transform(spec.T_robot_laser, rays)
-    turn = twist[2] * spec.beam_time_offsets
-    c, s = np.cos(turn), np.sin(turn)
-    x = c * points[:, 0] - s * points[:, 1] + twist[0] * spec.beam_time_offsets
-    y = s * points[:, 0] + c * points[:, 1] + twist[1] * spec.beam_time_offsets
-    return se2.transform(truth, np.stack([x, y], axis=1))
+    points = end_points(
+        ranges, spec.angles, spec.beam_time_offsets, spec.T_robot_laser, np.asarray(twist)
+    )
+    return se2.transform(truth, points)
 
 
 def clearance(points: Float, drive: Recording, k: int, *, without: int = -1) -> Float:

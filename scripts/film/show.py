@@ -24,12 +24,9 @@ from scripts.film.map_pane import SIGMAS, MapPane, Trail
 from scripts.film.scan_pane import legend, points_robot
 from scripts.film.view import Stage
 from slam import se2
-from slam.ekf.slam import EkfSlam
 from slam.frames import NS_PER_S, Float, Frame
 from slam.frontend.seen_space import SeenSpace
-from slam.grid.occupancy import OccupancySlam
 from slam.replay import Replay, Track
-from slam.shunting import ShuntingSlam
 
 SEEN_EVERY_NS = 200_000_000  # the areas of neighbouring scans overlap
 FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn anew
@@ -150,13 +147,11 @@ class Show:
 
     def holds(self) -> str:
         """What the map of the primary track is made of, where that is known."""
-        kinds = (
-            (OccupancySlam, "probabilities, "),
-            (ShuntingSlam, "activities, "),
-            (EkfSlam, f"landmarks ({SIGMAS:g} σ), "),
-        )
-        system = self.track().system
-        return next((words for kind, words in kinds if isinstance(system, kind)), "")
+        track = self.track()
+        if track.landmarks() is not None:
+            return f"landmarks ({SIGMAS:g} σ), "
+        words = track.cells_hold()
+        return f"{words}, " if words else ""
 
     def names(self) -> list[str]:
         """What has a trail, the primary track last."""
@@ -195,8 +190,8 @@ class _Panes:
         T_view_map = show.T_view_map()
         if fresh:
             self._fresh_at = seconds
-            system = track.system
-            known = system.landmarks().ellipses(SIGMAS) if isinstance(system, EkfSlam) else None
+            landmarks = track.landmarks()
+            known = None if landmarks is None else landmarks.ellipses(SIGMAS)
             self._map.refresh(track.map(), known, trails[show.primary], T_view_map)
         canvas = self._base.copy()
         self._headline(canvas, seconds)

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from scripts.paper.runs import statistics
-from slam.ekf.slam import EkfSlam
 from slam.frames import Float
 from slam.shunting.featured import FeaturedShuntingSlam
 from slam.shunting.map.peaks import peaks
+from slam.system import HasLandmarks
 
 GATE_M = 0.5  # an estimated landmark farther from every true one is spurious
 PEAK = 0.3  # activity from which a neuron counts as a landmark
@@ -75,7 +75,7 @@ def paired(found: Float, true: Float, gate_m: float) -> Pairs:
 def landmarks_of(system: object) -> tuple[Float, NDArray[np.int64]]:
     """(n, 2) what a map calls landmarks, confirmed ones or peaks of activity, and (n,) their names:
     never used twice by the EKF, ``NAMELESS`` in a shunting map."""
-    if isinstance(system, EkfSlam):
+    if isinstance(system, HasLandmarks):
         landmarks = system.landmarks()
         return landmarks.points_map, landmarks.keys
     assert isinstance(system, FeaturedShuntingSlam)

@@ -11,7 +11,6 @@ import numpy as np
 from scripts.paper.census import landmarks_of
 from scripts.paper.runs import save_run
 from slam import create
-from slam.ekf.slam import EkfSlam
 from slam.errors import InvalidValueError
 from slam.frames import Frame
 from slam.logs import victoria_graph
@@ -78,8 +77,9 @@ def run_one(path: Path, *, name: str, data: str, scans: int) -> None:
     }
     if final is not None:
         arrays["final"] = final.poses
-    if isinstance(system, EkfSlam):
-        arrays["ellipses"] = system.landmarks().ellipses()
+    landmarks = track.landmarks()
+    if landmarks is not None:
+        arrays["ellipses"] = landmarks.ellipses()
     raster = track.map()
     if raster is not None:
         arrays |= {

@@ -106,11 +106,11 @@ def _counted(system: Any, frames: Sequence[Frame], true_points: Float) -> tuple[
 
 
 def _maps(ekf: Track, ours: Track) -> dict[str, Any]:
-    raster = ours.map()
+    raster, landmarks = ours.map(), ekf.landmarks()
     assert raster is not None
-    assert isinstance(ekf.system, EkfSlam)
+    assert landmarks is not None
     return {
-        "ellipses": ekf.system.landmarks().ellipses(),
+        "ellipses": landmarks.ellipses(),
         "activities": np.nan_to_num(raster.values).astype(np.float16),
         "origin": raster.T_map_origin,
         "cell": raster.resolution_m,

@@ -14,7 +14,6 @@ from scripts.paper.report import Report
 from scripts.paper.runs import Plan, Run, job, pose_numbers, save_run, truth_of
 from sim.simulation import stream
 from slam import create, se2
-from slam.ekf.slam import EkfSlam
 from slam.evaluation import metrics
 from slam.frames import Float, Frame
 from slam.replay import Track
@@ -74,8 +73,9 @@ def run_one(  # noqa: PLR0913 (the arguments of a job)
 
 
 def _map_of(track: Track, name: str) -> dict[str, Any]:
-    if isinstance(track.system, EkfSlam):
-        return {f"ellipses {name}": track.system.landmarks().ellipses()}
+    landmarks = track.landmarks()
+    if landmarks is not None:
+        return {f"ellipses {name}": landmarks.ellipses()}
     raster = track.map()
     if raster is None:
         return {}

@@ -28,7 +28,6 @@ from slam.files import write_text
 from slam.frames import Stream
 from slam.maps import write_map
 from slam.replay import Replay
-from slam.shunting import ShuntingSlam
 from slam.system import SlamSystem, create
 from slam.trajectory import write_tum
 
@@ -93,7 +92,8 @@ def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any])
     online = {name: track.online() for name, track in replay.tracks.items()}
     world_truth = replay.truth()
     truth = figures.in_first_frame(world_truth) if world_truth is not None else None
-    raster = replay.tracks[show.primary].map()
+    primary = replay.tracks[show.primary]
+    raster = primary.map()
     truth_name = show.truth_name
     for name, track in online.items():
         write_tum(folder / f"trajectory_{file_name(name)}.tum", track)
@@ -107,12 +107,10 @@ def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any])
     if raster is not None:
         write_map(folder / "map", show.seen.merge(raster))
         figures.map_picture(folder / "map.png", raster, online[show.primary], show.last_points_map)
-    system = replay.tracks[show.primary].system
-    if isinstance(system, ShuntingSlam):
-        system.save(folder / "map.npz")
-        changes = system.changes()
-        if raster is not None and changes is not None:
-            figures.changes_picture(folder / "changes.png", raster, changes, online[show.primary])
+    primary.save(folder / "map.npz")
+    changes = primary.changes()
+    if raster is not None and changes is not None:
+        figures.changes_picture(folder / "changes.png", raster, changes, online[show.primary])
     write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
 
 
@@ -126,7 +124,7 @@ def _tell(outputs: Outputs) -> None:
     if (outputs.folder / "map.yaml").exists():
         others.append("map.yaml for map_server")
     if (outputs.folder / "map.npz").exists():
-        others.append("map.npz for ShuntingSlam.load")
+        others.append("map.npz for the SLAM's load()")
     first = escape(str(outputs.folder / there[0]))
     then = f", then {', '.join(there[1:])} beside it" if there[1:] else ""
     console.print(

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from slam import se2
 from slam._jit import njit
 from slam.frames import NS_PER_S, Float, Frame
+from slam.frontend.deskew import deskewed
 
 REACH_M = 3.0  # nothing further away matters to the next seconds
 MEMORY_S = 4.0  # of what is out of view
@@ -96,10 +97,8 @@ def _scanned(  # noqa: PLR0913 (kernel)
         angle = laser[2] + fan[0] + i * fan[1]
         x = laser[0] + ranges[i] * math.cos(angle)
         y = laser[1] + ranges[i] * math.sin(angle)
+        x, y = deskewed(x, y, offsets[i], twist)
         gap = GAP_M + GAP_PER_M * ranges[i]
-        turned, moved = twist[2] * offsets[i], twist[0] * offsets[i]
-        c, s = math.cos(turned), math.sin(turned)
-        x, y = c * x - s * y + moved, s * x + c * y + twist[1] * offsets[i]
         if last != i - 1 or (x - lx) ** 2 + (y - ly) ** 2 > gap * gap:
             k += 1
             things[k, 0] = count

@@ -2,6 +2,7 @@
 """The rival: EKF-SLAM on point landmarks, joint compatibility, landmarks that come and go."""
 
 from slam.ekf.config import EkfConfig
-from slam.ekf.slam import EkfSlam, Landmarks
+from slam.ekf.slam import EkfSlam
+from slam.estimate import Landmarks
 
 __all__ = ["EkfConfig", "EkfSlam", "Landmarks"]

@@ -20,6 +20,7 @@ from slam.ekf.lifecycle import (
     unhidden_by_features,
 )
 from slam.errors import InvalidValueError
+from slam.estimate import Estimate, Landmarks, Raster
 from slam.frames import Features, Float, Frame, Odometry
 from slam.frontend import odometry_steps
 from slam.frontend.corner_config import CornerConfig
@@ -28,7 +29,8 @@ from slam.frontend.odometry_prior import assumed_covariance
 from slam.frontend.polar import polar
 from slam.landmarks.association import METHODS
 from slam.landmarks.filter import MOST_STD_M, EkfFilter
-from slam.system import Estimate, Raster, register
+from slam.path import PosePath
+from slam.system import register
 from slam.trajectory import Trajectory
 
 GROUPS = ("lifecycle", "extractor")  # set by path, not as options
@@ -37,29 +39,6 @@ PRESETS: dict[str, Callable[..., EkfConfig]] = {
     "corners": EkfConfig.corners,
     "victoria_park": EkfConfig.victoria_park,
 }
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Landmarks:
-    """What the EKF has for a map.
-
-    keys         (n,) int64 names, never used twice
-    points_map   (n, 2) m
-    covariances  (n, 2, 2) m^2 in the map frame
-    looks        (n,) int64 how often each was seen
-    """
-
-    keys: NDArray[np.int64]
-    points_map: Float
-    covariances: Float
-    looks: NDArray[np.int64]
-
-    def ellipses(self, sigmas: float = 3.0) -> Float:
-        """(n, 5) for drawing: centre x, y (m), half axes (m), direction of the first axis (rad)."""
-        values, vectors = np.linalg.eigh(self.covariances)
-        axes = sigmas * np.sqrt(np.maximum(values[:, ::-1], 0.0))
-        angles = np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1])
-        return np.column_stack([self.points_map, axes, angles])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,8 +102,7 @@ class EkfSlam:
         self.lifecycle = Lifecycle(self.config)
         self._before: Odometry | None = None
         self._unmatched = 0
-        self._stamps: list[int] = []
-        self._poses: list[Float] = []
+        self._path = PosePath()
 
     def update(self, frame: Frame) -> Estimate:
         """One frame in six steps: from odometry and points to pose, covariance and landmarks."""
@@ -140,8 +118,8 @@ class EkfSlam:
 
     def _begin(self, frame: Frame) -> None:
         """Refuse a frame out of order; let the first one tell which preset is meant."""
-        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
-        if not self._stamps and not self._told:
+        self._path.check_order(frame.stamp_ns)
+        if not len(self._path) and not self._told:
             name = "points" if frame.features is not None else "corners"
             self._configure(PRESETS[name](**self._options))
             self.lifecycle = Lifecycle(self.config)
@@ -248,8 +226,7 @@ class EkfSlam:
 
     def _report(self, frame: Frame, matched: int, observed: int) -> Estimate:
         lost = self._unmatched >= self.config.lifecycle.lost_after
-        self._stamps.append(frame.stamp_ns)
-        self._poses.append(self.filter.pose.copy())
+        self._path.add(frame.stamp_ns, self.filter.pose)
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=self.filter.pose,
@@ -280,10 +257,7 @@ class EkfSlam:
 
     def trajectory(self) -> Trajectory:
         """The online poses: a filter does not revise its past."""
-        return Trajectory(
-            stamps_ns=np.array(self._stamps, dtype=np.int64),
-            poses=np.array(self._poses).reshape(-1, 3),
-        )
+        return self._path.trajectory()
 
 
 def _regular(covariances: Float, config: LifecycleConfig) -> Float:

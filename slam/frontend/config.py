@@ -110,8 +110,9 @@ class FrontendConfig(Settings):
         low=0.3, high=4.0,
     )  # fmt: skip
     sensor_sigma_m: float = number(
-        0.010, "m", "standard deviation of a range", "data sheet of the LMS-221", low=1e-6
-    )
+        0.010, "m", "sigma of a range, if the scanner states none", "data sheet of the LMS-221",
+        low=1e-6,
+    )  # fmt: skip
     spacing_m: float = number(
         0.1, "m", "beams closer than this share one observation's weight", low=1e-6
     )

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from slam.frames import Features, Float, Scan
 from slam.frontend import corner_image
 from slam.frontend.corner_config import CornerConfig
-from slam.frontend.polar import end_points
+from slam.frontend.deskew import end_points
 
 FAR_M = 1e6  # stands for no return
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from slam._jit import njit
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, Scan
-from slam.frontend.config import FrontendConfig
+from slam.frontend.config import FRONTEND, FrontendConfig
+from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import face, join, unveiled
 from slam.frontend.visibility import View, view_of_beams, view_of_features
 
@@ -58,6 +59,7 @@ class Observations:
     facings       (n,) uint8: the way the surface faces, see ``surfaces.face``; 0: unknown
     view          what is seen to be empty
     T_robot_laser (3,) origin of ``view``
+    sensor_sigma_m  standard deviation of a range: the scanner's own, or that of the config
     """
 
     points_robot: Float
@@ -68,10 +70,11 @@ class Observations:
     facings: NDArray[np.uint8]
     view: View
     T_robot_laser: Float
+    sensor_sigma_m: float = FRONTEND.sensor_sigma_m
 
 
 @njit
-def _deskew(  # noqa: PLR0913 (kernel)
+def _scanned(  # noqa: PLR0913 (kernel)
     ranges: NDArray[np.float32],
     angles: NDArray[np.float64],
     offsets: NDArray[np.float64],
@@ -102,14 +105,7 @@ def _deskew(  # noqa: PLR0913 (kernel)
         reach = min(r, use) if hit else silent
         px = lx + reach * math.cos(angles[k] + T_robot_laser[2])
         py = ly + reach * math.sin(angles[k] + T_robot_laser[2])
-        turn = twist[2] * offsets[k]
-        if offsets[k] != 0.0:
-            # Motion since the stamp: mid-point rule, exact to third order in the turned angle.
-            c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
-            mx = (c * twist[0] - s * twist[1]) * offsets[k]
-            my = (s * twist[0] + c * twist[1]) * offsets[k]
-            c, s = math.cos(turn), math.sin(turn)
-            px, py = c * px - s * py + mx, s * px + c * py + my
+        px, py = deskewed(px, py, offsets[k], twist)
         dx, dy = px - lx, py - ly
         bearings[k] = math.atan2(lc * dy - ls * dx, lc * dx + ls * dy)
         free[k] = math.sqrt(dx * dx + dy * dy)
@@ -139,7 +135,7 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     beams = np.empty(n, np.int64)
     use = min(grain.range_m, spec.range_max)
     config, surfaces = grain.frontend, grain.frontend.surfaces
-    count = _deskew(
+    count = _scanned(
         scan.ranges,
         spec.angles,
         spec.beam_time_offsets,
@@ -170,7 +166,8 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
         tangents = tangents.take(kept, axis=0)
     facings = np.zeros(len(points), np.uint8)
     face(points, spec.T_robot_laser, onward, surfaces.face_m, facings)
-    variance = max(config.sigma_cells * grain.cell_m, config.sensor_sigma_m) ** 2
+    sensor_sigma_m = spec.range_sigma_m or config.sensor_sigma_m
+    variance = max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2
     covariances = np.zeros((len(points), 3))
     covariances[:, 0] = covariances[:, 2] = variance
     x, y = points[:, 0], points[:, 1]
@@ -186,6 +183,7 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
         facings=facings,
         view=view,
         T_robot_laser=spec.T_robot_laser,
+        sensor_sigma_m=sensor_sigma_m,
     )
 
 
@@ -211,6 +209,7 @@ def from_features(features: Features, grain: Grain) -> Observations:
         facings=np.zeros(len(covariances), np.uint8),
         view=view_of_features(points[near], grain.cell_m, grain.frontend.view),
         T_robot_laser=np.zeros(3),
+        sensor_sigma_m=grain.frontend.sensor_sigma_m,
     )
 
 
@@ -240,4 +239,5 @@ def joined(first: Observations, second: Observations) -> Observations:
         facings=np.concatenate([first.facings, second.facings]),
         view=first.view,
         T_robot_laser=first.T_robot_laser,
+        sensor_sigma_m=first.sensor_sigma_m,
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiled sines and angles of many points, whose last bit NumPy's change with the CPU."""
+"""Compiled distances and angles of many points, whose last bit NumPy's change with the CPU."""
 
 from __future__ import annotations
 
@@ -12,25 +12,6 @@ from slam._jit import njit
 
 Float = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-
-
-@njit
-def end_points(
-    ranges: Float, angles: Float, offsets: Float, T_robot_laser: Float, twist: Float
-) -> Float:
-    """(n, 2) m ends of beams in the robot frame of the stamp, ``offsets`` s before each was sent.
-
-    First order in the way driven during one sweep (27 ms: a micrometre off the arc at 1 m/s).
-    """
-    out = np.empty((len(ranges), 2))
-    for k in range(len(ranges)):
-        angle = angles[k] + T_robot_laser[2]
-        x = T_robot_laser[0] + ranges[k] * math.cos(angle)
-        y = T_robot_laser[1] + ranges[k] * math.sin(angle)
-        c, s = math.cos(twist[2] * offsets[k]), math.sin(twist[2] * offsets[k])
-        out[k, 0] = c * x - s * y + twist[0] * offsets[k]
-        out[k, 1] = s * x + c * y + twist[1] * offsets[k]
-    return out
 
 
 @njit

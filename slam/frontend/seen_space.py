@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.errors import InvalidValueError
+from slam.estimate import Raster
 from slam.frames import Float, Scan
 from slam.frontend.config import FRONTEND
-from slam.system import Raster
 
 # Black or slanted surfaces give no return either: beyond this a silent beam says nothing.
 FREE_WITHOUT_RETURN_M = FRONTEND.view.silent_m

@@ -64,12 +64,14 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
 
 
 @njit
-def integrate(  # noqa: C901 (kernel)
-    cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, odds: Odds, write: bool
-) -> tuple[float, float, int]:
-    """Add one scan to the log-odds, which live in ``cells.age``; ``cells.y`` is 2 p - 1 above 0.
+def integrate(  # noqa: C901, PLR0913 (kernel)
+    cells: Cells, log_odds: NDArray[np.float32], view: View, T_map_laser: NDArray[np.float64],
+    cell: float, step: float, odds: Odds, write: bool,
+) -> tuple[float, float, int]:  # fmt: skip
+    """Add one scan, ``step`` s after the last, to ``log_odds`` (S, 8, 8) by slot.
 
-    Returns confirmed and contradicted evidence and the cells visited, as the network does.
+    ``cells.y`` becomes 2 p - 1 above 0, ``cells.age`` the s that a cell was
+    looked at. Returns confirmed and contradicted evidence and the cells visited, as the network.
     """
     confirmed, contradicted, visited = 0.0, 0.0, 0
     ox, oy = T_map_laser[0], T_map_laser[1]
@@ -105,15 +107,18 @@ def integrate(  # noqa: C901 (kernel)
                         more = odds.hit
                     visited += 1
                     if write:
-                        known = float(cells.age[slot, jj, ii]) + more
+                        known = float(log_odds[slot, jj, ii]) + more
                         known = min(max(known, -odds.most), odds.most)
-                        cells.age[slot, jj, ii] = known
+                        log_odds[slot, jj, ii] = known
+                        cells.age[slot, jj, ii] += step
                         cells.y[slot, jj, ii] = max(math.tanh(0.5 * known), 0.0)
     return confirmed, contradicted, visited
 
 
 @njit
-def _probabilities(cells: Cells, i0: int, j0: int, out: NDArray[np.float32]) -> None:
+def _probabilities(
+    cells: Cells, log_odds: NDArray[np.float32], i0: int, j0: int, out: NDArray[np.float32]
+) -> None:
     rows, columns = cells.directory.shape
     for a in range(out.shape[0]):
         for b in range(out.shape[1]):
@@ -121,30 +126,52 @@ def _probabilities(cells: Cells, i0: int, j0: int, out: NDArray[np.float32]) -> 
             row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
             out[a, b] = np.nan
             if 0 <= row < rows and 0 <= column < columns and cells.directory[row, column] >= 0:
-                odds = cells.age[cells.directory[row, column], j & MASK, i & MASK]
+                odds = log_odds[cells.directory[row, column], j & MASK, i & MASK]
                 if odds != 0.0:
                     out[a, b] = 0.5 + 0.5 * math.tanh(0.5 * odds)
 
 
 class Grid(Network):
-    """The same storage, filled with log-odds."""
+    """The same storage, and log-odds beside it.
+
+    log_odds  (S, 8, 8) float32 by slot. Zero where no block lives: one that was written to stays
+    """
 
     def __init__(self, config: OccupancyConfig) -> None:
         super().__init__(config)
         numbers = config.grid
         self._odds = Odds(numbers.hit, numbers.miss, numbers.most, numbers.struck)
+        self.log_odds = np.zeros_like(self.cells.age)
+
+    def grow(self) -> None:
+        """Make room where a kernel ran out of it."""
+        super().grow()
+        more = len(self.cells.age) - len(self.log_odds)
+        self.log_odds = np.concatenate([self.log_odds, np.zeros((more, SIDE, SIDE), np.float32)])
+
+    def kept(self, slots: NDArray[np.int32]) -> NDArray[np.float32]:
+        """Log-odds, which a file has in the place of ages."""
+        return self.log_odds[slots]
+
+    def restore(self, slot: int, kept: NDArray[np.float32]) -> None:
+        """Log-odds of a file, and the least time of looking that they took."""
+        self.log_odds[slot] = kept
+        looks = np.where(kept > 0.0, kept / self._odds.hit, kept / min(self._odds.miss, -1e-3))
+        self.cells.age[slot] = np.ceil(looks) * self.config.map.resumed_look_s
 
     def integrate(
         self, view: View, T_map_laser: Float, step: float, *, write: bool
     ) -> tuple[float, float, int]:
-        """As ``Network.integrate``; ``step`` does not matter to a grid that counts scans."""
+        """As ``Network.integrate``; a grid counts scans, but keeps for how long it has looked."""
         if write:
             reach = view.farthest
             x, y = float(T_map_laser[0]), float(T_map_laser[1])
             self.cover(x - reach, y - reach, x + reach, y + reach)
             while not _open(self.cells, view, T_map_laser, self.cell):
                 self.grow()
-        result = integrate(self.cells, view, T_map_laser, self.cell, self._odds, write)
+        result = integrate(
+            self.cells, self.log_odds, view, T_map_laser, self.cell, step, self._odds, write
+        )
         if write:
             self.release()
         return result
@@ -156,7 +183,7 @@ class Grid(Network):
             return None
         i0, j0, i1, j1 = extent
         values = np.empty((j1 - j0, i1 - i0), np.float32)
-        _probabilities(self.cells, i0, j0, values)
+        _probabilities(self.cells, self.log_odds, i0, j0, values)
         origin = np.array([i0 * self.cell, j0 * self.cell, 0.0])
         return Raster(values=values, resolution_m=self.cell, T_map_origin=origin)
 
@@ -166,6 +193,7 @@ class OccupancySlam(ShuntingSlam):
     """An ordinary log-odds occupancy grid, with the matcher of "shunting"."""
 
     config_class: ClassVar[type[ShuntingConfig]] = OccupancyConfig
+    cells_hold = "probabilities"
 
     def __init__(
         self,

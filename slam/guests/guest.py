@@ -17,10 +17,10 @@ from slam.errors import (
     SlamFailedError,
 )
 from slam.frames import Float, Frame, LaserSpec, Odometry
-from slam.frontend import odometry_steps
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.observations import from_scan
 from slam.frontend.odometry_prior import Prediction, predict
+from slam.path import PosePath
 from slam.system import Estimate, Raster, told
 from slam.trajectory import Trajectory
 
@@ -63,14 +63,13 @@ class Guest(ABC):
         """Forget everything; the next frame is the origin of the map."""
         self._before: Odometry | None = None
         self._T_map_robot: Float = np.zeros(3)
-        self._stamps: list[int] = []
-        self._poses: list[Float] = []
+        self._path = PosePath()
 
     def update(self, frame: Frame) -> Estimate:
         """Guess by odometry, let the guest match."""
         if frame.scan is None:
             raise InvalidValueError(f"{type(self).__name__} needs a laser scan in every frame")
-        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
+        self._path.check_order(frame.stamp_ns)
         before = frame.odometry if self._before is None else self._before
         prediction = predict(self._T_map_robot, before, frame.odometry)
         if self._before is None:
@@ -88,8 +87,7 @@ class Guest(ABC):
         if not np.isfinite(T_map_robot).all():
             raise SlamFailedError(f"{type(self).__name__} ended at {T_map_robot.tolist()}", "nan")
         self._before, self._T_map_robot = frame.odometry, T_map_robot
-        self._stamps.append(frame.stamp_ns)
-        self._poses.append(T_map_robot)
+        self._path.add(frame.stamp_ns, T_map_robot)
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=T_map_robot,
@@ -111,7 +109,4 @@ class Guest(ABC):
 
     def trajectory(self) -> Trajectory:
         """The online poses."""
-        return Trajectory(
-            stamps_ns=np.array(self._stamps, dtype=np.int64),
-            poses=np.array(self._poses).reshape(-1, 3),
-        )
+        return self._path.trajectory()

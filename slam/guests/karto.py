@@ -104,7 +104,7 @@ class KartoSlam(Guest):
         inside = (beams >= 0) & (beams < spec.n_beams)
         np.minimum.at(ranges, beams[inside], np.sqrt(x * x + y * y)[inside])
         pose = self._module.Pose2(*T_map_laser.tolist())
-        number = len(self._stamps)
+        number = len(self._path)
         return self._module.LocalizedRangeScan(
             self._laser, ranges.tolist(), pose, pose, number, float(number)
         )

@@ -16,21 +16,19 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
-
 from slam.errors import InvalidValueError, SlamFailedError
-from slam.frames import Float, Frame, LaserSpec
-from slam.frontend import odometry_steps
+from slam.frames import Frame, LaserSpec
 from slam.guests import protocol
 from slam.guests.limits import Limits
 from slam.guests.wire import Wire
 from slam.names import child_environment, join_folders, refuse_code
-from slam.system import Estimate, Raster, SlamSystem, create
+from slam.path import PosePath
+from slam.system import Estimate, Raster, SlamSystem, create, register_prefix
 from slam.trajectory import Trajectory
+from slam.variants import PIPE
 
-PREFIX = "pipe:"
 
-
+@register_prefix(PIPE)
 class PipeSlam:
     """The system behind a command. After a failure it is over; ``reset`` starts it anew.
 
@@ -69,8 +67,7 @@ class PipeSlam:
 
     def _forget(self) -> None:
         self._laser: LaserSpec | None = None
-        self._stamps: list[int] = []
-        self._poses: list[Float] = []
+        self._path = PosePath()
 
     def _ask(self, wanted: str, request: bytes, limit_s: float) -> dict[str, Any]:
         """The answer, which must be of the type ``wanted``."""
@@ -108,16 +105,15 @@ class PipeSlam:
 
         Raises ``InvalidValueError`` for a frame that does not come after the last one.
         """
-        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
+        self._path.check_order(frame.stamp_ns)
         request = protocol.frame_line(frame, self._laser)
-        limit_s = self.limits.scan_s if self._stamps else self.limits.first_s
+        limit_s = self.limits.scan_s if len(self._path) else self.limits.first_s
         with self._over_if_it_fails():
             message = self._ask("estimate", request, limit_s)
             estimate = protocol.estimate_of(message, frame.stamp_ns)
         if frame.scan is not None:
             self._laser = frame.scan.spec
-        self._stamps.append(frame.stamp_ns)
-        self._poses.append(estimate.T_map_robot)
+        self._path.add(frame.stamp_ns, estimate.T_map_robot)
         return estimate
 
     def map(self) -> Raster | None:
@@ -132,10 +128,7 @@ class PipeSlam:
         if self._has_trajectory:
             request = protocol.line({"type": "trajectory"})
             return protocol.trajectory_of(self._ask("trajectory", request, self.limits.first_s))
-        return Trajectory(
-            stamps_ns=np.array(self._stamps, dtype=np.int64),
-            poses=np.array(self._poses).reshape(-1, 3),
-        )
+        return self._path.trajectory()
 
     def processor_s(self) -> float:
         """Processor time its process has used, s; wall-clock time where no system tells."""
@@ -156,9 +149,9 @@ def _words(command: str | Sequence[str]) -> list[str]:
     try:
         words = shlex.split(command) if isinstance(command, str) else list(command)
     except ValueError as error:
-        raise InvalidValueError(f"'{PREFIX}{command}': {error}") from error
+        raise InvalidValueError(f"'{PIPE}{command}': {error}") from error
     if not words:
-        raise InvalidValueError(f"'{PREFIX}' needs a command, as in {PREFIX}./my_slam --option")
+        raise InvalidValueError(f"'{PIPE}' needs a command, as in {PIPE}./my_slam --option")
     return words
 
 
@@ -189,6 +182,6 @@ def limited(name: str, limits: Limits | None) -> SlamSystem:
     """``create(name)`` for comparisons: with limits, whatever is not ours runs in a child."""
     if limits is None or ":" not in name:
         return create(name)
-    if name.startswith(PREFIX):
+    if name.startswith(PIPE):
         return create(name, scan_limit_s=limits.scan_s, first_limit_s=limits.first_s)
     return guarded(name, limits)

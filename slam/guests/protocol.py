@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.errors import FAILURES, InvalidValueError, NotFiniteError, SlamFailedError
+from slam.estimate import Estimate, Raster
 from slam.frames import Features, Float, Frame, LaserSpec, Odometry, Scan
-from slam.system import Estimate, Raster
 from slam.trajectory import Trajectory
 
 PROTOCOL, VERSION = "mobilia-slam", 1
@@ -126,6 +126,7 @@ def _laser_message(spec: LaserSpec) -> dict[str, Any]:
         "range_max": spec.range_max,
         "beam_time_offsets": spec.beam_time_offsets.tolist(),
         "T_robot_laser": spec.T_robot_laser.tolist(),
+        **({"range_sigma_m": spec.range_sigma_m} if spec.range_sigma_m else {}),
     }
 
 

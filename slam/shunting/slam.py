@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.errors import InvalidValueError, LogFormatError
+from slam.estimate import Changes, Estimate, Raster
 from slam.frames import Float, Frame, Odometry
 from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.path import PosePath
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map import export
 from slam.shunting.map import io as memory
@@ -32,7 +34,7 @@ from slam.shunting.uncertainty.odometry_noise import OdometryNoise
 from slam.shunting.uncertainty.pose_covariance import PoseCovariance
 from slam.shunting.uncertainty.residuals import Evidence, look
 from slam.shunting.warmup import warm_up
-from slam.system import Estimate, Raster, register
+from slam.system import register
 from slam.trajectory import Trajectory
 
 
@@ -46,6 +48,7 @@ class ShuntingSlam:
     """
 
     config_class: ClassVar[type[ShuntingConfig]] = ShuntingConfig
+    cells_hold = "activities"
 
     def __init__(self, config: ShuntingConfig | str | Mapping[str, Any] = "robust") -> None:
         self.config = self.config_class.of(config)
@@ -66,8 +69,7 @@ class ShuntingSlam:
         self._relocalisation: Relocalisation | None = None
         self._loops = Loops(self.config, self._matcher)
         self._trusted = True  # the pose of the frame before
-        self._stamps: list[int] = []
-        self._poses: list[Float] = []
+        self._path = PosePath()
 
     def _new_network(self) -> Network:
         return Network(self.config)
@@ -79,13 +81,15 @@ class ShuntingSlam:
         """
         if self._before is None and self._resumed is None:
             return self._first(frame)
-        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, frame.stamp_ns)
+        self._path.check_order(frame.stamp_ns)
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
         prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
         evidence = self._compare(observations, match, prediction, state)  # 4 residuals
         state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
-        self._update_uncertainty(prediction, match, evidence, state)  # 6 pose, odometry noise
+        self._update_uncertainty(
+            observations, prediction, match, evidence, state
+        )  # 6 pose, odometry noise
         self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
         return self._report(frame, match, state)
 
@@ -183,7 +187,7 @@ class ShuntingSlam:
         if state != "tracking":
             return None
         short_term = self._matcher.reward.short_term
-        step, turn = min(prediction.elapsed, self.config.map.longest_look_s), len(self._poses)
+        step, turn = min(prediction.elapsed, self.config.map.longest_look_s), len(self._path)
         return look(self.network, short_term, observations, match.T_map_robot, step, turn)
 
     def _update_map(
@@ -219,11 +223,16 @@ class ShuntingSlam:
         return "lost" if doubtful else "tracking"
 
     def _update_uncertainty(
-        self, prediction: Prediction, match: Match, evidence: Evidence | None, state: str
+        self,
+        observations: Observations,
+        prediction: Prediction,
+        match: Match,
+        evidence: Evidence | None,
+        state: str,
     ) -> None:
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
         if state == "tracking" and not match.slipped:
-            self._odometry_noise.learn(prediction, match)
+            self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m)
         else:
             self._odometry_noise.skip()
 
@@ -237,13 +246,12 @@ class ShuntingSlam:
             motion, covariance = prediction.increment, prediction.covariance
         self._trusted = state in ("tracking", "relocated")
         covariance = turned(covariance, -float(self._T_map_robot[2]))
-        self._loops.add(len(self._poses), match.T_map_robot, motion, covariance, observations)
+        self._loops.add(len(self._path), match.T_map_robot, motion, covariance, observations)
 
     def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
         self._before = frame.odometry
         self._T_map_robot = match.T_map_robot
-        self._stamps.append(frame.stamp_ns)
-        self._poses.append(match.T_map_robot)
+        self._path.add(frame.stamp_ns, match.T_map_robot)
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=match.T_map_robot,
@@ -266,7 +274,7 @@ class ShuntingSlam:
         """
         return export.existence(self.network)
 
-    def changes(self) -> export.Changes | None:
+    def changes(self) -> Changes | None:
         """What appeared and what is gone lately; None without a map or a long-term memory."""
         return export.changes(self.network)
 
@@ -315,10 +323,7 @@ class ShuntingSlam:
 
     def trajectory(self) -> Trajectory:
         """The poses with loops closed; the online ones up to 100 m of way, or without a loop."""
-        return Trajectory(
-            stamps_ns=np.array(self._stamps, dtype=np.int64),
-            poses=self._loops.corrected(np.array(self._poses).reshape(-1, 3)),
-        )
+        return self._path.trajectory(self._loops.corrected(self._path.poses()))
 
 
 def _near(match: Match, prediction: Prediction) -> Match:

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from slam.errors import SlamFailedError
+from slam.estimate import Landmarks
 from slam.frames import Frame, Odometry
-from slam.replay import Replay
+from slam.odometry import OdometrySlam
+from slam.replay import Replay, Track
 from slam.system import Estimate, Raster, create
 from slam.trajectory import Trajectory
 
@@ -125,3 +127,46 @@ def test_a_failing_guest_is_named_with_the_scan_and_how_it_failed(answer, says, 
     assert got.value.outcome == outcome
     copied = pickle.loads(pickle.dumps(got.value))
     assert (str(copied), copied.outcome) == (str(got.value), outcome)
+
+
+class Mapper(OdometrySlam):
+    """One with the optional methods."""
+
+    cells_hold = "guesses"
+
+    def landmarks(self):
+        return Landmarks(
+            keys=np.array([3]), points_map=np.ones((1, 2)), covariances=np.eye(2)[None],
+            looks=np.array([1]),
+        )  # fmt: skip
+
+    def changes(self):
+        return self.found
+
+    def save(self, path):
+        if path.suffix != ".map":
+            raise RuntimeError("no such format")
+        path.write_text("mine")
+
+
+def test_optional_methods_are_asked_for_where_they_are(tmp_path):
+    plain, mapper = Track("plain", OdometrySlam()), Track("mapper", Mapper())
+    assert (plain.landmarks(), plain.changes(), plain.cells_hold()) == (None, None, "")
+    assert not plain.save(tmp_path / "a.map")
+    assert list(tmp_path.iterdir()) == []
+    assert mapper.landmarks().keys.tolist() == [3]
+    assert mapper.cells_hold() == "guesses"
+    assert mapper.save(tmp_path / "a.map")
+    assert (tmp_path / "a.map").read_text() == "mine"
+
+
+def test_optional_methods_of_somebody_else_fail_by_name(tmp_path):
+    track = Track("mapper", Mapper())
+    track.system.found = "a lot"
+    with pytest.raises(SlamFailedError, match=r"'mapper', changes\(\) returned no Changes or None"):
+        track.changes()
+    with pytest.raises(SlamFailedError, match=r"'mapper', save\(\) raised RuntimeError: no such"):
+        track.save(tmp_path / "a.png")
+    track.system.landmarks = list
+    with pytest.raises(SlamFailedError, match=r"landmarks\(\) returned no Landmarks but \[\]"):
+        track.landmarks()

@@ -10,7 +10,8 @@ import pytest
 
 import slam
 from slam import Estimate, Frame, Odometry, Raster, SlamSystem, Trajectory, se2, system
-from slam.errors import InvalidValueError, UnknownNameError
+from slam.errors import InvalidValueError, UnknownNameError, UntrustedNameError
+from slam.names import NameFromFile
 
 
 class Minimal:
@@ -58,6 +59,24 @@ def test_systems_are_made_by_name_and_by_entry(monkeypatch):
 def test_names_that_are_none_say_what_to_do(name, message):
     with pytest.raises(UnknownNameError, match=message):
         slam.create(name)
+
+
+def test_prefixed_names_are_made_by_whoever_registered_the_prefix(monkeypatch):
+    monkeypatch.setattr(system, "_prefixes", dict(system._prefixes))
+    rests = []
+
+    @system.register_prefix("mine:")
+    def make(rest, *, gain=1.0):
+        rests.append(rest)
+        return Minimal(gain=gain)
+
+    assert slam.create("mine:a:b c", gain=2.0).gain == 2.0
+    assert rests == ["a:b c"]
+    with pytest.raises(UntrustedNameError, match=r"a\.json names code"):
+        slam.create(NameFromFile("mine:a", "a.json"))
+    with pytest.raises(InvalidValueError, match="must end in ':', got 'mine'"):
+        system.register_prefix("mine")
+    assert rests == ["a:b c"]
 
 
 def test_half_a_system_and_unknown_options_are_refused(monkeypatch):

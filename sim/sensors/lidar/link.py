@@ -126,6 +126,7 @@ def partial_spec(spec: LaserSpec, config: Lms221Config, turn: int) -> LaserSpec:
         range_max=spec.range_max,
         beam_time_offsets=offsets - offsets[0],
         T_robot_laser=spec.T_robot_laser,
+        range_sigma_m=spec.range_sigma_m,
     )
 
 

@@ -88,6 +88,9 @@ class Band:
                 raise InvalidValueError(f"Band.{name} must be in 0..1, got {getattr(self, name)}")
 
 
+SIGMA_AT_M = 5.0  # where a spec states the one sigma of its ranges: across a room
+
+
 def error_at(bands: Sequence[Band], range_m: float) -> float:
     """m, of the band that holds there; 0 without any."""
     if not bands:
@@ -264,4 +267,5 @@ class Scanner:
             range_max=self.range_max_m,
             beam_time_offsets=times - times.min(),
             T_robot_laser=np.zeros(3) if T_robot_laser is None else T_robot_laser,
+            range_sigma_m=error_at(self.noise, SIGMA_AT_M),
         )

@@ -3,27 +3,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.estimate import Changes, Raster
 from slam.shunting.map.grid import dense
 from slam.shunting.map.network import Network
-from slam.system import Raster
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Changes:
-    """Short-term against long-term memory, on the same cells; NaN where no neuron lives.
-
-    appeared  what was seen lately beyond what was there on the whole: the input that would hold the
-              short-term activity, less the long-term trace within two neurons
-    gone      the trace less that input within two neurons: a neuron forgets only while seen empty
-    """
-
-    appeared: Raster
-    gone: Raster
 
 
 def existence(network: Network) -> Raster | None:

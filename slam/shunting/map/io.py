@@ -104,7 +104,7 @@ def save(path: Path, network: Network, state: State) -> None:
         "places": places,
         "x": cells.x[slots],
         "y": cells.y[slots],
-        "age": cells.age[slots],
+        "age": network.kept(slots),
         "facing": cells.facing[slots],
     }
     header["sha256"] = _sum(header, arrays)
@@ -230,4 +230,5 @@ def fill(network: Network, arrays: dict[str, NDArray[Any]]) -> None:
         slot = int(cells.free[cells.counts[FREE_COUNT]])
         cells.directory[row, column] = slot
         cells.x[slot], cells.y[slot] = arrays["x"][k], arrays["y"][k]
-        cells.age[slot], cells.facing[slot] = arrays["age"][k], arrays["facing"][k]
+        cells.facing[slot] = arrays["facing"][k]
+        network.restore(slot, arrays["age"][k])

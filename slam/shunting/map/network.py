@@ -92,6 +92,14 @@ class Network:
         """Forget the present impressions, and the blocks that were born under them in vain."""
         forget_impressions(self.cells)
 
+    def kept(self, slots: NDArray[np.int32]) -> NDArray[np.float32]:
+        """(n, 8, 8) what a file keeps as ``age``."""
+        return self.cells.age[slots]
+
+    def restore(self, slot: int, kept: NDArray[np.float32]) -> None:
+        """Let a block of a file have what ``kept`` gave."""
+        self.cells.age[slot] = kept
+
     def integrate(
         self, view: View, T_map_laser: NDArray[np.float64], step: float, *, write: bool
     ) -> tuple[float, float, int]:

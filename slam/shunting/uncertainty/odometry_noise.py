@@ -22,10 +22,9 @@ from slam.shunting.matching.matcher import Match
 from slam.shunting.uncertainty.covariances import innovation
 
 
-def _noise_share(config: ShuntingConfig) -> float:
+def _noise_share(config: ShuntingConfig, sensor_sigma_m: float) -> float:
     """Variance of a match by the noise of its beams over what the overlaps' curvature claims."""
-    numbers = config.frontend
-    return (numbers.sensor_sigma_m / (numbers.sigma_cells * config.cell_m)) ** 2 / 2.0
+    return (sensor_sigma_m / (config.frontend.sigma_cells * config.cell_m)) ** 2 / 2.0
 
 
 class OdometryNoise:
@@ -39,16 +38,17 @@ class OdometryNoise:
     def __init__(
         self,
         config: ShuntingConfig,
-        noise_share: float,
         *,
+        overlaps: bool,
         least_stated: float,
         bias: HeadingBias | None,
     ) -> None:
-        """``noise_share``: variance of a match by the noise of what was seen, over what the match's
-        information claims; ``least_stated``: least scale of a covariance that a log states.
+        """``overlaps``: a match's information is the curvature of overlaps, which claims more than
+        the noise of beams says; ``least_stated``: least scale of a covariance that a log states.
         """
+        self._whole, self._overlaps = config, overlaps
         self._config, self._prior = config.uncertainty.odometry, config.frontend.prior
-        self._noise_share, self._least_stated = noise_share, least_stated
+        self._least_stated = least_stated
         self.scales: Float = np.ones(2)
         self.nis: float | None = None
         self.bias = bias
@@ -61,7 +61,7 @@ class OdometryNoise:
     def of_beams(cls, config: ShuntingConfig) -> Self:
         """Matches of scans, whose information is the curvature of overlaps between bells."""
         least, bias = config.uncertainty.odometry.least_stated, HeadingBias(config.frontend.bias)
-        return cls(config, _noise_share(config), least_stated=least, bias=bias)
+        return cls(config, overlaps=True, least_stated=least, bias=bias)
 
     @classmethod
     def of_points(cls, config: ShuntingConfig, *, overlaps: bool) -> Self:
@@ -72,8 +72,11 @@ class OdometryNoise:
         looks too good beside such matches, and a bias learnt from them is theirs. So a stated
         covariance is never made smaller, and no bias is learnt.
         """
-        share = _noise_share(config) if overlaps else 1.0
-        return cls(config, share, least_stated=1.0, bias=None)
+        return cls(config, overlaps=overlaps, least_stated=1.0, bias=None)
+
+    def noise_share(self, sensor_sigma_m: float) -> float:
+        """Variance of a match by the noise of what was seen over what its information claims."""
+        return _noise_share(self._whole, sensor_sigma_m) if self._overlaps else 1.0
 
     def predict(self, T_map_before: Float, before: Odometry, now: Odometry) -> Prediction:
         """The prior of a frame."""
@@ -88,8 +91,8 @@ class OdometryNoise:
         self._stated = stated
         return predict(T_map_before, before, now, scales, self.bias, self._prior)
 
-    def learn(self, prediction: Prediction, match: Match) -> None:
-        """Compare the increment with a match that is believed."""
+    def learn(self, prediction: Prediction, match: Match, sensor_sigma_m: float) -> None:
+        """Compare the increment with a match that is believed, by ranges of that sigma."""
         off = match.T_map_robot - prediction.T_map_robot
         off[2] = se2.wrap(float(off[2]))
         data = match.tau * match.information
@@ -99,7 +102,7 @@ class OdometryNoise:
             variances = float(prediction.covariance[2, 2]), float(prediction.prior[2, 2])
             found_out = match.matched, float(off[2]), data
             self.bias.learn(prediction.increment, prediction.elapsed, variances, found_out)
-        share = min(match.tau * self._noise_share, 1.0)
+        share = min(match.tau * self.noise_share(sensor_sigma_m), 1.0)
         self.nis, *found = innovation(
             prediction.covariance + prediction.carried, prediction.prior, data, off, share
         )

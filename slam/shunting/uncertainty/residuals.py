@@ -95,8 +95,7 @@ def _age(cells: Cells, u: float, v: float) -> float:
     if row < 0 or column < 0 or row >= rows or column >= columns:
         return 0.0
     slot = cells.directory[row, column]
-    # an occupancy grid keeps its log-odds there, which may be negative
-    return max(float(cells.age[slot, j & MASK, i & MASK]), 0.0) if slot >= 0 else 0.0
+    return float(cells.age[slot, j & MASK, i & MASK]) if slot >= 0 else 0.0
 
 
 @inner
@@ -240,7 +239,7 @@ def look(
         longest=config.longest_cells * cell,
         faint_overlap=config.faint_overlap,
         bent=config.bent,
-        sensor_sigma=network.config.frontend.sensor_sigma_m,
+        sensor_sigma=seen.sensor_sigma_m,
     )
     law = network.law(elapsed)
     geometry, sums = np.zeros((3, 3)), np.zeros(5)

@@ -69,7 +69,7 @@ class Failing(Guest):
 
     def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
         place = prediction.T_map_robot.copy()
-        if len(self._stamps) == 3:
+        if len(self._path) == 3:
             place[0] = np.nan
         return place, {}
 

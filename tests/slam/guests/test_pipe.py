@@ -196,7 +196,7 @@ class Looping(OdometrySlam):
         self.word = word
     def update(self, frame):
         print(self.word, sys.stdin.read(), flush=True)
-        while len(self._stamps) == 6: pass
+        while len(self._path) == 6: pass
         return super().update(frame)
 '''
 

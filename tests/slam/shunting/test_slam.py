@@ -17,11 +17,8 @@ from slam import se2
 from slam.compiling import COMPILING
 from slam.errors import InvalidValueError
 from slam.frames import Features, Frame, Odometry, Scan
-from slam.frontend.observations import from_scan
-from slam.grid.occupancy import OccupancySlam
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.matching import local_search
-from slam.shunting.uncertainty.residuals import look
 from tests.world2d import Chairs, Drive, World2D, arena, frames, going_on, laser, rectangle, wander
 
 Array = NDArray[np.float64]
@@ -321,19 +318,3 @@ def test_the_ordinary_grid_drives_too_and_remembers_what_is_free() -> None:
     row = round(-raster.T_map_origin[1] / raster.resolution_m)
     assert raster.values[row, column] < 0.1  # 1 m ahead of the start
     assert np.nanmax(raster.values) > 0.9
-
-
-def test_a_grid_that_denies_what_is_seen_writes_no_less_than_nothing() -> None:
-    """Log-odds below zero stand where a network keeps ages."""
-    stream = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(181), seed=8)[:12]
-    system = OccupancySlam(cell_m=0.05)
-    for frame in stream[:-1]:
-        system.update(frame.without_truth())
-    system.network.cells.age[:] = -3.0
-    scan = stream[-1].scan
-    assert scan is not None
-    seen = from_scan(scan, np.zeros(3), system.config)
-    pose = se2.between(stream[0].truth, stream[-1].truth)  # type: ignore[arg-type]
-    evidence = look(system.network, 0.0, seen, pose, 0.2, 0)
-    assert evidence.weighed > 0.0
-    assert 0.0 < evidence.new <= evidence.weighed

@@ -306,3 +306,12 @@ def test_a_model_from_a_folder_outside_simulates(
         assert frames[-1].scan.valid.any()
         assert frames[-1].scan.spec.sweep_duration == pytest.approx(sweep_s, abs=1e-9)
         monkeypatch.delitem(sys.modules, name)
+
+
+def test_a_spec_states_the_sigma_of_its_model():
+    """At 5 m, where the data sheets state theirs; of ideal ranges there is none to state."""
+    wanted = {"lms221": 0.010, "utm30lx": 0.010, "tim561": 0.020, "rplidar_a1": 0.05 / 12**0.5}
+    for name, sigma_m in wanted.items():
+        model = scanner_of(name)
+        assert model.scanner().spec().range_sigma_m == pytest.approx(sigma_m), name
+        assert model.only("ideal").scanner().spec().range_sigma_m == 0.0

@@ -25,6 +25,7 @@ from slam.system import Estimate
 from tests.world2d import Drive, World2D, arena, frames, laser, rectangle, wander
 
 CONFIG = ShuntingConfig.robust(cell_m=0.05)
+SIGMA_M = CONFIG.frontend.sensor_sigma_m
 LONG = World2D(rectangle(-60.0, -1.0, 60.0, 1.01))
 
 
@@ -175,7 +176,8 @@ def corrected(
     )
     prediction = increments.predict(np.zeros(3), before, now)
     match = np.diag([1e-3, 1e-3, 5e-4]) ** 2
-    information = np.linalg.inv(match) * increments._noise_share  # what the reward's curvature says
+    share = increments.noise_share(SIGMA_M)
+    information = np.linalg.inv(match) * share  # what the reward's curvature says
     e = true * rng.normal(size=3) + np.sqrt(np.diag(match)) * rng.normal(size=3)
     gain = np.linalg.solve(information + np.linalg.inv(prediction.prior), information)
     increments.learn(
@@ -187,6 +189,7 @@ def corrected(
             score=0.0,
             tau=1.0,
         ),
+        SIGMA_M,
     )
     return increments.nis
 

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The path a SLAM has told so far: stamps and poses of its frames, which come in order."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slam.frames import Float
+from slam.frontend import odometry_steps
+from slam.trajectory import Trajectory
+
+
+class PosePath:
+    """Stamps (ns) and poses ``T_map_robot`` (m, m, rad) of the frames so far."""
+
+    def __init__(self) -> None:
+        self._stamps: list[int] = []
+        self._poses: list[Float] = []
+
+    def __len__(self) -> int:
+        return len(self._stamps)
+
+    def check_order(self, stamp_ns: int) -> None:
+        """Raise ``InvalidValueError`` unless a frame at ``stamp_ns`` comes after the last one."""
+        odometry_steps.check_order(self._stamps[-1] if self._stamps else None, stamp_ns)
+
+    def add(self, stamp_ns: int, T_map_robot: Float) -> None:
+        """The pose of one more frame."""
+        self._stamps.append(stamp_ns)
+        self._poses.append(T_map_robot.copy())
+
+    def poses(self) -> Float:
+        """(n, 3) m, m, rad."""
+        return np.array(self._poses, dtype=np.float64).reshape(-1, 3)
+
+    def trajectory(self, poses: Float | None = None) -> Trajectory:
+        """The poses as they were told, or others (n, 3) for the same stamps."""
+        return Trajectory(
+            stamps_ns=np.array(self._stamps, dtype=np.int64),
+            poses=self.poses() if poses is None else poses,
+        )
