@@ -16,7 +16,7 @@ from rich.table import Table
 from scenes import registry
 from scripts import workers
 from scripts.closed_loop import pictures, tables
-from scripts.closed_loop.plan import RUNS, Plan
+from scripts.closed_loop.plan import RUNS, SCHEMA, Plan
 from scripts.closed_loop.runs import Driven, load
 from scripts.comparison.folder import write_csv
 from scripts.console import console, level_table
@@ -30,8 +30,6 @@ from slam.evaluation.lost import FOUND_RULE, LOST_RULE
 from slam.files import write_text
 from slam.guests import Limits, limited
 from slam.variants import with_set
-
-SCHEMA = 1
 
 
 def drive(

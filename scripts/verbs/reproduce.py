@@ -14,12 +14,11 @@ import typer
 from rich.markup import escape
 
 from scripts.console import console, note
+from scripts.paper import EXPERIMENTS
 from scripts.paper.runs import Plan
 from scripts.paper.times import total
 from slam.errors import UnknownNameError
 from slam.files import write_text
-
-EXPERIMENTS = ("victoria-park", "landmarks", "chairs", "office", "theory")
 
 
 def reproduce(
