@@ -13,7 +13,7 @@ import slam
 from scripts.closed_loop import runs
 from scripts.comparison.plan import scripts_of, source_of, sources
 from scripts.jobs import Job
-from scripts.single_run.session import file_name
+from scripts.names import file_name
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError
 

@@ -8,10 +8,11 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scripts.comparison.again import is_run, run_of, why_no_run
+from scripts.comparison.again import run_of, why_no_run
 from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.show import Show
 from scripts.film.view import LogStage, Stage
+from scripts.names import is_run
 from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
 from scripts.trust import admitted
 from sim.core.versions import check_world, world_of
