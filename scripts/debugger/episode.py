@@ -83,9 +83,11 @@ def case_of(folder: Path, slam: str | None, every: int, trust: bool = False) -> 
         raise LogFormatError(path, "no recipe of a run: it has no settings")
     if "scene" not in settings:
         raise LogFormatError(path, "this run was on a log: only a simulated one can be run again")
-    unknown = sorted({"laser", "drive", "name", "start"}.intersection(settings))
+    unknown = sorted({"drive", "name", "start"}.intersection(settings))
     if unknown:
         raise LogFormatError(path, f"no recipe of a run: settings.{unknown[0]} is none of them")
+    if not isinstance(settings.get("laser", ""), str):
+        raise LogFormatError(path, "no recipe of a run: settings.laser must be a scanner's name")
     check_world(path, world_of(path, words))
     slams = slams_of(path, settings)
     if slam is None:

@@ -16,8 +16,8 @@ REPO = Path(__file__).resolve().parents[2]
 CODE = (
     "import time; from scripts import interrupt\n"
     "interrupt.install()\n"
-    "print('ready', flush=True)\n"
     "try:\n"
+    "    print('ready', flush=True)\n"
     "    time.sleep(float({seconds}))\n"
     "    print('undisturbed')\n"
     "except interrupt.InterruptedBySignal:\n"

@@ -147,6 +147,7 @@ STAY = {
     "matching/local_search.py": "how the work is laid out; integers of a field in bytes",
     "uncertainty/residuals.py": "places in an array",
     "featured.py": "PAPER_REWARD, which makes a preset",
+    "uncertainty/covariances.py": "LEAST, a guard against singular matrices",
 }
 
 

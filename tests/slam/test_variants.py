@@ -125,7 +125,7 @@ def test_a_map_file_keeps_every_number_and_an_older_one_has_the_defaults(tmp_pat
     groups = [key for key, value in header["config"].items() if isinstance(value, dict)]
     for key in groups:  # as files were written when there were twelve numbers
         del header["config"][key]
-    del header["config_sha256"]
+    del header["config_sha256"], header["sha256"]
     content["header"] = np.array(json.dumps(header))
     np.savez(tmp_path / "old.npz", **content)
     assert ShuntingSlam.load(tmp_path / "old.npz").config == ShuntingConfig(cell_m=0.1)

@@ -180,7 +180,7 @@ def test_every_flipped_byte_and_every_cut_is_noticed_or_changes_nothing(tmp_path
         slam.update(frame.without_truth())
     path = tmp_path / "small.npz"
     slam.save(path)
-    data, (config, state, arrays) = path.read_bytes(), memory.read(path)
+    data, (config, state, arrays) = path.read_bytes(), memory.read(path, ShuntingConfig)
     again = tmp_path / "again.npz"
     slam.save(again)
     assert again.read_bytes() == data
@@ -193,7 +193,7 @@ def test_every_flipped_byte_and_every_cut_is_noticed_or_changes_nothing(tmp_path
     for broken in damaged:
         path.write_bytes(broken)
         try:
-            found = memory.read(path)
+            found = memory.read(path, ShuntingConfig)
         except LogFormatError:
             noticed += 1
             continue
