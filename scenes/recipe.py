@@ -13,6 +13,7 @@ from scenes.assembly import hull_radius
 from scenes.builder import Builder
 from scenes.marks import Mark
 from scenes.placement import Floor
+from scenes.plan import Plan
 from scenes.scene import Kind, Pose, Scene
 from slam.errors import InvalidValueError
 
@@ -108,7 +109,7 @@ def seat_chairs(
         pose = _askew(floor, seats[index].pose, hull_radius(kind) + MARGIN, draws.chairs, PULLED)
         if pose is not None:
             _add_chair(builder, floor, kind, pose, draws)
-    while sum(m.kind.startswith("chair") for m in builder.movers) < n:
+    while sum(m.group == "chair" for m in builder.movers) < n:
         extra: Kind = "chair_swivel" if draws.chairs.random() < 0.75 else "chair_visitor"
         _add_chair(
             builder, floor, extra, _anywhere(floor, extra, "n_chairs", n, draws.chairs), draws
@@ -141,6 +142,17 @@ def scatter(
         floor.block(pose[0], pose[1], hull_radius(kind))
 
 
+def furnished(plan: Plan, draws: Draws, n_chairs: int, n_people: int, doors: str) -> Builder:
+    """Rooms with doors, a bin at each mark, chairs at the seats and people anywhere."""
+    builder = Builder(plan)
+    hang_doors(builder, draws.doors, doors)
+    put_bins(builder, draws.bins)
+    floor = free_floor(builder)
+    seat_chairs(builder, floor, plan.seats, n_chairs, draws)
+    scatter(builder, floor, "person", n_people, draws, draws.people)
+    return builder
+
+
 def put_bins(builder: Builder, rng: np.random.Generator) -> None:
     """A bin within a hand's breadth of each ``bin:...`` mark, away from the wall."""
     for index, mark in enumerate(builder.plan.find("bin")):
@@ -170,7 +182,7 @@ def finish(builder: Builder, name: str, seed: int, options: Mapping[str, object]
 
 
 def _add_chair(builder: Builder, floor: Floor, kind: Kind, pose: Pose, draws: Draws) -> None:
-    index = sum(m.kind.startswith("chair") for m in builder.movers)
+    index = sum(m.group == "chair" for m in builder.movers)
     paint = look.upholster(draws.colours) if kind == "chair_swivel" else None
     builder.add(kind, f"chair{index}", pose, paint=paint)
     floor.block(pose[0], pose[1], hull_radius(kind))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from slam.errors import InvalidValueError, MobiliaError, NotFiniteError, SlamFailedError
 from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame
-from slam.system import CanSave, HasChanges, HasLandmarks, SaysCells, SlamSystem, told
+from slam.system import CanSave, HasChanges, HasLandmarks, SaysCells, SlamSystem, create, told
 from slam.trajectory import Trajectory
 
 
@@ -231,3 +231,16 @@ class Replay:
         return Trajectory(
             stamps_ns=np.array(self._stamps, dtype=np.int64), poses=np.array(self._poses)
         )
+
+
+def systems_named(names: Sequence[str]) -> dict[str, SlamSystem]:
+    """Fresh systems by name, odometry among them as the null system."""
+    if not names:
+        raise InvalidValueError("name at least one SLAM")
+    wanted = dict.fromkeys([*names, "odometry"])
+    return {name: create(name) for name in wanted}
+
+
+def primary_of(replay: Replay) -> str:
+    """The system a run is about: the first that is not odometry."""
+    return next((n for n in replay.tracks if n != "odometry"), "odometry")

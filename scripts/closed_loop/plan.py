@@ -18,6 +18,7 @@ from sim.loop import LoopConfig
 from slam.errors import InvalidValueError
 
 RUNS = "runs"  # folder of the jobs' files
+SCHEMA = 1  # of the tables of a drive
 MAX_RUNS = 100_000
 IDENTITY = ("scene", "dynamism", "seed", "slam")
 

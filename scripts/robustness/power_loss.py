@@ -31,13 +31,13 @@ from unittest import mock
 import numpy as np
 from rich.table import Table
 
+from scripts.comparison import make
 from scripts.comparison.plan import Plan
 from scripts.console import console
 from scripts.output import READY, machine
 from scripts.robustness.disk_log import Cut, DiskLog, State, put_down, tree
 from scripts.single_run.live import on_scene
 from scripts.single_run.session import Outputs
-from scripts.verbs import compare as verb
 from scripts.verbs.generate import generate
 from sim.recording.sums import BESIDE, SUMS
 from slam import files, locks
@@ -269,7 +269,7 @@ def _compared(*slams: str) -> Callable[[Path], object]:
             seconds=2.0,
             scanner="noise",
         )
-        verb.carry_out(plan, root / "compared")
+        make.carry_out(plan, root / "compared")
 
     return call
 

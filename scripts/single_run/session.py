@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +23,10 @@ from scripts.film.show import Show
 from scripts.names import file_name
 from scripts.output import machine, whole_folder, write_recipe
 from scripts.single_run import score
-from slam.errors import InvalidValueError
 from slam.files import write_text
 from slam.frames import Stream
 from slam.maps import write_map
 from slam.replay import Replay
-from slam.system import SlamSystem, create
 from slam.trajectory import write_tum
 
 
@@ -42,19 +40,6 @@ class Outputs:
     overwrite: bool = False
     film: bool = True
     film_fps: float = FPS
-
-
-def systems_named(names: Sequence[str]) -> dict[str, SlamSystem]:
-    """Fresh systems by name, odometry among them as the null system."""
-    if not names:
-        raise InvalidValueError("name at least one SLAM")
-    wanted = dict.fromkeys([*names, "odometry"])
-    return {name: create(name) for name in wanted}
-
-
-def primary_of(replay: Replay) -> str:
-    """The system a run is about: the first that is not odometry."""
-    return next((n for n in replay.tracks if n != "odometry"), "odometry")
 
 
 def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:

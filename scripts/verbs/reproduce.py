@@ -14,13 +14,12 @@ import typer
 from rich.markup import escape
 
 from scripts.console import console, note
+from scripts.paper import EXPERIMENTS
 from slam.errors import UnknownNameError
 from slam.files import write_text
 
 if TYPE_CHECKING:
     from scripts.paper.runs import Plan
-
-EXPERIMENTS = ("victoria-park", "landmarks", "chairs", "office", "theory")
 
 
 def reproduce(

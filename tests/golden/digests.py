@@ -26,10 +26,10 @@ from typing import Any
 
 import numpy as np
 
+from scripts.comparison.make import carry_out
 from scripts.comparison.plan import Plan
 from scripts.film.footage import of_scene
 from scripts.film.render import pictures_at
-from scripts.verbs.compare import carry_out
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe, made_with
 from sim.recording.sums import read_sums

@@ -11,13 +11,13 @@ import pytest
 from typer.testing import CliRunner
 
 from scripts.cli import app
+from scripts.comparison import make
 from scripts.comparison.again import run_of
 from scripts.comparison.folder import RunFile
 from scripts.comparison.plan import Plan
 from scripts.debugger.episode import case_of
 from scripts.debugger.recording import record
 from scripts.film.footage import open_run
-from scripts.verbs import compare as verb
 from slam.errors import InvalidValueError, LogFormatError
 
 PLAN = {"scenes": ("arena",), "levels": (0.5,), "seeds": (7,), "scanner": "noise"}
@@ -26,7 +26,7 @@ PLAN = {"scenes": ("arena",), "levels": (0.5,), "seeds": (7,), "scanner": "noise
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("compare") / "out"
-    verb.carry_out(Plan(slams=("odometry", "occupancy"), seconds=1.3, **PLAN), out)
+    make.carry_out(Plan(slams=("odometry", "occupancy"), seconds=1.3, **PLAN), out)
     return out / "runs" / "arena_d0.5_s7.npz"
 
 

@@ -17,7 +17,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from scripts.comparison import folder, tables
+from scripts.comparison import folder, make, tables
 from scripts.comparison.columns import COLUMNS, lost_at
 from scripts.comparison.plan import Plan
 from scripts.comparison.recording import load
@@ -85,7 +85,7 @@ def compared(tmp_path_factory) -> Iterator[folder.Compared]:
     with pytest.MonkeyPatch.context() as patch:
         for name, factory in by_hand.items():
             patch.setitem(system._registry, name, factory)
-        verb.carry_out(Plan(slams=("odometry", "occupancy", *by_hand), **PLAN), out)
+        make.carry_out(Plan(slams=("odometry", "occupancy", *by_hand), **PLAN), out)
         yield folder.read(out)
 
 
@@ -149,9 +149,9 @@ def without_timings(rows):
 def test_killed_and_resumed_and_one_slam_more(tmp_path):
     """Kill -9 after the first result; the same command ends with the same numbers and frames."""
     command = (
-        "from pathlib import Path; from scripts.verbs import compare as verb; "
+        "from pathlib import Path; from scripts.comparison import make; "
         "from scripts.comparison.plan import Plan; "
-        "verb.carry_out(Plan(slams=('odometry', 'occupancy'), scenes=('arena',), levels=(1.0,),"
+        "make.carry_out(Plan(slams=('odometry', 'occupancy'), scenes=('arena',), levels=(1.0,),"
         f" seeds=(7,), seconds={SECONDS}), Path({str(tmp_path / 'a')!r}))"
     )
     process = subprocess.Popen([sys.executable, "-c", command], cwd=REPO)
@@ -161,15 +161,15 @@ def test_killed_and_resumed_and_one_slam_more(tmp_path):
     process.wait()
     kept = {file: file.stat().st_mtime_ns for file in tmp_path.glob("a/*/arena*.npz")}
     plan = Plan(slams=("odometry", "occupancy"), **PLAN)
-    resumed = verb.carry_out(plan, tmp_path / "a")
+    resumed = make.carry_out(plan, tmp_path / "a")
     assert {file: file.stat().st_mtime_ns for file in kept} == kept
-    straight = verb.carry_out(plan, tmp_path / "b")
+    straight = make.carry_out(plan, tmp_path / "b")
     assert repr(without_timings(resumed)) == repr(without_timings(straight))
     for file in tmp_path.glob("a/recordings/arena*.npz"):
         assert file.read_bytes() == (tmp_path / "b" / "recordings" / file.name).read_bytes()
     before = {file: file.stat().st_mtime_ns for file in tmp_path.glob("b/[er]*s/arena*-*.npz")}
     more = Plan(slams=("odometry", "occupancy", "ekf"), **PLAN)
-    rows = verb.carry_out(more, tmp_path / "b")
+    rows = make.carry_out(more, tmp_path / "b")
     assert len(rows) == 3
     assert {file: file.stat().st_mtime_ns for file in before} == before
 
@@ -218,8 +218,8 @@ def test_the_command_line_of_the_readme(monkeypatch):
         seen.update(plan=plan, out=out, ways=ways)
         return []
 
-    monkeypatch.setattr(verb, "carry_out", carry_out)
-    monkeypatch.setattr(verb, "_table", lambda *_: "")
+    monkeypatch.setattr(make, "carry_out", carry_out)
+    monkeypatch.setattr(make, "median_errors", lambda *_: "")
     line = (
         "--slam shunting ekf my_pkg:MySlam --scene arena office --dynamism 0:1:0.25 --seeds 10 "
         "--jobs 2 --out there"
@@ -236,9 +236,9 @@ def test_the_command_line_of_the_readme(monkeypatch):
 
 def test_what_cannot_be_compared_is_said_in_a_line(tmp_path):
     with pytest.raises(UnknownNameError, match="Did you mean 'shunting'"):
-        verb.carry_out(Plan(slams=("shuntin",), **PLAN), tmp_path / "a")
+        make.carry_out(Plan(slams=("shuntin",), **PLAN), tmp_path / "a")
     with pytest.raises(UnknownNameError, match="Did you mean 'arena'"):
-        verb.carry_out(Plan(slams=("odometry",), **{**PLAN, "scenes": ("arenna",)}), tmp_path / "a")
+        make.carry_out(Plan(slams=("odometry",), **{**PLAN, "scenes": ("arenna",)}), tmp_path / "a")
     with pytest.raises(InvalidValueError, match=r"Plan\.slams"):
         Plan(slams=("odometry", "odometry"), **PLAN)
     with pytest.raises(InvalidValueError, match="--dynamism"):
@@ -250,7 +250,7 @@ def test_what_cannot_be_compared_is_said_in_a_line(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
     with pytest.raises(OutputError, match="choose another"):
-        verb.carry_out(Plan(slams=("odometry",), **PLAN), tmp_path / "mine")
+        make.carry_out(Plan(slams=("odometry",), **PLAN), tmp_path / "mine")
     with pytest.raises(LogFormatError):
         folder.read(tmp_path)
 

@@ -262,7 +262,7 @@ def test_a_plan_of_too_many_episodes_is_refused():
 
 
 def test_a_flipped_recording_and_a_torn_entry_are_made_again(comparison, tmp_path, capsys):
-    from scripts.verbs.compare import carry_out
+    from scripts.comparison.make import carry_out
 
     folder = Path(shutil.copytree(comparison, tmp_path / "compared"))
     recording = min((folder / "recordings").glob("*.npz"))

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scripts.comparison import make
 from scripts.comparison.plan import Plan
 from scripts.console import console
 from scripts.film.encode import film
 from scripts.output import whole_folder, write_recipe
 from scripts.robustness.disk_log import tree
-from scripts.verbs import compare as verb
 from slam.errors import OutputError
 from slam.files import write_bytes
 from slam.maps import read_map, write_map
@@ -121,7 +121,7 @@ def test_tables_of_a_comparison(disk: Disk, tmp_path: Path):
     """Room for another SLAM's runs and not for the tables: the earlier ones stay, all of them."""
     ways = {"scenes": ("arena",), "levels": (1.0,), "seeds": (100,), "seconds": 1.0}
     one, two = (Plan(slams=slams, **ways) for slams in (("odometry",), ("odometry", "occupancy")))
-    verb.carry_out(one, tmp_path / "compared")
+    make.carry_out(one, tmp_path / "compared")
     place = disk(400)
     out = place / "compared"
     shutil.copytree(tmp_path / "compared", out)
@@ -129,14 +129,14 @@ def test_tables_of_a_comparison(disk: Disk, tmp_path: Path):
     room = os.statvfs(place).f_bavail * os.statvfs(place).f_bsize
     write_bytes(place / "rest", b"0" * (room - (32 << 10)))
     with pytest.raises(OutputError, match=f"cannot write {out}/.*: {FULL}"):
-        verb.carry_out(two, out)
+        make.carry_out(two, out)
     after = tree(out)
     assert {name: data for name, data in after.items() if name in before} == before
     new = set(after) - set(before)
     assert all(name.startswith("entries/") and "_occupancy-" in name for name in new)
     assert len(new) == 2  # the entry and its hash
     (place / "rest").unlink()
-    assert len(verb.carry_out(two, out)) == 2
+    assert len(make.carry_out(two, out)) == 2
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison as a whole: simulate, run the SLAMs, write tables; what is there stays."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from scenes import registry
+from scripts.comparison import folder as files
+from scripts.comparison import tables
+from scripts.comparison.columns import COLUMNS
+from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
+from scripts.comparison.recording import load
+from scripts.console import level_table
+from scripts.jobs import Job, run_jobs
+from scripts.metrics.table import DRIVES
+from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
+from slam.evaluation.lost import LOST_RULE
+from slam.frames import BeamClass
+from slam.guests import Limits, limited
+
+
+def carry_out(
+    plan: Plan, out: Path, *, jobs: int = 1, cluster: str | None = None
+) -> list[dict[str, Any]]:
+    """Make what is missing and write the tables; the rows of ``runs.csv``."""
+    for name in plan.scenes:
+        registry.build(name)  # wrong names are told before anything starts
+    for name in plan.slams:
+        limited(name, Limits())
+    out = out.absolute()
+    with locked_folder(out):
+        settings = {"compare_schema": files.SCHEMA, **asdict(plan), "lost_rule": LOST_RULE}
+        settings["machine"] = machine()
+        if not (out / RECIPE).exists():  # else that of the tables there stays with them
+            write_recipe(out, "compare", settings)
+        simulations, entries = plan.recordings(), list(plan.entries())
+        ways: dict[str, Any] = {"processes": jobs, "cluster": cluster}
+        recordings = run_jobs(simulations.values(), out / RECORDINGS, title="simulating", **ways)
+        only: list[Job] = [job for _, _, job in entries]
+        done = run_jobs(only, out / ENTRIES, title="running SLAMs", **ways)
+        with together(out) as staged:
+            rows: list[dict[str, Any]] = []
+            for run in plan.runs():
+                own = {name: done[job.name] for its, name, job in entries if its == run}
+                merged = files.merge(staged / "runs" / f"{run.name}.npz", recordings[run.name], own)
+                about = asdict(run) | _about(recordings[run.name])
+                rows += [about | row for row in merged]
+            files.write_csv(staged / files.RUNS, rows, COLUMNS)
+            files.write_json(staged / files.RUNS_JSON, rows)
+            files.write_csv(staged / files.LEVELS, tables.levels(rows), tables.LEVEL_COLUMNS)
+            files.write_csv(staged / files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS)
+            write_recipe(staged, "compare", settings)
+    return rows
+
+
+def _about(recording: Path) -> dict[str, float]:
+    """What a run itself was like: the columns ``DRIVES``."""
+    drive = load(recording)
+    truth = drive.truth()
+    values = (
+        float(truth.stamps_ns[-1] - truth.stamps_ns[0]) / 1e9,
+        truth.length_m(),
+        drive.share_of_returns(BeamClass.MOVING),
+        drive.share_of_returns(BeamClass.SEMI_STATIC),
+    )
+    return dict(zip(DRIVES, values, strict=True))
+
+
+def median_errors(plan: Plan, scene: str, rows: list[dict[str, Any]]) -> Table:
+    """Median error and runs lost, to be printed."""
+    summary = {
+        (row["dynamism"], row["slam"], row["metric"]): row["value"]
+        for row in tables.levels([row for row in rows if row["scene"] == scene])
+    }
+
+    def cell(level: float, slam: str) -> str:
+        ate_cm = 100.0 * summary[level, slam, "ate_unaligned_m"]
+        lost = round(summary[level, slam, "lost"] * len(plan.seeds))
+        return f"{ate_cm:.2f} ({lost})"
+
+    title = f"{scene}: median unaligned ATE in cm (runs lost of {len(plan.seeds)})"
+    return level_table(title, f"lost: {LOST_RULE}", plan.levels, plan.slams, cell)
