@@ -9,6 +9,7 @@ from scenes.apartment import apartment
 from scenes.arena import arena
 from scenes.classroom import classroom
 from scenes.corridor import corridor
+from scenes.filled import filled
 from scenes.mounting import at_scan_height
 from scenes.office import office
 from scenes.random_rooms import random_rooms
@@ -27,6 +28,7 @@ __all__ = [
     "classroom",
     "corridor",
     "describe",
+    "filled",
     "names",
     "office",
     "random_rooms",

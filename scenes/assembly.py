@@ -11,43 +11,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import mujoco
 
+from scenes.marks import Mark, marks
+from scenes.mjcf import check_materials, parsed
 from scenes.scene import Pose
-from slam.errors import InvalidValueError
-
-HERE = Path(__file__).parent
-
-
-@dataclass(frozen=True, kw_only=True)
-class Mark:
-    """A site of a plan: ``words`` of its name split at ':', where it is, half sizes of its box."""
-
-    words: tuple[str, ...]
-    pose: Pose
-    half: tuple[float, float]
-
-    @property
-    def rect(self) -> tuple[float, float, float, float]:
-        """xmin, ymin, xmax, ymax of an unrotated box, m."""
-        (x, y, _), (a, b) = self.pose, self.half
-        return x - a, y - b, x + a, y + b
-
-
-def marks(spec: mujoco.MjSpec) -> tuple[Mark, ...]:
-    """Every site of an uncompiled spec, in the order of the file."""
-    return tuple(
-        Mark(
-            words=tuple(site.name.split(":")),
-            pose=(float(site.pos[0]), float(site.pos[1]), _yaw(site)),
-            half=(float(site.size[0]), float(site.size[1])),
-        )
-        for site in spec.sites
-    )
 
 
 def moved(pose: Pose, local: Pose) -> Pose:
@@ -58,18 +28,10 @@ def moved(pose: Pose, local: Pose) -> Pose:
     return x + cos * local[0] - sin * local[1], y + sin * local[0] + cos * local[1], turned
 
 
-def file_of(folder: str, name: str) -> Path:
-    """The MJCF file of a part or plan: one of ours by its name, anybody's by its path."""
-    path = Path(name) if name.endswith(".xml") else HERE / folder / f"{name}.xml"
-    if not path.is_file():
-        raise InvalidValueError(f"no file '{path.name}' for '{name}' among the {folder}")
-    return path
-
-
 @cache
 def part(name: str) -> mujoco.MjSpec:
     """The parsed part without its materials; copy before use."""
-    spec = mujoco.MjSpec.from_file(str(file_of("parts", name)))
+    spec = parsed("parts", name)
     for material in list(spec.materials):
         spec.delete(material)
     return spec
@@ -110,12 +72,16 @@ class Assembly:
         group.attach(child, frame=frame, prefix=f"{instance.removeprefix(kin)}/")
 
     def into(self, spec: mujoco.MjSpec) -> None:
-        """Hand everything over to ``spec``, whose materials the parts use from now on."""
+        """Hand everything over to ``spec``, whose materials the parts use from now on.
+
+        Raises ``InvalidValueError`` for a material that ``spec`` does not have.
+        """
         for kin, group in self._groups.items():
             geoms = group.geoms  # still the same geoms once attached
             spec.attach(group, frame=spec.worldbody.add_frame(), prefix=kin)
             for geom in geoms:
                 geom.material = geom.material.rpartition("/")[2]
+            check_materials(spec, geoms, f"part '{kin}'")
         self._groups = {}
         for camera in spec.cameras:
             camera.name = camera.name.rpartition("/")[2]
@@ -124,11 +90,3 @@ class Assembly:
 def quaternion(yaw: float) -> list[float]:
     """Of a turn about the vertical."""
     return [math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)]
-
-
-def _yaw(site: mujoco.MjsSite) -> float:
-    return (
-        float(site.alt.euler[2])
-        if site.alt.type == mujoco.mjtOrientation.mjORIENTATION_EULER
-        else 0.0
-    )

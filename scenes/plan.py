@@ -11,14 +11,17 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
+from typing import get_args
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes import look
-from scenes.assembly import Assembly, Mark, file_of, marks, moved, part_marks, quaternion
-from scenes.scene import Pose
+from scenes.assembly import Assembly, moved, part_marks, quaternion
+from scenes.marks import Mark, check_marks, check_written, marks
+from scenes.mjcf import check_materials, ours, parsed
+from scenes.scene import Kind, Pose
 from scenes.views import add_cameras
 from slam.errors import InvalidValueError
 
@@ -40,13 +43,15 @@ class Plan:
     def __init__(self, source: str, *, floors: Sequence[str] = ()) -> None:
         """``source``: name of one of our plans or path of an MJCF file; ``floors``: materials that
         will be used beside those of the file."""
-        parsed, self.marks = _parsed(source, tuple(floors))
-        self.spec = parsed.copy()
+        spec, self.marks = _parsed(source, tuple(floors))
+        self.spec = spec.copy()
+        self._source = Path(source).name
         self.seats: list[Mark] = list(self.find("seat"))
         self._furniture: list[list[float]] = []
         self._boxes: NDArray[np.float64] | None = None
         self._counts: Counter[str] = Counter()
         self._parts = Assembly()
+        self._kinds: set[str] = set()
 
     def find(self, first: str) -> Iterator[Mark]:
         """Marks whose name starts with that word."""
@@ -116,6 +121,7 @@ class Plan:
     def furnish_marks(self, parts: Sequence[str]) -> None:
         """Put each of these parts wherever a mark starts with its name."""
         for part in parts:
+            self._kinds.add(Path(part).stem)
             for mark in self.find(Path(part).stem):
                 self.furnish(part, mark.pose)
 
@@ -175,7 +181,12 @@ class Plan:
                 geom.group = HIDDEN
 
     def finish(self) -> Plan:
-        """Put the parts in, dress the walls, add cameras where none are."""
+        """Put the parts in, dress the walls, add cameras where none are.
+
+        Raises ``InvalidValueError`` for marks and materials that there are not.
+        """
+        check_marks(self._source, self.marks, {*furniture(), *self._kinds})
+        check_materials(self.spec, self.spec.geoms, f"plan '{self._source}'")
         self._parts.into(self.spec)
         self._boxes = self.boxes
         look.trim_walls(self.spec)
@@ -184,10 +195,18 @@ class Plan:
 
 
 @cache
+def furniture() -> tuple[str, ...]:
+    """Names of our parts that a mark can put: neither movers nor what comes with a door."""
+    placed_by_recipes = {*get_args(Kind), "door_frame"}
+    return tuple(name for name in ours("parts") if name not in placed_by_recipes)
+
+
+@cache
 def _parsed(source: str, floors: tuple[str, ...]) -> tuple[mujoco.MjSpec, tuple[Mark, ...]]:
     """The file without its marks, floors painted, all clothes in the wardrobe; copy before use."""
-    spec = mujoco.MjSpec.from_file(str(file_of("plans", source)))
+    spec = parsed("plans", source)
     found = marks(spec)
+    check_written(Path(source).name, found)
     for site in list(spec.sites):
         spec.delete(site)
     look.paint_floors(spec, floors)

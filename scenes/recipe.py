@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from scenes import look
-from scenes.assembly import Mark, hull_radius
+from scenes.assembly import hull_radius
 from scenes.builder import Builder
+from scenes.marks import Mark
 from scenes.placement import Floor
 from scenes.scene import Kind, Pose, Scene
 from slam.errors import InvalidValueError

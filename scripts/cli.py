@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import os
 import sys
+from typing import Annotated
 
 import typer
 from rich.logging import RichHandler
@@ -29,7 +30,7 @@ from scripts.verbs.run import run
 from scripts.verbs.sensor_card import sensor_card
 from scripts.verbs.verify import verify
 from slam.errors import MobiliaError
-from slam.names import look_in
+from slam.names import load, look_in
 
 _log = logging.getLogger(__name__)
 
@@ -64,6 +65,14 @@ app.command("report")(report)
 @app.callback()
 def options(
     verbose: bool = typer.Option(False, "--verbose", "-v", help="Also print what is going on."),
+    modules: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with",
+            help="Import this Python module of yours first, so that the scanner, topic or film "
+            "pane that it registers is known.",
+        ),
+    ] = None,
 ) -> None:
     """Options of every verb."""
     logging.basicConfig(
@@ -71,6 +80,7 @@ def options(
         format="%(message)s",
         handlers=[RichHandler(console=console, show_path=False, show_time=False)],
     )
+    load(modules or ())
 
 
 def main(warning: str | None = None) -> None:

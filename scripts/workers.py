@@ -23,6 +23,7 @@ from slam import locks
 from slam.errors import InvalidValueError, MissingDependencyError, MobiliaError, OutputError
 from slam.files import write_text
 from slam.guests import guarding
+from slam.names import load, loaded
 
 MAX_JOBS = 1024
 WORKERS_TIMEOUT_S = 30
@@ -71,7 +72,8 @@ def each(
         stack.enter_context(joblib.parallel_config(**backend))
         parallel = joblib.Parallel(return_as="generator_unordered", batch_size=1)
         held = (shared, locks.ticket(shared)) if shared is not None else None
-        results = parallel(joblib.delayed(_guarded)(call, item, held) for item in items)
+        modules = loaded()
+        results = parallel(joblib.delayed(_guarded)(call, item, held, modules) for item in items)
         try:
             for result, error in results:
                 if error is not None:
@@ -97,10 +99,11 @@ def check_jobs(jobs: int) -> None:
 
 
 def _guarded(
-    call: Callable[[T], R], item: T, held: tuple[Path, str] | None
+    call: Callable[[T], R], item: T, held: tuple[Path, str] | None, modules: tuple[str, ...]
 ) -> tuple[R | None, MobiliaError | None]:
     """Errors as values: as exceptions they would come back wrapped in a worker's traceback."""
     try:
+        load(modules)
         with locks.working(*held) if held is not None and held[1] else nullcontext():
             return call(item), None
     except MobiliaError as error:

@@ -9,15 +9,18 @@ read from a file is a ``NameFromFile``: it resolves to what is registered and to
 
 from __future__ import annotations
 
+import importlib
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
-from slam.errors import UntrustedNameError
+from slam.errors import InvalidValueError, MobiliaError, UnknownNameError, UntrustedNameError
 
 SAFE_PATH = "PYTHONSAFEPATH"
 OURS = "mobilia"  # the value of SAFE_PATH where it was us who set it
 _wanted: list[str] = []
+_loaded: list[str] = []
 
 
 class NameFromFile(str):
@@ -68,6 +71,35 @@ def join_folders() -> None:
     Not before: a folder of somebody else's data may hold a module called like one that we import.
     """
     sys.path.extend(folder for folder in _wanted if folder not in sys.path)
+
+
+def load(modules: Iterable[str]) -> None:
+    """Import modules that the user typed, so that what they register is known.
+
+    Raises ``UnknownNameError`` for one that cannot be found, ``InvalidValueError`` for one that
+    fails, and ``UntrustedNameError`` for one that was read from a file.
+    """
+    for name in modules:
+        if isinstance(name, NameFromFile):
+            raise UntrustedNameError(f"{name.file} names code to run: module {str(name)[:200]!r}")
+        if name in _loaded:
+            continue
+        join_folders()
+        try:
+            importlib.import_module(name)
+        except (ImportError, TypeError) as error:  # TypeError: no name of a module
+            raise UnknownNameError(f"module '{name}' cannot be imported: {error}") from error
+        except MobiliaError:
+            raise
+        except Exception as error:  # somebody else's code raises whatever it likes
+            what = f"{type(error).__name__}: {error}"
+            raise InvalidValueError(f"module '{name}' fails: {what}") from error
+        _loaded.append(name)
+
+
+def loaded() -> tuple[str, ...]:
+    """What ``load`` has imported here: a process that we start needs the same."""
+    return tuple(_loaded)
 
 
 def child_environment(*, guest: bool) -> dict[str, str]:

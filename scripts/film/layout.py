@@ -9,6 +9,7 @@ from scripts.film.encode import Size
 
 MARGIN, TOP, TITLE, GUTTER = 16, 66, 20, 16  # of a 1280 x 720 frame, px
 CHART, LEFT, CLOSE = 240, 480, 150
+MORE = 220  # width of the column of panes that users add, px
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class Layout:
     """The panes of a frame; ``camera`` is None without a 3D view, whose place the others take.
 
     unit  px that stand for one of 1280 x 720: what fonts and lines scale with
+    more  panes that users add (``scripts.film.panes``), a column at the right of the map
     """
 
     size: Size
@@ -40,10 +42,11 @@ class Layout:
     chart: Box
     close: Box
     camera: Box | None = None
+    more: tuple[Box, ...] = ()
 
     @classmethod
-    def of(cls, size: Size, *, camera: bool) -> Layout:
-        """For a frame of (width, height); the panes grow with it."""
+    def of(cls, size: Size, *, camera: bool, more: int = 0) -> Layout:
+        """For a frame of (width, height) with ``more`` panes of users; all grow with it."""
         unit = min(size[0] / 1280.0, size[1] / 720.0)
         width, height = size[0] / unit, size[1] / unit
 
@@ -63,12 +66,19 @@ class Layout:
             half = (width - 2 * MARGIN - GUTTER) / 2.0
             scan, view = box(MARGIN, TOP, half, upper), None
         map_left = left if camera else MARGIN + half + GUTTER
+        map_width = width - MARGIN - map_left - (MORE + GUTTER if more else 0)
+        each = (upper - (more - 1) * (TITLE + 4)) / more if more else 0.0
+        column = [
+            box(width - MARGIN - MORE, TOP + k * (each + TITLE + 4), MORE, each)
+            for k in range(more)
+        ]
         return cls(
             size=size,
             unit=unit,
             camera=view,
             scan=scan,
-            map=box(map_left, TOP, width - MARGIN - map_left, upper),
+            map=box(map_left, TOP, map_width, upper),
             chart=box(left, chart_top, width - MARGIN - CLOSE - GUTTER - left, CHART),
             close=box(width - MARGIN - CLOSE, chart_top + TITLE, CLOSE, CLOSE),
+            more=tuple(column),
         )

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import cv2
 import numpy as np
 
-from scripts.film import draw
+from scripts.film import draw, panes
 from scripts.film.chart import Bar, ErrorChart, Series
 from scripts.film.close_up import CloseUp, off_by
 from scripts.film.draw import Color, Picture
@@ -168,7 +168,8 @@ class _Panes:
 
     def __init__(self, show: Show) -> None:
         self._show, stage, pace = show, show.stage, show.pace
-        layout = Layout.of(show.size, camera=stage.camera)
+        self._more = panes.registered()
+        layout = Layout.of(show.size, camera=stage.camera, more=len(self._more))
         self._layout, unit = layout, layout.unit
         stage.open(layout)
         self._map = MapPane(*layout.map.size, unit, stage.bounds)
@@ -211,6 +212,8 @@ class _Panes:
         _put(canvas, layout.chart, self._chart.paint(show.series, bars, show.stage.kidnaps()))
         _put(canvas, layout.close, self._close_up(T_view_map, covariance))
         self._say_off(canvas, covariance)
+        for pane, box in zip(self._more, layout.more, strict=True):
+            _put(canvas, box, pane(show, frame, box.size))
         return canvas
 
     def vignette(self, whole: Picture) -> Picture:
@@ -262,6 +265,7 @@ class _Panes:
             (layout.map, f"map of {show.primary}: {show.holds()}scan, trails"),
             (layout.close, f"close-up, {SIGMAS:g} σ ellipse"),
         ]
+        titles += [(box, p.title) for p, box in zip(self._more, layout.more, strict=True)]
         if layout.camera is not None:
             titles.append((layout.camera, "3D camera"))
         labelled = show.stage.labelled

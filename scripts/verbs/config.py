@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from itertools import groupby
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,12 +15,14 @@ if TYPE_CHECKING:
     from slam.settings import Row, Settings
 
 BY_DEVICE = "TD: technical description 8008970/06-2003, TL: telegram listing 8007954"
-ROOMS = ("actors", "lms221")  # trees that belong to no SLAM
+ROOMS = ("actors", "dynamism", "lms221")  # what belongs to no SLAM
+LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of dynamism that are printed
 
 
 def config(
     what: Annotated[
-        str, typer.Argument(help="A SLAM (or a variant, SLAM{PATH=VALUE}), actors or lms221.")
+        str,
+        typer.Argument(help="A SLAM (or a variant, SLAM{PATH=VALUE}), actors, dynamism or lms221."),
     ],
     group: Annotated[
         str, typer.Argument(help="Only the numbers whose path begins so: matching.local.")
@@ -34,6 +37,9 @@ def config(
 
     [bold]mobilia config shunting matching[/bold]
     """
+    if what == "dynamism":
+        _print_dynamism(as_json)
+        return
     tree, default = (None, None) if what == "lms221" else _trees(what)
     rows = _chosen(_of_scanner() if tree is None else list(tree.rows()), group)
     if as_json:
@@ -43,6 +49,37 @@ def config(
         return
     changed = {} if tree is None or default is None else tree.differences(default)
     _print(rows, changed)
+
+
+def _print_dynamism(as_json: bool) -> None:
+    """Each rate at five levels of the knob."""
+    from sim.core.dynamism import KNOB
+
+    rows = [(rate, [rate.at(level) for level in LEVELS]) for rate in KNOB]
+    if as_json:
+        words = [
+            {"field": rate.field, "meaning": rate.meaning, "unit": rate.unit,
+             "values": dict(zip(map(str, LEVELS), map(_finite, values), strict=True))}
+            for rate, values in rows
+        ]  # fmt: skip
+        print(json.dumps({"rates": words}, indent=1, ensure_ascii=False))
+        return
+    from rich.table import Table
+
+    from scripts.console import console
+
+    table = Table(box=None, pad_edge=False)
+    for heading in ("dynamism", "", *(f"{level:g}" for level in LEVELS), "unit"):
+        table.add_column(heading, justify="left" if heading in ("dynamism", "") else "right")
+    for rate, values in rows:
+        cells = [f"{value:.3g}" for value in values]
+        table.add_row(rate.field, rate.meaning, *cells, "" if rate.unit == "1" else rate.unit)
+    console.print(table)
+
+
+def _finite(value: float) -> float | None:
+    """Strict JSON has no infinity."""
+    return value if math.isfinite(value) else None
 
 
 def _of_scanner() -> list[Row]:

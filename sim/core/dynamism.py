@@ -1,20 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """One number in [0, 1] for how much a room moves, and the table of what it means.
 
-| rate                                | at dynamism d    | d = 0 | 0.25  | 0.5   | 0.75  | 1     |
-|-------------------------------------|------------------|-------|-------|-------|-------|-------|
-| shoves of each chair, 1/s           | 0.15 d           | 0     | 0.038 | 0.075 | 0.113 | 0.15  |
-| kicks of each bin, 1/s              | 0.06 d           | 0     | 0.015 | 0.03  | 0.045 | 0.06  |
-| moves of each trolley, pallet, 1/s  | 0.06 d           | 0     | 0.015 | 0.03  | 0.045 | 0.06  |
-| draughts that move each door, 1/s   | 0.04 d           | 0     | 0.01  | 0.02  | 0.03  | 0.04  |
-| mean stay of a person at a goal, s  | 12 / d - 10      | never | 38    | 14    | 6     | 2     |
-| walking pace, times a person's own  | 0.7 + 0.3 d      | -     | 0.775 | 0.85  | 0.925 | 1     |
+``KNOB`` is that table; ``mobilia config dynamism`` prints it.
 
-The rates are set so that the share of moving things rises in proportion to d. A shove keeps a
-chair rolling for about a second, so at 1 one office chair in seven moves at any time. A path
+The rates are set so that what is on the move rises in proportion to d: a shove keeps a
+chair rolling for about a second, so at 1 one office chair in seven moves at any time; a way
 between two goals takes a person about ten seconds, so at 1 five in six are walking, and a stay of
-12 / d - 10 seconds makes that (5 / 6) d. ``scripts.experiments.dynamism_curve`` shows the share
-that the scanner observes.
+12 / d - 10 seconds makes that (5 / 6) d. ``scripts.experiments.dynamism_curve`` shows what the
+scanner sees of it.
 
 At 0 nothing moves by itself: people are present and stand perfectly still, chairs and bins are
 never pushed and doors stay at their angle of rest (a door still gives way to the robot). How hard
@@ -29,10 +22,37 @@ loads by a set share of them on the move at any time (``sim.actors.rolling``).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from sim.core.checks import check_types
 from slam.errors import InvalidValueError
+
+
+@dataclass(frozen=True)
+class Rate:
+    """One rate as a function of the dynamism d in [0, 1].
+
+    field  of ``Dynamism``
+    """
+
+    field: str
+    meaning: str
+    unit: str
+    at: Callable[[float], float]
+
+
+KNOB = (
+    Rate("chair_push_rate", "shoves of each chair", "1/s", lambda d: 0.15 * d),
+    Rate("bin_kick_rate", "kicks of each bin", "1/s", lambda d: 0.06 * d),
+    Rate("load_push_rate", "moves of each trolley or pallet", "1/s", lambda d: 0.06 * d),
+    Rate("door_rate", "each door moved by nobody", "1/s", lambda d: 0.04 * d),
+    Rate(
+        "stay_mean", "mean stay of a person at a goal; infinite: nobody leaves", "s",
+        lambda d: 12.0 / d - 10.0 if d > 0.0 else math.inf,
+    ),
+    Rate("pace", "walking pace, times a person's own", "1", lambda d: 0.7 + 0.3 * d),
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,23 +105,16 @@ class Dynamism:
 
     @classmethod
     def from_knob(cls, dynamism: float) -> Dynamism:
-        """Rates at a knob in [0, 1]; ``InvalidValueError`` outside."""
+        """Rates at a dynamism in [0, 1]; ``InvalidValueError`` outside."""
         if isinstance(dynamism, bool) or not isinstance(dynamism, (int, float)):
             raise InvalidValueError(f"dynamism must be a number in [0, 1], got {dynamism!r}")
         d = float(dynamism)
         if not 0.0 <= d <= 1.0:
             raise InvalidValueError(f"dynamism must lie in [0, 1], got {dynamism}")
-        return cls(
-            chair_push_rate=0.15 * d,
-            bin_kick_rate=0.06 * d,
-            load_push_rate=0.06 * d,
-            door_rate=0.04 * d,
-            stay_mean=12.0 / d - 10.0 if d > 0.0 else math.inf,
-            pace=0.7 + 0.3 * d,
-        )
+        return cls(**{rate.field: rate.at(d) for rate in KNOB})
 
     @classmethod
     def of(cls, dynamism: float | Dynamism, moving_share: float | None = None) -> Dynamism:
-        """A knob or the rates themselves, with ``moving_share`` put in if it is not None."""
+        """A number in [0, 1] or the rates themselves, with ``moving_share`` put in if it is not None."""
         rates = dynamism if isinstance(dynamism, Dynamism) else cls.from_knob(dynamism)
         return rates if moving_share is None else replace(rates, moving_share=moving_share)

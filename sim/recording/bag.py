@@ -31,6 +31,7 @@ from sim.recording import messages as ros
 from sim.recording.label_cloud import LabelsMessage
 from sim.recording.objects import ObjectsMessage
 from sim.recording.template import STORE
+from sim.recording.topics import MoreTopics
 from slam import se2
 from slam._jit import njit
 from slam.errors import InvalidValueError
@@ -191,6 +192,7 @@ class BagWriter:
         self._wheels, self._truth = _Wheels(), ros.TruthMessage()
         self._labels = LabelsMessage(spec) if labels else None
         self._objects = ObjectsMessage(movers) if movers else None
+        self._more = MoreTopics()
         self._writer = Writer(path, version=VERSION, storage_plugin=StoragePlugin.MCAP)
         self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         self._connections: dict[str, Any] = {}
@@ -210,6 +212,7 @@ class BagWriter:
             "/ground_truth/labels": LabelsMessage.KIND if self._labels else "",
             "/scan": scan,
             "/scan_turn": scan,
+            **self._more.kinds,
         }
         for topic, kind in topics.items():
             if kind:
@@ -254,6 +257,8 @@ class BagWriter:
         self._put("/scan", *self._scan(scan))
         for turn in self._turns:
             self._put("/scan_turn", *turn(scan))
+        for topic, data in self._more(moment):
+            self._put(topic, stamp_ns, data)
 
     def _put(self, topic: str, stamp_ns: int, data: bytearray) -> None:
         self._chunks.turn_to(topic not in _LEAN)

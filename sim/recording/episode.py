@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from sim.moments import Moment, toured
+from sim.recording import topics
 from sim.recording.bag import BagWriter
 from sim.recording.recipe import RECIPE, Recipe, write_recipe
 from sim.recording.relations import write_relations
@@ -109,6 +110,8 @@ def _write(
         write_relations(folder / "relations.txt", truth)
         write_map(folder / "map", scene.static_map)
         result = {**summary.result(), "messages_sha256": bag.messages_sha256}
+        if topics.names():
+            result["topics"] = topics.names()
         write_recipe(folder / RECIPE, recipe, result)
         write_sums(folder)
         size = sum(file.stat().st_size for file in folder.iterdir())

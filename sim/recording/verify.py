@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Literal, cast
 
 from sim.core.versions import not_this_world
+from sim.recording import topics
 from sim.recording.bag import MessageHash
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Made, Recipe, read_recipe
@@ -168,6 +169,10 @@ def regenerate(folder: Path, *, trust: bool = False) -> Finding:
     why = not_this_world(made.world)
     if why:
         return Finding(episode=folder.name, verdict="other world", why=f"not made again: {why}")
+    wanted, here = made.result.get("topics", []), topics.names()
+    if wanted != here:
+        why = f"not made again: it has topics {wanted!r:.200}, here are {here}; see --with"
+        return Finding(episode=folder.name, verdict="differs", why=why)
     recipe = made.recipe
     if trust:
         recipe = replace(recipe, scene=str(recipe.scene))  # as if it had been typed

@@ -4,40 +4,75 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.errors import InvalidValueError
 from slam.frames import Float
 
-LOST_M, LOST_RAD, LOST_S = 0.5, math.radians(20.0), 1.0
-LOST_RULE = "position error > 0.5 m or heading error > 20 degrees for more than 1 s on end"
-FOUND_RULE = "both errors below half of that for more than 1 s on end"
+LOST_M = 0.5  # m of position error
+LOST_RAD = math.radians(20.0)  # of heading error
+LOST_S = 1.0  # s on end of either
 
 
-def lost_at(seconds: Float, distances: Float, headings: Float) -> float | None:
-    """The first moment of the first stretch by ``LOST_RULE``; None where there is none.
+@dataclass(frozen=True, kw_only=True)
+class LostRule:
+    """Lost: a position error > ``metres`` or heading error > ``radians`` for > ``seconds``.
+
+    Found again: both below half of that for as long. Raises ``InvalidValueError`` for a number that
+    is not > 0.
+    """
+
+    metres: float = LOST_M
+    radians: float = LOST_RAD
+    seconds: float = LOST_S
+
+    def __post_init__(self) -> None:
+        for name in ("metres", "radians", "seconds"):
+            if not getattr(self, name) > 0.0:
+                raise InvalidValueError(f"LostRule.{name} must be > 0, got {getattr(self, name)}")
+
+    def __str__(self) -> str:
+        degrees = f"{math.degrees(self.radians):g}"
+        return (
+            f"position error > {self.metres:g} m or heading error > {degrees} degrees "
+            f"for more than {self.seconds:g} s on end"
+        )
+
+
+USUAL = LostRule()
+LOST_RULE = str(USUAL)
+FOUND_RULE = f"both errors below half of that for more than {LOST_S:g} s on end"
+
+
+def lost_at(
+    seconds: Float, distances: Float, headings: Float, rule: LostRule = USUAL
+) -> float | None:
+    """The first moment of the first stretch by ``rule``; None where there is none.
 
     (n,) times s, position errors m and heading errors rad.
     """
-    return _first(seconds, (distances > LOST_M) | (np.abs(headings) > LOST_RAD), -math.inf)
+    off = (distances > rule.metres) | (np.abs(headings) > rule.radians)
+    return _first(seconds, off, -math.inf, rule)
 
 
 def found_again_at(
-    seconds: Float, distances: Float, headings: Float, lost_s: float
+    seconds: Float, distances: Float, headings: Float, lost_s: float, rule: LostRule = USUAL
 ) -> float | None:
-    """The same after ``lost_s`` by ``FOUND_RULE``."""
-    near = (distances < 0.5 * LOST_M) & (np.abs(headings) < 0.5 * LOST_RAD)
-    return _first(seconds, near, lost_s)
+    """The first moment after ``lost_s`` from which on both errors are small, by ``rule``."""
+    near = (distances < 0.5 * rule.metres) & (np.abs(headings) < 0.5 * rule.radians)
+    return _first(seconds, near, lost_s, rule)
 
 
-def _first(seconds: Float, holds: NDArray[np.bool_], after: float) -> float | None:
+def _first(seconds: Float, holds: NDArray[np.bool_], after: float, rule: LostRule) -> float | None:
     since: float | None = None
     for second, is_so in zip(seconds.tolist(), holds.tolist(), strict=True):
         if not is_so or second <= after:
             since = None
             continue
         since = second if since is None else since
-        if second - since > LOST_S:
+        if second - since > rule.seconds:
             return since
     return None

@@ -74,13 +74,13 @@ class Guest(ABC):
         before = frame.odometry if self._before is None else self._before
         prediction = predict(self._T_map_robot, before, frame.odometry)
         if self._before is None:
-            self._begin(frame.scan.spec)
+            self.begin(frame.scan.spec)
             twist = np.zeros(3) if frame.odometry.twist is None else frame.odometry.twist
         else:
             twist = prediction.twist
         points_robot = from_scan(frame.scan, np.asarray(twist), _GRAIN).points_robot
         try:
-            T_map_robot, diagnostics = self._locate(points_robot, prediction)
+            T_map_robot, diagnostics = self.locate(points_robot, prediction)
         except MobiliaError:
             raise
         except Exception as error:  # somebody else's code raises whatever it likes
@@ -98,13 +98,11 @@ class Guest(ABC):
         )
 
     @abstractmethod
-    def _begin(self, spec: LaserSpec) -> None:
+    def begin(self, spec: LaserSpec) -> None:
         """Make the guest anew, for the scanner of the first frame."""
 
     @abstractmethod
-    def _locate(
-        self, points_robot: Float, prediction: Prediction
-    ) -> tuple[Float, dict[str, float]]:
+    def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
         """T_map_robot (3,) of a scan whose end points are (n, 2), and numbers to tell about it."""
 
     def map(self) -> Raster | None:

@@ -44,7 +44,8 @@ class KartoSlam(Guest):
         self._kept: list[Any] = []
         self._places: list[Float] = []
 
-    def _begin(self, spec: LaserSpec) -> None:
+    def begin(self, spec: LaserSpec) -> None:
+        """Two matchers, of a narrow and a wide search."""
         if spec.n_beams > MOST_BEAMS:
             raise InvalidValueError(
                 f"KartoSlam takes scanners of up to {MOST_BEAMS} beams, got {spec.n_beams}"
@@ -65,9 +66,8 @@ class KartoSlam(Guest):
             config.fine_search_angle_resolution = FINE_RAD
             self._matchers.append(self._module.Wrapper(config))
 
-    def _locate(
-        self, points_robot: Float, prediction: Prediction
-    ) -> tuple[Float, dict[str, float]]:
+    def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
+        """Match to the kept scans nearby, far and wide where that fits poorly."""
         T_map_laser = se2.compose(prediction.T_map_robot, self._spec.T_robot_laser)
         scan = self._scan(points_robot, T_map_laser)
         if not self._kept:

@@ -42,7 +42,8 @@ class KissIcpSlam(Guest):
         self._config = needed("kiss_icp.config", "kiss-icp")
         super().__init__()
 
-    def _begin(self, spec: LaserSpec) -> None:
+    def begin(self, spec: LaserSpec) -> None:
+        """A matcher with a map of this scanner's grain."""
         config = self._config.KISSConfig()
         config.data.deskew = False  # done already, by odometry
         config.data.max_range = MAP_M
@@ -52,9 +53,8 @@ class KissIcpSlam(Guest):
         config.registration.max_num_threads = 1
         self._icp: Any = self._kiss.KissICP(config)
 
-    def _locate(
-        self, points_robot: Float, prediction: Prediction
-    ) -> tuple[Float, dict[str, float]]:
+    def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
+        """ICP from the predicted pose."""
         points = np.zeros((len(points_robot), 3))
         points[:, :2] = points_robot
         self._icp.last_delta = _lifted(prediction.increment)

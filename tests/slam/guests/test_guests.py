@@ -64,12 +64,10 @@ def test_a_guest_that_is_not_installed_says_how_to_get_it(
 class Failing(Guest):
     """Ends nowhere at its fourth scan."""
 
-    def _begin(self, spec: LaserSpec) -> None:
+    def begin(self, spec: LaserSpec) -> None:
         self.scanner = spec
 
-    def _locate(
-        self, points_robot: Float, prediction: Prediction
-    ) -> tuple[Float, dict[str, float]]:
+    def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
         place = prediction.T_map_robot.copy()
         if len(self._stamps) == 3:
             place[0] = np.nan

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene from a plan alone: whatever its marks ask for, and chairs and people besides.
+
+``arena``, ``office`` and the others are recipes of their own, as they have options of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+from scenes.builder import Builder
+from scenes.plan import Plan, furniture
+from scenes.recipe import (
+    Draws,
+    count,
+    finish,
+    free_floor,
+    hang_doors,
+    put_bins,
+    scatter,
+    seat_chairs,
+)
+from scenes.scene import Pose, Scene
+
+
+def filled(
+    plan: str | Path,
+    seed: int,
+    *,
+    parts: Sequence[str | Path] = (),
+    put: Sequence[tuple[str | Path, Pose]] = (),
+    n_chairs: int = 0,
+    n_people: int = 0,
+    doors: str = "open",
+) -> Scene:
+    """The scene of a plan: furniture, doors and bins at its marks, then chairs and people.
+
+    plan    path of an MJCF file, or the name of one of ``scenes/plans``
+    parts   paths of MJCF files of furniture: each is put wherever a mark starts with its name
+    put     furniture where no mark is: (path or name, (x m, y m, yaw rad)), its back to +y
+    doors   how they rest: "open", "ajar", "closed" or "mixed"
+
+    Chairs take the ``seat:...`` marks first, then free floor. Raises ``InvalidValueError`` for a
+    file, mark, material or number that cannot be.
+    """
+    n_chairs, n_people = count("n_chairs", n_chairs, 0), count("n_people", n_people, 0)
+    more = tuple((str(part), (pose[0], pose[1], pose[2])) for part, pose in put)
+    walls = _plan(str(plan), tuple(map(str, parts)), more)
+    builder, draws = Builder(walls), Draws(seed)
+    hang_doors(builder, draws.doors, doors)
+    put_bins(builder, draws.bins)
+    floor = free_floor(builder)
+    seat_chairs(builder, floor, walls.seats, n_chairs, draws)
+    scatter(builder, floor, "person", n_people, draws, draws.people)
+    options = {"n_chairs": n_chairs, "n_people": n_people, "doors": doors}
+    return finish(builder, Path(plan).stem, seed, options)
+
+
+@cache
+def _plan(source: str, parts: tuple[str, ...], put: tuple[tuple[str, Pose], ...]) -> Plan:
+    plan = Plan(source)
+    plan.furnish_marks([*parts, *furniture()])
+    for part, pose in put:
+        plan.furnish(part, pose)
+    plan.frame_doors()
+    return plan.finish()

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The marks of a plan: sites named by words, ``room:kitchen``; which there are and what they need.
+
+A plan with another mark, or with too few words in one, is refused: it would be left out silently.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import mujoco
+
+from slam.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from scenes.scene import Pose
+
+# first word -> how the mark is written
+WRITTEN = {
+    "room": "room:NAME",
+    "start": "start:robot",
+    "goal": "goal:NAME",
+    "door": "door:ROOM:left|right",
+    "opening": "opening:NAME",
+    "seat": "seat:KIND:N",
+    "spot": "spot:KIND:N",
+    "bin": "bin:ROOM:N",
+}
+NEEDED = ("room", "start")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mark:
+    """A site of a plan: ``words`` of its name split at ':', where it is, half sizes of its box."""
+
+    words: tuple[str, ...]
+    pose: Pose
+    half: tuple[float, float]
+
+    @property
+    def rect(self) -> tuple[float, float, float, float]:
+        """xmin, ymin, xmax, ymax of an unrotated box, m."""
+        (x, y, _), (a, b) = self.pose, self.half
+        return x - a, y - b, x + a, y + b
+
+
+def marks(spec: mujoco.MjSpec) -> tuple[Mark, ...]:
+    """Every site of an uncompiled spec, in the order of the file."""
+    return tuple(
+        Mark(
+            words=tuple(site.name.split(":")),
+            pose=(float(site.pos[0]), float(site.pos[1]), _yaw(site)),
+            half=(float(site.size[0]), float(site.size[1])),
+        )
+        for site in spec.sites
+    )
+
+
+def check_written(source: str, found: Iterable[Mark]) -> None:
+    """Raise ``InvalidValueError`` for a mark of ``WRITTEN`` that lacks a word."""
+    for mark in found:
+        form = WRITTEN.get(mark.words[0], "")
+        short = len(mark.words) < len(form.split(":"))
+        if short or (mark.words[0] == "door" and mark.words[2] not in ("left", "right")):
+            name = ":".join(mark.words)
+            raise InvalidValueError(f"plan '{source}': mark '{name}' must be written {form}")
+
+
+def check_marks(source: str, found: Iterable[Mark], parts: Collection[str]) -> None:
+    """Raise ``InvalidValueError`` for a mark that means nothing, and for a plan that lacks one.
+
+    source  name of the plan, for the error
+    parts   first words that put a part
+    """
+    seen = {mark.words[0]: mark for mark in found}
+    for first, mark in seen.items():
+        if first in WRITTEN or first in parts:
+            continue
+        near = difflib.get_close_matches(first, [*WRITTEN, *parts], n=1)
+        hint = f" Did you mean '{near[0]}'?" if near else ""
+        raise InvalidValueError(
+            f"plan '{source}': unknown mark '{':'.join(mark.words)}'.{hint} Marks: "
+            f"{', '.join(WRITTEN.values())}; or furniture: {', '.join(sorted(parts))}"
+        )
+    for word in NEEDED:
+        if word not in seen:
+            raise InvalidValueError(f"plan '{source}' needs a mark '{WRITTEN[word]}'; it has none")
+
+
+def _yaw(site: mujoco.MjsSite) -> float:
+    return (
+        float(site.alt.euler[2])
+        if site.alt.type == mujoco.mjtOrientation.mjORIENTATION_EULER
+        else 0.0
+    )

@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/extending.md does what it says: each recipe is followed literally, in an empty folder."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import imageio.v2 as imageio
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import scenes
+from scripts.cli import app
+from scripts.film import panes
+from sim.recording import topics
+from sim.sensors.lidar import registry as scanners
+from slam import system
+from slam.errors import InvalidValueError, UnknownNameError, UntrustedNameError
+from slam.logs.bag_topics import Bag
+from slam.names import NameFromFile, load
+
+PAGE = (Path(__file__).resolve().parents[1] / "docs" / "extending.md").read_text()
+HEADINGS = {part.partition("\n")[0]: part.partition("\n")[2] for part in PAGE.split("\n## ")[1:]}
+BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
+MOST_LINES = 15
+MODULES = ("shed", "crated", "lab_lidar", "my_slam", "my_guest", "worst", "turning", "speed")
+
+
+@pytest.fixture
+def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder to stand in; what is registered there is forgotten afterwards."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
+    for module, registry in (
+        (panes, "_panes"), (topics, "_topics"), (scanners, "_models"), (system, "_registry"),
+    ):  # fmt: skip
+        monkeypatch.setattr(module, registry, dict(getattr(module, registry)))
+    monkeypatch.setattr(sys.modules["slam.names"], "_loaded", [])
+    for name in MODULES:
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    yield tmp_path
+    for name in MODULES:
+        sys.modules.pop(name, None)
+
+
+def blocks(heading: str) -> list[tuple[str, str, str]]:
+    """(file to save as or "", language, text) of each block under that heading."""
+    found, text = [], HEADINGS[heading]
+    for block in BLOCK.finditer(text):
+        before = text[: block.start()].rstrip().rpartition("\n\n")[2]
+        saved = re.search(r"[Ss]ave (?:it |the \w+ )?as\s+`(\w+\.\w+)`:$", before)
+        found.append((saved[1] if saved else "", block[1], block[2]))
+    return found
+
+
+def follow(heading: str, folder: Path) -> None:
+    """Save what is to be saved, run what is to be run."""
+    for saved, language, text in blocks(heading):
+        if saved:
+            (folder / saved).write_text(text)
+        elif language == "python":
+            exec(compile(text, heading, "exec"), {})
+        else:
+            assert language == "sh", heading
+            for line in text.splitlines():
+                done = CliRunner().invoke(app, shlex.split(line)[1:], catch_exceptions=False)
+                assert done.exit_code == 0, done.output
+
+
+@pytest.mark.parametrize("heading", HEADINGS)
+def test_a_recipe_is_short(heading: str):
+    lines = [line for _, _, text in blocks(heading) for line in text.splitlines() if line.strip()]
+    assert 0 < len(lines) <= MOST_LINES, heading
+
+
+def test_the_table_links_every_recipe():
+    links = set(re.findall(r"\(#([\w-]+)\)", PAGE))
+    assert links == {heading.lower().replace(" ", "-") for heading in HEADINGS}
+
+
+def test_places_in_the_table_exist():
+    repo = Path(__file__).resolve().parents[1]
+    for row in re.findall(r"^\| \[.*\|$", PAGE, re.MULTILINE):
+        for place in re.findall(r"`((?:slam|sim|scenes|scripts)/[\w/]*(?:NAME)?[\w.]*)`", row):
+            path = repo / place
+            assert (path.parent if "NAME" in place else path).exists(), place
+
+
+def test_scene(outside: Path):
+    follow("Scene", outside)
+    scene = scenes.build("shed:shed", 3, n_chairs=4)
+    assert [mover.kind.startswith("chair") for mover in scene.movers].count(True) == 4
+    assert scene.compile().body("desk0/base").id > 0
+    assert scene.bounds == (-3.0, -2.0, 3.0, 2.0)
+
+
+WRONG = {
+    'material="floor_concrete"': ('material="marble"', "marble.*There are: .*floor_concrete"),
+    "desk:shed:0": ("dsk:shed:0", "unknown mark 'dsk:shed:0'.*'desk'.*room:NAME.*bookshelf"),
+    "start:robot": ("goal:there", "needs a mark 'start:robot'"),
+    "room:shed": ("opening:shed", "needs a mark 'room:NAME'"),
+    "desk:shed": ("door:shed", "'door:shed:0' must be written door:ROOM:left|right"),
+    'class="wall"': ('class="wal"', "shed.xml.*'wal'"),
+    "</worldbody>": ("", "shed.xml.*mismatched tag"),
+    "0 2.1 0.55": ("0 up 0.55", "shed.xml"),
+}
+
+
+@pytest.mark.parametrize("right", WRONG)
+def test_what_is_wrong_in_a_plan_is_named_with_what_there_is(outside: Path, right: str):
+    (_, _, plan), *_ = blocks("Scene")
+    wrong, words = WRONG[right]
+    (outside / "shed.xml").write_text(plan.replace(right, wrong))
+    with pytest.raises(InvalidValueError, match=words.replace("|", r"\|")):
+        scenes.filled(outside / "shed.xml", 1)
+
+
+def test_an_include_of_ones_own_is_left_as_it_is(outside: Path):
+    (_, _, plan), *_ = blocks("Scene")
+    common = Path(scenes.__file__).parent / "parts" / "common.xml"
+    world = Path(scenes.__file__).parent / "plans" / "world.xml"
+    lines = f'<mujoco><include file="{common}"/><include file="{world}"/>'
+    (outside / "other.xml").write_text(plan.replace("<mujoco>", lines))
+    (outside / "shed.xml").write_text(plan)
+    with_include, without = (scenes.filled(outside / n, 1) for n in ("other.xml", "shed.xml"))
+    assert with_include.initial == without.initial
+    assert with_include.compile().ngeom == without.compile().ngeom
+
+
+def test_furniture(outside: Path):
+    follow("Furniture", outside)
+    model = scenes.build("crated:crated", 1).compile()
+    np.testing.assert_allclose(model.body("crate0/base").pos, [1.0, 2.0, 0.0])
+    assert scenes.build("crated:crated", 1).static_map.values.sum() > (
+        scenes.filled("arena", 1).static_map.values.sum()
+    )
+    (_, _, part), *_ = blocks("Furniture")
+    (outside / "box.xml").write_text(part.replace("carton", "cardboard"))
+    with pytest.raises(InvalidValueError, match=r"part 'box'.*'cardboard'. There are: .*carton"):
+        scenes.filled("arena", 1, put=[(outside / "box.xml", (1.0, 2.0, 0.0))])
+    with pytest.raises(InvalidValueError, match=r"no file 'box.xml'.* there are .*bookshelf"):
+        scenes.filled("arena", 1, put=[("box", (1.0, 2.0, 0.0))])
+
+
+def test_a_mark_puts_furniture_of_ones_own(outside: Path):
+    (_, _, plan), *_ = blocks("Scene")
+    (_, _, part), *_ = blocks("Furniture")
+    (outside / "crate.xml").write_text(part)
+    (outside / "shed.xml").write_text(plan.replace("desk:shed:0", "crate:0"))
+    scene = scenes.filled(outside / "shed.xml", 1, parts=[outside / "crate.xml"])
+    assert [0.0, 1.5, 0.3, 0.3, 0.0] in scene.obstacles.tolist()
+
+
+def test_scanner(outside: Path):
+    follow("Scanner", outside)
+    settings = json.loads((outside / "out/lidar/recipe.json").read_text())["settings"]
+    assert settings["laser"] == "lab_lidar(rate_hz=10):noise"
+    assert scanners.scanner_of("lab_lidar(rate_hz=10)").scanner().rate_hz == 10.0
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "out"),
+    [("SLAM", "my_slam:MySlam", "slam"), ("Guest", "my_guest:MyGuest", "guest")],
+)
+def test_slam_and_guest(outside: Path, heading: str, name: str, out: str):
+    follow(heading, outside)
+    results = json.loads((outside / "out" / out / "results.json").read_text())
+    assert set(results["slams"]) == {name, "odometry"}
+
+
+def test_metric(outside: Path, capsys: pytest.CaptureFixture[str]):
+    follow("Metric", outside)
+    found = eval(capsys.readouterr().out)
+    assert 0.0 < found["shunting"] < 0.5
+    assert 0.0 < found["odometry"] < 0.5
+
+
+def test_topic(outside: Path):
+    follow("Topic", outside)
+    (episode,) = (path for path in (outside / "out/turning").iterdir() if path.is_dir())
+    with Bag(episode) as bag:
+        found = [topic for topic, *_ in bag.raw()]
+    assert found.count("/turning") == found.count("/scan") > 10
+    words = ["--with", "turning", "verify", str(episode), "--regenerate", "1"]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    topics._topics.clear()
+    done = CliRunner().invoke(app, words[2:])
+    assert done.exit_code == 1
+    assert "/turning" in done.output
+
+
+def test_a_topic_that_cannot_be_is_refused():
+    with pytest.raises(InvalidValueError, match="/scan"):
+        topics.topic("/scan", "std_msgs/msg/Float64")
+    with pytest.raises(UnknownNameError, match="Flaot64"):
+        topics.topic("/new", "std_msgs/msg/Flaot64")
+
+
+def test_film_pane(outside: Path):
+    follow("Film pane", outside)
+    poster = np.asarray(imageio.imread(outside / "out/speed/poster.png"))
+    painted = np.abs(poster[..., :3].astype(int) - (0, 0, 255)).sum(axis=2) < 30
+    assert painted.sum() > 100
+    assert np.flatnonzero(painted.any(axis=0)).min() > 1280 - 16 - 220
+
+
+def test_a_pane_of_another_size_is_refused_by_name(outside: Path):
+    panes.pane("small")(lambda show, frame, size: panes.blank((2, 2)))
+    with pytest.raises(InvalidValueError, match="'small'"):
+        panes.registered()[-1](None, None, (20, 10))
+
+
+@pytest.mark.parametrize("heading", ["Dynamism rate", "Lost rule", "Number of a SLAM"])
+def test_numbers(outside: Path, heading: str):
+    follow(heading, outside)
+    if heading != "Dynamism rate":
+        folder = "decay" if heading == "Number of a SLAM" else "doubt"
+        assert (outside / "out" / folder / "results.json").exists()
+
+
+def test_a_module_that_cannot_be_loaded_is_named(outside: Path):
+    (outside / "speed.py").write_text("1 / 0")
+    with pytest.raises(InvalidValueError, match=r"'speed' fails: ZeroDivisionError"):
+        load(["speed"])
+    with pytest.raises(UnknownNameError, match="no_such_module"):
+        load(["no_such_module"])
+    with pytest.raises(UntrustedNameError, match=r"theirs\.json"):
+        load([NameFromFile("speed", "theirs.json")])
