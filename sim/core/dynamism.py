@@ -115,6 +115,6 @@ class Dynamism:
 
     @classmethod
     def of(cls, dynamism: float | Dynamism, moving_share: float | None = None) -> Dynamism:
-        """A number in [0, 1] or the rates themselves, with ``moving_share`` put in if it is not None."""
+        """A number in [0, 1], or the rates; with ``moving_share`` put in if it is not None."""
         rates = dynamism if isinstance(dynamism, Dynamism) else cls.from_knob(dynamism)
         return rates if moving_share is None else replace(rates, moving_share=moving_share)
