@@ -3,11 +3,11 @@
 
 ``KNOB`` is that table; ``mobilia config dynamism`` prints it.
 
-The rates are set so that the share of moving things rises in proportion to d. A shove keeps a
-chair rolling for about a second, so at 1 one office chair in seven moves at any time. A path
+The rates are set so that what is on the move rises in proportion to d: a shove keeps a
+chair rolling for about a second, so at 1 one office chair in seven moves at any time; a way
 between two goals takes a person about ten seconds, so at 1 five in six are walking, and a stay of
-12 / d - 10 seconds makes that (5 / 6) d. ``scripts.experiments.dynamism_curve`` shows the share
-that the scanner observes.
+12 / d - 10 seconds makes that (5 / 6) d. ``scripts.experiments.dynamism_curve`` shows what the
+scanner sees of it.
 
 At 0 nothing moves by itself: people are present and stand perfectly still, chairs and bins are
 never pushed and doors stay at their angle of rest (a door still gives way to the robot). How hard
@@ -31,7 +31,7 @@ from slam.errors import InvalidValueError
 
 @dataclass(frozen=True)
 class Rate:
-    """One rate as a function of the knob d in [0, 1].
+    """One rate as a function of the dynamism d in [0, 1].
 
     field  of ``Dynamism``
     """
@@ -105,7 +105,7 @@ class Dynamism:
 
     @classmethod
     def from_knob(cls, dynamism: float) -> Dynamism:
-        """Rates at a knob in [0, 1]; ``InvalidValueError`` outside."""
+        """Rates at a dynamism in [0, 1]; ``InvalidValueError`` outside."""
         if isinstance(dynamism, bool) or not isinstance(dynamism, (int, float)):
             raise InvalidValueError(f"dynamism must be a number in [0, 1], got {dynamism!r}")
         d = float(dynamism)
@@ -115,6 +115,6 @@ class Dynamism:
 
     @classmethod
     def of(cls, dynamism: float | Dynamism, moving_share: float | None = None) -> Dynamism:
-        """A knob or the rates themselves, with ``moving_share`` put in if it is not None."""
+        """A number in [0, 1], or the rates; with ``moving_share`` put in if it is not None."""
         rates = dynamism if isinstance(dynamism, Dynamism) else cls.from_knob(dynamism)
         return rates if moving_share is None else replace(rates, moving_share=moving_share)
