@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.assembly import Assembly, hull_radius, moved, part, quaternion
+from scenes.kinds import kind_of
 from scenes.plan import Plan
 from scenes.scene import Kind, Mover, Pose
 
@@ -33,7 +34,11 @@ class Builder:
     def add(
         self, kind: Kind, name: str, pose: Pose, *, paint: Mapping[str, str] | None = None
     ) -> Mover:
-        """Put something planar that moves. ``paint`` maps material names of the part to others."""
+        """Put something planar that moves. ``paint`` maps material names of the part to others.
+
+        ``UnknownNameError`` for a kind without a row in ``scenes.kinds``.
+        """
+        kind_of(kind)
 
         def prepare(child: mujoco.MjSpec) -> None:
             for geom in child.geoms if paint else ():

@@ -108,7 +108,7 @@ def seat_chairs(
         pose = _askew(floor, seats[index].pose, hull_radius(kind) + MARGIN, draws.chairs, PULLED)
         if pose is not None:
             _add_chair(builder, floor, kind, pose, draws)
-    while sum(m.kind.startswith("chair") for m in builder.movers) < n:
+    while sum(m.group == "chair" for m in builder.movers) < n:
         extra: Kind = "chair_swivel" if draws.chairs.random() < 0.75 else "chair_visitor"
         _add_chair(
             builder, floor, extra, _anywhere(floor, extra, "n_chairs", n, draws.chairs), draws
@@ -170,7 +170,7 @@ def finish(builder: Builder, name: str, seed: int, options: Mapping[str, object]
 
 
 def _add_chair(builder: Builder, floor: Floor, kind: Kind, pose: Pose, draws: Draws) -> None:
-    index = sum(m.kind.startswith("chair") for m in builder.movers)
+    index = sum(m.group == "chair" for m in builder.movers)
     paint = look.upholster(draws.colours) if kind == "chair_swivel" else None
     builder.add(kind, f"chair{index}", pose, paint=paint)
     floor.block(pose[0], pose[1], hull_radius(kind))

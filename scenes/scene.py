@@ -6,22 +6,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.footprint import static_raster
+from scenes.kinds import Group, kind_of
 from slam.errors import InvalidValueError
 from slam.system import Raster
 
 SCAN_HEIGHT = 0.36
 """Usual height of the scan plane above the floor, m (where parts/robot.xml has its laser)."""
 
-Kind = Literal[
-    "chair_swivel", "chair_visitor", "bin", "trolley", "pallet", "person", "door", "robot"
-]
+Kind = str
+"""A key of ``scenes.kinds.KINDS``."""
+
 Pose = tuple[float, float, float]
 
 
@@ -31,13 +31,21 @@ class Mover:
 
     name    prefix of its names in the model: body "<name>/base", joints "<name>/x|y|yaw"; for a
             door body "<name>/leaf", joint "<name>/hinge"
-    kind    which part it is
+    kind    which part it is: a key of ``scenes.kinds.KINDS``, else ``UnknownNameError``
     radius  m, footprint disc of its hull; for a door the width of its leaf
     """
 
     name: str
     kind: Kind
     radius: float
+
+    def __post_init__(self) -> None:
+        kind_of(self.kind)
+
+    @property
+    def group(self) -> Group:
+        """What moves it."""
+        return kind_of(self.kind).group
 
 
 @dataclass(frozen=True, kw_only=True)

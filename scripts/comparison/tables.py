@@ -8,17 +8,11 @@ from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
-from scripts.comparison.columns import LESS_IS_BETTER, MORE_IS_BETTER, WORST_WHEN_FAILED
+from scripts.metrics.table import JUDGED, MEDIANS, METRICS, SHARES
 from slam.evaluation.statistics import median_interval, paired, quantile, share_interval
 
 Row = dict[str, Any]
 FAILED = ("raised", "hung", "nan", "bad")
-SHARES = ("lost",)
-MEDIANS = (
-    *(m for m in (*LESS_IS_BETTER, *MORE_IS_BETTER) if m not in SHARES),
-    "nees_over_3", "not_trusted_share", "distance_m", "moving_share_of_returns",
-    "semi_static_share_of_returns",
-)  # fmt: skip
 LEVEL_COLUMNS = (
     "scene", "dynamism", "slam", "metric", "statistic", "n", "value", "low", "high", "q25", "q75",
 )  # fmt: skip
@@ -31,7 +25,7 @@ PAIRED_COLUMNS = (
 def number(row: Row, metric: str) -> float | None:
     """A cell as a number: infinite for the error of a SLAM that failed, None where it is empty."""
     value = row.get(metric)
-    if value is None and metric in WORST_WHEN_FAILED and row["outcome"] in FAILED:
+    if value is None and row["outcome"] in FAILED and METRICS[metric].worst_if_failed:
         return math.inf
     return None if value is None or math.isnan(value) else float(value)
 
@@ -64,7 +58,7 @@ def pairs(rows: Sequence[Row]) -> list[Row]:
     out = []
     slams = list(dict.fromkeys(row["slam"] for row in rows))
     for (scene, dynamism), group in _grouped(rows, ("scene", "dynamism")).items():
-        for metric in (*LESS_IS_BETTER, *MORE_IS_BETTER):
+        for metric in JUDGED:
             for slam_a, slam_b in combinations(slams, 2):
                 a, b = (_by_seed(group, slam, metric) for slam in (slam_a, slam_b))
                 seeds = sorted(a.keys() & b.keys())
@@ -73,7 +67,7 @@ def pairs(rows: Sequence[Row]) -> list[Row]:
                 both = ([a[seed] for seed in seeds], [b[seed] for seed in seeds])
                 head = {"scene": scene, "dynamism": dynamism, "metric": metric}
                 head |= {"slam_a": slam_a, "slam_b": slam_b}
-                out.append(head | paired(*both, less_is_better=metric in LESS_IS_BETTER))
+                out.append(head | paired(*both, less_is_better=METRICS[metric].better == "less"))
     return out
 
 

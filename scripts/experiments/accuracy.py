@@ -16,22 +16,23 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from scripts.metrics.judged import Judged
+from scripts.metrics.table import METRICS
 from sim.actors.robot import DriveConfig
 from sim.driving.drive import TourConfig
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation, n_frames, tour
 from slam import create
-from slam.evaluation import metrics
 from slam.files import write_text
 from slam.frames import Frame
 from slam.frontend.odometry_sum import MotionSum
 from slam.replay import Track
 from slam.trajectory import Trajectory
 
-SETTLED_S = 5.0
 LOST_M = 0.5
 FULL_RATE_HZ = 37.5
 SCANNERS = {"noise": Lms221Config.noise_only(), "full": Lms221Config()}
@@ -89,6 +90,13 @@ DRIVES = {
 }
 
 
+# Field of ``Score`` -> metric.
+FIGURES = {
+    "ate_m": "ate_unaligned_m", "aligned_m": "ate_se2_m", "final_m": "ate_final_m",
+    "heading_rad": "heading_rmse_rad", "nees": "nees_over_3", "ms_p50": "ms_per_scan_p50",
+}  # fmt: skip
+
+
 @dataclass(frozen=True, kw_only=True)
 class Score:
     """One run of one SLAM; ``aligned_m`` online, ``final_m`` of the trajectory it corrects."""
@@ -125,7 +133,7 @@ def score(blank: Score, frames: list[Frame]) -> Score:
     )
     wheels = Track(name="odometry", system=create("odometry"))
     wheels.survive(frames)
-    odometry_m = metrics.ate(wheels.online(), truth).value
+    odometry_m = Judged.of(wheels, truth).ate()
     track = Track(name=blank.slam, system=create(blank.slam))
     failure = track.survive(frames)
     if failure is not None:
@@ -134,19 +142,14 @@ def score(blank: Score, frames: list[Frame]) -> Score:
         return replace(
             blank, ate_m=lost, odometry_m=odometry_m, aligned_m=lost, final_m=lost, heading_rad=lost
         )
-    online = track.online()
-    settled = (online.stamps_ns - online.stamps_ns[0]) * 1e-9 > SETTLED_S
-    nees = metrics.nees(online, track.covariances(), truth).values[settled]
+    seen = Judged.of(track, truth, track.system.trajectory())
+    seen = replace(seen, steady_s=np.array(track.durations_s))
+    figures: dict[str, Any] = {field: METRICS[key].of(seen) for field, key in FIGURES.items()}
     return replace(
         blank,
-        ate_m=metrics.ate(online, truth).value,
         odometry_m=odometry_m,
-        aligned_m=metrics.ate(online, truth, align="se2").value,
-        final_m=metrics.ate(track.system.trajectory(), truth).value,
-        heading_rad=metrics.heading_rmse(online, truth).value,
-        nees=float(np.nanmean(nees)) / 3.0 if np.isfinite(nees).any() else math.nan,
         not_trusted=sum(not e.converged for e in track.estimates),
-        ms_p50=float(np.median(track.durations_s)) * 1e3,
+        **{name: math.nan if value is None else value for name, value in figures.items()},
     )
 
 

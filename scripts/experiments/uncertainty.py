@@ -24,8 +24,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scripts.experiments.accuracy import FULL_RATE_HZ, SCANNERS, SETTLED_S, thinned
+from scripts.experiments.accuracy import FULL_RATE_HZ, SCANNERS, thinned
 from scripts.experiments.parts import Part
+from scripts.metrics.judged import SETTLED_S
 from sim.simulation import stream
 from slam import create
 from slam.evaluation import metrics

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scripts.jobs import Job
+from scripts.metrics.judged import Judged
+from scripts.metrics.table import METRICS
 from scripts.paper.depends import depends_on
 from slam import se2
 from slam.archives import read_arrays
 from slam.errors import InvalidValueError, LogFormatError
-from slam.evaluation import metrics
 from slam.frames import Float, Frame
 from slam.replay import Track
 from slam.system import SlamSystem
@@ -134,11 +135,11 @@ def follow(system: SlamSystem, frames: Iterable[Frame], name: str) -> Track:
 
 def pose_numbers(estimate: Trajectory, truth: Trajectory) -> dict[str, Any]:
     """RMSE, and the paper's mean(e), var(e), var(p) of x, y and heading."""
-    e = metrics.pose_errors(estimate, truth)
+    judged = Judged(estimate=estimate, truth=truth)
     return {
-        "rmse_m": metrics.ate(estimate, truth).value,
-        "heading_rmse_rad": metrics.heading_rmse(estimate, truth).value,
-        **statistics(e.errors, QUANTITIES),
+        "rmse_m": METRICS["ate_unaligned_m"].of(judged),
+        "heading_rmse_rad": METRICS["heading_rmse_rad"].of(judged),
+        **statistics(judged.pairs.errors, QUANTITIES),
     }
 
 

@@ -18,17 +18,18 @@ from scripts.comparison.folder import Compared, Row, read
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.tables import number
 from scripts.experiments.dynamism_curve import Curve
+from scripts.metrics.table import METRICS
 from scripts.quotes.results import RESULTS, SCHEMA, commit, write
 from slam.errors import InvalidValueError, MobiliaError
 from slam.evaluation.statistics import paired, quantile
 
 OURS = "shunting"
-CODE = ("slam", "sim", "scenes", "scripts/compare")  # what decides the numbers
-LESS = (
+CODE = ("slam", "sim", "scenes", "scripts/comparison")  # what decides the numbers
+QUOTED = (
     "ate_unaligned_m", "ate_se2_m", "heading_rmse_rad", "lost", "ms_per_scan_p50", "ghost_rate",
-    "ghost_left_rate", "half_life_s", "half_life_observations",
+    "ghost_left_rate", "half_life_s", "half_life_observations", "new_object_recall",
+    "door_accuracy",
 )  # fmt: skip
-MORE = ("new_object_recall", "door_accuracy")
 OTHER = ("moving_share_of_returns",)
 CORRELATED = ("ate_unaligned_m", "ate_se2_m", "lost", "moving_share_of_returns")
 PLANNED = ("slams", "scenes", "levels", "seeds", "seconds", "every", "scanner", "scan_limit_s")
@@ -75,7 +76,7 @@ def _levels(compared: Compared) -> dict[str, Any]:
     table = {}
     for scene in settings["scenes"]:
         for slam in settings["slams"]:
-            for metric in (*LESS, *MORE, *OTHER):
+            for metric in (*QUOTED, *OTHER):
                 rows = [found.get((scene, slam, metric, level)) for level in settings["levels"]]
                 cells = [row and [row["value"], row["low"], row["high"]] for row in rows]
                 if any(cells):
@@ -88,12 +89,12 @@ def _paired(compared: Compared) -> dict[str, dict[str, Any]]:
     by_level, over = {}, {}
     for scene in settings["scenes"]:
         for rival in settings["slams"]:
-            for metric in (*LESS, *MORE) if rival != OURS else ():
+            for metric in QUOTED if rival != OURS else ():
                 ours, theirs = (_table(compared, scene, slam, metric) for slam in (OURS, rival))
                 levels = [_differences(a, b) for a, b in zip(ours, theirs, strict=True)]
                 if not any(levels):
                     continue
-                key, less = f"{scene} {rival} {metric}", metric in LESS
+                key, less = f"{scene} {rival} {metric}", METRICS[metric].better == "less"
                 by_level[key] = [_cell(list(level.values()), less) for level in levels]
                 seeds = sorted({seed for level in levels for seed in level})
                 middles = [

@@ -7,9 +7,9 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
+from scripts.metrics.table import METRICS
 from scripts.quotes.results import Comparison, Interval, load
 from scripts.quotes.words import interval, made, shown, table, verdict, verdicts
-from scripts.report.metrics import METRICS
 from scripts.report.words import listed
 
 ATE, ALIGNED, LOST = "ate_unaligned_m", "ate_se2_m", "lost"

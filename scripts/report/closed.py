@@ -13,10 +13,10 @@ from matplotlib.ticker import MaxNLocator
 
 from scripts.closed_loop.tables import LEVEL_COLUMNS
 from scripts.comparison.folder import Row, read_csv, read_json
+from scripts.metrics.metric import digits
 from scripts.output import check_whole
 from scripts.report import style
 from scripts.report.curves import HEIGHT, WIDTH
-from scripts.report.metrics import digits
 from scripts.report.tables import Cell, Table
 from scripts.verbs.drive import SCHEMA
 from slam.errors import LogFormatError

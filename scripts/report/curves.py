@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from scripts.comparison.tables import number
+from scripts.metrics.metric import Metric
+from scripts.metrics.table import METRICS
 from scripts.report import style
-from scripts.report.metrics import METRICS, Metric
 from scripts.report.study import Study
 
 WIDTH, HEIGHT = 4.0, 2.8  # inches
@@ -58,5 +59,5 @@ def _axes(ax: Axes, study: Study, metric: Metric) -> None:
     if metric.log:
         style.log_axis(ax)
     else:
-        ax.set_ylim(bottom=0.0, top=100.0 if metric.unit == "%" else None)
+        ax.set_ylim(bottom=0.0, top=100.0 if metric.shown == "%" else None)
         ax.yaxis.set_major_locator(MaxNLocator(5))

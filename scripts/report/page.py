@@ -13,9 +13,9 @@ from typing import Any
 
 import jinja2
 
-from scripts.report import closed, curves, metrics, pictures, style, tables, words
+from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, of_section
+from scripts.report import closed, curves, pictures, style, tables, words
 from scripts.report.closed import Driven
-from scripts.report.metrics import METRICS
 from scripts.report.study import LEAST_RUNS, Study
 from sim.recording.sums import add_to_sums
 from slam.files import write_text
@@ -47,12 +47,12 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
         differences=_differences(study),
         outcomes=[tables.of_outcomes(study, scene) for scene in study.scenes],
         messages=tables.messages(study),
-        honesty=_levels(study, metrics.HONESTY),
-        costs=tables.costs(study, metrics.COSTS),
-        maps=_levels(study, metrics.MAPS),
+        honesty=_levels(study, of_section("honesty")),
+        costs=tables.costs(study, of_section("costs")),
+        maps=_levels(study, of_section("maps")),
         scenes=scenes,
-        numbers=_levels(study, metrics.ERRORS),
-        measures=[METRICS[key] for key in METRICS if study.has(key)],
+        numbers=_levels(study, of_section("errors")),
+        measures=[metric for metric in EXPLAINED if study.has(metric.key)],
         recipe=_recipe(study),
     )
 
@@ -89,10 +89,7 @@ def _curves(study: Study) -> list[tuple[str, list[tuple[str, str]]]]:
     return [
         (
             scene,
-            [
-                (METRICS[key].name, curves.curve(study, scene, key))
-                for key in _there(study, metrics.CURVES)
-            ],
+            [(METRICS[key].name, curves.curve(study, scene, key)) for key in _there(study, CURVES)],
         )
         for scene in study.scenes
     ]
@@ -100,7 +97,7 @@ def _curves(study: Study) -> list[tuple[str, list[tuple[str, str]]]]:
 
 def _differences(study: Study) -> list[tuple[str, list[tables.Table]]]:
     """For each scene the tables of ours against everybody."""
-    found = [METRICS[key] for key in _there(study, metrics.PAIRED)]
+    found = [METRICS[key] for key in _there(study, PAIRED)]
     return [
         (scene, [tables.of_pairs(study, scene, metric) for metric in found])
         for scene in study.scenes

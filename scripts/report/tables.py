@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from scripts.comparison.tables import FAILED
-from scripts.report.metrics import METRICS, Metric, digits
+from scripts.metrics.metric import Metric, digits
+from scripts.metrics.table import METRICS
 from scripts.report.study import Row, Study, verdict
 
 OUTCOMES = ("finished", "lost", *FAILED)
@@ -129,7 +130,7 @@ def growth(study: Study, scene: str) -> Table:
             Cell(text=slam), *(_value(row, ate) for row in found), Cell(text=ratio),
             *(_count(row) for row in shares),
         ])  # fmt: skip
-    head = [f"{ate.name} at {end:g}, {ate.unit}" for end in ends]
+    head = [f"{ate.name} at {end:g}, {ate.shown}" for end in ends]
     lost_head = [f"{lost.name} at {end:g}" for end in ends]
     caption = f"From dynamism {ends[0]:g} to {ends[1]:g}"
     return Table(caption=caption, head=["SLAM", *head, "grows", *lost_head], rows=rows)

@@ -7,9 +7,9 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 
-from scripts.comparison.columns import LESS_IS_BETTER, MORE_IS_BETTER
 from scripts.comparison.tables import FAILED
-from scripts.report.metrics import METRICS, Metric
+from scripts.metrics.metric import Metric
+from scripts.metrics.table import EXPLAINED, METRICS
 from scripts.report.study import LEAST_RUNS, Study, verdict
 
 ATE = METRICS["ate_unaligned_m"]
@@ -17,7 +17,7 @@ _FAILURES = {
     "raised": "raised or ended", "hung": "hung", "nan": "gave a pose that is not finite",
     "bad": "gave no answer to the frame",
 }  # fmt: skip
-_JUDGED = tuple(METRICS[key] for key in METRICS if key in (*LESS_IS_BETTER, *MORE_IS_BETTER))
+_JUDGED = tuple(metric for metric in EXPLAINED if metric.better)
 
 
 def listed(words: list[str]) -> str:
@@ -84,7 +84,7 @@ def against_ours(study: Study, side: int) -> list[Against]:
         for metric in _JUDGED:
             where, most = _places(study, rival, metric, side)
             if where:
-                words = f"{metric.name} ({metric.show(most)} {metric.unit})"
+                words = f"{metric.name} ({metric.show(most)} {metric.shown})"
                 found.setdefault((rival, where), []).append(words)
     return [
         Against(rival=rival, where=where, measures=measures)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from scripts.console import console
-from slam.evaluation import metrics
+from scripts.metrics.judged import Judged
+from scripts.metrics.table import IN_RUN
 from slam.replay import Replay, Track
 from slam.trajectory import Trajectory
 
@@ -41,59 +43,23 @@ def results(replay: Replay, wall_s: float, machine: Mapping[str, Any]) -> dict[s
 def scores(track: Track, truth: Trajectory | None, duration_s: float) -> dict[str, Any]:
     """The block of one SLAM."""
     spent = np.array(track.durations_s)
-    steady = spent[WARM_UP:] if len(spent) > 2 * WARM_UP else spent
-    block: dict[str, Any] = {
-        "scans": len(track.estimates),
-        "not_converged": sum(not e.converged for e in track.estimates),
-        "ms_per_scan_p50": float(np.percentile(steady, 50)) * 1e3,
-        "ms_per_scan_p99": float(np.percentile(steady, 99)) * 1e3,
-        "real_time_factor": duration_s / max(float(steady.mean()) * len(spent), 1e-9),
-    }
-    if truth is None or len(truth) < 2:
-        return block
-    block |= errors(track.online(), truth)
-    final = track.final()
+    judged = replace(
+        Judged.of(track, truth if truth is not None and len(truth) >= 2 else None),
+        steady_s=spent[WARM_UP:] if len(spent) > 2 * WARM_UP else spent,
+        duration_s=duration_s,
+    )
+    block = {"scans": len(track.estimates), **_block(judged)}
+    final = track.final() if judged.truth is not None else None
     if final is not None:
-        block |= {f"{key}_final": value for key, value in errors(final, truth).items()}
+        errors = _block(Judged(estimate=final, truth=truth), section="errors")
+        block |= {f"{key}_final": value for key, value in errors.items()}
     return block
 
 
-def errors(estimate: Trajectory, truth: Trajectory) -> dict[str, Any]:
-    """Position and heading errors, and the paper's statistics per x, y, theta (unaligned)."""
-    statistics = metrics.error_statistics(estimate, truth)
-    pairs = metrics.pose_errors(estimate, truth)
-    block: dict[str, Any] = {
-        "ate_unaligned_m": metrics.ate(estimate, truth).value,
-        "ate_se2_m": metrics.ate(estimate, truth, align="se2").value,
-        "heading_rmse_rad": metrics.heading_rmse(estimate, truth).value,
-        "end_error_m": float(np.hypot(*pairs.errors[-1, :2])),
-    }
-    for k, axis in enumerate(("x", "y", "theta")):
-        block[f"mean_e_{axis}"] = float(statistics.mean[k])
-        block[f"var_e_{axis}"] = float(statistics.var_e[k])
-        block[f"var_p_{axis}"] = float(statistics.var_p[k])
-    return block
-
-
-_ROWS = (
-    ("ATE, unaligned", "ate_unaligned_m", "m", "{:.4f}"),
-    ("ATE, SE(2)-aligned", "ate_se2_m", "m", "{:.4f}"),
-    ("heading RMSE, unaligned", "heading_rmse_rad", "rad", "{:.5f}"),
-    ("error at the end, unaligned", "end_error_m", "m", "{:.4f}"),
-    ("mean(e) x", "mean_e_x", "m", "{:+.4f}"),
-    ("mean(e) y", "mean_e_y", "m", "{:+.4f}"),
-    ("mean(e) theta", "mean_e_theta", "rad", "{:+.5f}"),
-    ("var(e) x", "var_e_x", "m²", "{:.2e}"),
-    ("var(e) y", "var_e_y", "m²", "{:.2e}"),
-    ("var(e) theta", "var_e_theta", "rad²", "{:.2e}"),
-    ("var(p) x", "var_p_x", "m²", "{:.2e}"),
-    ("var(p) y", "var_p_y", "m²", "{:.2e}"),
-    ("var(p) theta", "var_p_theta", "rad²", "{:.2e}"),
-    ("CPU per scan, p50", "ms_per_scan_p50", "ms", "{:.2f}"),
-    ("CPU per scan, p99", "ms_per_scan_p99", "ms", "{:.2f}"),
-    ("real-time factor of the SLAM", "real_time_factor", "×", "{:.1f}"),
-    ("scans it did not trust", "not_converged", "", "{:d}"),
-)
+def _block(judged: Judged, section: str = "") -> dict[str, Any]:
+    """The metrics that a run has, all or one section of them, those without a value left out."""
+    values = {m.in_run: m.of(judged) for m in IN_RUN if section in ("", m.section)}
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def print_table(outcome: Mapping[str, Any], title: str) -> None:
@@ -108,13 +74,14 @@ def print_table(outcome: Mapping[str, Any], title: str) -> None:
     table.add_column("unit")
     for heading, _, _ in columns:
         table.add_column(escape(heading), justify="right")
-    for label, key, unit, form in _ROWS:
+    for metric in IN_RUN:
+        key = metric.in_run
         cells = [
-            form.format(block[key + suffix]) if key + suffix in block else ""
+            metric.form.format(block[key + suffix]) if key + suffix in block else ""
             for _, block, suffix in columns
         ]
         if any(cells):
-            table.add_row(label, unit, *cells)
+            table.add_row(metric.label, metric.unit, *cells)
     console.print(table)
 
 

@@ -17,11 +17,12 @@ from scenes import registry
 from scripts import workers
 from scripts.comparison import folder as files
 from scripts.comparison import tables
-from scripts.comparison.columns import COLUMNS, DRIVES
+from scripts.comparison.columns import COLUMNS
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.recording import load
 from scripts.console import console, level_table
 from scripts.jobs import Job, run_jobs
+from scripts.metrics.table import DRIVES
 from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
 from scripts.scanner_option import Scanner, every_of
 from scripts.verbs.generate import sweep

@@ -17,14 +17,13 @@ from dataclasses import replace
 
 import mujoco
 
+from scenes.kinds import Feet, kind_of
 from scenes.scene import Scene
 from slam.errors import InvalidValueError
 
 LEVELS = ("planar", "free")
 GRAVITY = 9.81
 FLOOR_BIT, CASTOR_BIT = 16, 32  # they meet each other and nothing else
-# Number of castors or glides, radius of their circle m, angle of the first rad, radius of each m.
-FEET = {"chair_swivel": (5, 0.30, 0.0, 0.028), "chair_visitor": (4, 0.295, 0.75, 0.012)}
 # Castor friction at walking speed, N per axis: the planar level has friction and damping in its
 # joints; here the spheres have it all. Damping counts at 0.5 m/s.
 _DAMPED_AT = 0.5
@@ -45,8 +44,9 @@ def stand_on_castors(scene: Scene) -> Scene:
     if abs(float(spec.option.gravity[2]) + GRAVITY) > 0.01:
         spec.option.gravity = [0.0, 0.0, -GRAVITY]
     for mover in scene.movers:
-        if mover.kind in FEET:
-            _set_on_feet(spec, mover.name, mover.kind)
+        feet = kind_of(mover.kind).feet
+        if feet is not None:
+            _set_on_feet(spec, mover.name, feet)
     return replace(scene, spec=spec)
 
 
@@ -57,7 +57,7 @@ def checked_level(level: str) -> str:
     return level
 
 
-def _set_on_feet(spec: mujoco.MjSpec, name: str, kind: str) -> None:
+def _set_on_feet(spec: mujoco.MjSpec, name: str, feet: Feet) -> None:
     body = spec.body(f"{name}/base")
     grip = friction_of(spec, name)
     for axis in ("x", "y", "yaw"):
@@ -68,9 +68,9 @@ def _set_on_feet(spec: mujoco.MjSpec, name: str, kind: str) -> None:
     body.add_joint(name=f"{name}/z", type=slide, axis=[0, 0, 1])
     body.add_joint(name=f"{name}/pitch", type=hinge, axis=[0, 1, 0])
     body.add_joint(name=f"{name}/roll", type=hinge, axis=[1, 0, 0])
-    number, circle, first, radius = FEET[kind]
-    for k in range(number):
-        angle = first + math.tau * k / number
+    circle, radius = feet.circle_m, feet.radius_m
+    for k in range(feet.number):
+        angle = feet.first_rad + math.tau * k / feet.number
         body.add_geom(
             name=f"{name}/foot{k}",
             type=mujoco.mjtGeom.mjGEOM_SPHERE,

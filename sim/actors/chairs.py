@@ -108,13 +108,12 @@ def pushers(
 ) -> dict[str, Shoves | Rolling]:
     """What moves the planar things without a will of their own, by the group they belong to.
 
-    "chair", "bin", and "load" for every other kind that is no person, door or robot.
+    The groups are those of ``scenes.kinds``; people, doors and the robot have a will of their own.
     """
     groups: dict[str, list[str]] = {group: [] for group in GROUPS}
     for mover in movers:
-        if mover.kind not in ("person", "door", "robot"):
-            kind = mover.kind.partition("_")[0]
-            groups[kind if kind in groups else "load"].append(mover.name)
+        if mover.group in groups:
+            groups[mover.group].append(mover.name)
     shove = (rates.push_speed_min, rates.push_speed_max, rates.push_spin_max)
     kick = (rates.kick_speed_min, rates.kick_speed_max, rates.push_spin_max)
     how = {

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.kinds import kind_of
 from scenes.scene import Mover
 from sim.recording.messages import WORLD
 from sim.recording.template import Marks, Template, header, message
@@ -16,10 +17,6 @@ from slam._jit import njit
 from slam.frames import Float
 
 LEAF_M = 0.04  # thickness of a door as drawn
-_HEIGHTS_M = {
-    "chair_swivel": 0.95, "chair_visitor": 0.85, "bin": 0.4, "trolley": 1.0, "pallet": 0.15,
-    "person": 1.75, "door": 2.0,
-}  # fmt: skip
 _RESTING, _MOVING = (0.55, 0.55, 0.6, 1.0), (0.9, 0.3, 0.1, 1.0)
 _CUBE, _CYLINDER = 1, 3
 
@@ -49,7 +46,7 @@ class ObjectsMessage:
         shown = [movers[k] for k in self._rows]
         marks, n = Marks(), len(shown)
         poses, colors = marks(7 * n).reshape(n, 7), marks(4 * n, np.float32).reshape(n, 4)
-        self._heights = np.array([_HEIGHTS_M[mover.kind] for mover in shown])
+        self._heights = np.array([kind_of(mover.kind).height_m for mover in shown])
         self._reach = np.array([0.5 * m.radius if m.kind == "door" else 0.0 for m in shown])
         markers = [
             _marker(mover, row, pose, color)
@@ -74,7 +71,7 @@ class ObjectsMessage:
 def _marker(mover: Mover, row: int, pose: Float, color: NDArray[np.float32]) -> object:
     x, y, z, qx, qy, qz, qw = pose.tolist()
     r, g, b, a = color.tolist()
-    door, height = mover.kind == "door", _HEIGHTS_M[mover.kind]
+    door, height = mover.kind == "door", kind_of(mover.kind).height_m
     wide, deep = (mover.radius, LEAF_M) if door else (2.0 * mover.radius, 2.0 * mover.radius)
     none = np.zeros(0, dtype=np.uint8)
     return message(

@@ -7,13 +7,15 @@ x is forward, y left, in metres; colours are RGB 0..255. ``sim.view.mapview`` pl
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.scene import Kind
+from scenes.kinds import kind_of
+from slam.errors import UnknownNameError
 
 Float = NDArray[np.float64]
 Colour = tuple[int, int, int]
@@ -66,36 +68,49 @@ def block(x: float, y: float, a: float, b: float, corner: float = 0.0) -> Float:
     )
 
 
+def icon(kind: str, size: float, colour: Colour | None = None) -> tuple[Shape, ...]:
+    """The drawing of a mover; ``size`` is ``Mover.radius``, ``colour`` its cloth or upholstery.
+
+    ``UnknownNameError`` where its row in ``scenes.kinds`` names no drawing of ``DRAWINGS``.
+    """
+    name = kind_of(kind).icon
+    if name not in DRAWINGS:
+        known = ", ".join(DRAWINGS)
+        raise UnknownNameError(f"icon of {kind} must be one of {known}, got {name!r}")
+    return _drawn(name, size, colour)
+
+
 @cache
-def icon(kind: Kind, size: float, colour: Colour | None = None) -> tuple[Shape, ...]:
-    """The drawing of a mover; ``size`` is ``Mover.radius``, ``colour`` its cloth or upholstery."""
-    if kind == "chair_swivel":
-        return _chair_swivel(colour or BLUE)
-    if kind == "chair_visitor":
-        return _chair_visitor(colour or RED)
-    if kind == "bin":
-        return (
-            Shape(lines=(disc(0, 0, 0.15),), colour=GREEN),
-            Shape(lines=(disc(0, 0, 0.11),), colour=INK),
-        )
-    if kind == "door":
-        leaf = np.array([[0.0, 0.0], [size, 0.0]])
-        return (
-            Shape(lines=(leaf,), colour=WOOD, width=0.06),
-            Shape(lines=(disc(0, 0, 0.045),), colour=INK),
-        )
-    if kind == "trolley":
-        return _trolley()
-    if kind == "pallet":
-        return _pallet()
-    if kind == "robot":
-        return _robot()
-    return _person(colour or BLUE)
+def _drawn(name: str, size: float, colour: Colour | None) -> tuple[Shape, ...]:
+    return DRAWINGS[name](size, colour)
 
 
 def foot() -> tuple[Shape, ...]:
     """One shoe, its ankle at the origin."""
     return (Shape(lines=(disc(0.05, 0.0, 0.125, 0.05, 12),), colour=INK),)
+
+
+def _plain(size: float, colour: Colour | None) -> tuple[Shape, ...]:
+    """Its hull, for whatever has no drawing of its own."""
+    return (
+        Shape(lines=(disc(0.0, 0.0, size),), colour=colour or STEEL),
+        Shape(lines=(disc(0.0, 0.0, 0.8 * size),), colour=_darker(colour or STEEL)),
+    )
+
+
+def _bin() -> tuple[Shape, ...]:
+    return (
+        Shape(lines=(disc(0, 0, 0.15),), colour=GREEN),
+        Shape(lines=(disc(0, 0, 0.11),), colour=INK),
+    )
+
+
+def _door(width: float) -> tuple[Shape, ...]:
+    leaf = np.array([[0.0, 0.0], [width, 0.0]])
+    return (
+        Shape(lines=(leaf,), colour=WOOD, width=0.06),
+        Shape(lines=(disc(0, 0, 0.045),), colour=INK),
+    )
 
 
 def _chair_swivel(cloth: Colour) -> tuple[Shape, ...]:
@@ -173,3 +188,17 @@ def _robot() -> tuple[Shape, ...]:
 def _darker(colour: Colour) -> Colour:
     red, green, blue = (round(0.68 * c) for c in colour)
     return red, green, blue
+
+
+# Name of a drawing -> its shapes, from the mover's radius m and the colour of its cloth.
+DRAWINGS: dict[str, Callable[[float, Colour | None], tuple[Shape, ...]]] = {
+    "plain": _plain,
+    "chair_swivel": lambda size, colour: _chair_swivel(colour or BLUE),
+    "chair_visitor": lambda size, colour: _chair_visitor(colour or RED),
+    "bin": lambda size, colour: _bin(),
+    "trolley": lambda size, colour: _trolley(),
+    "pallet": lambda size, colour: _pallet(),
+    "person": lambda size, colour: _person(colour or BLUE),
+    "door": lambda size, colour: _door(size),
+    "robot": lambda size, colour: _robot(),
+}

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scenes.kinds import kind_of
 from scenes.scene import Scene
 from sim.view import icons
 from sim.view.floorplan import PAD, FloorPlan, panel, text_width, write
@@ -38,16 +39,6 @@ TRAILS = {
 }
 OTHER_TRAILS = ((146, 64, 190), (24, 150, 110), (200, 50, 110))
 MAX_TRAIL_POINTS = 500
-ORDER = {
-    "bin": 0,
-    "pallet": 0,
-    "trolley": 1,
-    "chair_visitor": 1,
-    "chair_swivel": 1,
-    "door": 2,
-    "robot": 3,
-    "person": 4,
-}
 
 
 class MapView:
@@ -218,7 +209,7 @@ def _strokes(scene: Scene) -> _Strokes:
     for row, mover in enumerate(scene.movers):
         worn = cloth.get(mover.name, {})
         shapes = icons.icon(mover.kind, mover.radius, worn.get("shirt") or worn.get("fabric"))
-        rank = ORDER[mover.kind]
+        rank = kind_of(mover.kind).z_order
         if mover.kind == "person":
             for foot in (foot_row, foot_row + 1):
                 drawn += [(rank, foot, shape) for shape in icons.foot()]

@@ -184,7 +184,7 @@ def _discs(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Float:
     for mover in bodies.scene.movers:
         if mover.kind == "robot":
             discs[planar.index(mover.name), right_of_way.KIND] = right_of_way.ROBOT
-        elif mover.kind.startswith("chair"):
+        elif mover.group == "chair":
             discs[planar.index(mover.name), right_of_way.KIND] = right_of_way.CHAIR
     discs[: len(planar), right_of_way.R] = bodies.radii(planar)
     for row in range(len(planar), len(discs)):

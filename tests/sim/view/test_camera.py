@@ -133,7 +133,7 @@ def test_a_clean_environment_is_left_alone(monkeypatch):
 def test_a_bad_mujoco_gl_does_not_kill_the_program(value):
     """In a fresh process: the import dies without the repair, and lives with it."""
     program = "{}import mujoco; print(note)"
-    repair = "from sim import gl; note = gl.sanitise_environment(); "
+    repair = "from sim.view import gl; note = gl.sanitise_environment(); "
     environment = {**os.environ, gl.VARIABLE: value}
     environment.pop("PYOPENGL_PLATFORM", None)
     plain, repaired = (

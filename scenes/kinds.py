@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One row a kind of thing that moves: a part in ``parts/<kind>.xml`` and its row here are all.
+
+The physics reads ``group`` and ``feet``, the bag ``height_m``, pictures ``icon`` and ``z_order``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from slam.errors import InvalidValueError, UnknownNameError
+
+Group = Literal["chair", "bin", "load", "person", "door", "robot"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Feet:
+    """Castors or glides that it stands on at the level "free".
+
+    number    of them, evenly on a circle
+    circle_m  radius of that circle
+    first_rad angle of the first from the front
+    radius_m  of the sphere that each is
+    """
+
+    number: int
+    circle_m: float
+    first_rad: float
+    radius_m: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class KindOfMover:
+    """One kind.
+
+    group     what moves it: "chair", "bin" and "load" are pushed at their own rates, the others
+              have a will of their own
+    height_m  of its marker in the bag
+    z_order   of its drawing from above; higher covers lower
+    icon      its drawing, one of ``sim.view.icons.DRAWINGS``
+    feet      None: it slides in the plane at every level
+    """
+
+    group: Group
+    height_m: float
+    z_order: int
+    icon: str
+    feet: Feet | None = None
+
+    def __post_init__(self) -> None:
+        if self.group not in get_args(Group):
+            raise InvalidValueError(f"group must be one of {get_args(Group)}, got {self.group!r}")
+        if not self.height_m > 0.0:
+            raise InvalidValueError(f"height_m must be > 0, got {self.height_m}")
+
+
+KINDS = {
+    "chair_swivel": KindOfMover(
+        group="chair", height_m=0.95, z_order=1, icon="chair_swivel",
+        feet=Feet(number=5, circle_m=0.30, first_rad=0.0, radius_m=0.028),
+    ),
+    "chair_visitor": KindOfMover(
+        group="chair", height_m=0.85, z_order=1, icon="chair_visitor",
+        feet=Feet(number=4, circle_m=0.295, first_rad=0.75, radius_m=0.012),
+    ),
+    "bin": KindOfMover(group="bin", height_m=0.4, z_order=0, icon="bin"),
+    "trolley": KindOfMover(group="load", height_m=1.0, z_order=1, icon="trolley"),
+    "pallet": KindOfMover(group="load", height_m=0.15, z_order=0, icon="pallet"),
+    "person": KindOfMover(group="person", height_m=1.75, z_order=4, icon="person"),
+    "door": KindOfMover(group="door", height_m=2.0, z_order=2, icon="door"),
+    "robot": KindOfMover(group="robot", height_m=0.45, z_order=3, icon="robot"),
+}  # fmt: skip
+
+
+def kind_of(kind: str) -> KindOfMover:
+    """Its row; ``UnknownNameError`` where it has none."""
+    if kind not in KINDS:
+        known = ", ".join(KINDS)
+        raise UnknownNameError(f"kind must have a row in scenes.kinds ({known}), got {kind!r}")
+    return KINDS[kind]

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run as the metrics see it: poses beside their truth, and what the SLAM said on the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from slam.errors import InvalidValueError
+from slam.evaluation import metrics
+from slam.frames import NS_PER_S, Float
+from slam.replay import Track
+from slam.system import Estimate
+from slam.trajectory import Trajectory
+
+SETTLED_S = 5.0  # NEES counts after this: before, the covariance is that of the known first pose
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judged:
+    """What a metric may be computed from.
+
+    estimate     the poses that are judged: usually the online ones
+    truth        beside them; None where there is none: only metrics ``without_truth`` are defined
+    final        the poses as the SLAM sees them at the end; None where it revises nothing
+    estimates    one a scan, with covariance and convergence
+    covariances  (n, 3, 3) of the online poses
+    steady_s     (n,) processor time of the updates that count for timings
+    duration_s   of the run, recorded time
+    """
+
+    estimate: Trajectory
+    truth: Trajectory | None
+    final: Trajectory | None = None
+    estimates: Sequence[Estimate] = ()
+    covariances: Float | None = None
+    steady_s: Float | None = None
+    duration_s: float = math.nan
+
+    @classmethod
+    def of(cls, track: Track, truth: Trajectory | None, final: Trajectory | None = None) -> Judged:
+        """The online poses of a track."""
+        return cls(
+            estimate=track.online(),
+            truth=truth,
+            final=final,
+            estimates=track.estimates,
+            covariances=track.covariances(),
+        )
+
+    @property
+    def known(self) -> Trajectory:
+        """The truth; ``InvalidValueError`` where there is none."""
+        if self.truth is None:
+            raise InvalidValueError("this metric needs a run with truth")
+        return self.truth
+
+    @cached_property
+    def pairs(self) -> metrics.PoseErrors:
+        """Errors, unaligned."""
+        return metrics.pose_errors(self.estimate, self.known)
+
+    @cached_property
+    def statistics(self) -> metrics.ErrorStatistics:
+        """The paper's mean(e), var(e), var(p)."""
+        return metrics.error_statistics(self.estimate, self.known)
+
+    def ate(self, align: metrics.Alignment = "none") -> float:
+        """Absolute trajectory error, m."""
+        return metrics.ate(self.estimate, self.known, align=align).value
+
+    def rpe(self, per: metrics.Per, which: int) -> float | None:
+        """Relative pose error, position (0) or heading (1); None where it did not drive so far."""
+        try:
+            return metrics.rpe(self.estimate, self.known, per=per)[which].value
+        except InvalidValueError:
+            return None
+
+    def nees_over_3(self) -> float | None:
+        """Mean after ``SETTLED_S``; None where the SLAM claims nothing, as guests."""
+        if self.covariances is None:
+            return None
+        online = self.estimate
+        settled = (online.stamps_ns - online.stamps_ns[0]) / NS_PER_S > SETTLED_S
+        values = metrics.nees(online, self.covariances, self.known).values[settled]
+        values = values[np.isfinite(values)]
+        if len(values) == 0 or not values.mean() > 0.0:
+            return None
+        return float(values.mean()) / 3.0
+
+    def milliseconds(self, percentile: float) -> float | None:
+        """Of processor time a scan; None where no scan counts."""
+        if self.steady_s is None or len(self.steady_s) == 0:
+            return None
+        return float(np.percentile(self.steady_s * 1e3, percentile))
+
+    def real_time_factor(self) -> float | None:
+        """Seconds recorded over seconds that the updates took; None where no scan counts."""
+        if self.steady_s is None or len(self.steady_s) == 0:
+            return None
+        return self.duration_s / max(float(self.steady_s.mean()) * len(self.estimates), 1e-9)

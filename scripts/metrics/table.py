@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every metric, one row each, in the order of the columns of ``runs.csv``.
+
+``run`` scores with it, ``compare`` makes its columns and tables from it, ``report`` its pages,
+``reproduce`` and ``scripts.experiments.accuracy`` compute by it: a new metric is a new row.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from scripts.metrics.judged import Judged
+from scripts.metrics.metric import Better, Metric, Section
+from slam.evaluation import metrics
+
+DEG = 180.0 / math.pi
+AXES = (("x", "m"), ("y", "m"), ("theta", "rad"))
+
+
+def _dishonesty(run: Judged) -> float | None:
+    ratio = run.nees_over_3()
+    return None if ratio is None else abs(math.log(ratio))
+
+
+def _moments() -> list[Metric]:
+    """The paper's mean(e), var(e) and var(p) of x, y and heading."""
+
+    def row(which: str, k: int, axis: str, unit: str) -> Metric:
+        kind, _, of = which.partition("_")
+        mean = kind == "mean"
+        form = ("{:+.5f}" if unit == "rad" else "{:+.4f}") if mean else "{:.2e}"
+        return Metric(
+            key=f"{which}_{axis}_{unit}" + ("" if mean else "2"),
+            unit=unit if mean else unit + "²",
+            compute=lambda run: float(getattr(run.statistics, "mean" if mean else which)[k]),
+            label=f"{kind}({of}) {axis}", section="errors", summary=None,
+            in_run=f"{which}_{axis}", form=form,
+        )  # fmt: skip
+
+    return [
+        row(which, k, axis, unit)
+        for which in ("mean_e", "var_e", "var_p")
+        for k, (axis, unit) in enumerate(AXES)
+    ]
+
+
+def _count(key: str, section: Section, unit: str = "") -> Metric:
+    """A column of ``runs.csv`` that is not summed up."""
+    return Metric(key=key, unit=unit, label=key, section=section, summary=None)
+
+
+def _share(key: str, name: str, about: str, better: Better) -> Metric:
+    return Metric(key=key, unit="", better=better, label=name, section="maps", name=name,
+                  shown="%", factor=100.0, about=about)  # fmt: skip
+
+
+_ALL = (
+    Metric(key="ate_unaligned_m", unit="m", better="less", compute=lambda run: run.ate(),
+           label="ATE, unaligned", section="errors", worst_if_failed=True, in_run="ate_unaligned_m",
+           name="position error (ATE)", shown="cm", factor=100.0, log=True, curve=1, paired=True,
+           about="root mean square distance between believed and true position over the run, "
+           "online poses, unaligned: in the frame of the known first pose"),
+    Metric(key="ate_se2_m", unit="m", better="less", compute=lambda run: run.ate("se2"),
+           label="ATE, SE(2)-aligned", section="errors", worst_if_failed=True, in_run="ate_se2_m",
+           name="position error, aligned", shown="cm", factor=100.0, log=True,
+           about="ATE after the best rigid alignment of the whole path: its shape alone"),
+    Metric(key="ate_final_m", unit="m", better="less",
+           compute=lambda run: metrics.ate(run.final or run.estimate, run.known).value,
+           label="ATE, final", section="errors", worst_if_failed=True,
+           name="position error, final", shown="cm", factor=100.0, log=True,
+           about="ATE of the poses as the SLAM sees them at the end, where it revises them"),
+    Metric(key="heading_rmse_rad", unit="rad", better="less",
+           compute=lambda run: metrics.heading_rmse(run.estimate, run.known).value,
+           label="heading RMSE, unaligned", section="errors", worst_if_failed=True,
+           in_run="heading_rmse_rad", form="{:.5f}",
+           name="heading error", shown="°", factor=DEG, log=True, curve=4, paired=True,
+           about="root mean square heading error, unaligned"),
+    Metric(key="end_error_m", unit="m", better="less",
+           compute=lambda run: float(run.pairs.distances[-1]),
+           label="error at the end, unaligned", section="errors", worst_if_failed=True,
+           in_run="end_error_m", name="error at the end", shown="cm", factor=100.0, log=True,
+           about="distance between believed and true position at the last scan"),
+    Metric(key="rpe_m_per_m", unit="m/m", better="less", compute=lambda run: run.rpe("m", 0),
+           label="RPE per metre", section="errors", worst_if_failed=True,
+           name="drift per metre", shown="cm/m", factor=100.0, log=True, curve=3, paired=True,
+           about="relative position error over each metre driven"),
+    Metric(key="rpe_rad_per_m", unit="rad/m", better="less", compute=lambda run: run.rpe("m", 1),
+           label="heading RPE per metre", section="errors", worst_if_failed=True, tabled=False,
+           name="turn drift per metre", shown="°/m", factor=DEG, log=True,
+           about="relative heading error over each metre driven"),
+    Metric(key="rpe_m_per_s", unit="m/s", better="less", compute=lambda run: run.rpe("s", 0),
+           label="RPE per second", section="errors", worst_if_failed=True, tabled=False,
+           name="drift per second", shown="cm/s", factor=100.0, log=True,
+           about="relative position error over each second"),
+    Metric(key="rpe_rad_per_s", unit="rad/s", better="less", compute=lambda run: run.rpe("s", 1),
+           label="heading RPE per second", section="errors", worst_if_failed=True, tabled=False,
+           name="turn drift per second", shown="°/s", factor=DEG, log=True,
+           about="relative heading error over each second"),
+    *_moments(),
+    Metric(key="lost", unit="", better="less", label="lost", section="errors", summary="share",
+           name="runs lost", shown="%", factor=100.0, curve=2, paired=True,
+           about="share of runs in which the SLAM failed or lost its way, see Outcomes"),
+    _count("lost_at_s", "errors", "s"),
+    Metric(key="nees_over_3", unit="", compute=lambda run: run.nees_over_3(),
+           label="NEES / 3", section="honesty", name="NEES / 3", log=True, curve=5,
+           about="squared error measured by the SLAM's own covariance, over its three "
+           "dimensions, mean of a run: 1 is honest, above is overconfident, below is timid"),
+    Metric(key="nees_abs_log", unit="", better="less", compute=_dishonesty,
+           label="|ln NEES/3|", section="honesty", tabled=False,
+           name="dishonesty", shown="|ln NEES/3|", about="how far NEES / 3 is from 1, either way"),
+    Metric(key="not_trusted_share", unit="",
+           compute=lambda run: float(np.mean([not e.converged for e in run.estimates])),
+           label="share of scans it did not trust", section="honesty",
+           name="scans it did not trust", shown="%", factor=100.0,
+           about="share of estimates that the SLAM itself marked as not converged"),
+    Metric(key="ms_per_scan_p50", unit="ms", better="less", without_truth=True,
+           compute=lambda run: run.milliseconds(50.0), label="CPU per scan, p50",
+           section="costs", in_run="ms_per_scan_p50", form="{:.2f}",
+           name="time per scan, median", shown="ms", log=True,
+           about="processor time of one update, all threads"),
+    Metric(key="ms_per_scan_p99", unit="ms", better="less", without_truth=True,
+           compute=lambda run: run.milliseconds(99.0), label="CPU per scan, p99",
+           section="costs", in_run="ms_per_scan_p99", form="{:.2f}",
+           name="time per scan, 99th percentile", shown="ms", log=True,
+           about="the slow ones: what a real-time budget must hold"),
+    Metric(key="real_time_factor", unit="×", without_truth=True, summary=None, column=False,
+           compute=lambda run: run.real_time_factor(), label="real-time factor of the SLAM",
+           section="costs", in_run="real_time_factor", form="{:.1f}"),
+    Metric(key="not_converged", unit="", without_truth=True, summary=None, column=False,
+           compute=lambda run: sum(not e.converged for e in run.estimates),
+           label="scans it did not trust", section="costs", in_run="not_converged", form="{:d}"),
+    Metric(key="peak_memory_mb", unit="MB", better="less", label="memory", section="costs",
+           name="memory", shown="MB", log=True,
+           about="growth of resident memory at its highest"),
+    _share("ghost_rate", "ghosts", "share of occupied cells with nothing within 15 cm", "less"),
+    _share("ghost_left_rate", "ghosts left behind",
+           "share of occupied cells where a mover was seen before and nothing is now", "less"),
+    _share("new_object_recall", "new objects found",
+           "of what stands at a new place for 2 s and was seen in 5 scans, the share that "
+           "the map holds", "more"),
+    _count("new_objects", "maps"),
+    Metric(key="half_life_s", unit="s", better="less", label="half-life", section="maps",
+           name="half-life of a moved chair", shown="s",
+           about="Kaplan-Meier median over what was moved: how long the map shows it at its old "
+           "place after the scan that first sees that empty; ∞ where most outlast the watch"),
+    Metric(key="half_life_observations", unit="scans", better="less", label="half-life",
+           section="maps", name="half-life of a moved chair", shown="looks",
+           about="the same, in scans that looked there"),
+    _count("half_life_events", "maps"),
+    _count("half_life_censored", "maps"),
+    _share("door_accuracy", "doors right",
+           "of doors seen in the last 2 s and closed or open, the share that the map shows so",
+           "more"),
+    _count("doors_judged", "maps"),
+    _count("duration_s", "drive", "s"),
+    Metric(key="distance_m", unit="m", label="distance driven", section="drive"),
+    Metric(key="moving_share_of_returns", unit="", label="returns from what moves",
+           section="drive"),
+    Metric(key="semi_static_share_of_returns", unit="", label="returns from what was moved",
+           section="drive"),
+)  # fmt: skip
+
+METRICS = {metric.key: metric for metric in _ALL}
+
+COLUMNS = tuple(m.key for m in _ALL if m.column)
+DRIVES = tuple(m.key for m in _ALL if m.section == "drive")
+JUDGED = tuple(m.key for better in ("less", "more") for m in _ALL if m.better == better)
+SHARES = tuple(m.key for m in _ALL if m.summary == "share")
+MEDIANS = (
+    *(key for key in JUDGED if key not in SHARES),
+    *(m.key for m in _ALL if m.summary == "median" and m.better is None),
+)
+IN_RUN = tuple(m for m in _ALL if m.in_run)
+
+_SECTIONS: tuple[Section, ...] = ("errors", "honesty", "costs", "maps")
+# The report explains them section by section, what it draws first.
+EXPLAINED = tuple(
+    m
+    for section in _SECTIONS
+    for m in sorted(_ALL, key=lambda m: m.curve or len(_ALL))
+    if m.section == section and m.name
+)
+CURVES = tuple(m.key for m in EXPLAINED if m.curve)
+PAIRED = tuple(m.key for m in sorted(EXPLAINED, key=lambda m: m.summary == "share") if m.paired)
+
+
+def of_section(section: Section) -> tuple[str, ...]:
+    """The metrics in the report's table of it."""
+    return tuple(m.key for m in EXPLAINED if m.section == section and m.tabled)

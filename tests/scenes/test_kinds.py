@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One row a kind of furniture: a part and its row are all that a new kind takes."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scenes
+from scenes.assembly import file_of
+from scenes.kinds import KINDS, Feet, KindOfMover
+from scenes.scene import Mover
+from sim.actors.castors import stand_on_castors
+from sim.recording.objects import ObjectsMessage
+from sim.view.icons import DRAWINGS
+from sim.view.mapview import MapView
+from slam.errors import UnknownNameError
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_every_row_has_a_part_and_a_drawing():
+    for name, row in KINDS.items():
+        assert file_of("parts", name).is_file()
+        assert row.icon in DRAWINGS
+        assert (row.feet is not None) == (row.group == "chair")
+
+
+@pytest.mark.parametrize("scene", ["office", "warehouse"])
+def test_what_stands_in_a_scene_has_a_row(scene):
+    built = scenes.build(scene, seed=3)
+    assert {mover.kind for mover in built.movers} <= set(KINDS)
+
+
+def test_a_kind_without_a_row_is_refused_by_name():
+    with pytest.raises(UnknownNameError, match=r"kind must have a row.*chair_swivel.*'stool'"):
+        Mover(name="stool0", kind="stool", radius=0.2)
+
+
+def test_a_row_is_all_that_the_rest_reads(monkeypatch):
+    built = scenes.build("arena", seed=3)
+    chair = next(m for m in built.movers if m.kind == "chair_swivel")
+    poses = np.array([built.initial[m.name] for m in built.movers])
+    before = MapView(built, 320, 240).draw(poses)
+    row = KindOfMover(group="chair", height_m=0.5, z_order=9, icon="plain",
+                      feet=Feet(number=3, circle_m=0.2, first_rad=0.0, radius_m=0.02))  # fmt: skip
+    monkeypatch.setitem(KINDS, "chair_swivel", row)
+    assert not np.array_equal(MapView(built, 320, 240).draw(poses), before)
+    names = [geom.name for geom in stand_on_castors(built).spec.body(f"{chair.name}/base").geoms]
+    assert sum(name.startswith(f"{chair.name}/foot") for name in names) == 3
+    message = ObjectsMessage(built.movers)
+    message(0, poses, np.zeros(len(poses), dtype=bool))
+    assert 0.25 in message._placed[:, 2]
+
+
+def test_no_second_list_of_kinds():
+    found = set()
+    for folder in ("scenes", "sim", "scripts"):
+        for path in (ROOT / folder).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                inside = getattr(node, "elts", None) or getattr(node, "keys", None) or []
+                words = {n.value for n in inside if isinstance(n, ast.Constant)}
+                if len(words & set(KINDS)) > 2:
+                    found.add(path.relative_to(ROOT).as_posix())
+    # the rows; the drawings by their own names; what the groups are
+    assert found == {"scenes/kinds.py", "sim/view/icons.py"}

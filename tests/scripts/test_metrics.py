@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One row a metric: every command takes it from the table, and nobody keeps a list of his own."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scripts.comparison import maps, tables
+from scripts.comparison.columns import COLUMNS, scored
+from scripts.metrics import table
+from scripts.metrics.table import METRICS
+from scripts.single_run.score import scores
+from slam import Trajectory, create
+from slam.replay import Track
+from tests.world2d import Drive, World2D, arena, frames, laser
+
+ROOT = Path(__file__).parents[2]
+SELECTIONS = {"scripts/quotes/distil.py"}  # which of them the pages in docs/ quote
+
+
+@pytest.fixture(scope="module")
+def run() -> tuple[Track, Trajectory]:
+    drive = Drive((1.0, 0.5, 0.3), ((0.4, 0.8, 8.0),))
+    stream = frames(World2D(arena()), drive, rate_hz=10.0, spec=laser(61), seed=4)
+    track = Track(name="odometry", system=create("odometry"))
+    for frame in stream:
+        track.take(frame)
+    truth = Trajectory(
+        stamps_ns=np.array([f.stamp_ns for f in stream]),
+        poses=np.array([f.truth for f in stream]),
+    )
+    return track, truth
+
+
+def test_every_metric_is_a_column_with_a_direction_and_words():
+    for key, metric in METRICS.items():
+        assert metric.label, key
+        assert (key in COLUMNS) == metric.column
+        assert (key in (*tables.MEDIANS, *tables.SHARES)) == (metric.summary is not None)
+        if metric.better is not None:  # the report compares by it, so it must explain it
+            assert metric in table.EXPLAINED
+            assert metric.name
+            assert metric.about
+        if metric.in_run:
+            assert metric in table.IN_RUN
+
+
+def test_run_and_compare_compute_the_same_figures(run):
+    track, truth = run
+    block = scores(track, truth, duration_s=8.0)
+    row = scored(track, None, None, truth)
+    shared = [m for m in table.IN_RUN if m.column and m.section == "errors"]
+    assert len(shared) > 10
+    assert {m.key: block[m.in_run] for m in shared} == {m.key: row[m.key] for m in shared}
+    assert set(row) <= set(COLUMNS)
+    computed = {m.key for m in METRICS.values() if m.column and m.compute is not None}
+    assert computed <= set(row)
+
+
+def test_without_truth_only_what_needs_none_is_there(run):
+    block = scores(run[0], None, duration_s=8.0)
+    assert set(block) == {"scans"} | {m.in_run for m in table.IN_RUN if m.without_truth}
+
+
+def test_a_new_row_is_computed_for_every_command(run, monkeypatch):
+    new = replace(METRICS["end_error_m"], key="largest_m", in_run="largest_m",
+                  compute=lambda judged: float(judged.pairs.distances.max()))  # fmt: skip
+    monkeypatch.setitem(METRICS, new.key, new)
+    monkeypatch.setattr(table, "COLUMNS", (*table.COLUMNS, new.key))
+    monkeypatch.setattr("scripts.single_run.score.IN_RUN", (*table.IN_RUN, new))
+    track, truth = run
+    row = scored(track, None, None, truth)
+    assert row["largest_m"] == scores(track, truth, duration_s=8.0)["largest_m"]
+    assert row["largest_m"] >= row["end_error_m"] > 0.0
+
+
+def test_what_a_map_is_judged_by_has_rows():
+    source = ast.parse(Path(maps.__file__).read_text(encoding="utf-8"))
+    judge = next(n for n in ast.walk(source) if getattr(n, "name", "") == "scores")
+    keys = {k for n in ast.walk(judge) if isinstance(n, ast.Dict) for k in _strings(n.keys)}
+    assert keys
+    assert keys <= {m.key for m in METRICS.values() if m.section == "maps"}
+
+
+def test_no_second_list_of_metrics():
+    found = set()
+    for path in (ROOT / "scripts").rglob("*.py"):
+        place = path.relative_to(ROOT).as_posix()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            inside = getattr(node, "elts", None) or getattr(node, "keys", None) or []
+            if len(_strings(inside) & set(METRICS)) > 6:
+                found.add(place)
+    computed_there = {"scripts/comparison/maps.py"}  # they fill the rows of the maps
+    assert found - computed_there == SELECTIONS
+
+
+def _strings(nodes: list[ast.expr | None]) -> set[str]:
+    return {n.value for n in nodes if isinstance(n, ast.Constant) and isinstance(n.value, str)}
