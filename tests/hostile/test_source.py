@@ -16,6 +16,7 @@ CALLS = {"eval", "exec", "compile", "__import__", "joblib.load", "joblib.dump", 
 # the only places where a word becomes a module; each has its reason
 IMPORTERS = {
     "slam/system.py": "module:Class, refused for names from files",
+    "slam/names.py": "--with MODULE, the same",
     "scenes/registry.py": "module:function, the same",
     "slam/guests/guest.py": "the two guests, by constants",
     "sim/view/camera.py": "the GL libraries, by constants",
