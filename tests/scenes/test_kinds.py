@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import scenes
-from scenes.assembly import file_of
+from scenes.mjcf import file_of
 from scenes.kinds import KINDS, Feet, KindOfMover
 from scenes.scene import Mover
 from sim.actors.castors import stand_on_castors
