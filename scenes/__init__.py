@@ -3,35 +3,48 @@
 
 scene = scenes.build("office", seed=3, n_people=0)
 model = scene.compile()
+
+The public names are imported when they are first asked for: ``import scenes`` alone loads no
+physics engine.
 """
 
-from scenes.apartment import apartment
-from scenes.arena import arena
-from scenes.classroom import classroom
-from scenes.corridor import corridor
-from scenes.filled import filled
-from scenes.mounting import at_scan_height
-from scenes.office import office
-from scenes.random_rooms import random_rooms
-from scenes.registry import build, describe, names, register
-from scenes.scene import SCAN_HEIGHT, Mover, Scene
-from scenes.warehouse import warehouse
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scenes.filling import filled
+    from scenes.mounting import at_scan_height
+    from scenes.registry import SCAN_HEIGHT, build, describe, names, register
+    from scenes.scene import Mover, Scene
+
+_WHERE = {
+    **dict.fromkeys(("SCAN_HEIGHT", "build", "describe", "names", "register"), "registry"),
+    **dict.fromkeys(("Mover", "Scene"), "scene"),
+    "at_scan_height": "mounting",
+    "filled": "filling",
+}
 
 __all__ = [
     "SCAN_HEIGHT",
     "Mover",
     "Scene",
-    "apartment",
-    "arena",
     "at_scan_height",
     "build",
-    "classroom",
-    "corridor",
     "describe",
     "filled",
     "names",
-    "office",
-    "random_rooms",
     "register",
-    "warehouse",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, from the module that has it."""
+    if name not in _WHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(f"scenes.{_WHERE[name]}"), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    """What there is, loaded or not."""
+    return sorted({*globals(), *__all__})

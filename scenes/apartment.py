@@ -5,18 +5,8 @@ from __future__ import annotations
 
 from functools import cache
 
-from scenes.builder import Builder
 from scenes.plan import Plan
-from scenes.recipe import (
-    Draws,
-    count,
-    finish,
-    free_floor,
-    hang_doors,
-    put_bins,
-    scatter,
-    seat_chairs,
-)
+from scenes.recipe import Draws, count, finish, furnished
 from scenes.registry import register
 from scenes.scene import Scene
 
@@ -35,14 +25,7 @@ def apartment(
     ``doors``: how they rest, "open", "ajar", "closed" or "mixed".
     """
     n_chairs, n_people = count("n_chairs", n_chairs, 6), count("n_people", n_people, 2)
-    draws = Draws(seed)
-    plan = _plan()
-    builder = Builder(plan)
-    hang_doors(builder, draws.doors, doors)
-    put_bins(builder, draws.bins)
-    floor = free_floor(builder)
-    seat_chairs(builder, floor, plan.seats, n_chairs, draws)
-    scatter(builder, floor, "person", n_people, draws, draws.people)
+    builder = furnished(_plan(), Draws(seed), n_chairs, n_people, doors)
     return finish(
         builder, "apartment", seed, {"n_chairs": n_chairs, "n_people": n_people, "doors": doors}
     )

@@ -5,19 +5,8 @@ from __future__ import annotations
 
 from functools import cache
 
-from scenes.builder import Builder
 from scenes.plan import Plan
-from scenes.recipe import (
-    Draws,
-    count,
-    finish,
-    free_floor,
-    hang_doors,
-    put_bins,
-    scatter,
-    seat_chairs,
-    switch,
-)
+from scenes.recipe import Draws, count, finish, furnished, switch
 from scenes.registry import register
 from scenes.scene import Scene
 
@@ -40,14 +29,7 @@ def classroom(
     """
     n_chairs, n_people = count("n_chairs", n_chairs, 34), count("n_people", n_people, 4)
     glass = switch("glass", glass)
-    draws = Draws(seed)
-    plan = _plan(glass)
-    builder = Builder(plan)
-    hang_doors(builder, draws.doors, doors)
-    put_bins(builder, draws.bins)
-    floor = free_floor(builder)
-    seat_chairs(builder, floor, plan.seats, n_chairs, draws)
-    scatter(builder, floor, "person", n_people, draws, draws.people)
+    builder = furnished(_plan(glass), Draws(seed), n_chairs, n_people, doors)
     options = {"n_chairs": n_chairs, "n_people": n_people, "glass": glass, "doors": doors}
     return finish(builder, "classroom", seed, options)
 

@@ -13,6 +13,7 @@ from scenes.assembly import hull_radius
 from scenes.builder import Builder
 from scenes.marks import Mark
 from scenes.placement import Floor
+from scenes.plan import Plan
 from scenes.scene import Kind, Pose, Scene
 from slam.errors import InvalidValueError
 
@@ -139,6 +140,17 @@ def scatter(
         paint = look.dress(draws.colours) if kind == "person" else None
         builder.add(kind, f"{kind}{index}", pose, paint=paint)
         floor.block(pose[0], pose[1], hull_radius(kind))
+
+
+def furnished(plan: Plan, draws: Draws, n_chairs: int, n_people: int, doors: str) -> Builder:
+    """Rooms with doors, a bin at each mark, chairs at the seats and people anywhere."""
+    builder = Builder(plan)
+    hang_doors(builder, draws.doors, doors)
+    put_bins(builder, draws.bins)
+    floor = free_floor(builder)
+    seat_chairs(builder, floor, plan.seats, n_chairs, draws)
+    scatter(builder, floor, "person", n_people, draws, draws.people)
+    return builder
 
 
 def put_bins(builder: Builder, rng: np.random.Generator) -> None:

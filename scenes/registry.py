@@ -7,16 +7,30 @@ import difflib
 import importlib
 import inspect
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from scenes.mounting import at_scan_height
-from scenes.scene import SCAN_HEIGHT, Scene
 from slam.errors import InvalidValueError, UnknownNameError
-from slam.names import join_folders, refuse_code
+from slam.names import first_line, join_folders, refuse_code
 
-Recipe = Callable[..., Scene]
+if TYPE_CHECKING:  # both load MuJoCo, and names are checked before that
+    from scenes.scene import Scene
+
+SCAN_HEIGHT = 0.36
+"""Usual height of the scan plane above the floor, m (where parts/robot.xml has its laser)."""
+
+Recipe = Callable[..., "Scene"]
 F = TypeVar("F", bound=Recipe)
 _recipes: dict[str, Recipe] = {}
+OWN = {
+    "apartment": "scenes.apartment:apartment",
+    "arena": "scenes.arena:arena",
+    "classroom": "scenes.classroom:classroom",
+    "corridor": "scenes.corridor:corridor",
+    "office": "scenes.office:office",
+    "random-rooms": "scenes.random_rooms:random_rooms",
+    "warehouse": "scenes.warehouse:warehouse",
+}
+"""This project's scenes by name, as ``module:function``: imported when one is asked for."""
 
 
 def register(name: str) -> Callable[[F], F]:
@@ -31,11 +45,16 @@ def register(name: str) -> Callable[[F], F]:
 
 def names() -> list[str]:
     """Registered names, sorted."""
-    return sorted(_recipes)
+    return sorted({*OWN, *_recipes})
 
 
 def describe(name: str) -> str:
-    """The first line of the docstring of a registered recipe."""
+    """The first line of the docstring of a registered recipe.
+
+    That of a scene which is not imported yet is read from its file.
+    """
+    if name in OWN and name not in _recipes:
+        return first_line(OWN[name])
     return (inspect.getdoc(_find(name)) or "").partition("\n")[0]
 
 
@@ -56,6 +75,9 @@ def build(name: str, seed: int = 0, *, scan_height_m: float = SCAN_HEIGHT, **opt
         inspect.signature(recipe).bind(seed, **options)
     except TypeError as error:
         raise InvalidValueError(f"scene '{name}' cannot take these options: {error}") from None
+    from scenes.mounting import at_scan_height
+    from scenes.scene import Scene
+
     scene = recipe(seed, **options)
     if not isinstance(scene, Scene):
         raise UnknownNameError(f"'{name}' is no recipe: it returned {type(scene).__name__}")
@@ -68,14 +90,24 @@ def find(name: str) -> Recipe:
     return _load(name) if ":" in name else _find(name)
 
 
-def _find(name: str) -> Recipe:
-    if name in _recipes:
-        return _recipes[name]
-    near = difflib.get_close_matches(name, _recipes, n=1)
+def check_name(name: str) -> None:
+    """Raise what ``build`` raises for a name that nothing is registered under; import nothing."""
+    if ":" in name or name in OWN or name in _recipes:
+        return
+    near = difflib.get_close_matches(name, names(), n=1)
     hint = f" Did you mean '{near[0]}'?" if near else ""
     raise UnknownNameError(
         f"no scene is called '{name}'.{hint} Known: {', '.join(names())}, or module:function."
     )
+
+
+def _find(name: str) -> Recipe:
+    check_name(name)
+    if name in _recipes:
+        return _recipes[name]
+    module, _, attribute = OWN[name].partition(":")
+    recipe: Recipe = getattr(importlib.import_module(module), attribute)
+    return recipe
 
 
 def _load(entry: str) -> Recipe:

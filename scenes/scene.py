@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 
 from scenes.footprint import static_raster
 from scenes.kinds import Group, kind_of
+from scenes.registry import SCAN_HEIGHT
 from slam.errors import InvalidValueError
 from slam.system import Raster
-
-SCAN_HEIGHT = 0.36
-"""Usual height of the scan plane above the floor, m (where parts/robot.xml has its laser)."""
 
 Kind = str
 """A key of ``scenes.kinds.KINDS``."""

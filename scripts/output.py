@@ -48,8 +48,17 @@ MAX_RECIPE_BYTES = 1 << 20
 
 
 @contextmanager
-def whole_folder(path: Path, *, overwrite: bool) -> Iterator[Path]:
+def whole_folder(
+    path: Path,
+    *,
+    overwrite: bool,
+    command: str = "",
+    settings: Mapping[str, Any] | None = None,
+) -> Iterator[Path]:
     """Yield a temporary folder beside ``path``; it takes the name ``path`` when the block succeeds.
+
+    command, settings  as ``write_recipe`` gets them: only for a folder whose recipe has the same
+                       does the error name --overwrite as a way out
 
     Raises ``OutputError`` when ``path`` exists and ``overwrite`` is off, when it exists and holds
     no recipe of ours (then it is somebody else's and never replaced), or cannot be written. On any
@@ -62,7 +71,7 @@ def whole_folder(path: Path, *, overwrite: bool) -> Iterator[Path]:
     try:
         made = make_folder(path.parent)
         _put_back(path)
-        _refuse(path, overwrite)
+        _refuse(path, overwrite, command, settings or {})
         clear_parts(path)
         temporary.mkdir()
         with locked(temporary):
@@ -160,7 +169,7 @@ def check_whole(folder: Path) -> None:
         )
 
 
-def _refuse(path: Path, overwrite: bool) -> None:
+def _refuse(path: Path, overwrite: bool, command: str, settings: Mapping[str, Any]) -> None:
     if not path.exists():
         return
     if not path.is_dir():
@@ -170,9 +179,29 @@ def _refuse(path: Path, overwrite: bool) -> None:
     if not (path / RECIPE).exists():
         raise OutputError(f"{path} holds files that mobilia did not write: choose another --out")
     if not overwrite:
-        raise OutputError(
-            f"{path} holds an earlier run: pass --overwrite to replace it, or another --out"
+        raise OutputError(_what_lies_there(path, command, settings))
+
+
+def _what_lies_there(path: Path, command: str, settings: Mapping[str, Any]) -> str:
+    """What the folder of ours at ``path`` holds, and what to do about it."""
+    another = "choose another --out"
+    try:
+        words = read_recipe_words(path / RECIPE)
+    except LogFormatError:
+        return f"{path} holds an earlier result, whose recipe cannot be read: {another}"
+    if words.get("command") != command:
+        return f"{path} holds what mobilia {words.get('command')!s:.40} wrote: {another}"
+    theirs, ours = words.get("settings"), json.loads(json.dumps(_plain(settings)))
+    if theirs == ours:
+        return (
+            f"{path} holds an earlier run of the same settings: pass --overwrite to replace it, "
+            "or another --out"
         )
+    there: Mapping[str, Any] = theirs if isinstance(theirs, dict) else {}
+    keys = sorted(key for key in {*there, *ours} if there.get(key) != ours.get(key))
+    differ = ", ".join(f"{key} {there.get(key)!r:.40} there, {ours.get(key)!r:.40} now"
+                       for key in keys[:3])  # fmt: skip
+    return f"{path} holds another run ({differ}): {another}"
 
 
 def _take_place(temporary: Path, path: Path) -> None:

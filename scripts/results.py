@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from scripts.comparison import folder as compared
-from scripts.comparison.again import is_run
 from scripts.comparison.plan import Run
+from scripts.names import file_name, is_run
 from scripts.output import MAX_RECIPE_BYTES, RECIPE
-from scripts.single_run.session import file_name
 from sim.recording.dataset import PLAN, check_dataset
 from sim.recording.sums import SUMS, Fault, check_vouched, faults
 from sim.recording.verify import METADATA, Finding, check_hashes, finding, listed_in

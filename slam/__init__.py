@@ -1,28 +1,44 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SLAM on a stream of frames. Works without a simulator: never imports mujoco, gymnasium or sim."""
+"""SLAM on a stream of frames. Works without a simulator: never imports mujoco, gymnasium or sim.
 
-# isort: off
-from slam import _numba  # noqa: F401  (before anything else imports Numba)
+The public names are imported when they are first asked for, and each SLAM when it is created
+(``slam.system``): ``import slam`` alone loads no compiler.
+"""
 
-# isort: on
-from slam import ekf as _ekf  # noqa: F401  (registers itself)
-from slam import grid as _grid  # noqa: F401
-from slam import guests as _guests  # noqa: F401
-from slam import odometry as _odometry  # noqa: F401
-from slam import shunting as _shunting  # noqa: F401
-from slam.frames import (
-    BeamClass,
-    BeamLabels,
-    Features,
-    Frame,
-    LaserSpec,
-    Odometry,
-    Scan,
-    Stream,
-    StreamMetadata,
-)
-from slam.system import Estimate, Raster, SlamSystem, config_of, create, names, register
-from slam.trajectory import Trajectory
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import slam.names  # noqa: F401  (a module called like the function below, which comes after it)
+
+if TYPE_CHECKING:
+    from slam.frames import (
+        BeamClass,
+        BeamLabels,
+        Features,
+        Frame,
+        LaserSpec,
+        Odometry,
+        Scan,
+        Stream,
+        StreamMetadata,
+    )
+    from slam.system import Estimate, Raster, SlamSystem, config_of, create, register
+    from slam.trajectory import Trajectory
+
+if Path(".numba_config.yaml").exists():  # not to be read, whoever imports Numba next
+    from slam import _numba  # noqa: F401
+
+_FRAMES = (
+    "BeamClass", "BeamLabels", "Features", "Frame", "LaserSpec", "Odometry", "Scan", "Stream",
+    "StreamMetadata",
+)  # fmt: skip
+_SYSTEM = ("Estimate", "Raster", "SlamSystem", "config_of", "create", "register")
+_WHERE = {
+    **dict.fromkeys(_FRAMES, "slam.frames"),
+    **dict.fromkeys(_SYSTEM, "slam.system"),
+    "Trajectory": "slam.trajectory",
+}
 
 __all__ = [
     "BeamClass",
@@ -43,3 +59,23 @@ __all__ = [
     "names",
     "register",
 ]
+
+
+def names() -> list[str]:
+    """Names that ``create`` knows, sorted."""
+    from slam import system
+
+    return system.names()
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, from the module that has it."""
+    if name not in _WHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_WHERE[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    """What there is, loaded or not."""
+    return sorted({*globals(), *__all__})

@@ -20,6 +20,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+# isort: off
+from slam import _numba  # noqa: F401  (before anything else imports Numba)
+
+# isort: on
 import numba
 
 _log = logging.getLogger(__name__)

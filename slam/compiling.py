@@ -9,6 +9,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+# isort: off
+from slam import _numba  # noqa: F401  (before anything else imports Numba)
+
+# isort: on
 from numba.core import event
 
 _log = logging.getLogger(__name__)

@@ -9,10 +9,12 @@ read from a file is a ``NameFromFile``: it resolves to what is registered and to
 
 from __future__ import annotations
 
+import ast
 import importlib
 import os
 import sys
 from collections.abc import Iterable
+from importlib.util import find_spec
 from pathlib import Path
 
 from slam.errors import InvalidValueError, MobiliaError, UnknownNameError, UntrustedNameError
@@ -114,3 +116,18 @@ def child_environment(*, guest: bool) -> dict[str, str]:
     elif environment.get(SAFE_PATH) == OURS:
         del environment[SAFE_PATH]
     return environment
+
+
+def first_line(entry: str) -> str:
+    """The first line of the docstring of ``entry``, a ``module:name`` of ours.
+
+    Read from its file, for lists: to import it would load a compiler or a physics engine.
+    """
+    module, _, name = entry.partition(":")
+    top = find_spec(module.partition(".")[0])
+    root = Path(str(top and top.origin)).parents[1]
+    tree = ast.parse(root.joinpath(*module.split(".")).with_suffix(".py").read_bytes())
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name == name:
+            return (ast.get_docstring(node) or "").partition("\n")[0]
+    return ""

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError, NotFiniteError, SlamFailedError
 from slam.frames import Float, Frame
-from slam.system import Estimate, Raster, SlamSystem, told
+from slam.system import Estimate, Raster, SlamSystem, create, told
 from slam.trajectory import Trajectory
 
 
@@ -179,3 +179,16 @@ class Replay:
         return Trajectory(
             stamps_ns=np.array(self._stamps, dtype=np.int64), poses=np.array(self._poses)
         )
+
+
+def systems_named(names: Sequence[str]) -> dict[str, SlamSystem]:
+    """Fresh systems by name, odometry among them as the null system."""
+    if not names:
+        raise InvalidValueError("name at least one SLAM")
+    wanted = dict.fromkeys([*names, "odometry"])
+    return {name: create(name) for name in wanted}
+
+
+def primary_of(replay: Replay) -> str:
+    """The system a run is about: the first that is not odometry."""
+    return next((n for n in replay.tracks if n != "odometry"), "odometry")

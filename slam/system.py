@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from slam.checked import covariance, frozen, pose
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError
 from slam.frames import Float, Frame
-from slam.names import join_folders, refuse_code
+from slam.names import first_line, join_folders, refuse_code
 from slam.settings import Settings
 from slam.trajectory import Trajectory
 from slam.variants import parsed
@@ -110,6 +110,16 @@ class SlamSystem(Protocol):
 Factory = Callable[..., object]
 F = TypeVar("F", bound=Callable[..., Any])
 _registry: dict[str, Factory] = {}
+OWN = {
+    "ekf": "slam.ekf.slam:EkfSlam",
+    "karto": "slam.guests.karto:KartoSlam",
+    "kiss-icp": "slam.guests.kiss:KissIcpSlam",
+    "occupancy": "slam.grid.occupancy:OccupancySlam",
+    "odometry": "slam.odometry:OdometrySlam",
+    "shunting": "slam.shunting.slam:ShuntingSlam",
+    "shunting-features": "slam.shunting.featured:FeaturedShuntingSlam",
+}
+"""This project's SLAMs by name, as ``module:Class``: imported when one is asked for."""
 
 
 def register(name: str) -> Callable[[F], F]:
@@ -124,12 +134,39 @@ def register(name: str) -> Callable[[F], F]:
 
 def names() -> list[str]:
     """Registered names, sorted."""
-    return sorted(_registry)
+    return sorted({*OWN, *_registry})
+
+
+def _registered(name: str) -> Factory | None:
+    """The factory of that name; None where nothing is registered under it."""
+    if name not in _registry and name in OWN:
+        module, _, attribute = OWN[name].partition(":")
+        own: Factory = getattr(importlib.import_module(module), attribute)
+        return own
+    return _registry.get(name)
 
 
 def describe(name: str) -> str:
-    """The first line of the docstring of a registered system."""
+    """The first line of the docstring of a registered system.
+
+    That of a system which is not imported yet is read from its file.
+    """
+    if name in OWN and name not in _registry:
+        return first_line(OWN[name])
     return (inspect.getdoc(_registry[name]) or "").partition("\n")[0]
+
+
+def check_name(name: str) -> None:
+    """Raise what ``create`` raises for a name that nothing is registered under; import nothing."""
+    base = parsed(name)[0]
+    if ":" in base or base in OWN or base in _registry:
+        return
+    near = difflib.get_close_matches(base, names(), n=1)
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    raise UnknownNameError(
+        f"no SLAM is called '{base}'.{hint} Known: {', '.join(names())}, or module:Class, "
+        "or pipe:COMMAND."
+    )
 
 
 def config_of(name: str) -> tuple[Settings, Settings] | None:
@@ -138,7 +175,7 @@ def config_of(name: str) -> tuple[Settings, Settings] | None:
     None for one that has none, or is not ours. Raises as ``create`` does for its numbers.
     """
     base, changes = parsed(name)
-    kind = getattr(_registry.get(base), "config_class", None)
+    kind = getattr(_registered(base), "config_class", None)
     if kind is None:
         return None
     default: Settings = kind()
@@ -159,7 +196,7 @@ def create(name: str, **config: Any) -> SlamSystem:
     if changes:
         if "config" in config:
             raise InvalidValueError(f"SLAM '{name}': numbers in its name and a config, not both")
-        if name in _registry and not hasattr(_registry[name], "config_class"):
+        if ":" not in name and (own := _registered(name)) and not hasattr(own, "config_class"):
             raise InvalidValueError(f"SLAM '{name}' has no numbers to set")
         config["config"] = changes
     if name.startswith("pipe:"):
@@ -168,15 +205,11 @@ def create(name: str, **config: Any) -> SlamSystem:
         factory: Factory = partial(PipeSlam, name.removeprefix("pipe:"))
     elif ":" in name:
         factory = _load(name)
-    elif name in _registry:
-        factory = _registry[name]
     else:
-        near = difflib.get_close_matches(name, _registry, n=1)
-        hint = f" Did you mean '{near[0]}'?" if near else ""
-        raise UnknownNameError(
-            f"no SLAM is called '{name}'.{hint} Known: {', '.join(names())}, or module:Class, "
-            "or pipe:COMMAND."
-        )
+        check_name(name)
+        registered = _registered(name)
+        assert registered is not None
+        factory = registered
     _check_options(name, factory, config)
     try:
         system = factory(**config)

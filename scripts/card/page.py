@@ -51,12 +51,8 @@ def page(rows: Sequence[measure.Row]) -> str:
         "",
         "![Card](pictures/sensor_card.png)",
         "",
-        "| | what | data sheet | measured | source |",
-        "|---|---|---|---|---|",
+        *measure.table(rows),
     ]
-    for row in rows:
-        mark = "✓" if row.kept else "✗"
-        lines.append(f"| {mark} | {row.what} | {row.datasheet} | {row.measured} | {row.source} |")
     return "\n".join([*lines, "", *NOTES])
 
 

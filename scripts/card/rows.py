@@ -8,7 +8,7 @@ TD is the manufacturer's technical description (8008970/06-2003), TL his telegra
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +36,15 @@ class Row:
     measured: str
     source: str
     kept: bool
+
+
+def table(rows: Sequence[Row]) -> list[str]:
+    """The lines of a Markdown table."""
+    lines = ["| | what | data sheet | measured | source |", "|---|---|---|---|---|"]
+    for row in rows:
+        mark = "✓" if row.kept else "✗"
+        lines.append(f"| {mark} | {row.what} | {row.datasheet} | {row.measured} | {row.source} |")
+    return lines
 
 
 def rows() -> list[Row]:

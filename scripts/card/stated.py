@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from scripts.card.bench import Bench, box, plate
-from scripts.card.rows import Row
+from scripts.card.rows import Row, table
 from sim.sensors.lidar.registry import describe, scanner_of
 from sim.sensors.lidar.scanner import Scanner
 from sim.sensors.lidar.sheet import NOT_STATED, QUANTITIES, Stated, sheet_of
@@ -175,10 +175,7 @@ def page(name: str, rows: list[Row]) -> str:
         f'at the top of `sim/sensors/lidar/models/{name}.py`. "{NOT_STATED}": not by the sources',
         "read; such a thing is not simulated unless the row says so.",
         "",
-        "| | what | data sheet | measured | source |",
-        "|---|---|---|---|---|",
+        *table(rows),
+        "",
     ]
-    for row in rows:
-        mark = "✓" if row.kept else "✗"
-        lines.append(f"| {mark} | {row.what} | {row.datasheet} | {row.measured} | {row.source} |")
-    return "\n".join([*lines, ""])
+    return "\n".join(lines)

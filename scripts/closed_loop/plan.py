@@ -13,11 +13,12 @@ import slam
 from scripts.closed_loop import runs
 from scripts.comparison.plan import scripts_of, source_of, sources
 from scripts.jobs import Job
-from scripts.single_run.session import file_name
+from scripts.names import file_name
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError
 
 RUNS = "runs"  # folder of the jobs' files
+SCHEMA = 1  # of the tables of a drive
 MAX_RUNS = 100_000
 IDENTITY = ("scene", "dynamism", "seed", "slam")
 

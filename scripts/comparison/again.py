@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from scripts.comparison.plan import Plan
+from scripts.names import RUNS
 from scripts.output import RECIPE, check_whole, read_recipe_words, scenes_of, slams_of
 from sim.core.versions import check_world, world_of
 from sim.recording.recipe import Recipe
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
-
-RUNS = "runs"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,11 +22,6 @@ class Again:
     recipe: Recipe
     every: int
     slams: tuple[str, ...]
-
-
-def is_run(path: Path) -> bool:
-    """Whether it is where a comparison keeps a run: ``<folder>/runs/<name>.npz``."""
-    return path.parent.name == RUNS and path.suffix == ".npz"
 
 
 def run_of(path: Path) -> Again:

@@ -17,7 +17,7 @@ import slam
 from scripts.comparison import entry, recording
 from scripts.imports import with_imports
 from scripts.jobs import Job
-from scripts.single_run.session import file_name
+from scripts.names import file_name
 from sim.recording.recipe import Recipe
 from sim.simulation import n_frames
 from slam.errors import InvalidValueError

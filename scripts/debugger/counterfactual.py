@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from scripts.debugger.question import Question
 from scripts.debugger.recording import Checkpoint, Pair, Sighting, Strip, Tape, row_at, sightings
 from sim.twins.absence import Change
-from slam.errors import InvalidValueError, SlamFailedError
-from slam.evaluation.divergence import Divergence, Rule, first_divergence, largest_rise_m
+from slam.errors import SlamFailedError
+from slam.evaluation.divergence import Divergence, first_divergence, largest_rise_m
 from slam.frames import Float
 
 CURED = 0.5
@@ -28,37 +29,6 @@ MODES = ("out", "frozen")
 VERDICTS = ("none", "weak", "undecided", "culprit", "several", "joint", "not the movers")
 
 Note = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Question:
-    """What is asked.
-
-    rule       what a divergence is
-    at_s       look at this time instead of searching for one
-    lead_s     from the checkpoint to where the divergence begins
-    horizon_s  from where it is found to the end of the re-runs
-    top        only so many suspects, the likeliest; 0: all
-    repeats    other draws of the scanner's noise, for the original and for each cure
-    """
-
-    rule: Rule = field(default_factory=Rule)
-    at_s: float | None = None
-    lead_s: float = 2.0
-    horizon_s: float = 4.0
-    top: int = 0
-    repeats: int = 3
-
-    def __post_init__(self) -> None:
-        for name in ("lead_s", "horizon_s"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                option = name.replace("_s", "")
-                raise InvalidValueError(f"--{option} must be > 0 s and finite, got {value}")
-        for name in ("top", "repeats"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-                raise InvalidValueError(f"--{name} must be a whole number >= 0, got {value!r}")
 
 
 @dataclass(kw_only=True, eq=False)

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scripts.comparison.again import is_run, run_of, why_no_run
+from scripts.comparison.again import run_of, why_no_run
 from scripts.comparison.folder import RunFile
+from scripts.names import file_name, is_run
 from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
-from scripts.single_run.session import file_name
 from scripts.trust import admitted
 from sim.core.versions import check_world, world_of
 from sim.recording.recipe import Made, read_recipe

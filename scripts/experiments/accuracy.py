@@ -29,7 +29,7 @@ from sim.simulation import Simulation, n_frames, tour
 from slam import create
 from slam.files import write_text
 from slam.frames import Frame
-from slam.frontend.odometry_sum import MotionSum
+from slam.frontend.odometry_sum import thinned
 from slam.replay import Track
 from slam.trajectory import Trajectory
 
@@ -116,16 +116,6 @@ class Score:
     ms_p50: float
 
 
-def thinned(frames: list[Frame], stride: int) -> list[Frame]:
-    """Every ``stride``-th frame, with the covariance of all the motion in between."""
-    out, motion = [], MotionSum()
-    for k, frame in enumerate(frames):
-        motion.add(frame.odometry)
-        if k % stride == 0:
-            out.append(replace(motion.passed_on(frame), labels=None))
-    return out
-
-
 def score(blank: Score, frames: list[Frame]) -> Score:
     """Let the SLAM named in ``blank`` see the frames, and fill the rest of it; inf if it fails."""
     truth = Trajectory(
@@ -144,12 +134,13 @@ def score(blank: Score, frames: list[Frame]) -> Score:
         )
     seen = Judged.of(track, truth, track.system.trajectory())
     seen = replace(seen, steady_s=np.array(track.durations_s))
-    figures: dict[str, Any] = {field: METRICS[key].of(seen) for field, key in FIGURES.items()}
+    values = {field: METRICS[key].of(seen) for field, key in FIGURES.items()}
+    figures: dict[str, Any] = {k: math.nan if v is None else v for k, v in values.items()}
     return replace(
         blank,
         odometry_m=odometry_m,
         not_trusted=sum(not e.converged for e in track.estimates),
-        **{name: math.nan if value is None else value for name, value in figures.items()},
+        **figures,
     )
 
 

@@ -25,7 +25,6 @@ import scenes
 import sim
 import slam
 from scripts.comparison.plan import scripts_of, sources
-from scripts.experiments.accuracy import thinned
 from scripts.jobs import Job, run_jobs
 from scripts.paper.runs import follow, sign_test, truth_of
 from sim.simulation import stream
@@ -35,6 +34,7 @@ from slam.errors import InvalidValueError, MobiliaError
 from slam.evaluation import metrics
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import Float, Frame
+from slam.frontend.odometry_sum import thinned
 
 TRAINING = range(20)
 WORLDS: dict[str, tuple[dict[str, Any], ...]] = {

@@ -24,13 +24,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scripts.experiments.accuracy import FULL_RATE_HZ, SCANNERS, thinned
+from scripts.experiments.accuracy import FULL_RATE_HZ, SCANNERS
 from scripts.experiments.parts import Part
 from scripts.metrics.judged import SETTLED_S
 from sim.simulation import stream
 from slam import create
 from slam.evaluation import metrics
 from slam.frames import Float, Frame
+from slam.frontend.odometry_sum import thinned
 from slam.replay import Track
 from slam.trajectory import Trajectory
 

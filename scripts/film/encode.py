@@ -14,6 +14,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 
+from scripts.film import FPS
 from scripts.film.draw import Picture
 from slam.errors import InvalidValueError, MissingDependencyError, OutputError
 from slam.files import reason, replacing
@@ -21,7 +22,6 @@ from slam.files import reason, replacing
 Size = tuple[int, int]
 
 SIZE: Size = (1280, 720)
-FPS = 30.0
 FILM_S = 60.0  # a longer run is shown faster, unless a speed is asked for
 _SIZES = (320, 4096)
 

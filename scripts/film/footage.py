@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scripts.comparison.again import is_run, run_of, why_no_run
+from scripts.comparison.again import run_of, why_no_run
 from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.show import Show
 from scripts.film.view import LogStage, Stage
+from scripts.names import is_run
 from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
-from scripts.single_run.session import primary_of, systems_named
 from scripts.trust import admitted
 from sim.core.versions import check_world, world_of
 from sim.recording.sums import check_vouched
@@ -22,7 +22,7 @@ from slam.frames import NS_PER_S, Stream
 from slam.logs import open_log
 from slam.logs.bag import read_bag
 from slam.logs.bag_topics import is_bag
-from slam.replay import Replay
+from slam.replay import Replay, primary_of, systems_named
 
 if TYPE_CHECKING:
     from sim.moments import Moment

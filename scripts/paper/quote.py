@@ -18,7 +18,7 @@ from pathlib import Path
 from PIL import Image
 
 from scripts.marks import filled
-from scripts.verbs.reproduce import EXPERIMENTS
+from scripts.paper import EXPERIMENTS
 from slam.files import write_bytes, write_text
 
 PICTURES = "pictures/paper"

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from scripts.experiments.accuracy import thinned
 from scripts.paper.report import Report
 from scripts.paper.runs import Plan, Run, job, pose_numbers, save_run, truth_of
 from sim.simulation import stream
@@ -17,6 +16,7 @@ from slam import create, se2
 from slam.ekf.slam import EkfSlam
 from slam.evaluation import metrics
 from slam.frames import Float, Frame
+from slam.frontend.odometry_sum import thinned
 from slam.replay import Track
 
 STRIDE = 5  # 37.5 Hz thinned to 7.5 Hz

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from scripts.experiments.accuracy import thinned
 from scripts.figures import styled
 from scripts.paper import theory_data
 from scripts.paper.landmarks import PAPER_SHARE
@@ -20,6 +19,7 @@ from slam import se2
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import Float, Frame
 from slam.frontend.observations import from_features, from_scan
+from slam.frontend.odometry_sum import thinned
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.featured import FeaturedShuntingSlam
 from slam.shunting.map.rasterise import rasterise

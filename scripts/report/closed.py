@@ -11,6 +11,7 @@ from typing import Any
 
 from matplotlib.ticker import MaxNLocator
 
+from scripts.closed_loop.plan import SCHEMA
 from scripts.closed_loop.tables import LEVEL_COLUMNS
 from scripts.comparison.folder import Row, read_csv, read_json
 from scripts.metrics.metric import digits
@@ -18,7 +19,6 @@ from scripts.output import check_whole
 from scripts.report import style
 from scripts.report.curves import HEIGHT, WIDTH
 from scripts.report.tables import Cell, Table
-from scripts.verbs.drive import SCHEMA
 from slam.errors import LogFormatError
 
 SUCCESS = ("success", "success_low", "success_high")

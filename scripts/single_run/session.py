@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,18 +16,18 @@ from rich.markup import escape
 
 from scripts import figures
 from scripts.console import console
-from scripts.film.encode import FPS, Pace, film, require_ffmpeg
+from scripts.film import FPS
+from scripts.film.encode import Pace, film, require_ffmpeg
 from scripts.film.render import shoot, watched
 from scripts.film.show import Show
+from scripts.names import file_name
 from scripts.output import machine, whole_folder, write_recipe
 from scripts.single_run import score
-from slam.errors import InvalidValueError
 from slam.files import write_text
 from slam.frames import Stream
 from slam.maps import write_map
 from slam.replay import Replay
 from slam.shunting import ShuntingSlam
-from slam.system import SlamSystem, create
 from slam.trajectory import write_tum
 
 
@@ -43,19 +43,6 @@ class Outputs:
     film_fps: float = FPS
 
 
-def systems_named(names: Sequence[str]) -> dict[str, SlamSystem]:
-    """Fresh systems by name, odometry among them as the null system."""
-    if not names:
-        raise InvalidValueError("name at least one SLAM")
-    wanted = dict.fromkeys([*names, "odometry"])
-    return {name: create(name) for name in wanted}
-
-
-def primary_of(replay: Replay) -> str:
-    """The system a run is about: the first that is not odometry."""
-    return next((n for n in replay.tracks if n != "odometry"), "odometry")
-
-
 def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
     """Replay ``stream``, write everything into ``outputs.folder``, print the table.
 
@@ -64,7 +51,12 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
     replay = show.replay
     if outputs.film:
         require_ffmpeg()
-    with whole_folder(outputs.folder, overwrite=outputs.overwrite) as folder:
+    with whole_folder(
+        outputs.folder,
+        overwrite=outputs.overwrite,
+        command=outputs.command,
+        settings=outputs.settings,
+    ) as folder:
         show.pace = Pace.within_a_minute(show.duration_s, outputs.film_fps)
         reel = film(folder / "film.mp4", show.pace.fps) if outputs.film else nullcontext()
         started = time.perf_counter()
@@ -107,11 +99,6 @@ def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any])
         if raster is not None and changes is not None:
             figures.changes_picture(folder / "changes.png", raster, changes, online[show.primary])
     write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
-
-
-def file_name(name: str) -> str:
-    """A system's name as part of a file name: ``my_pkg:MySlam`` becomes ``my_pkg-MySlam``."""
-    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
 
 
 _WORTH_OPENING = ("film.mp4", "map.png", "changes.png", "trajectories.png", "errors.png")

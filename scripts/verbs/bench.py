@@ -13,7 +13,6 @@ import typer
 from rich.table import Table
 
 from scripts.console import console
-from scripts.output import machine, versions
 from slam.errors import InvalidValueError
 from slam.files import write_text
 
@@ -35,6 +34,7 @@ def bench(
         raise InvalidValueError(f"--seconds must lie in [1, 3600] s, got {seconds}")
     from scripts.benches import dataset, world
     from scripts.benches import slam as bench_slam
+    from scripts.output import machine, versions
 
     measures: tuple[Callable[[float], Iterable[dict[str, Any]]], ...] = (
         world.simulation,

@@ -6,29 +6,26 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 from rich.markup import escape
 from rich.progress import Progress
 
 from scripts import interrupt
-from scripts.comparison.again import is_run
 from scripts.console import console, note, progress
-from scripts.debugger.counterfactual import Inquest, Question, hold
-from scripts.debugger.episode import Case, case_of, options_of
-from scripts.debugger.picture import blame_picture
-from scripts.debugger.recording import Tape, record
-from scripts.debugger.words import FIXED, as_json, headline, table
-from scripts.output import whole_folder, write_recipe
+from scripts.debugger.question import Question
+from scripts.names import check, file_name, run_name
 from scripts.scanner_option import Scanner
-from scripts.single_run.session import file_name
 from scripts.trust import Trust
-from sim.sensors.lidar.registry import scanner_of
 from slam.errors import InvalidValueError
 from slam.evaluation.divergence import Rule
 from slam.files import write_text
+
+if TYPE_CHECKING:
+    from scripts.debugger.counterfactual import Inquest
+    from scripts.debugger.episode import Case
+    from scripts.debugger.recording import Tape
 
 AGREES_M = 1e-5  # a trajectory on file is rounded
 
@@ -92,6 +89,13 @@ def blame(
         rule=Rule(threshold_m=threshold, within_s=within), at_s=at, lead_s=lead,
         horizon_s=horizon, top=top, repeats=repeats,
     )  # fmt: skip
+    check([slam] if slam else [], scene)
+    from scripts.debugger.episode import Case, case_of, options_of
+    from scripts.debugger.picture import blame_picture
+    from scripts.debugger.words import as_json
+    from scripts.output import whole_folder, write_recipe
+    from sim.sensors.lidar.registry import scanner_of
+
     if run is not None:
         case = case_of(run, slam, every, trust)
     else:
@@ -102,18 +106,22 @@ def blame(
         case = Case(settings=settings, seconds=seconds, slam=slam or "shunting", every=every)
     if at is not None and not 0.0 <= at <= case.seconds:
         raise InvalidValueError(f"--at must lie in 0..{case.seconds:g} s, got {at:g}")
-    name = (run.stem if is_run(run) else run.name) if run is not None else f"{scene}-{seed}"
+    name = run_name(run) if run is not None else f"{scene}-{seed}"
     folder = out or Path("out") / f"blame-{file_name(name)}-{file_name(case.slam)}"
-    with whole_folder(folder, overwrite=overwrite) as part:
+    recipe = _recipe(case, question)
+    with whole_folder(folder, overwrite=overwrite, command="blame", settings=recipe) as part:
         found = _inquest(case, question)
         blame_picture(part / "blame.png", found)
         text = json.dumps(as_json(found), indent=1, allow_nan=False)
         write_text(part / "blame.json", text + "\n")
-        write_recipe(part, "blame", _recipe(case, question))
+        write_recipe(part, "blame", recipe)
     _tell(found, folder)
 
 
 def _inquest(case: Case, question: Question) -> Inquest:
+    from scripts.debugger.counterfactual import hold
+    from scripts.debugger.recording import record
+
     with progress() as bar:
         tape = record(case, _Bar(bar, "driving").scans)
         _compare(tape)
@@ -142,6 +150,8 @@ class _Bar:
 
 def _compare(tape: Tape) -> None:
     """Say so where the run on file was another one."""
+    import numpy as np
+
     case = tape.case
     if case.made is not None and case.made.elsewhere():
         note(f"the episode was made elsewhere: {case.made.elsewhere()}")
@@ -166,6 +176,8 @@ def _recipe(case: Case, question: Question) -> dict[str, Any]:
 
 
 def _tell(found: Inquest, folder: Path) -> None:
+    from scripts.debugger.words import FIXED, headline, table
+
     says = headline(found)
     if found.trials:
         console.print(table(found))

@@ -7,30 +7,24 @@ import re
 import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
 from rich.table import Table
 
 from scenes import registry
-from scripts import workers
-from scripts.comparison import folder as files
-from scripts.comparison import tables
-from scripts.comparison.columns import COLUMNS
-from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
-from scripts.comparison.recording import load
 from scripts.console import console, level_table
-from scripts.jobs import Job, run_jobs
-from scripts.metrics.table import DRIVES
-from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
+from scripts.names import check
 from scripts.scanner_option import Scanner, every_of
 from scripts.verbs.generate import sweep
 from slam.errors import InvalidValueError
-from slam.evaluation.lost import LOST_RULE
-from slam.frames import BeamClass
-from slam.guests import Limits, limited
+from slam.guests.limits import Limits
 from slam.variants import PIPE, with_set
+
+if TYPE_CHECKING:
+    from scripts.comparison.plan import Plan
+    from scripts.jobs import Job
 
 BETWEEN = re.compile(r",(?![^{]*\})")  # a comma outside braces
 
@@ -72,12 +66,17 @@ def compare(
     [bold]mobilia compare --slam shunting ekf odometry --scene arena --dynamism 0:1:0.5 --seeds 3
     --out out/compare[/bold]
     """
-    workers.check_jobs(jobs)
     if isinstance(seeds, bool) or not 1 <= seeds <= 10_000:
         raise InvalidValueError(f"--seeds must be 1 to 10000, got {seeds}")
+    slams, rooms = with_set(named(slam), set_ or []), named(scene or ["arena", "office"])
+    check(slams, *rooms)
+    from scripts import workers
+    from scripts.comparison.plan import Plan
+
+    workers.check_jobs(jobs)
     plan = Plan(
-        slams=with_set(named(slam), set_ or []),
-        scenes=named(scene or ["arena", "office"]),
+        slams=slams,
+        scenes=rooms,
         levels=levels(dynamism or ["0:1:0.25"]),
         seeds=tuple(range(first_seed, first_seed + seeds)),
         seconds=seconds,
@@ -123,6 +122,15 @@ def carry_out(
     plan: Plan, out: Path, *, jobs: int = 1, cluster: str | None = None
 ) -> list[dict[str, Any]]:
     """Make what is missing and write the tables; the rows of ``runs.csv``."""
+    from scripts.comparison import folder as files
+    from scripts.comparison import tables
+    from scripts.comparison.columns import COLUMNS
+    from scripts.comparison.plan import ENTRIES, RECORDINGS
+    from scripts.jobs import run_jobs
+    from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
+    from slam.evaluation.lost import LOST_RULE
+    from slam.guests import limited
+
     for name in plan.scenes:
         registry.build(name)  # wrong names are told before anything starts
     for name in plan.slams:
@@ -155,6 +163,10 @@ def carry_out(
 
 def _about(recording: Path) -> dict[str, float]:
     """What a run itself was like: the columns ``DRIVES``."""
+    from scripts.comparison.recording import load
+    from scripts.metrics.table import DRIVES
+    from slam.frames import BeamClass
+
     drive = load(recording)
     truth = drive.truth()
     values = (
@@ -168,6 +180,9 @@ def _about(recording: Path) -> dict[str, float]:
 
 def _table(plan: Plan, scene: str, rows: list[dict[str, Any]]) -> Table:
     """Median error and runs lost."""
+    from scripts.comparison import tables
+    from slam.evaluation.lost import LOST_RULE
+
     summary = {
         (row["dynamism"], row["slam"], row["metric"]): row["value"]
         for row in tables.levels([row for row in rows if row["scene"] == scene])

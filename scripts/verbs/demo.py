@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
+from scripts.names import check
 from scripts.scanner_option import Scanner
-from scripts.single_run.session import Outputs
 
 FILM_FPS = 15.0  # the whole demo is to last a minute on two cores
 
@@ -36,7 +36,9 @@ def demo(
     minute more the first time, while Numba compiles. The default seed drives 31 m and lets odometry
     drift as far as it does in half of all runs; try others.
     """
+    check(["shunting"], scene)
     from scripts.single_run.live import on_scene
+    from scripts.single_run.session import Outputs
 
     on_scene(
         ["shunting"],

@@ -7,31 +7,24 @@ import json
 import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
 from rich.table import Table
 
 from scenes import registry
-from scripts import workers
-from scripts.closed_loop import pictures, tables
-from scripts.closed_loop.plan import RUNS, Plan
-from scripts.closed_loop.runs import Driven, load
-from scripts.comparison.folder import write_csv
 from scripts.console import console, level_table
-from scripts.jobs import run_jobs
-from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
+from scripts.names import check
 from scripts.scanner_option import Scanner, every_of
 from scripts.verbs.compare import levels, named
-from sim.loop import LoopConfig
 from slam.errors import InvalidValueError, UnknownNameError
-from slam.evaluation.lost import FOUND_RULE, LOST_RULE
 from slam.files import write_text
-from slam.guests import Limits, limited
 from slam.variants import with_set
 
-SCHEMA = 1
+if TYPE_CHECKING:
+    from scripts.closed_loop.plan import Plan
+    from scripts.closed_loop.runs import Driven
 
 
 def drive(
@@ -68,10 +61,16 @@ def drive(
     [bold]mobilia drive arena --slam shunting odometry --dynamism 0:1:0.5 --seeds 3 --out
     out/drive[/bold]
     """
+    slams = with_set(named(slam), set_ or [])
+    check(slams, scene)
+    from scripts import workers
+    from scripts.closed_loop.plan import Plan
+    from sim.loop.config import LoopConfig
+
     workers.check_jobs(jobs)
     plan = Plan(
         scene=scene,
-        slams=with_set(named(slam), set_ or []),
+        slams=slams,
         levels=levels(dynamism or ["0:1:0.25"]),
         seeds=_seeds(named(seeds or ["5"])),
         goals=_goals(named(goals or [])),
@@ -112,6 +111,13 @@ def _goals(words: tuple[str, ...]) -> tuple[str, ...] | int:
 
 def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
     """Drive what is missing, write tables and pictures; the rows of ``levels.csv``."""
+    from scripts.closed_loop.plan import RUNS, SCHEMA
+    from scripts.closed_loop.runs import load
+    from scripts.jobs import run_jobs
+    from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
+    from slam.evaluation.lost import FOUND_RULE, LOST_RULE
+    from slam.guests import Limits, limited
+
     built = registry.build(plan.scene)  # wrong names are told before anything starts
     for name in plan.goals if isinstance(plan.goals, tuple) else ():
         if name not in built.goals:
@@ -135,6 +141,10 @@ def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
 
 
 def _write(out: Path, plan: Plan, runs: list[Driven]) -> list[dict[str, Any]]:
+    from scripts.closed_loop import pictures, tables
+    from scripts.closed_loop.plan import SCHEMA
+    from scripts.comparison.folder import write_csv
+
     goals = [row for run in runs for row in tables.goal_rows(run)]
     rows = [tables.run_row(run) for run in runs]
     summary = tables.levels(goals, rows)
@@ -156,6 +166,8 @@ def _write(out: Path, plan: Plan, runs: list[Driven]) -> list[dict[str, Any]]:
 
 def _table(plan: Plan, rows: list[dict[str, Any]]) -> Table:
     """Success and precision."""
+    from slam.evaluation.lost import LOST_RULE
+
     at = {(row["dynamism"], row["slam"]): row for row in rows}
     title = f"{plan.scene}: goals reached, %; median precision, cm; runs lost"
     caption = f"reached: within {plan.loop.tolerance_m:g} m in truth; lost: {LOST_RULE}"

@@ -5,21 +5,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 from rich.markup import escape
 
 from scripts.console import console
-from sim.recording.verify import check_bag
 from slam.errors import InvalidValueError
 from slam.files import replacing
-from slam.frames import Frame, Stream
-from slam.logs import open_log, read_bag, write_carmen
-from slam.logs.bag_topics import is_bag
-from slam.trajectory import Trajectory, write_tum
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from slam.frames import Frame, Stream
 
 
 def export(
@@ -39,6 +37,10 @@ def export(
     }  # fmt: skip
     if to not in writers:
         raise InvalidValueError(f"--to must be one of {', '.join(writers)}, got {to!r}")
+    from sim.recording.verify import check_bag
+    from slam.logs import open_log, read_bag
+    from slam.logs.bag_topics import is_bag
+
     check_bag(episode)
     stream = read_bag(episode, labels=True) if is_bag(episode) else open_log(episode)
     suffix = {"tum": ".tum", "carmen": ".log.gz", "npz": ".npz"}[to]
@@ -49,6 +51,10 @@ def export(
 
 
 def _tum(target: Path, stream: Stream) -> list[Path]:
+    import numpy as np
+
+    from slam.trajectory import Trajectory, write_tum
+
     stamps, odometry, truth = [], [], []
     for frame in stream:
         stamps.append(frame.stamp_ns)
@@ -66,11 +72,15 @@ def _tum(target: Path, stream: Stream) -> list[Path]:
 
 
 def _carmen(target: Path, stream: Stream) -> list[Path]:
+    from slam.logs import write_carmen
+
     write_carmen(target, stream)
     return [target]
 
 
 def _npz(target: Path, stream: Stream) -> list[Path]:
+    import numpy as np
+
     frames = list(stream)
     if not frames or frames[0].scan is None:
         raise InvalidValueError("npz holds scans: this log has none")
@@ -92,6 +102,8 @@ def _npz(target: Path, stream: Stream) -> list[Path]:
 
 def _optional(frames: list[Frame]) -> dict[str, NDArray[Any]]:
     """What every frame has, of what it need not have."""
+    import numpy as np
+
     arrays = {}
     if all(f.odometry.increment_covariance is not None for f in frames):
         covariances = [f.odometry.increment_covariance for f in frames]

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -15,13 +15,14 @@ from rich.progress import Progress
 from rich.table import Table
 
 from scenes import registry
-from scripts import interrupt, workers
+from scripts import interrupt
 from scripts.console import console, note, progress
 from scripts.scanner_option import Scanner, rate_hz
-from sim.recording.dataset import Dataset, Plan, writing
-from sim.recording.episode import record
-from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from slam.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from sim.recording.dataset import Dataset
+    from sim.recording.recipe import Recipe
 
 MAX_SWEEP = 1000
 
@@ -53,6 +54,11 @@ def generate(
     [bold]mobilia generate office --dynamism 0.5 --episodes 4 --seconds 20 --out data[/bold]
     """
     levels = sweep(dynamism_sweep) if dynamism_sweep else (dynamism,)
+    registry.check_name(scene)
+    from scripts import workers
+    from sim.recording.dataset import Plan, writing
+    from sim.recording.recipe import Recipe
+
     first = Recipe(scene=scene, seed=seed, dynamism=levels[0], seconds=seconds, scanner=scanner)
     plan = Plan(recipe=first, dynamisms=levels, episodes=episodes, twins=twins)
     workers.check_jobs(jobs)
@@ -87,6 +93,8 @@ def sweep(text: str, option: str = "--dynamism-sweep") -> tuple[float, ...]:
 
 def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | None) -> None:
     """Every missing episode, with a bar: episodes, simulated seconds a second, time left."""
+    from scripts import workers
+
     total, length_s = len(dataset.plan.jobs()), dataset.plan.recipe.seconds
     alone = cluster is None and (jobs == 1 or len(missing) < 2)
     with progress() as bar:
@@ -105,6 +113,8 @@ def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | Non
 
 def _one(folder: Path, note_frame: Callable[[], None] | None, recipe: Recipe) -> None:
     """A job, here or in a worker."""
+    from sim.recording.episode import record
+
     record(recipe, folder, note=note_frame or (lambda: None))
 
 
@@ -159,6 +169,8 @@ def _summary(dataset: Dataset, made: int, spent_s: float) -> Table:
 
 
 def _row(folders: list[Path]) -> list[str]:
+    from sim.recording.recipe import RECIPE, read_recipe
+
     results: list[Any] = [read_recipe(folder / RECIPE).result for folder in folders]
     returns = {
         name: sum(int(result["returns"][name]) for result in results)

@@ -7,21 +7,21 @@ import math
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
-from scripts.comparison.again import is_run
 from scripts.console import console, note
-from scripts.film.encode import FPS, Pace, film, require_ffmpeg, size_of
-from scripts.film.footage import Footage, open_run
-from scripts.film.render import Snapshots, shoot, watched
-from scripts.film.rerun_log import RerunLog
-from scripts.film.show import Show
-from scripts.film.strips import evenly, strip
+from scripts.film import FPS
+from scripts.names import check, run_name
 from scripts.trust import Trust, admitted
 from slam.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from scripts.film.encode import Pace
+    from scripts.film.footage import Footage
+    from scripts.film.show import Show
 
 STRIP_PICTURES = 6
 VIEWS = ("follow", "top", "persp")
@@ -73,16 +73,21 @@ def render(
 
     [bold]mobilia render out/demo --strip strip.png --out film.mp4[/bold]
     """
-    pixels = size_of(size)
     if view not in VIEWS:
         raise InvalidValueError(f"--view must be one of {', '.join(VIEWS)}, got '{view}'")
     if out is None and strip_to is None and rerun is None:
-        name = run.stem if is_run(run) else run.resolve().name.split(".")[0]
-        out = Path("out") / f"{name}.mp4"
+        out = Path("out") / f"{run_name(run)}.mp4"
     _check_suffixes(out, strip_to, rerun)
     if at and strip_to is None:
         raise InvalidValueError("--at names the moments of --strip, which is missing")
     moments = _moments(at)
+    check([slam] if slam else [])
+    from scripts.film.encode import require_ffmpeg, size_of
+    from scripts.film.footage import open_run
+    from scripts.film.rerun_log import RerunLog
+    from scripts.film.strips import evenly
+
+    pixels = size_of(size)
     if out is not None:
         require_ffmpeg()
     if rerun is not None:
@@ -111,6 +116,11 @@ def _render(
     moments: list[float],
     rerun: Path | None,
 ) -> None:
+    from scripts.film.encode import film
+    from scripts.film.render import Snapshots, shoot, watched
+    from scripts.film.rerun_log import RerunLog
+    from scripts.film.strips import strip
+
     started = time.perf_counter()
     with ExitStack() as stack:
         reel = stack.enter_context(film(out, show.pace.fps)) if out is not None else None
@@ -138,6 +148,8 @@ def _render(
 def _pace(
     footage: Footage, fps: float, from_s: float, to_s: float | None, speed: float | None
 ) -> Pace:
+    from scripts.film.encode import Pace
+
     end = footage.duration_s if to_s is None else to_s
     if not (math.isfinite(from_s) and math.isfinite(end) and 0.0 <= from_s < max(end, 1e-3)):
         raise InvalidValueError(

@@ -8,18 +8,18 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
 from scripts.console import console, note
-from scripts.paper.runs import Plan
-from scripts.paper.times import total
+from scripts.paper import EXPERIMENTS
 from slam.errors import UnknownNameError
 from slam.files import write_text
 
-EXPERIMENTS = ("victoria-park", "landmarks", "chairs", "office", "theory")
+if TYPE_CHECKING:
+    from scripts.paper.runs import Plan
 
 
 def reproduce(
@@ -44,8 +44,11 @@ def reproduce(
 
     [bold]mobilia reproduce landmarks[/bold]
     """
-    plan = Plan(out=out, seeds=seeds, quick=quick, data=data, processes=jobs or os.cpu_count() or 1)
     names, started = _named(what), time.perf_counter()
+    from scripts.paper.runs import Plan
+    from scripts.paper.times import total
+
+    plan = Plan(out=out, seeds=seeds, quick=quick, data=data, processes=jobs or os.cpu_count() or 1)
     left_out = "all" in what and plan.data is None
     if left_out:
         names.remove("victoria-park")

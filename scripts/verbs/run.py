@@ -9,9 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from scripts.film.footage import of_log
+from scripts.names import check, run_name
 from scripts.scanner_option import Scanner
-from scripts.single_run.session import Outputs, run_session
 from slam.errors import InvalidValueError
 from slam.variants import with_set
 
@@ -62,10 +61,12 @@ def run(
     if (log is None) == (scene is None):
         raise InvalidValueError("name exactly one of --log and --scene")
     slam = list(with_set(slam, set_ or []))
+    check(slam, scene)
     if log is not None:
-        on_log(slam, log, out or Path("out") / f"run-{log.name.split('.')[0]}", overwrite, film)
+        on_log(slam, log, out or Path("out") / f"run-{run_name(log)}", overwrite, film)
     elif scene is not None:
         from scripts.single_run.live import on_scene
+        from scripts.single_run.session import Outputs
 
         on_scene(
             slam,
@@ -89,6 +90,9 @@ def run(
 
 def on_log(names: list[str], path: Path, out: Path, overwrite: bool, film: bool) -> dict[str, Any]:
     """Run SLAMs on a recorded log."""
+    from scripts.film.footage import of_log
+    from scripts.single_run.session import Outputs, run_session
+
     footage = of_log(path)
     show = footage.show(names)
     settings = {

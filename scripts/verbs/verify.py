@@ -4,20 +4,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 from rich.markup import escape
 
 from scripts import interrupt
 from scripts.console import console, fail, progress
-from scripts.results import check
 from scripts.trust import Trust, admitted
-from sim.recording.dataset import episodes_in
-from sim.recording.recipe import RECIPE, read_recipe
-from sim.recording.verify import STATUS, Finding, regenerate
 from slam.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from sim.recording.verify import Finding
 
 _COLORS = {
     "whole": "green", "same bytes": "green", "damaged": "red", "incomplete": "red",
@@ -46,6 +44,12 @@ def verify(
     """
     if regenerate_ < 0 or seed < 0:
         raise InvalidValueError("--regenerate and --seed must be >= 0")
+    import numpy as np
+
+    from scripts.results import check
+    from sim.recording.recipe import RECIPE, read_recipe
+    from sim.recording.verify import STATUS, regenerate
+
     findings = check(folder)
     checked = len(findings)
     sound = _sound(folder, findings) if regenerate_ else []
@@ -72,6 +76,8 @@ def verify(
 
 def _sound(folder: Path, findings: list[Finding]) -> list[Path]:
     """The episodes that can be made again: planned, and with nothing of theirs missing."""
+    from sim.recording.dataset import episodes_in
+
     sound = {f.episode for f in findings if f.verdict not in ("damaged", "incomplete")}
     return [path for path in episodes_in(folder.resolve()) if path.name in sound]
 

@@ -14,6 +14,10 @@ from __future__ import annotations
 import ctypes
 from typing import Any, NamedTuple
 
+# isort: off
+from slam import _numba  # noqa: F401  (before anything else imports Numba)
+
+# isort: on
 import mujoco
 import numpy as np
 from llvmlite import ir

@@ -25,7 +25,8 @@ from rosbags.interfaces import (
 )
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from scenes.scene import SCAN_HEIGHT, Mover
+from scenes.registry import SCAN_HEIGHT
+from scenes.scene import Mover
 from sim.moments import Moment
 from sim.recording import messages as ros
 from sim.recording.label_cloud import LabelsMessage

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.actors.doors import OPENED
-from sim.actors.people import gait, right_of_way
+from sim.actors.people import columns, gait
 from sim.sensors.lidar.candidates import HULL_GROUP
 from sim.sensors.lidar.device import LaserScanner
 from sim.simulation import Simulation
@@ -138,11 +138,11 @@ def _free_seat(world: World, name: str) -> None:
     """Who sits on it, or is about to, stands there."""
     at, task = world.people.table.at, world.people.crowd.task
     rows = np.flatnonzero(at.discs[:, 0] == _qpos_of(world, name)[0])
-    sitters = np.flatnonzero(np.isin(task[:, right_of_way.SEAT], rows))
-    task[sitters, right_of_way.SEAT] = -1
-    walking = task[sitters, right_of_way.WALKING] == right_of_way.WALKS
-    task[sitters[~walking], right_of_way.WALKING] = right_of_way.STANDS
-    world.people.crowd.state[sitters, right_of_way.SIT] = 0.0
+    sitters = np.flatnonzero(np.isin(task[:, columns.SEAT], rows))
+    task[sitters, columns.SEAT] = -1
+    walking = task[sitters, columns.WALKING] == columns.WALKS
+    task[sitters[~walking], columns.WALKING] = columns.STANDS
+    world.people.crowd.state[sitters, columns.SIT] = 0.0
 
 
 def _halt(world: World, name: str, *, seated: bool) -> None:
@@ -151,13 +151,13 @@ def _halt(world: World, name: str, *, seated: bool) -> None:
         return
     i, crowd = world.people.names.index(name), world.people.crowd
     state, task = crowd.state[i], crowd.task[i]
-    if not (seated and task[right_of_way.WALKING] == right_of_way.SEATED):
-        task[right_of_way.WALKING] = right_of_way.STANDS
-        if not seated or state[right_of_way.SIT] == 0.0:
-            task[right_of_way.SEAT] = -1
-            state[right_of_way.SIT] = 0.0
-    state[[right_of_way.STAY_UNTIL, right_of_way.LOOK_UNTIL]] = math.inf
-    state[[right_of_way.VX, right_of_way.VY, right_of_way.BLOCKED]] = 0.0
+    if not (seated and task[columns.WALKING] == columns.SEATED):
+        task[columns.WALKING] = columns.STANDS
+        if not seated or state[columns.SIT] == 0.0:
+            task[columns.SEAT] = -1
+            state[columns.SIT] = 0.0
+    state[[columns.STAY_UNTIL, columns.LOOK_UNTIL]] = math.inf
+    state[[columns.VX, columns.VY, columns.BLOCKED]] = 0.0
 
 
 def _joints(world: World, name: str) -> list[int]:

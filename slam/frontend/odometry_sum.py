@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from slam.frames import Float, Frame, Odometry
@@ -33,3 +34,13 @@ class MotionSum:
         whole = None if self._unstated else self._sum
         self._sum, self._unstated = None, False
         return replace(frame, odometry=replace(frame.odometry, increment_covariance=whole))
+
+
+def thinned(frames: Sequence[Frame], stride: int) -> list[Frame]:
+    """Every ``stride``-th frame without labels, with the covariance of all the motion between."""
+    out, motion = [], MotionSum()
+    for k, frame in enumerate(frames):
+        motion.add(frame.odometry)
+        if k % stride == 0:
+            out.append(replace(motion.passed_on(frame), labels=None))
+    return out

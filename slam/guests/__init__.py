@@ -2,11 +2,24 @@
 """SLAMs from outside, behind the same protocol: to compare with on the same frames.
 
 KISS-ICP and Karto are optional: ``pip install 'mobilia[guests]'``. Any other joins over a pipe.
+``Guest``, the base of the two, is imported when it is first asked for: it loads a compiler.
 """
 
-from slam.guests.guest import Guest
-from slam.guests.karto import KartoSlam
-from slam.guests.kiss import KissIcpSlam
-from slam.guests.pipe import Limits, PipeSlam, guarded, limited
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["Guest", "KartoSlam", "KissIcpSlam", "Limits", "PipeSlam", "guarded", "limited"]
+from slam.guests.limits import Limits
+from slam.guests.pipe import PipeSlam, guarded, limited
+
+if TYPE_CHECKING:
+    from slam.guests.guest import Guest
+
+__all__ = ["Guest", "Limits", "PipeSlam", "guarded", "limited"]
+
+
+def __getattr__(name: str) -> Any:
+    """``Guest``."""
+    if name != "Guest":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from slam.guests.guest import Guest
+
+    return Guest

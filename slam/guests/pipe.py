@@ -8,14 +8,12 @@ Python class the same way, so that neither its crash nor its endless loop is our
 from __future__ import annotations
 
 import json
-import math
 import os
 import shlex
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,31 +22,13 @@ from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Float, Frame, LaserSpec
 from slam.frontend import odometry_steps
 from slam.guests import protocol
+from slam.guests.limits import Limits
 from slam.guests.wire import Wire
 from slam.names import child_environment, join_folders, refuse_code
 from slam.system import Estimate, Raster, SlamSystem, create
 from slam.trajectory import Trajectory
 
 PREFIX = "pipe:"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Limits:
-    """How long an answer may take, seconds of wall-clock time.
-
-    scan_s   one scan
-    first_s  its start, the first scan after it, a reset, the map and the final poses: compilers and
-             great maps are no hang
-    """
-
-    scan_s: float = 10.0
-    first_s: float = 120.0
-
-    def __post_init__(self) -> None:
-        for name in ("scan_s", "first_s"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not 0.0 < value < math.inf:
-                raise InvalidValueError(f"Limits.{name} must be > 0 s and finite, got {value!r}")
 
 
 class PipeSlam:

@@ -37,6 +37,7 @@ REFUSED = "pass --trust"
 OPEN_NOTHING = {
     "demo": "a scene of ours",
     "list": "what is registered",
+    "config": "numbers of ours",
     "bench": "scenes of ours",
     "sensor-card": "scenes of ours",
     "reproduce": "logs by the readers of run --log; its results, of which it takes numbers",

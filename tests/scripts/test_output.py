@@ -11,6 +11,7 @@ import pytest
 
 from scripts.comparison import folder as compared
 from scripts.comparison.again import run_of
+from scripts.names import run_name
 from scripts.output import (
     check_whole,
     locked_folder,
@@ -26,7 +27,8 @@ from slam.files import write_text
 
 
 def make(path: Path, text: str, *, overwrite: bool = False) -> None:
-    with whole_folder(path, overwrite=overwrite) as folder:
+    made = {"command": "test", "settings": {"text": text}}
+    with whole_folder(path, overwrite=overwrite, **made) as folder:
         (folder / "data.txt").write_text(text)
         write_recipe(folder, "test", {"text": text})
 
@@ -39,11 +41,45 @@ def test_a_folder_appears_whole(tmp_path: Path):
 
 def test_an_earlier_run_is_refused_and_replaced_only_when_asked(tmp_path: Path):
     make(tmp_path / "run", "one")
-    with pytest.raises(OutputError, match="holds an earlier run: pass --overwrite"):
-        make(tmp_path / "run", "two")
+    with pytest.raises(OutputError, match="earlier run of the same settings: pass --overwrite"):
+        make(tmp_path / "run", "one")
     make(tmp_path / "run", "two", overwrite=True)
     assert (tmp_path / "run" / "data.txt").read_text() == "two"
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_to_overwrite_is_no_advice_for_another_result(tmp_path: Path):
+    make(tmp_path / "run", "one")
+    recipe = tmp_path / "run" / "recipe.json"
+    with pytest.raises(OutputError, match=r"'one' there, 'two' now.*--out") as other:
+        make(tmp_path / "run", "two")
+    with (
+        pytest.raises(OutputError, match="mobilia test wrote: choose another --out") as elsewhere,
+        whole_folder(tmp_path / "run", overwrite=False, command="run", settings={"text": "one"}),
+    ):
+        pass
+    recipe.write_text("{")
+    with pytest.raises(OutputError, match="cannot be read: choose another --out") as broken:
+        make(tmp_path / "run", "one")
+    assert not any("--overwrite" in str(error.value) for error in (other, elsewhere, broken))
+    make(tmp_path / "run", "two", overwrite=True)  # who asks for it gets it
+
+
+@pytest.mark.parametrize(
+    ("words", "is_folder", "name"),
+    [
+        ("office-d0.5-s0001", True, "office-d0.5-s0001"),
+        ("office-d0.5-s0002", True, "office-d0.5-s0002"),
+        ("intel.log.xz", False, "intel"),
+        ("runs/arena-d0.5-s0100.npz", False, "arena-d0.5-s0100"),
+        ("lab.v2.bag", False, "lab.v2"),
+        ("recorded.mcap", False, "recorded"),
+    ],
+)
+def test_outputs_keep_the_whole_name_of_an_episode(words, is_folder, name, tmp_path: Path):
+    if is_folder:
+        (tmp_path / words).mkdir()
+    assert run_name(tmp_path / words) == name
 
 
 def test_somebody_elses_files_are_never_replaced(tmp_path: Path):
@@ -165,7 +201,7 @@ def test_what_killed_runs_left_is_removed_or_put_back(tmp_path: Path):
     (tmp_path / ".run.17.part" / "half").touch()
     (tmp_path / ".run2.17.part").mkdir()
     (tmp_path / "run").rename(tmp_path / ".run.17.old")
-    with pytest.raises(OutputError, match="holds an earlier run"):
+    with pytest.raises(OutputError, match="holds another run"):
         make(tmp_path / "run", "two")
     assert (tmp_path / "run" / "data.txt").read_text() == "one"
     make(tmp_path / "run", "two", overwrite=True)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sim.actors import doors
-from sim.actors.people import right_of_way
+from sim.actors.people import columns
 from sim.core.seeds import Seeds
 from sim.driving.pilot import Pilot
 from sim.sensors.lidar.models.lms221 import Lms221Config
@@ -43,9 +43,7 @@ def draws(seeds: Seeds) -> dict[str, Any]:
         noise.update(_state(*simulation.laser.streams).encode())
         simulation.observe()
         for i in np.flatnonzero(people.draws[: len(trips)] != before[: len(trips)]).tolist():
-            trips[i].append(
-                (people.state[i, right_of_way.ARRIVE], float(people.task[i, right_of_way.GOAL]))
-            )
+            trips[i].append((people.state[i, columns.ARRIVE], float(people.task[i, columns.GOAL])))
         for d in np.flatnonzero(angle != world._doors.schedule[:, doors.ANGLE]).tolist():
             angles[d].append(float(world._doors.schedule[d, doors.ANGLE]))
     return {
@@ -53,7 +51,7 @@ def draws(seeds: Seeds) -> dict[str, Any]:
         "chairs": world._shoves["chair"].schedule[:, 0].tolist(),
         "bins": world._shoves["bin"].schedule[:, 0].tolist(),
         "doors": (angles, world._doors.schedule[:, doors.NEXT].tolist()),
-        "people": (people.state[:, right_of_way.SPEED].tolist(), trips),
+        "people": (people.state[:, columns.SPEED].tolist(), trips),
         "lidar": noise.hexdigest(),
         "odometry": (_state(simulation.encoders._rng), simulation.encoders.errors),
         "driving": tour.tolist(),

@@ -10,23 +10,8 @@ from __future__ import annotations
 import math
 
 from sim.actors.config import ACTORS
-from sim.actors.people.right_of_way import (
-    BLOCKED,
-    BODY,
-    KIND,
-    PERSON,
-    ROBOT,
-    VX,
-    VY,
-    Crowd,
-    Float,
-    Int,
-    R,
-    U,
-    V,
-    X,
-    Y,
-)
+from sim.actors.people import columns
+from sim.actors.people.right_of_way import BODY, Crowd, Float, Int
 from sim.core.flow import Field, clearance_at
 from slam._jit import njit
 
@@ -55,18 +40,28 @@ def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> flo
 @njit
 def danger(i: int, vx: float, vy: float, near: Int, discs: Float, fade: float) -> float:
     """Cost of what person ``i`` would run into at velocity (vx, vy)."""
-    x, y, r, ux, uy = discs[i, X], discs[i, Y], discs[i, R], discs[i, U], discs[i, V]
+    x, y, r, ux, uy = (
+        discs[i, columns.X],
+        discs[i, columns.Y],
+        discs[i, columns.R],
+        discs[i, columns.U],
+        discs[i, columns.V],
+    )
     cost = 0.0
     for k in range(len(near)):
         other = discs[near[k]]
-        weight = 1.0 if other[KIND] == PERSON or other[KIND] == ROBOT else fade
+        weight = (
+            1.0
+            if other[columns.KIND] == columns.PERSON or other[columns.KIND] == columns.ROBOT
+            else fade
+        )
         if weight <= 0.0:
             continue
-        dx, dy, reach = other[X] - x, other[Y] - y, r + other[R] + APART
-        if other[KIND] == PERSON:  # each takes half of the evasion
-            wx, wy = 2.0 * vx - ux - other[U], 2.0 * vy - uy - other[V]
+        dx, dy, reach = other[columns.X] - x, other[columns.Y] - y, r + other[columns.R] + APART
+        if other[columns.KIND] == columns.PERSON:  # each takes half of the evasion
+            wx, wy = 2.0 * vx - ux - other[columns.U], 2.0 * vy - uy - other[columns.V]
         else:
-            wx, wy = vx - other[U], vy - other[V]
+            wx, wy = vx - other[columns.U], vy - other[columns.V]
         gap2 = dx * dx + dy * dy
         if gap2 < reach * reach:
             closing = (dx * vx + dy * vy) / math.sqrt(max(gap2, 1e-6))
@@ -89,12 +84,12 @@ def choose(
     """The best of 35 velocities for person ``i`` who would like to walk at ``wanted``."""
     discs, state = crowd.discs, crowd.state
     wx, wy = wanted
-    x, y = discs[i, X], discs[i, Y]
+    x, y = discs[i, columns.X], discs[i, columns.Y]
     heading = math.atan2(wy, wx)
     here = min(clearance_at(field, x, y), BODY)
     wish = math.sqrt(wx * wx + wy * wy)
     pace = max(wish, LEAST_PACE)
-    hurry = min(HURRY * state[i, BLOCKED], HURRY_MOST) if wish > HURRY_FROM else 0.0
+    hurry = min(HURRY * state[i, columns.BLOCKED], HURRY_MOST) if wish > HURRY_FROM else 0.0
     best, best_x, best_y = math.inf, 0.0, 0.0
     for k in range(35):
         if k == 0:
@@ -102,14 +97,16 @@ def choose(
         elif k == 1:
             vx, vy = 0.0, 0.0
         elif k == 2:
-            vx, vy = state[i, VX], state[i, VY]
+            vx, vy = state[i, columns.VX], state[i, columns.VY]
         else:
             angle = heading + (k - 3) // 2 * (math.pi / 8.0)
             speed = pace if k % 2 == 0 else 0.5 * pace
             vx, vy = speed * math.cos(angle), speed * math.sin(angle)
         speed = math.sqrt(vx * vx + vy * vy)
         cost = math.sqrt((vx - wx) ** 2 + (vy - wy) ** 2)
-        cost += CHANGE * math.sqrt((vx - state[i, VX]) ** 2 + (vy - state[i, VY]) ** 2)
+        cost += CHANGE * math.sqrt(
+            (vx - state[i, columns.VX]) ** 2 + (vy - state[i, columns.VY]) ** 2
+        )
         cost += KEEP_RIGHT * max(0.0, wx * vy - wy * vx)  # people keep right
         if speed < SLOW * pace:  # who has been held up steps aside rather than stand
             cost += hurry * (1.0 - speed / pace)
@@ -132,14 +129,14 @@ def spare_robot(
     vx, vy = wanted
     for k in range(len(near)):
         robot = discs[near[k]]
-        if robot[KIND] != ROBOT:
+        if robot[columns.KIND] != columns.ROBOT:
             continue
-        dx, dy = robot[X] - discs[i, X], robot[Y] - discs[i, Y]
+        dx, dy = robot[columns.X] - discs[i, columns.X], robot[columns.Y] - discs[i, columns.Y]
         far = math.sqrt(max(dx * dx + dy * dy, 1e-6))
         ux, uy = dx / far, dy / far
-        gap = far - discs[i, R] - robot[R] - SPARE
+        gap = far - discs[i, columns.R] - robot[columns.R] - SPARE
         # A person stops at ACCEL; what the robot itself comes nearer is stepped back from.
-        approach = vx * ux + vy * uy - (robot[U] * ux + robot[V] * uy)
+        approach = vx * ux + vy * uy - (robot[columns.U] * ux + robot[columns.V] * uy)
         allowed = math.sqrt(2.0 * ACCEL * gap) if gap > 0.0 else 4.0 * gap
         excess = min(max(approach - allowed, 0.0), SPARE_MPS)
         vx, vy = vx - excess * ux, vy - excess * uy

@@ -16,45 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.actors.config import ACTORS
+from sim.actors.people import columns
 from sim.actors.people.avoidance import ACCEL, choose, spare_robot
 from sim.actors.people.right_of_way import (
-    ANGLE,
-    ARRIVE,
-    BEST,
-    BEST_AT,
-    BLOCKED,
-    BLOCKED_S,
-    CX,
-    CY,
-    GOAL,
-    KIND,
-    LEAF,
-    LOOK,
-    LOOK_UNTIL,
-    LUCK,
     OPEN,
-    SEAT,
-    SIT,
-    SPEED,
-    STANDS,
-    STAY_UNTIL,
-    TO_SEAT,
-    TURN,
-    VX,
-    VY,
-    WALKED_S,
-    WALKING,
-    WALKS,
-    WIDTH,
     Addresses,
     Crowd,
     Doors,
     Float,
     Int,
-    U,
-    V,
-    X,
-    Y,
     give_turns,
     hold_off,
     wait_beside,
@@ -105,42 +75,42 @@ def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> No
     discs, state, task, draws = crowd.discs, crowd.state, crowd.task, crowd.draws
     n_goals = field.times.shape[0]
     offset = 1 + int(uniform(draws, i) * (n_goals - 1))
-    goal = task[i, GOAL]
-    state[i, ARRIVE] = between(draws, i, ARRIVE_LEAST, ARRIVE_MOST)
-    state[i, STAY_UNTIL] = waiting(draws, i, 1.0 / stay)  # a duration until the arrival
-    state[i, LOOK] = between(draws, i, -math.pi, math.pi)
-    state[i, LUCK] = uniform(draws, i)
+    goal = task[i, columns.GOAL]
+    state[i, columns.ARRIVE] = between(draws, i, ARRIVE_LEAST, ARRIVE_MOST)
+    state[i, columns.STAY_UNTIL] = waiting(draws, i, 1.0 / stay)  # a duration until the arrival
+    state[i, columns.LOOK] = between(draws, i, -math.pi, math.pi)
+    state[i, columns.LUCK] = uniform(draws, i)
     for _ in range(n_goals):
-        goal = (task[i, GOAL] + offset) % n_goals
-        if time_at(field, goal, discs[i, X], discs[i, Y]) < FAR:
+        goal = (task[i, columns.GOAL] + offset) % n_goals
+        if time_at(field, goal, discs[i, columns.X], discs[i, columns.Y]) < FAR:
             break
         offset += 1
-    task[i, GOAL] = goal
-    task[i, WALKING] = WALKS
-    state[i, BLOCKED] = 0.0
-    state[i, BEST], state[i, BEST_AT] = FAR, time
+    task[i, columns.GOAL] = goal
+    task[i, columns.WALKING] = columns.WALKS
+    state[i, columns.BLOCKED] = 0.0
+    state[i, columns.BEST], state[i, columns.BEST_AT] = FAR, time
 
 
 @njit
 def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[float, float]:
     """The velocity person ``i`` would like to have, other movers aside."""
     discs, state, task = crowd.discs, crowd.state, crowd.task
-    if task[i, WALKING] == TO_SEAT:
+    if task[i, columns.WALKING] == columns.TO_SEAT:
         return to_chair(i, crowd)
-    if task[i, WALKING] != WALKS:
+    if task[i, columns.WALKING] != columns.WALKS:
         return 0.0, 0.0
-    goal = task[i, GOAL]
-    wx, wy = way_at(field, goal, discs[i, X], discs[i, Y])
-    left = time_at(field, goal, discs[i, X], discs[i, Y])
-    speed = min(pace * state[i, SPEED], 0.3 + 1.2 * left)
+    goal = task[i, columns.GOAL]
+    wx, wy = way_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
+    left = time_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
+    speed = min(pace * state[i, columns.SPEED], 0.3 + 1.2 * left)
     wx, wy = speed * wx, speed * wy
     for d in range(ways.doors.shape[0]):
-        side, turn = ways.sides[i, d], ways.passage[d, TURN]
+        side, turn = ways.sides[i, d], ways.passage[d, columns.TURN]
         if side == 0:
             continue
         if turn != 0.0 and side != turn:
             wx, wy = wait_beside(i, ways.doors[d], side, field, discs)
-        elif ways.doors[d, ANGLE] < OPEN:
+        elif ways.doors[d, columns.ANGLE] < OPEN:
             wx, wy = hold_off(i, d, (wx, wy), ways, discs)
     return wx, wy
 
@@ -149,10 +119,15 @@ def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[
 def arrived(i: int, left: float, doors: Float, discs: Float, state: Float) -> bool:
     """Near enough to the goal, or held up close to it, and not standing in a doorway."""
     for d in range(doors.shape[0]):
-        dx, dy = discs[i, X] - doors[d, CX], discs[i, Y] - doors[d, CY]
+        dx, dy = (
+            discs[i, columns.X] - doors[d, columns.CX],
+            discs[i, columns.Y] - doors[d, columns.CY],
+        )
         if dx * dx + dy * dy < DOORWAY * DOORWAY:
             return False
-    return left < state[i, ARRIVE] or (left < NEAR_S and state[i, BLOCKED] > NEAR_BLOCKED)
+    return left < state[i, columns.ARRIVE] or (
+        left < NEAR_S and state[i, columns.BLOCKED] > NEAR_BLOCKED
+    )
 
 
 @njit
@@ -163,34 +138,34 @@ def plan(
     discs, state, task, draws = crowd.discs, crowd.state, crowd.task, crowd.draws
     look = len(task) + i  # its generator
     sit(i, time, tick, crowd)
-    if task[i, WALKING] == TO_SEAT:
+    if task[i, columns.WALKING] == columns.TO_SEAT:
         return
-    if task[i, WALKING] != WALKS:
-        if time >= state[i, STAY_UNTIL]:
+    if task[i, columns.WALKING] != columns.WALKS:
+        if time >= state[i, columns.STAY_UNTIL]:
             new_trip(i, time, stay, field, crowd)
-        elif task[i, WALKING] == STANDS and time >= state[i, LOOK_UNTIL]:
-            state[i, LOOK] = between(draws, look, -math.pi, math.pi)
-            state[i, LOOK_UNTIL] = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
+        elif task[i, columns.WALKING] == columns.STANDS and time >= state[i, columns.LOOK_UNTIL]:
+            state[i, columns.LOOK] = between(draws, look, -math.pi, math.pi)
+            state[i, columns.LOOK_UNTIL] = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
         return
-    if state[i, SIT] > 0.0:  # getting up
-        state[i, BEST_AT] = time
+    if state[i, columns.SIT] > 0.0:  # getting up
+        state[i, columns.BEST_AT] = time
         return
-    left = time_at(field, task[i, GOAL], discs[i, X], discs[i, Y])
-    state[i, WALKED_S] += tick
-    if discs[i, U] ** 2 + discs[i, V] ** 2 < STILL * STILL:
-        state[i, BLOCKED] += tick
-        state[i, BLOCKED_S] += tick
+    left = time_at(field, task[i, columns.GOAL], discs[i, columns.X], discs[i, columns.Y])
+    state[i, columns.WALKED_S] += tick
+    if discs[i, columns.U] ** 2 + discs[i, columns.V] ** 2 < STILL * STILL:
+        state[i, columns.BLOCKED] += tick
+        state[i, columns.BLOCKED_S] += tick
     else:
-        state[i, BLOCKED] = max(0.0, state[i, BLOCKED] - 2.0 * tick)
-    if left < state[i, BEST] - 0.3:
-        state[i, BEST], state[i, BEST_AT] = left, time
+        state[i, columns.BLOCKED] = max(0.0, state[i, columns.BLOCKED] - 2.0 * tick)
+    if left < state[i, columns.BEST] - 0.3:
+        state[i, columns.BEST], state[i, columns.BEST_AT] = left, time
     if arrived(i, left, doors, discs, state):
-        task[i, WALKING] = STANDS
-        state[i, STAY_UNTIL] += time
-        state[i, LOOK_UNTIL] = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
-        if task[i, SEAT] < 0:
+        task[i, columns.WALKING] = columns.STANDS
+        state[i, columns.STAY_UNTIL] += time
+        state[i, columns.LOOK_UNTIL] = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
+        if task[i, columns.SEAT] < 0:
             may_sit(i, field, crowd)
-    elif state[i, BLOCKED] > GIVES_UP or time - state[i, BEST_AT] > NO_PROGRESS:
+    elif state[i, columns.BLOCKED] > GIVES_UP or time - state[i, columns.BEST_AT] > NO_PROGRESS:
         new_trip(i, time, stay, field, crowd)
 
 
@@ -203,10 +178,16 @@ def nearby(i: int, seat: int, discs: Float, sides: Int, near: Int) -> int:
     """
     count = 0
     for k in range(discs.shape[0]):
-        dx, dy = discs[k, X] - discs[i, X], discs[k, Y] - discs[i, Y]
+        dx, dy = (
+            discs[k, columns.X] - discs[i, columns.X],
+            discs[k, columns.Y] - discs[i, columns.Y],
+        )
         if k in (i, seat) or dx * dx + dy * dy > 9.0 or count == len(near):
             continue
-        if discs[k, KIND] >= LEAF and sides[i, int(discs[k, KIND] - LEAF)] != 0:
+        if (
+            discs[k, columns.KIND] >= columns.LEAF
+            and sides[i, int(discs[k, columns.KIND] - columns.LEAF)] != 0
+        ):
             continue
         near[count] = k
         count += 1
@@ -225,40 +206,40 @@ def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) ->
     discs, k = crowd.discs, at.discs.shape[0]
     for row in range(k):
         q, v = at.discs[row]
-        discs[row, X], discs[row, Y] = qpos[q], qpos[q + 1]
-        discs[row, U], discs[row, V] = qvel[v], qvel[v + 1]
+        discs[row, columns.X], discs[row, columns.Y] = qpos[q], qpos[q + 1]
+        discs[row, columns.U], discs[row, columns.V] = qvel[v], qvel[v + 1]
         if row < len(crowd.yaws):
             crowd.yaws[row] = qpos[q + 2]
     for d in range(at.doors.shape[0]):
         q, v = at.doors[d]
         x, y, closed, sign = at.hinges[d]
-        ways.doors[d, ANGLE] = qpos[q]
+        ways.doors[d, columns.ANGLE] = qpos[q]
         c, s = math.cos(closed + sign * qpos[q]), math.sin(closed + sign * qpos[q])
         for part in range(3):
             row = k + 3 * d + part
-            length = (0.35 + 0.3 * part) * ways.doors[d, WIDTH]
-            discs[row, X], discs[row, Y] = x + length * c, y + length * s
-            discs[row, U] = -length * s * sign * qvel[v]
-            discs[row, V] = length * c * sign * qvel[v]
+            length = (0.35 + 0.3 * part) * ways.doors[d, columns.WIDTH]
+            discs[row, columns.X], discs[row, columns.Y] = x + length * c, y + length * s
+            discs[row, columns.U] = -length * s * sign * qvel[v]
+            discs[row, columns.V] = length * c * sign * qvel[v]
 
 
 @njit
 def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -> None:
     """Change towards (vx, vy) as fast as legs allow and face the way; servo targets to ``out``."""
     state, yaw = crowd.state, crowd.yaws[i]
-    dvx, dvy = vx - state[i, VX], vy - state[i, VY]
+    dvx, dvy = vx - state[i, columns.VX], vy - state[i, columns.VY]
     change = math.sqrt(dvx * dvx + dvy * dvy)
     share = min(1.0, ACCEL * tick / change) if change > 0.0 else 0.0
-    state[i, VX] += share * dvx
-    state[i, VY] += share * dvy
+    state[i, columns.VX] += share * dvx
+    state[i, columns.VY] += share * dvy
     heading = yaw
     if on_chair(i, crowd):
-        heading = state[i, LOOK]
-    elif state[i, VX] ** 2 + state[i, VY] ** 2 > 0.04:
-        heading = math.atan2(state[i, VY], state[i, VX])
-    elif crowd.task[i, WALKING] == STANDS:
-        heading = state[i, LOOK]
-    out[0], out[1] = state[i, VX], state[i, VY]
+        heading = state[i, columns.LOOK]
+    elif state[i, columns.VX] ** 2 + state[i, columns.VY] ** 2 > 0.04:
+        heading = math.atan2(state[i, columns.VY], state[i, columns.VX])
+    elif crowd.task[i, columns.WALKING] == columns.STANDS:
+        heading = state[i, columns.LOOK]
+    out[0], out[1] = state[i, columns.VX], state[i, columns.VY]
     out[2] = min(max(TURN_GAIN * wrap(heading - yaw), -TURN_MOST), TURN_MOST)
 
 
@@ -268,8 +249,12 @@ def patience(i: int, time: float, crowd: Crowd) -> float:
 
     It wears out after 0.8 to 1.6 s of standing, or 2 to 4 s of walking about without progress.
     """
-    stood = (crowd.state[i, BLOCKED] - 0.8) / 0.8
-    lost = (time - crowd.state[i, BEST_AT] - 2.0) / 2.0 if crowd.task[i, WALKING] == WALKS else 0.0
+    stood = (crowd.state[i, columns.BLOCKED] - 0.8) / 0.8
+    lost = (
+        (time - crowd.state[i, columns.BEST_AT] - 2.0) / 2.0
+        if crowd.task[i, columns.WALKING] == columns.WALKS
+        else 0.0
+    )
     return float(min(max(1.0 - max(stood, lost), 0.0), 1.0))
 
 
@@ -296,7 +281,7 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
             steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])
             continue
         wanted = want(i, pace, ways, field, crowd)
-        count = nearby(i, crowd.task[i, SEAT], crowd.discs, ways.sides, near)
+        count = nearby(i, crowd.task[i, columns.SEAT], crowd.discs, ways.sides, near)
         fade = patience(i, time, crowd)
         chosen = choose(i, wanted, near[:count], fade, field, crowd)
         vx, vy = spare_robot(i, chosen, near[:count], crowd.discs)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scenes.scene import Scene
 from sim.actors.config import ACTORS
 from sim.actors.doors import Doors
-from sim.actors.people import crowd, gait, right_of_way, sitting
+from sim.actors.people import columns, crowd, gait, right_of_way, sitting
 from sim.actors.people.right_of_way import Addresses, Crowd
 from sim.core.bodies import Bodies
 from sim.core.draws import between, normal, uniform
@@ -83,11 +83,11 @@ class People:
         self.crowd = Crowd(
             discs=_discs(bodies, doors, self.names),
             yaws=np.zeros(len(at.discs)),
-            state=np.zeros((n, right_of_way.N_STATE)),
+            state=np.zeros((n, columns.N_STATE)),
             task=np.zeros((n, 3), dtype=np.int64),
             draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
         )
-        self.crowd.task[:, right_of_way.SEAT] = -1
+        self.crowd.task[:, columns.SEAT] = -1
         alive = n > 0 and math.isfinite(stay_mean) and len(scene.goals) > 0
         servos = [model.actuator(f"{p}/vx").id for p in self.names]
         limbs = [[model.body(f"{p}/{limb}").mocapid[0] for limb in _LIMBS] for p in self.names]
@@ -102,7 +102,7 @@ class People:
             torsos=np.ascontiguousarray(at.discs[:n]),
             limbs=np.array(limbs, dtype=np.int64).reshape(n, 4),
             feet=self.feet,
-            sitting=self.crowd.state[:, right_of_way.SIT],
+            sitting=self.crowd.state[:, columns.SIT],
             hulls=_hulls(model, self.names),
         )
 
@@ -112,15 +112,15 @@ class People:
         for i in range(len(self.names)):
             numbers = ACTORS.walking
             speed = numbers.speed_mps + numbers.speed_sd * normal(draws, i)
-            state[i, right_of_way.SPEED] = min(max(speed, numbers.speed_least), numbers.speed_most)
+            state[i, columns.SPEED] = min(max(speed, numbers.speed_least), numbers.speed_most)
             first = min(self._rates[0], numbers.first_stay_s)
-            state[i, right_of_way.STAY_UNTIL] = first * uniform(draws, i)
-            state[i, right_of_way.LOOK] = data.qpos[self.table.torsos[i, 0] + 2]
-            state[i, right_of_way.LOOK_UNTIL] = between(
+            state[i, columns.STAY_UNTIL] = first * uniform(draws, i)
+            state[i, columns.LOOK] = data.qpos[self.table.torsos[i, 0] + 2]
+            state[i, columns.LOOK_UNTIL] = between(
                 draws, i, numbers.look_least_s, numbers.look_most_s
             )
             n_goals = max(len(self.table.field.times), 1)
-            task[i, right_of_way.GOAL] = int(uniform(draws, i) * n_goals)
+            task[i, columns.GOAL] = int(uniform(draws, i) * n_goals)
         self.stand(data)
 
     def dress(self) -> None:
@@ -142,7 +142,7 @@ class People:
     def walked_s(self) -> tuple[Float, Float]:
         """(n,) s each has been on the way so far, and (n,) s of these standing still, blocked."""
         state = self.crowd.state
-        return state[:, right_of_way.WALKED_S].copy(), state[:, right_of_way.BLOCKED_S].copy()
+        return state[:, columns.WALKED_S].copy(), state[:, columns.BLOCKED_S].copy()
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""
@@ -153,14 +153,14 @@ class People:
 def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:
     m = len(doors.names)
     table = np.zeros((m, 8))
-    table[:, [right_of_way.CX, right_of_way.CY]] = doors.middles
-    table[:, [right_of_way.EX, right_of_way.EY]] = doors.along
+    table[:, [columns.CX, columns.CY]] = doors.middles
+    table[:, [columns.EX, columns.EY]] = doors.along
     sign = doors.hinges[:, 3]
-    table[:, right_of_way.NX], table[:, right_of_way.NY] = (
+    table[:, columns.NX], table[:, columns.NY] = (
         -sign * doors.along[:, 1],
         sign * doors.along[:, 0],
     )
-    table[:, right_of_way.WIDTH] = doors.widths
+    table[:, columns.WIDTH] = doors.widths
     sides = np.zeros((n_people, m), dtype=np.int64)
     return right_of_way.Doors(doors=table, passage=doors.passage, sides=sides)
 
@@ -179,15 +179,15 @@ def _addresses(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Addresses
 def _discs(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Float:
     planar = _planar(bodies, people)
     discs = np.zeros((len(planar) + 3 * len(doors.names), 6))
-    discs[: len(planar), right_of_way.KIND] = right_of_way.THING
-    discs[: len(people), right_of_way.KIND] = right_of_way.PERSON
+    discs[: len(planar), columns.KIND] = columns.THING
+    discs[: len(people), columns.KIND] = columns.PERSON
     for mover in bodies.scene.movers:
         if mover.kind == "robot":
-            discs[planar.index(mover.name), right_of_way.KIND] = right_of_way.ROBOT
+            discs[planar.index(mover.name), columns.KIND] = columns.ROBOT
         elif mover.group == "chair":
-            discs[planar.index(mover.name), right_of_way.KIND] = right_of_way.CHAIR
-    discs[: len(planar), right_of_way.R] = bodies.radii(planar)
+            discs[planar.index(mover.name), columns.KIND] = columns.CHAIR
+    discs[: len(planar), columns.R] = bodies.radii(planar)
     for row in range(len(planar), len(discs)):
-        discs[row, right_of_way.KIND] = right_of_way.LEAF + (row - len(planar)) // 3
-        discs[row, right_of_way.R] = 0.06
+        discs[row, columns.KIND] = columns.LEAF + (row - len(planar)) // 3
+        discs[row, columns.R] = 0.06
     return discs

@@ -13,28 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.actors.config import ACTORS
+from sim.actors.people import columns
 from sim.core.flow import Field, clearance_at, time_at, way_at
 from slam._jit import njit
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-
-# columns of the people's state, (n, 14) float64
-SPEED, STAY_UNTIL, BLOCKED, ARRIVE, LOOK, LOOK_UNTIL = 0, 1, 2, 3, 4, 5
-VX, VY, BEST, BEST_AT, WALKED_S, BLOCKED_S = 6, 7, 8, 9, 10, 11
-SIT, LUCK = 12, 13  # 0 stands to 1 sits; drawn for each trip: whether to look for a chair
-N_STATE = 14
-# columns of their task, (n, 3) int64: what one does, where to, disc row of one's chair (-1 none)
-WALKING, GOAL, SEAT = 0, 1, 2
-STANDS, WALKS, TO_SEAT, SEATED = 0, 1, 2, 3
-# columns of a disc: everything with a round hull, people first, then (k, 6)
-X, Y, R, U, V, KIND = 0, 1, 2, 3, 4, 5
-PERSON, THING, ROBOT, CHAIR, LEAF = 0.0, 1.0, 2.0, 3.0, 10.0  # LEAF + d: of the leaf of door d
-# columns of a door, (m, 8) float64: centre, normal to the side it swings to, along the leaf when
-# closed, width, angle; and of its passage, (m, 3): whose turn (side +1, -1, 0 none), asked for,
-# someone in it
-CX, CY, NX, NY, EX, EY, WIDTH, ANGLE = 0, 1, 2, 3, 4, 5, 6, 7
-TURN, ASKED, INSIDE = 0, 1, 2
 
 _R = ACTORS.right_of_way
 BODY, OPEN = _R.body_m, ACTORS.doors.passable_rad
@@ -85,17 +69,17 @@ class Addresses(NamedTuple):
 def wants_through(i: int, door: Float, field: Field, crowd: Crowd) -> int:
     """Side (+1 where the leaf swings to, -1) from which person ``i`` wants to pass; 0: none."""
     discs, task = crowd.discs, crowd.task
-    dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+    dx, dy = discs[i, columns.X] - door[columns.CX], discs[i, columns.Y] - door[columns.CY]
     distance = math.sqrt(dx * dx + dy * dy)
-    if task[i, WALKING] != WALKS or distance > WANTS:
+    if task[i, columns.WALKING] != columns.WALKS or distance > WANTS:
         return 0
-    goal = task[i, GOAL]
-    normal = dx * door[NX] + dy * door[NY]
+    goal = task[i, columns.GOAL]
+    normal = dx * door[columns.NX] + dy * door[columns.NY]
     if distance < IN_DOORWAY:
-        wx, wy = way_at(field, goal, discs[i, X], discs[i, Y])
-        return -1 if wx * door[NX] + wy * door[NY] > 0.0 else 1
-    there = time_at(field, goal, door[CX], door[CY])
-    if time_at(field, goal, discs[i, X], discs[i, Y]) - there < ON_WAY * distance:
+        wx, wy = way_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
+        return -1 if wx * door[columns.NX] + wy * door[columns.NY] > 0.0 else 1
+    there = time_at(field, goal, door[columns.CX], door[columns.CY])
+    if time_at(field, goal, discs[i, columns.X], discs[i, columns.Y]) - there < ON_WAY * distance:
         return 0
     return 1 if normal > 0.0 else -1
 
@@ -108,52 +92,60 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:
         door = doors[d]
         inside, nearest, turn = 0, math.inf, 0
         kept, asked = False, False
-        passage[d, INSIDE] = 0.0
+        passage[d, columns.INSIDE] = 0.0
         for i in range(sides.shape[0]):
             side = wants_through(i, door, field, crowd)
             sides[i, d] = side
-            dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+            dx, dy = discs[i, columns.X] - door[columns.CX], discs[i, columns.Y] - door[columns.CY]
             distance = math.sqrt(dx * dx + dy * dy)
-            hx = dx + 0.5 * door[WIDTH] * door[EX]
-            hy = dy + 0.5 * door[WIDTH] * door[EY]
-            swept = dx * door[NX] + dy * door[NY] > 0.0 and hx * hx + hy * hy < SWEPT
+            hx = dx + 0.5 * door[columns.WIDTH] * door[columns.EX]
+            hy = dy + 0.5 * door[columns.WIDTH] * door[columns.EY]
+            swept = (
+                dx * door[columns.NX] + dy * door[columns.NY] > 0.0 and hx * hx + hy * hy < SWEPT
+            )
             if distance < CLEAR or swept:  # nobody is hit by a leaf that moves by itself
-                passage[d, INSIDE] = 1.0
+                passage[d, columns.INSIDE] = 1.0
             if side == 0:
                 continue
-            across, along = dx * door[NX] + dy * door[NY], dx * door[EX] + dy * door[EY]
-            in_frame = abs(across) < IN_FRAME and abs(along) < 0.5 * door[WIDTH]
-            if in_frame and (inside == 0 or side == int(passage[d, TURN])):
+            across, along = (
+                dx * door[columns.NX] + dy * door[columns.NY],
+                dx * door[columns.EX] + dy * door[columns.EY],
+            )
+            in_frame = abs(across) < IN_FRAME and abs(along) < 0.5 * door[columns.WIDTH]
+            if in_frame and (inside == 0 or side == int(passage[d, columns.TURN])):
                 inside = side
-            if side == int(passage[d, TURN]) and distance < KEPT:
+            if side == int(passage[d, columns.TURN]) and distance < KEPT:
                 kept = True
             if distance < nearest:
                 nearest, turn = distance, side
         if inside != 0:
             turn = inside
         elif kept:
-            turn = int(passage[d, TURN])
-        passage[d, TURN] = turn
+            turn = int(passage[d, columns.TURN])
+        passage[d, columns.TURN] = turn
         for i in range(sides.shape[0]):
             if turn != 0 and sides[i, d] == turn:
-                dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+                dx, dy = (
+                    discs[i, columns.X] - door[columns.CX],
+                    discs[i, columns.Y] - door[columns.CY],
+                )
                 reach = PULL if turn > 0 else PUSH  # who pulls a door starts earlier
                 asked = asked or dx * dx + dy * dy < reach * reach
-        passage[d, ASKED] = 1.0 if asked else 0.0
+        passage[d, columns.ASKED] = 1.0 if asked else 0.0
 
 
 @njit
 def wait_beside(i: int, door: Float, side: int, field: Field, discs: Float) -> tuple[float, float]:
     """Velocity to a place on one's own side, out of the way of those who come through."""
-    dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
-    beside = BESIDE if dx * door[EX] + dy * door[EY] >= 0.0 else -BESIDE
+    dx, dy = discs[i, columns.X] - door[columns.CX], discs[i, columns.Y] - door[columns.CY]
+    beside = BESIDE if dx * door[columns.EX] + dy * door[columns.EY] >= 0.0 else -BESIDE
     for _ in range(2):
-        tx = door[CX] + BACK * side * door[NX] + beside * door[EX]
-        ty = door[CY] + BACK * side * door[NY] + beside * door[EY]
+        tx = door[columns.CX] + BACK * side * door[columns.NX] + beside * door[columns.EX]
+        ty = door[columns.CY] + BACK * side * door[columns.NY] + beside * door[columns.EY]
         if clearance_at(field, tx, ty) > BODY:
             break
         beside = -beside
-    tx, ty = tx - discs[i, X], ty - discs[i, Y]
+    tx, ty = tx - discs[i, columns.X], ty - discs[i, columns.Y]
     gap = math.sqrt(tx * tx + ty * ty)
     speed = min(WAIT_MPS, WAIT_GAIN * gap) / max(gap, 1e-6)
     return speed * tx, speed * ty
@@ -169,19 +161,19 @@ def hold_off(
     leaves room to the one in front.
     """
     door, side = ways.doors[d], ways.sides[i, d]
-    dx, dy = discs[i, X] - door[CX], discs[i, Y] - door[CY]
+    dx, dy = discs[i, columns.X] - door[columns.CX], discs[i, columns.Y] - door[columns.CY]
     first = 0
     for k in range(len(ways.sides)):
         if k != i and ways.sides[k, d] == side:
-            kx, ky = discs[k, X] - door[CX], discs[k, Y] - door[CY]
+            kx, ky = discs[k, columns.X] - door[columns.CX], discs[k, columns.Y] - door[columns.CY]
             first += kx * kx + ky * ky < dx * dx + dy * dy
     if side > 0:
-        rx = dx + 0.5 * door[WIDTH] * door[EX]
-        ry = dy + 0.5 * door[WIDTH] * door[EY]
+        rx = dx + 0.5 * door[columns.WIDTH] * door[columns.EX]
+        ry = dy + 0.5 * door[columns.WIDTH] * door[columns.EY]
         gap = math.sqrt(rx * rx + ry * ry)
-        rx, ry, stop = rx / gap, ry / gap, door[WIDTH] + LEAF_M
+        rx, ry, stop = rx / gap, ry / gap, door[columns.WIDTH] + LEAF_M
     else:
-        rx, ry, stop = -door[NX], -door[NY], PUSH_STOP
+        rx, ry, stop = -door[columns.NX], -door[columns.NY], PUSH_STOP
         gap = dx * rx + dy * ry
     excess = -(wanted[0] * rx + wanted[1] * ry) - HOLD_GAIN * (gap - stop - QUEUE * first)
     excess = min(max(excess, 0.0), HOLD_MPS)

@@ -15,30 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.actors.config import ACTORS
+from sim.actors.people import columns
 from sim.actors.people.gait import HIP, SEAT_HEIGHT
-from sim.actors.people.right_of_way import (
-    BLOCKED,
-    CHAIR,
-    KIND,
-    LOOK,
-    LUCK,
-    SEAT,
-    SEATED,
-    SIT,
-    STANDS,
-    STAY_UNTIL,
-    TO_SEAT,
-    WALKING,
-    WALKS,
-    Crowd,
-    Float,
-    Int,
-    R,
-    U,
-    V,
-    X,
-    Y,
-)
+from sim.actors.people.right_of_way import Crowd, Float, Int
 from sim.core.flow import Field, clearance_at
 from slam._jit import njit
 
@@ -69,11 +48,11 @@ def dress(crowd: Crowd, hulls: Hulls) -> None:
     """Who has a chair, and no longer walks to it, meets walls, people and doors only; and sinks."""
     for i in range(len(hulls.geoms)):
         geom, look = hulls.geoms[i], hulls.looks[i]
-        off = crowd.task[i, SEAT] >= 0 and crowd.task[i, WALKING] != TO_SEAT
+        off = crowd.task[i, columns.SEAT] >= 0 and crowd.task[i, columns.WALKING] != columns.TO_SEAT
         hulls.contype[geom] = 0 if off else hulls.bits[i, 0]
         hulls.affinity[geom] = hulls.bits[i, 1] & ~PLANAR_BIT if off else hulls.bits[i, 1]
         if look >= 0:
-            sunk = (HIP - SEAT_HEIGHT) * crowd.state[i, SIT]
+            sunk = (HIP - SEAT_HEIGHT) * crowd.state[i, columns.SIT]
             hulls.body_pos[look, 2] = hulls.heights[i] - sunk
 
 
@@ -83,18 +62,21 @@ def free_seat(i: int, field: Field, crowd: Crowd) -> int:
     discs, task = crowd.discs, crowd.task
     best, found = HAND * HAND, -1
     for k in range(discs.shape[0]):
-        dx, dy = discs[k, X] - discs[i, X], discs[k, Y] - discs[i, Y]
+        dx, dy = (
+            discs[k, columns.X] - discs[i, columns.X],
+            discs[k, columns.Y] - discs[i, columns.Y],
+        )
         far = dx * dx + dy * dy
-        if discs[k, KIND] != CHAIR or far >= best:
+        if discs[k, columns.KIND] != columns.CHAIR or far >= best:
             continue
-        if discs[k, U] ** 2 + discs[k, V] ** 2 > 0.01:
+        if discs[k, columns.U] ** 2 + discs[k, columns.V] ** 2 > 0.01:
             continue
         taken = False
         for other in range(len(task)):
-            taken = taken or task[other, SEAT] == k
-        open_way = clearance_at(field, discs[k, X], discs[k, Y]) > ROOM
+            taken = taken or task[other, columns.SEAT] == k
+        open_way = clearance_at(field, discs[k, columns.X], discs[k, columns.Y]) > ROOM
         for part in range(1, 5):
-            x, y = discs[i, X] + 0.2 * part * dx, discs[i, Y] + 0.2 * part * dy
+            x, y = discs[i, columns.X] + 0.2 * part * dx, discs[i, columns.Y] + 0.2 * part * dy
             open_way = open_way and clearance_at(field, x, y) > 0.25
         if open_way and not taken:
             best, found = far, k
@@ -104,53 +86,64 @@ def free_seat(i: int, field: Field, crowd: Crowd) -> int:
 @njit
 def may_sit(i: int, field: Field, crowd: Crowd) -> None:
     """On arrival: perhaps go on to a chair."""
-    if crowd.state[i, LUCK] < SHARE:
+    if crowd.state[i, columns.LUCK] < SHARE:
         seat = free_seat(i, field, crowd)
         if seat >= 0:
-            crowd.task[i, WALKING], crowd.task[i, SEAT] = TO_SEAT, seat
-            crowd.state[i, BLOCKED] = 0.0
+            crowd.task[i, columns.WALKING], crowd.task[i, columns.SEAT] = columns.TO_SEAT, seat
+            crowd.state[i, columns.BLOCKED] = 0.0
 
 
 @njit
 def sit(i: int, time: float, tick: float, crowd: Crowd) -> None:
     """Come to the chair, sit down, get up; call it at every tick."""
     discs, state, task = crowd.discs, crowd.state, crowd.task
-    seat = task[i, SEAT]
+    seat = task[i, columns.SEAT]
     if seat < 0:
         return
-    dx, dy = discs[seat, X] - discs[i, X], discs[seat, Y] - discs[i, Y]
+    dx, dy = (
+        discs[seat, columns.X] - discs[i, columns.X],
+        discs[seat, columns.Y] - discs[i, columns.Y],
+    )
     far = math.sqrt(dx * dx + dy * dy)
-    apart = far - discs[i, R] - discs[seat, R]
-    if task[i, WALKING] == TO_SEAT:
-        slow = discs[i, U] ** 2 + discs[i, V] ** 2 < 0.01
-        state[i, BLOCKED] += tick if slow else 0.0
+    apart = far - discs[i, columns.R] - discs[seat, columns.R]
+    if task[i, columns.WALKING] == columns.TO_SEAT:
+        slow = discs[i, columns.U] ** 2 + discs[i, columns.V] ** 2 < 0.01
+        state[i, columns.BLOCKED] += tick if slow else 0.0
         if apart < NEAR:
-            task[i, WALKING] = SEATED
-            state[i, STAY_UNTIL] += (STAY - 1.0) * max(state[i, STAY_UNTIL] - time, 0.0) + 2.0
-        elif state[i, BLOCKED] > GIVE_UP_S or far > HAND + 1.0:
-            task[i, WALKING], task[i, SEAT] = STANDS, -1
-    elif task[i, WALKING] == SEATED:
-        state[i, LOOK] = crowd.yaws[seat]
+            task[i, columns.WALKING] = columns.SEATED
+            state[i, columns.STAY_UNTIL] += (STAY - 1.0) * max(
+                state[i, columns.STAY_UNTIL] - time, 0.0
+            ) + 2.0
+        elif state[i, columns.BLOCKED] > GIVE_UP_S or far > HAND + 1.0:
+            task[i, columns.WALKING], task[i, columns.SEAT] = columns.STANDS, -1
+    elif task[i, columns.WALKING] == columns.SEATED:
+        state[i, columns.LOOK] = crowd.yaws[seat]
         if far < 0.15:
-            state[i, SIT] = min(state[i, SIT] + tick / DOWN_S, 1.0)
+            state[i, columns.SIT] = min(state[i, columns.SIT] + tick / DOWN_S, 1.0)
     else:
-        state[i, SIT] = max(state[i, SIT] - tick / DOWN_S, 0.0)
-        if state[i, SIT] == 0.0 and apart > 0.03:
-            task[i, SEAT] = -1
+        state[i, columns.SIT] = max(state[i, columns.SIT] - tick / DOWN_S, 0.0)
+        if state[i, columns.SIT] == 0.0 and apart > 0.03:
+            task[i, columns.SEAT] = -1
 
 
 @njit
 def on_chair(i: int, crowd: Crowd) -> bool:
     """Sitting, sitting down or getting up: moves with the chair."""
-    seated = crowd.task[i, WALKING] == SEATED
-    return bool(seated or (crowd.task[i, WALKING] == WALKS and crowd.state[i, SIT] > 0.0))
+    seated = crowd.task[i, columns.WALKING] == columns.SEATED
+    return bool(
+        seated
+        or (crowd.task[i, columns.WALKING] == columns.WALKS and crowd.state[i, columns.SIT] > 0.0)
+    )
 
 
 @njit
 def to_chair(i: int, crowd: Crowd) -> tuple[float, float]:
     """Velocity to the middle of the chair."""
-    discs, seat = crowd.discs, crowd.task[i, SEAT]
-    dx, dy = discs[seat, X] - discs[i, X], discs[seat, Y] - discs[i, Y]
+    discs, seat = crowd.discs, crowd.task[i, columns.SEAT]
+    dx, dy = (
+        discs[seat, columns.X] - discs[i, columns.X],
+        discs[seat, columns.Y] - discs[i, columns.Y],
+    )
     far = math.sqrt(dx * dx + dy * dy)
     speed = min(PACE, 3.0 * far) / max(far, 1e-6)
     return speed * dx + 0.0, speed * dy + 0.0

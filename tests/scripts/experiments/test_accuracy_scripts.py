@@ -12,6 +12,7 @@ import pytest
 from scripts.experiments import accuracy, kidnap, uncertainty
 from slam import Estimate, Raster, Trajectory, create, se2
 from slam.frames import Frame
+from slam.frontend.odometry_sum import thinned
 from tests.world2d import Drive, World2D, arena, frames, laser
 
 
@@ -22,13 +23,13 @@ def stream() -> list[Frame]:
 
 
 def test_thinned_frames_state_the_covariance_of_all_the_motion_between_them(stream):
-    thin = accuracy.thinned(stream, 4)
+    thin = thinned(stream, 4)
     assert [f.stamp_ns for f in thin] == [f.stamp_ns for f in stream[::4]]
     parts = [f.odometry.increment_covariance for f in stream]
     np.testing.assert_array_equal(thin[2].odometry.increment_covariance, np.sum(parts[5:9], axis=0))
     bare = [replace(f, odometry=replace(f.odometry, increment_covariance=None)) for f in stream]
-    assert accuracy.thinned(bare, 4)[2].odometry.increment_covariance is None
-    assert [f.scan for f in accuracy.thinned(stream, 1)] == [f.scan for f in stream]
+    assert thinned(bare, 4)[2].odometry.increment_covariance is None
+    assert [f.scan for f in thinned(stream, 1)] == [f.scan for f in stream]
 
 
 def test_a_run_that_fails_is_scored_as_lost(stream, monkeypatch, capsys):

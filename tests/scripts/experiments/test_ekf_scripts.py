@@ -30,7 +30,7 @@ def test_trials_are_scored_on_the_training_seeds(tmp_path, monkeypatch):
 
 def test_runs_on_corners_are_made_again_when_the_rooms_change():
     corners, points = ({p.name for p in tune_ekf.made_of(w)} for w in ("corners", "points"))
-    assert {"slam", "sim", "scenes", "tune_ekf.py", "accuracy.py", "runs.py"} <= corners
+    assert {"slam", "sim", "scenes", "tune_ekf.py", "runs.py"} <= corners
     assert {"slam", "tune_ekf.py", "runs.py"} <= points
     assert not {"sim", "scenes"} & points
 

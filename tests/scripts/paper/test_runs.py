@@ -46,7 +46,7 @@ def test_a_run_depends_on_what_makes_it_and_not_on_pages():
         return {path.name for path in depends_on(call, arguments)}
 
     of_rooms = depends(rooms.run_one, scene="office")
-    assert {"slam", "rooms.py", "runs.py", "accuracy.py", "sim", "scenes"} <= of_rooms
+    assert {"slam", "rooms.py", "runs.py", "sim", "scenes"} <= of_rooms
     assert not {"report.py", "times.py"} & of_rooms
     assert {"slam", "point_runs.py", "census.py"} <= depends(point_runs.run_one)
     for runs in (point_runs, park_runs):

@@ -168,7 +168,7 @@ def test_an_earlier_run_stays_unless_overwriting_is_asked_for(tmp_path: Path, ca
     kept = (tmp_path / "out" / "recipe.json").stat().st_mtime_ns
     again = called(*words)
     assert again.returncode == 1
-    assert "holds an earlier run: pass --overwrite" in again.stderr
+    assert "holds an earlier run of the same settings: pass --overwrite" in again.stderr
     assert (tmp_path / "out" / "recipe.json").stat().st_mtime_ns == kept
     assert called(*words, "--overwrite").returncode == 0
 

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.actors.people import gait, right_of_way
+from sim.actors.people import columns, gait
 from sim.core.dynamism import Dynamism
 from sim.core.flow import clearance_at
 from sim.world.world import SUBSTEPS_PER_S, World
@@ -66,7 +66,7 @@ def test_people_walk_from_room_to_room(walk):
         }
         visited.append(len(inside))
     assert np.mean(visited) > 3
-    arrivals = np.sum(np.diff(walk["tasks"][:, :, right_of_way.WALKING], axis=0) < 0)
+    arrivals = np.sum(np.diff(walk["tasks"][:, :, columns.WALKING], axis=0) < 0)
     assert arrivals > poses.shape[1]
 
 
@@ -223,12 +223,12 @@ def test_somebody_sits_down_gets_up_and_leaves():
     sitter, later = -1, 0
     for k in range(60 * SUBSTEPS_PER_S):
         world.substep()
-        if sitter < 0 and (crowd.state[:, right_of_way.SIT] == 1.0).any():
-            sitter = int(np.argmax(crowd.state[:, right_of_way.SIT]))
-            chair = crowd.discs[crowd.task[sitter, right_of_way.SEAT]].copy()
+        if sitter < 0 and (crowd.state[:, columns.SIT] == 1.0).any():
+            sitter = int(np.argmax(crowd.state[:, columns.SIT]))
+            chair = crowd.discs[crowd.task[sitter, columns.SEAT]].copy()
             hull = int(world.model.geom(f"{world.people.names[sitter]}/hull").id)
             assert np.hypot(*(crowd.discs[sitter, :2] - chair[:2])) < 0.15
-            assert chair[right_of_way.KIND] == right_of_way.CHAIR
+            assert chair[columns.KIND] == columns.CHAIR
             assert world.model.geom_contype[hull] == 0
             thigh = world.model.body(f"{world.people.names[sitter]}/thigh_l").id
             assert world.data.xpos[thigh, 2] == pytest.approx(gait.SEAT_HEIGHT, abs=0.02)
@@ -240,11 +240,11 @@ def test_somebody_sits_down_gets_up_and_leaves():
                 fresh.substep()
             np.testing.assert_array_equal(fresh.data.qpos, expected)
         if sitter >= 0:
-            seen.add(int(crowd.task[sitter, right_of_way.WALKING]))
-            if crowd.task[sitter, right_of_way.SEAT] < 0:
+            seen.add(int(crowd.task[sitter, columns.WALKING]))
+            if crowd.task[sitter, columns.SEAT] < 0:
                 break
-    assert {right_of_way.SEATED, right_of_way.WALKS} <= seen
+    assert {columns.SEATED, columns.WALKS} <= seen
     world.people.dress()
     assert world.model.geom_contype[hull] == 4
-    assert crowd.state[sitter, right_of_way.SIT] == 0.0
+    assert crowd.state[sitter, columns.SIT] == 0.0
     assert not any(w.number for w in world.data.warning)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names that are typed, and names of outputs: all that a verb needs before its slow imports."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from scenes import registry
+from slam import system
+
+RUNS = "runs"  # of a comparison: the folder of its runs
+# Endings of logs, which are no part of their names.
+LOGS = (".gz", ".xz", ".log", ".clf", ".txt", ".mat", ".bag", ".mcap", ".db3", ".npz")
+
+
+def check(slams: Sequence[str], *scenes: str | None) -> None:
+    """``UnknownNameError`` for a SLAM or a scene of no such name; None is no scene.
+
+    Names of code (``module:Class``) are resolved later, where they are used.
+    """
+    for scene in scenes:
+        if scene is not None:
+            registry.check_name(scene)
+    for slam in slams:
+        system.check_name(slam)
+
+
+def is_run(path: Path) -> bool:
+    """Whether it is where a comparison keeps a run: ``<folder>/runs/<name>.npz``."""
+    return path.parent.name == RUNS and path.suffix == ".npz"
+
+
+def run_name(path: Path) -> str:
+    """What outputs about the run, episode or log at ``path`` are called.
+
+    A folder's name is whole (``office-d0.5-s0001``); a file's is without the endings of logs.
+    """
+    path = path.resolve()
+    if path.is_dir():
+        return path.name
+    while path.suffix.lower() in LOGS:
+        path = path.with_suffix("")
+    return path.name
+
+
+def file_name(name: str) -> str:
+    """A system's name as part of a file name: ``my_pkg:MySlam`` becomes ``my_pkg-MySlam``."""
+    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name)

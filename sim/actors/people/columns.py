@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What stands in which column of the tables that all kernels of the crowd share.
+
+Imported as a module: ``state[i, columns.SPEED]``.
+"""
+
+from __future__ import annotations
+
+# The people's state, (n, 14) float64.
+SPEED, STAY_UNTIL, BLOCKED, ARRIVE, LOOK, LOOK_UNTIL = range(6)
+VX, VY, BEST, BEST_AT, WALKED_S, BLOCKED_S = range(6, 12)
+SIT, LUCK = 12, 13  # 0 stands to 1 sits; drawn for each trip: whether to look for a chair
+N_STATE = 14
+
+# Their task, (n, 3) int64: what one does, where to, disc row of one's chair (-1 none).
+WALKING, GOAL, SEAT = range(3)
+STANDS, WALKS, TO_SEAT, SEATED = range(4)  # values of WALKING
+
+# A disc, (k, 6) float64: everything with a round hull, people first.
+X, Y, R, U, V, KIND = range(6)
+PERSON, THING, ROBOT, CHAIR, LEAF = 0.0, 1.0, 2.0, 3.0, 10.0  # LEAF + d: of the leaf of door d
+
+# A door, (m, 8) float64: centre, normal to the side it swings to, along the leaf when closed,
+# width, angle.
+CX, CY, NX, NY, EX, EY, WIDTH, ANGLE = range(8)
+
+# Its passage, (m, 3): whose turn (side +1, -1, 0 none), asked for, someone in it.
+TURN, ASKED, INSIDE = range(3)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What needs no simulator, compiler or figure loads none: lists, help and typing errors."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+from scenes import registry
+from slam import system
+
+SLOW = ("mujoco", "numba", "matplotlib", "scipy", "cv2", "rosbags", "joblib")
+_PROBE = """
+import sys
+from scripts.__main__ import main
+sys.argv = ["mobilia", *sys.argv[1:]]
+try:
+    main()
+except SystemExit as ended:
+    print(f"ended with {ended.code}")
+print("loaded:", *sorted({name.partition(".")[0] for name in sys.modules}))
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("list", "random-rooms"),
+        ("--help", "sensor-card"),
+        ("blame --help", "--horizon"),
+        ("rnu", "Did you mean 'run'"),
+        ("run --sene arena", "No such option: --sene"),
+        ("run shuntin --scene arena", "Did you mean 'shunting'"),
+        ("run ekf --scene aren", "Did you mean 'arena'"),
+        ("compare --slam shunting{a=1 --out x", "'{' without '}'"),
+        ("drive arena --slam shuntin --out x", "Did you mean 'shunting'"),
+        ("generate aren --out x", "Did you mean 'arena'"),
+    ],
+)
+def test_what_simulates_nothing_loads_no_simulator(words, said, tmp_path):
+    ran = subprocess.run(
+        [sys.executable, "-c", _PROBE, *words.split()],
+        capture_output=True, text=True, check=True, cwd=tmp_path, timeout=120,
+    )  # fmt: skip
+    answer, _, loaded = ran.stdout.rpartition("loaded:")
+    assert said in answer + ran.stderr
+    assert "ended with" in answer
+    assert not set(SLOW) & set(loaded.split())
+    assert not any(tmp_path.iterdir())
+
+
+def test_what_a_list_says_of_a_name_is_what_its_docstring_says():
+    for table, describe in ((system.OWN, system.describe), (registry.OWN, registry.describe)):
+        for name, entry in table.items():
+            module, _, attribute = entry.partition(":")
+            own = getattr(importlib.import_module(module), attribute)
+            assert describe(name) == own.__doc__.strip().partition("\n")[0] != ""
+    assert set(system.OWN) <= set(system._registry)  # each also registers itself
+    assert set(registry.OWN) <= set(registry._recipes)
+
+
+def test_a_public_name_is_what_its_module_has():
+    import scenes
+    import slam
+
+    for package in (slam, scenes):
+        for name in package.__all__:
+            assert getattr(package, name) is not None
+            assert name in dir(package)
+        with pytest.raises(AttributeError, match="nothing_of_that_name"):
+            package.nothing_of_that_name  # noqa: B018
+    assert slam.names() == system.names()
