@@ -171,7 +171,7 @@ def regenerate(folder: Path, *, trust: bool = False) -> Finding:
         return Finding(episode=folder.name, verdict="other world", why=f"not made again: {why}")
     wanted, here = made.result.get("topics", []), topics.names()
     if wanted != here:
-        why = f"not made again: it has topics {wanted!r:.200}, not {here}: load their module, --with"
+        why = f"not made again: it has topics {wanted!r:.200}, not {here}: load them, --with"
         return Finding(episode=folder.name, verdict="differs", why=why)
     recipe = made.recipe
     if trust:
