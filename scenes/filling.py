@@ -6,11 +6,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
 from scenes.builder import Builder
+from scenes.kinds import kind_of
 from scenes.plan import Plan, furniture
 from scenes.recipe import (
     Draws,
@@ -18,6 +19,7 @@ from scenes.recipe import (
     finish,
     free_floor,
     hang_doors,
+    park,
     put_bins,
     scatter,
     seat_chairs,
@@ -33,6 +35,7 @@ def filled(  # noqa: PLR0913 (the counts of a scene, each by name)
     put: Sequence[tuple[str | Path, Pose]] = (),
     n_chairs: int = 0,
     n_people: int = 0,
+    loads: Mapping[str, int] | None = None,
     doors: str = "open",
 ) -> Scene:
     """The scene of a plan: furniture, doors and bins at its marks, then chairs and people.
@@ -40,10 +43,11 @@ def filled(  # noqa: PLR0913 (the counts of a scene, each by name)
     plan    path of an MJCF file, or the name of one of ``scenes/plans``
     parts   paths of MJCF files of furniture: each is put wherever a mark starts with its name
     put     furniture where no mark is: (path or name, (x m, y m, yaw rad)), its back to +y
+    loads   how many of each kind that is pushed about, ``spot:KIND:N`` marks first: {"trolley": 2}
     doors   how they rest: "open", "ajar", "closed" or "mixed"
 
     Chairs take the ``seat:...`` marks first, then free floor. Raises ``InvalidValueError`` for a
-    file, mark, material or number that cannot be.
+    file, mark, material or number that cannot be, ``UnknownNameError`` for a kind of load.
     """
     n_chairs, n_people = count("n_chairs", n_chairs, 0), count("n_people", n_people, 0)
     more = tuple((str(part), (pose[0], pose[1], pose[2])) for part, pose in put)
@@ -53,8 +57,12 @@ def filled(  # noqa: PLR0913 (the counts of a scene, each by name)
     put_bins(builder, draws.bins)
     floor = free_floor(builder)
     seat_chairs(builder, floor, walls.seats, n_chairs, draws)
+    for kind, n in (loads or {}).items():
+        kind_of(kind)  # an unknown one is refused with the kinds that there are
+        park(builder, floor, kind, count(f"loads[{kind!r}]", n, 0), draws.cargo)
     scatter(builder, floor, "person", n_people, draws, draws.people)
-    options = {"n_chairs": n_chairs, "n_people": n_people, "doors": doors}
+    options: dict[str, object] = {"n_chairs": n_chairs, "n_people": n_people, "doors": doors}
+    options |= {"loads": dict(loads)} if loads else {}
     return finish(builder, Path(plan).stem, seed, options)
 
 

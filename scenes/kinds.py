@@ -40,6 +40,7 @@ class KindOfMover:
     z_order   of its drawing from above; higher covers lower
     icon      its drawing, one of ``sim.view.icons.DRAWINGS``
     feet      None: it slides in the plane at every level
+    part      path of its MJCF file; "" for ``parts/<kind>.xml``
     """
 
     group: Group
@@ -47,6 +48,7 @@ class KindOfMover:
     z_order: int
     icon: str
     feet: Feet | None = None
+    part: str = ""
 
     def __post_init__(self) -> None:
         if self.group not in get_args(Group):
@@ -71,6 +73,15 @@ KINDS = {
     "door": KindOfMover(group="door", height_m=2.0, z_order=2, icon="door"),
     "robot": KindOfMover(group="robot", height_m=0.45, z_order=3, icon="robot"),
 }  # fmt: skip
+
+
+def register(kind: str, row: KindOfMover) -> None:
+    """Make a kind of your own known; its row names its ``part``.
+
+    Raises ``InvalidValueError`` for a name that is taken by another row.
+    """
+    if KINDS.setdefault(kind, row) != row:
+        raise InvalidValueError(f"kind '{kind}' has a row already. Taken: {', '.join(KINDS)}")
 
 
 def kind_of(kind: str) -> KindOfMover:

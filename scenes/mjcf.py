@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import mujoco
 
+from scenes.kinds import KINDS
 from slam.errors import InvalidValueError
 
 HERE = Path(__file__).parent
@@ -23,6 +24,8 @@ MAX_BYTES = 1 << 24  # of a file from elsewhere
 
 def file_of(folder: str, name: str) -> Path:
     """The MJCF file of a part or plan: one of ours by its name, anybody's by its path."""
+    if folder == "parts" and name in KINDS:
+        name = KINDS[name].part or name
     path = Path(name) if name.endswith(".xml") else HERE / folder / f"{name}.xml"
     if not path.is_file():
         known = f"; there are {', '.join(ours(folder))}" if folder == "parts" else ""

@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from typing import get_args
 
 import mujoco
 import numpy as np
@@ -19,9 +18,10 @@ from numpy.typing import NDArray
 
 from scenes import look
 from scenes.assembly import Assembly, moved, part_marks, quaternion
+from scenes.kinds import KINDS
 from scenes.marks import Mark, check_marks, check_written, marks
 from scenes.mjcf import check_materials, ours, parsed
-from scenes.scene import Kind, Pose
+from scenes.scene import Pose
 from scenes.views import add_cameras
 from slam.errors import InvalidValueError
 
@@ -197,7 +197,7 @@ class Plan:
 @cache
 def furniture() -> tuple[str, ...]:
     """Names of our parts that a mark can put: neither movers nor what comes with a door."""
-    placed_by_recipes = {*get_args(Kind), "door_frame"}
+    placed_by_recipes = {*KINDS, "door_frame"}
     return tuple(name for name in ours("parts") if name not in placed_by_recipes)
 
 

@@ -28,7 +28,17 @@ PAGE = (Path(__file__).resolve().parents[1] / "docs" / "extending.md").read_text
 HEADINGS = {part.partition("\n")[0]: part.partition("\n")[2] for part in PAGE.split("\n## ")[1:]}
 BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
 MOST_LINES = 15
-MODULES = ("shed", "crated", "lab_lidar", "my_slam", "my_guest", "worst", "turning", "speed")
+MODULES = (
+    "shed",
+    "crated",
+    "carts",
+    "lab_lidar",
+    "my_slam",
+    "my_guest",
+    "worst",
+    "turning",
+    "speed",
+)
 
 
 @pytest.fixture
@@ -44,6 +54,7 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in MODULES:
         monkeypatch.delitem(sys.modules, name, raising=False)
     yield tmp_path
+    scenes.kinds.KINDS.pop("cart", None)
     for name in MODULES:
         sys.modules.pop(name, None)
 
@@ -53,7 +64,7 @@ def blocks(heading: str) -> list[tuple[str, str, str]]:
     found, text = [], HEADINGS[heading]
     for block in BLOCK.finditer(text):
         before = text[: block.start()].rstrip().rpartition("\n\n")[2]
-        saved = re.search(r"[Ss]ave (?:it |the \w+ )?as\s+`(\w+\.\w+)`:$", before)
+        saved = re.search(r"[Ss]ave [^.`]*?as\s+`(\w+\.\w+)`:$", before)
         found.append((saved[1] if saved else "", block[1], block[2]))
     return found
 
@@ -145,6 +156,17 @@ def test_furniture(outside: Path):
         scenes.filled("arena", 1, put=[(outside / "box.xml", (1.0, 2.0, 0.0))])
     with pytest.raises(InvalidValueError, match=r"no file 'box.xml'.* there are .*bookshelf"):
         scenes.filled("arena", 1, put=[("box", (1.0, 2.0, 0.0))])
+
+
+def test_furniture_on_castors(outside: Path):
+    follow("Furniture on castors", outside)
+    scene = scenes.build("carts:carts", 1)
+    assert [mover.name for mover in scene.movers if mover.kind == "cart"] == ["cart0", "cart1"]
+    scenes.kinds.register("cart", scenes.kinds.KINDS["cart"])
+    with pytest.raises(InvalidValueError, match=r"'cart'.*trolley"):
+        scenes.kinds.register("cart", scenes.kinds.KINDS["bin"])
+    with pytest.raises(UnknownNameError, match="'sleigh'"):
+        scenes.filled("arena", 1, loads={"sleigh": 1})
 
 
 def test_a_mark_puts_furniture_of_ones_own(outside: Path):
