@@ -9,18 +9,11 @@ from functools import partial
 
 from gymnasium.envs.registration import register, registry
 
+from scenes.registry import OWN
 from sim.core.versions import WORLD, gone
 
-_SCENES = {
-    "Arena": "arena",
-    "Office": "office",
-    "Corridor": "corridor",
-    "Warehouse": "warehouse",
-    "Classroom": "classroom",
-    "Apartment": "apartment",
-    "RandomRooms": "random-rooms",
-}
-for _name, _scene in _SCENES.items():
+for _scene in OWN:  # "random-rooms" is mobilia/RandomRooms-v1
+    _name = _scene.title().replace("-", "")
     for _version in range(WORLD + 1):
         _id = f"mobilia/{_name}-v{_version}"
         if _id in registry:

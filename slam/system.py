@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a SLAM is to this project: a protocol of five methods, and the names it can be asked for by.
+"""What a SLAM is to this project: a protocol of four methods, and the names it can be asked for by.
 
     class MySlam:
         def reset(self) -> None: ...

@@ -175,7 +175,7 @@ def test_killed_and_resumed_and_one_slam_more(tmp_path):
 
 
 def test_a_recording_is_what_the_simulation_gave(compared):
-    drive = load(next((compared.folder / "recordings").glob("arena_d1_*")))
+    drive = load(next((compared.folder / "recordings").glob("arena_d1_*.npz")))
     assert len(drive.frames) == len(range(0, round(SECONDS * 37.5), 8))
     assert drive.names[-1] == "robot"
     assert drive.hit.shape == (len(drive.frames), 361)

@@ -221,7 +221,7 @@ def run_of_another_schema(folder: Path) -> None:
         (lambda folder: (folder / "recipe.json").write_text("[1]"), "holds no JSON object"),
         (damage("recipe.json"), "recipe.json: cannot be read"),
         (of_another_schema, "no comparison of schema 1"),
-        (lambda folder: (folder / "runs.csv").unlink(), "runs.csv: no table"),
+        (lambda folder: (folder / "runs.csv").unlink(), "runs.csv: cannot be read"),
         (damage("levels.csv"), "levels.csv: no table"),
         (lambda folder: (folder / "paired.csv").write_bytes(b"\xff"), "paired.csv: no table"),
         (lambda folder: (folder / "runs.csv").write_text("scene\n"), "a table without rows"),
