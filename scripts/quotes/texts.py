@@ -283,7 +283,7 @@ def readme_comparison(full: Comparison, noise: Comparison) -> str:
         f"With every error of the scanner, the median position error in cm at dynamism "
         f"{full.dynamisms[0]:g} and {full.dynamisms[-1]:g} is {'; '.join(said)}. Against an "
         "ordinary grid with the same matcher (`occupancy`), over all levels: "
-        f"{_against_grid(full)}. With a scanner whose only error is noise, the grid is {_factors(noise)} "
-        f"times as far off. Who wins where, and where `shunting` does not: "
+        f"{_against_grid(full)}. With a scanner whose only error is noise, the grid "
+        f"is {_factors(noise)} times as far off. Who wins where, and where `shunting` does not: "
         f"[docs/comparing.md](docs/comparing.md) ({made(full.data, full.data['seeds'])})."
     )

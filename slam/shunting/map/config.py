@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers of the map that no preset turns; its decay and trace are in ``slam.shunting.config``."""
+"""The numbers of the map that no preset turns; decay and trace: ``slam.shunting.config``."""
 
 from __future__ import annotations
 
