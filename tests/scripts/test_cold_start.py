@@ -58,8 +58,8 @@ def test_what_a_list_says_of_a_name_is_what_its_docstring_says():
             module, _, attribute = entry.partition(":")
             own = getattr(importlib.import_module(module), attribute)
             assert describe(name) == own.__doc__.strip().partition("\n")[0] != ""
-    assert set(system.OWN) <= set(system._registry)  # each also registers itself
-    assert set(registry.OWN) <= set(registry._recipes)
+    assert set(system.OWN) <= set(system.names())
+    assert set(registry.OWN) <= set(registry.names())
 
 
 def test_a_public_name_is_what_its_module_has():
