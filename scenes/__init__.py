@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from scenes.filling import filled
     from scenes.mounting import at_scan_height
-    from scenes.registry import SCAN_HEIGHT, build, describe, names, register
+    from scenes.registry import build, describe, names, register
+    from scenes.scan_plane import SCAN_HEIGHT
     from scenes.scene import Mover, Scene
 
 _WHERE = {
-    **dict.fromkeys(("SCAN_HEIGHT", "build", "describe", "names", "register"), "registry"),
+    **dict.fromkeys(("build", "describe", "names", "register"), "registry"),
+    "SCAN_HEIGHT": "scan_plane",
     **dict.fromkeys(("Mover", "Scene"), "scene"),
     "at_scan_height": "mounting",
     "filled": "filling",

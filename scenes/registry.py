@@ -9,14 +9,12 @@ import inspect
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from scenes.scan_plane import SCAN_HEIGHT
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.names import first_line, join_folders, refuse_code
 
 if TYPE_CHECKING:  # both load MuJoCo, and names are checked before that
     from scenes.scene import Scene
-
-SCAN_HEIGHT = 0.36
-"""Usual height of the scan plane above the floor, m (where parts/robot.xml has its laser)."""
 
 Recipe = Callable[..., "Scene"]
 F = TypeVar("F", bound=Recipe)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenes.footprint import static_raster
 from scenes.kinds import Group, kind_of
-from scenes.registry import SCAN_HEIGHT
+from scenes.scan_plane import SCAN_HEIGHT
 from slam.errors import InvalidValueError
 from slam.system import Raster
 

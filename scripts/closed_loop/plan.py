@@ -11,7 +11,13 @@ import scenes
 import sim
 import slam
 from scripts.closed_loop import runs
-from scripts.comparison.plan import scripts_of, source_of, sources
+from scripts.comparison.plan import (
+    scripts_of,
+    source_of,
+    source_of_loaded,
+    source_of_scene,
+    sources,
+)
 from scripts.jobs import Job
 from scripts.names import file_name
 from sim.loop import LoopConfig
@@ -72,6 +78,6 @@ class Plan:
             },
             code=(
                 *sources(sim, scenes, slam), *scripts_of(runs.__file__, runs.__name__),
-                *source_of(name),
+                *source_of(name), *source_of_scene(self.scene), *source_of_loaded(),
             ),
         )  # fmt: skip

@@ -22,7 +22,7 @@ from sim.recording.recipe import Recipe
 from sim.simulation import n_frames
 from slam.errors import InvalidValueError
 from slam.guests import Limits
-from slam.names import join_folders
+from slam.names import join_folders, loaded
 from slam.variants import PIPE
 
 RECORDINGS, ENTRIES = "recordings", "entries"
@@ -100,12 +100,13 @@ class Plan:
     def recordings(self) -> dict[str, Job]:
         """The jobs that simulate, by the names of the runs."""
         code = (*sources(sim, scenes), *scripts_of(recording.__file__, recording.__name__))
+        own = {name: (*code, *source_of_scene(name), *source_of_loaded()) for name in self.scenes}
         return {
             run.name: Job(
                 name=run.name,
                 call=recording.record,
                 arguments={**asdict(self.recipe(run)), "every": self.every},
-                code=code,
+                code=own[run.scene],
             )
             for run in self.runs()
         }
@@ -115,7 +116,7 @@ class Plan:
         recordings = {name: job.file_name() for name, job in self.recordings().items()}
         own = (*sources(slam), *scripts_of(entry.__file__, entry.__name__))
         for name in self.slams:
-            code = (*own, *source_of(name))
+            code = (*own, *source_of(name), *source_of_loaded())
             for run in self.runs():
                 file = f"{RECORDINGS}/{recordings[run.name]}"
                 arguments: dict[str, Any] = {"recording": file, "slam": name}
@@ -151,9 +152,27 @@ def source_of(slam: str) -> tuple[Path, ...]:
     if slam.startswith(PIPE):
         named = [path for path in map(Path, shlex.split(command)) if path.is_file()]
         return tuple(file for path in named for file in _whole(path, path.stem))
+    return _of_module(kind)
+
+
+def source_of_scene(scene: str) -> tuple[Path, ...]:
+    """The files of a scene's own module as ``source_of`` has them, and the plans and parts (MJCF)
+    in their folders."""
+    module, colon, _ = scene.partition(":")
+    python = _of_module(module) if colon else ()
+    return (*python, *sorted({xml for file in python for xml in file.parent.glob("*.xml")}))
+
+
+def source_of_loaded() -> tuple[Path, ...]:
+    """The files of the modules that ``--with`` has loaded: what they register is known by a name
+    that does not tell where it comes from."""
+    return tuple(file for module in loaded() for file in _of_module(module))
+
+
+def _of_module(module: str) -> tuple[Path, ...]:
     join_folders()
-    spec = importlib.util.find_spec(kind)
-    return _whole(Path(spec.origin), kind) if spec and spec.origin and spec.has_location else ()
+    spec = importlib.util.find_spec(module)
+    return _whole(Path(spec.origin), module) if spec and spec.origin and spec.has_location else ()
 
 
 def _whole(file: Path, module: str) -> tuple[Path, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from scenes.registry import SCAN_HEIGHT
+from scenes.scan_plane import SCAN_HEIGHT
 from sim.core.checks import instance, number, one_of, whole_numbers
 from sim.core.seeds import Seeds
 from sim.gym.actions import clipped

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from scripts.comparison import plan as plan_module
 from scripts.comparison.entry import Entry
 from scripts.comparison.plan import Plan, source_of
 from scripts.jobs import _digest
@@ -109,10 +110,40 @@ def test_after_a_change_in_a_helper_its_runs_are_made_again(own: Path):
     assert files()["own_module:System"] != before["own_module:System"]
 
 
+def files_of(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
+    """File names of the runs, and of the SLAMs on them."""
+    _digest.cache_clear()
+    runs = {name: job.file_name() for name, job in plan.recordings().items()}
+    return runs, {slam: job.file_name() for _, slam, job in plan.entries()}
+
+
+def test_after_a_change_in_a_module_given_by_with_all_is_made_again(own: Path, monkeypatch):
+    plan = Plan(slams=("odometry",), scenes=("arena",), levels=(0.0,), seeds=(1,))
+    without = files_of(plan)
+    monkeypatch.setattr(plan_module, "loaded", lambda: ("own_module",))
+    before = files_of(plan)
+    assert before != without
+    (own / "own_helper.py").write_text("SIGMA_M = 0.5")
+    runs, entries = files_of(plan)
+    assert runs["arena_d0_s1"] != before[0]["arena_d0_s1"]
+    assert entries["odometry"] != before[1]["odometry"]
+
+
+def test_after_a_change_in_a_scene_of_ones_own_or_its_plan_it_is_made_again(own: Path):
+    plan = Plan(slams=("odometry",), scenes=("own_module:room",), levels=(0.0,), seeds=(1,))
+    found = [files_of(plan)]
+    for name in ("own_helper.py", "room.xml"):
+        (own / name).write_text("")
+        found.append(files_of(plan))
+    runs = [next(iter(runs.values())) for runs, _ in found]
+    assert len(set(runs)) == len(runs)
+
+
 def test_rows_are_scored_again_when_what_scores_them_changes():
     plan = Plan(slams=("odometry",), scenes=("arena",), levels=(0.0,), seeds=(1,))
     ((_, _, job),) = plan.entries()
     scoring = {"columns.py", "entry.py", "maps.py", "memory.py", "places.py", "sight.py"}
+    scoring |= {"judged.py", "metric.py", "table.py"}
     assert scoring | {"slam"} <= {path.name for path in job.code}
     assert not {"tables.py", "verb.py", "plan.py"} & {path.name for path in job.code}
 
