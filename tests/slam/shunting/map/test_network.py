@@ -18,7 +18,7 @@ from slam.frontend.visibility import View, view_of_beams, view_of_features
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.energy import energy, shunting_terms
 from slam.shunting.map.network import SIDE, Network, lateral_mu
-from slam.shunting.map.rasterise import rasterise
+from slam.tracker.rasterise import rasterise
 
 Array = NDArray[np.float64]
 ORIGIN = np.zeros(3)
