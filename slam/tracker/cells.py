@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the map's neurons are kept: blocks of 8 x 8 in a pool, found through a directory.
+"""Where a map's cells are kept: blocks of 8 x 8 in a pool, found through a directory.
 
-A neuron costs memory only where its block lives; a block is born under an impression and dies when
-every neuron in it is silent.
+A cell costs memory only where its block lives; a block is born under an impression and dies when
+every cell in it is silent.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from slam._jit import inner, njit
 from slam.frontend.visibility import View
 
-SIDE = 8  # neurons along a block's edge
-SHIFT, MASK = 3, 7  # i >> SHIFT is the block of neuron i, i & MASK its place inside
+SIDE = 8  # cells along a block's edge
+SHIFT, MASK = 3, 7  # i >> SHIFT is the block of cell i, i & MASK its place inside
 
 FREE_COUNT, TOUCHED_COUNT = 0, 1  # places in ``Cells.counts``
 _FIRST_SLOTS, _FIRST_TOUCHED, _FIRST_ACROSS = 64, 64, 64
@@ -28,7 +28,7 @@ class Cells(NamedTuple):
 
     directory   (rows, columns) int32: slot of a block, -1 where none lives
     corner      (2,) int64: block index (x, y) of directory[0, 0]
-    x           (S, 8, 8) float32: short-term activity, Eq. (8), in [0, 1); indexed [slot, row, col]
+    x           (S, 8, 8) float32: short-term activity in [0, 1); indexed [slot, row, col]
     y           (S, 8, 8) float32: long-term trace, the running mean of the input
     age         (S, 8, 8) float32: s of looking that ``y`` averages over
     facing      (S, 8, 8) uint8: the way the surface faces that was traced there (``surfaces.face``)
@@ -136,7 +136,7 @@ def forget_impressions(cells: Cells) -> None:
 def dense(
     cells: Cells, i0: int, j0: int, shape: tuple[int, int]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """x and y of neurons (i0 + column, j0 + row), 0 where nothing lives."""
+    """x and y of cells (i0 + column, j0 + row), 0 where nothing lives."""
     top, left = j0 >> SHIFT, i0 >> SHIFT
     rows = np.arange(top, ((j0 + shape[0] - 1) >> SHIFT) + 1) - int(cells.corner[1])
     columns = np.arange(left, ((i0 + shape[1] - 1) >> SHIFT) + 1) - int(cells.corner[0])

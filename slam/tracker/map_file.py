@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A SLAM's memory as a file: its config, the living neurons, and where the robot was.
+"""A SLAM's memory as a file: its config, the living cells, and where the robot was.
 
 A NumPy archive (.npz) without pickled objects. ``header`` is JSON text with ``format``, ``version``
 and ``state``; ``places`` (n, 2) are the blocks' indices (x, y); ``x``, ``y``, ``age`` and
-``facing`` (n, 8, 8) their neurons. The header's ``sha256`` is the sum of all the rest; maps of
+``facing`` (n, 8, 8) their cells. The header's ``sha256`` is the sum of all the rest; maps of
 before it have none, which is said in the log. Older readers refuse newer versions.
 """
 
@@ -33,7 +33,7 @@ FORMAT, VERSION = "mobilia shunting memory", 1
 Config = TypeVar("Config", bound=TrackerConfig)
 _ARRAYS = ("places", "x", "y", "age", "facing")
 # What a file may claim.
-MAX_BYTES = 1 << 30  # of all arrays: 1.2 million blocks, 70 000 m^2 of neurons of 3 cm
+MAX_BYTES = 1 << 30  # of all arrays: 1.2 million blocks, 70 000 m^2 of cells of 3 cm
 FARTHEST = 1 << 20  # blocks from the origin: 250 km
 MOST_AGE_S = 1.5e8  # 13 times the slowest pace, two minutes a scan
 MOST_ODDS = 3.5  # as in ``slam.grid.occupancy``

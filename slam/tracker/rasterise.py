@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes impressions onto the map: the inspiration I that observations give to neurons.
+"""Writes impressions onto the map: the inspiration I that observations give to cells.
 
-I of a neuron is the largest of the Gaussians around the observed points there; each has the
+I of a cell is the largest of the Gaussians around the observed points there; each has the
 analytic peak 1 (not the largest sampled value), as everything else makes structure creep towards
-neuron centres (pixel locking).
+cell centres (pixel locking).
 """
 
 from __future__ import annotations

@@ -275,7 +275,7 @@ class Tracker(abc.ABC):
     def window(
         self, xmin: float, ymin: float, xmax: float, ymax: float
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Dense short-term x and long-term y of the neurons centred in the rectangle (map, m)."""
+        """Dense short-term x and long-term y of the cells centred in the rectangle (map, m)."""
         return self.cell_map.window(xmin, ymin, xmax, ymax)
 
     def save(self, path: Path) -> None:

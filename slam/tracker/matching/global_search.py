@@ -19,7 +19,7 @@ from slam.tracker.matching.branch_and_bound import Lattice, Search, levels_of
 from slam.tracker.matching.config import GlobalConfig
 from slam.tracker.matching.local_search import field_of, place
 
-STRIP = 16 * SIDE  # neurons pooled at a time, so that little of the map is ever laid out
+STRIP = 16 * SIDE  # cells pooled at a time, so that little of the map is ever laid out
 MAX_ACROSS = 40  # coarsest blocks along the map
 
 

@@ -2,7 +2,7 @@
 """Multi-resolution search for the pose in a wide window (section 3.4), by branch and bound.
 
 A field of smoothed activities in small integers is built once; its sliding maxima over 2, 4, 8
-neurons bound the overlap of whole blocks of offsets from above. The prior enters a bound with what
+cells bound the overlap of whole blocks of offsets from above. The prior enters a bound with what
 its heading alone costs, so no bound is ever too low and the result equals exhaustive search.
 """
 
@@ -24,7 +24,7 @@ from slam.tracker.cells import MASK, SHIFT, SIDE, Cells, no_cells
 from slam.tracker.matching.branch_and_bound import Lattice, Search, levels_of
 from slam.tracker.matching.config import LocalConfig
 
-LEVELS = 3  # coarsest block of offsets: 8 x 8 neurons
+LEVELS = 3  # coarsest block of offsets: 8 x 8 cells
 FULL = 255.0  # integer that stands for the field's value 1
 
 
@@ -146,7 +146,7 @@ def _get_ready() -> None:
 def field_of(
     cell_map: CellMap, short_term: float, i0: int, j0: int, rows: int, columns: int
 ) -> NDArray[np.uint8]:
-    """(rows, columns) smoothed activities from neuron (i0, j0) on, which begins a block."""
+    """(rows, columns) smoothed activities from cell (i0, j0) on, which begins a block."""
     _get_ready()
     field = np.zeros((rows, columns), np.uint8)
     sigma = cell_map.config.frontend.sigma_cells

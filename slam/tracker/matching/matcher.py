@@ -136,7 +136,7 @@ class Matcher:
     ) -> Float:
         """Where to start climbing: the optimum for observations blurred by the prior's own spread.
 
-        Returns the prediction itself where the prior moves no observation by half a neuron.
+        Returns the prediction itself where the prior moves no observation by half a cell.
         """
         points = observations.points_robot
         if len(points) == 0:

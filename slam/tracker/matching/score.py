@@ -2,7 +2,7 @@
 """How well observations overlap the map, Eq. (13), and the climb to the pose where they do most.
 
 Sub-cell accuracy needs the overlap as a sum of Gaussians over the raw activities: interpolated or
-pre-blurred fields pull structure towards neuron centres, and a map that is rewritten from its own
+pre-blurred fields pull structure towards cell centres, and a map that is rewritten from its own
 poses then creeps. Gradient and curvature of that sum are analytic.
 """
 
@@ -71,8 +71,8 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
 ) -> None:
     """Overlap f of a Gaussian at (u, v) with the map, its gradient and its negative curvature.
 
-    (u, v) and ``cov`` (xx, xy, yy) are in cells, neuron (i, j) lies at (i, j). f is the sum over
-    neurons of Gaussian times activity, divided so that a lone landmark scores 1 on itself. Neurons
+    (u, v) and ``cov`` (xx, xy, yy) are in cells, cell (i, j) lies at (i, j). f is the sum over
+    cells of Gaussian times activity, divided so that a lone landmark scores 1 on itself. Cells
     of a surface that faces away from the observed one (``faced``) do not count.
     ``out``: f, df/du, df/dv, -d2f/du2, -d2f/dudv, -d2f/dv2.
     """

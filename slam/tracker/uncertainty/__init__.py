@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How sure the shunting SLAM is: pose covariance, residuals, odometry noise."""
+"""How sure a tracker is: pose covariance, residuals, odometry noise."""

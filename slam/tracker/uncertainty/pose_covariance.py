@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How sure the shunting SLAM is of its pose, in the map of the known start.
+"""How sure a tracker is of its pose, in the map of the known start.
 
 Three errors, kept apart because they grow differently:
 

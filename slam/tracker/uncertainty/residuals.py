@@ -88,7 +88,7 @@ def _offset(  # noqa: PLR0913 (kernel)
 
 @inner
 def _age(cells: Cells, u: float, v: float) -> float:
-    """For how long, s, the neuron nearest to (u, v) was looked at; 0 where none lives."""
+    """For how long, s, the cell nearest to (u, v) was looked at; 0 where none lives."""
     i, j = math.floor(u + 0.5), math.floor(v + 0.5)
     row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
     rows, columns = cells.directory.shape
