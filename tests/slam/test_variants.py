@@ -60,7 +60,7 @@ def test_create_sets_the_numbers_of_a_name(name: str) -> None:
     assert system.config.cell_m == 0.1
     assert system.config.tracking.relocalise.most == 3
     same = slam.create(name, config={"cell_m": 0.1, "tracking.relocalise.most": 3})
-    assert isinstance(same, ShuntingSlam)
+    assert isinstance(same, Tracker)
     assert same.config == system.config
 
 
