@@ -19,7 +19,7 @@ from sim.recording.verify import METADATA, Finding, check_hashes, finding, liste
 from slam.bounded import check_file
 from slam.errors import LogFormatError
 from slam.maps import has_sums, read_map
-from slam.shunting.map import io as memory
+from slam.tracker import map_file as memory
 
 _TABLES = ("runs.csv", "runs.json", "levels.csv")
 # What a verb always leaves, by the command in the recipe: a lost line is no way out.

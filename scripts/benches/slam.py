@@ -17,8 +17,8 @@ from sim.simulation import stream
 from slam.ekf.slam import EkfSlam
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.shunting.map.grid import living
-from slam.shunting.map.io import fill
+from slam.tracker.cells import living
+from slam.tracker.map_file import fill
 
 
 def updates(seconds: float) -> Iterator[Row]:

@@ -22,8 +22,8 @@ from slam.frontend.observations import from_features, from_scan
 from slam.frontend.odometry_sum import thinned
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.featured import FeaturedShuntingSlam
-from slam.shunting.map.rasterise import rasterise
 from slam.shunting.slam import ShuntingSlam
+from slam.tracker.rasterise import rasterise
 
 RED, BLUE, GREEN, GREY = "#ce2c3c", "#1f61be", "#168c5a", "#5b6472"
 STRIDE = 5

@@ -17,12 +17,12 @@ from slam.frames import Features, Float, Frame
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.energy import energy
-from slam.shunting.map.grid import SIDE
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import rasterise
 from slam.shunting.map.update import lateral_mu
-from slam.shunting.matching.matcher import Matcher
 from slam.shunting.slam import ShuntingSlam
+from slam.tracker.cells import SIDE
+from slam.tracker.matching.matcher import Matcher
+from slam.tracker.rasterise import rasterise
 
 
 def inputs_of(network: Network, shape: tuple[int, int], i0: int, j0: int) -> Float:

@@ -27,8 +27,8 @@ from sim.loop import LoopConfig
 from slam.maps import write_map
 from slam.shunting import ShuntingSlam
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.map import io as memory
 from slam.system import Raster
+from slam.tracker import map_file as memory
 
 Outcome = Any  # compared with ==
 COMPARED = Plan(

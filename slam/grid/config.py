@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers of the occupancy grid, beside those that it shares with "shunting"."""
+"""The numbers of the occupancy grid, beside those of every tracker."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 from slam.settings import Settings, number
-from slam.shunting.config import ShuntingConfig
+from slam.tracker.config import TrackerConfig
 
 OCTOMAP = "Hornung et al. 2013"
 
@@ -24,7 +24,7 @@ class GridConfig(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class OccupancyConfig(ShuntingConfig):
-    """As ``ShuntingConfig``, of whose map only ``cell_m`` counts here, and the grid's own."""
+class OccupancyConfig(TrackerConfig):
+    """As ``TrackerConfig``, of whose map only ``cell_m`` counts here, and the grid's own."""
 
     grid: GridConfig = field(default=GridConfig())

@@ -18,12 +18,11 @@ from slam._jit import njit
 from slam.frames import Float
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
 from slam.grid.config import OccupancyConfig
-from slam.shunting.config import ShuntingConfig
-from slam.shunting.map.grid import FREE_COUNT, MASK, SHIFT, SIDE, Cells
-from slam.shunting.map.network import Network
-from slam.shunting.map.update import in_reach
-from slam.shunting.slam import ShuntingSlam
+from slam.grid.submap import Submap
 from slam.system import Raster, register
+from slam.tracker.cell_map import CellMap
+from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells, in_reach
+from slam.tracker.tracker import Tracker
 
 
 class Odds(NamedTuple):
@@ -131,11 +130,13 @@ def _probabilities(
                     out[a, b] = 0.5 + 0.5 * math.tanh(0.5 * odds)
 
 
-class Grid(Network):
+class Grid(CellMap):
     """The same storage, and log-odds beside it.
 
     log_odds  (S, 8, 8) float32 by slot. Zero where no block lives: one that was written to stays
     """
+
+    config: OccupancyConfig
 
     def __init__(self, config: OccupancyConfig) -> None:
         super().__init__(config)
@@ -162,7 +163,7 @@ class Grid(Network):
     def integrate(
         self, view: View, T_map_laser: Float, step: float, *, write: bool
     ) -> tuple[float, float, int]:
-        """As ``Network.integrate``; a grid counts scans, but keeps for how long it has looked."""
+        """As ``CellMap.integrate``; a grid counts scans, but keeps for how long it has looked."""
         if write:
             reach = view.farthest
             x, y = float(T_map_laser[0]), float(T_map_laser[1])
@@ -189,15 +190,15 @@ class Grid(Network):
 
 
 @register("occupancy")
-class OccupancySlam(ShuntingSlam):
-    """An ordinary log-odds occupancy grid, with the matcher of "shunting"."""
+class OccupancySlam(Tracker):
+    """An ordinary log-odds occupancy grid, with the matcher of every tracker."""
 
-    config_class: ClassVar[type[ShuntingConfig]] = OccupancyConfig
+    config_class: ClassVar[type[OccupancyConfig]] = OccupancyConfig
     cells_hold = "probabilities"
 
     def __init__(
         self,
-        config: ShuntingConfig | str | Mapping[str, Any] = "robust",
+        config: OccupancyConfig | str | Mapping[str, Any] = "robust",
         *,
         cell_m: float | None = None,
     ) -> None:
@@ -205,15 +206,18 @@ class OccupancySlam(ShuntingSlam):
         given = self.config_class.of(config)
         super().__init__(given if cell_m is None else given.changed({"cell_m": cell_m}))
 
-    def _new_network(self) -> Network:
-        assert isinstance(self.config, OccupancyConfig)
-        return Grid(self.config)
+    @staticmethod
+    def _new_map(config: OccupancyConfig) -> Grid:
+        return Grid(config)
+
+    def _new_submap(self) -> Submap:
+        return Submap(self.config)
 
     def changes(self) -> None:
         """A grid has but one memory."""
 
     def map(self) -> Raster | None:
         """Probability of being occupied; NaN where nothing was ever seen."""
-        grid = self.network
+        grid = self.cell_map
         assert isinstance(grid, Grid)
         return grid.probabilities()

@@ -36,12 +36,12 @@ from slam.landmarks.association import ipjc
 from slam.landmarks.filter import EkfFilter
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.peaks import Peaks, peaks
-from slam.shunting.matching.matcher import Match, seen_by
-from slam.shunting.matching.score import evaluate
 from slam.shunting.slam import ShuntingSlam
-from slam.shunting.uncertainty.odometry_noise import OdometryNoise
-from slam.shunting.uncertainty.pose_covariance import PoseCovariance
 from slam.system import Estimate, register
+from slam.tracker.matching.matcher import Match, seen_by
+from slam.tracker.matching.score import evaluate
+from slam.tracker.uncertainty.odometry_noise import OdometryNoise
+from slam.tracker.uncertainty.pose_covariance import PoseCovariance
 
 # Weight of a logarithm of overlap, preset ``paper``. Features are independent, unlike beams (0.3);
 # and the lattice widens the bells of feature and peak to some three times their variances, which

@@ -3,43 +3,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import replace
-from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from slam import se2
-from slam.errors import InvalidValueError, LogFormatError
-from slam.estimate import Changes, Estimate, Raster
-from slam.frames import Float, Frame, Odometry
-from slam.frontend import odometry_steps
-from slam.frontend.observations import Observations, observe
-from slam.frontend.odometry_prior import Prediction, inverted, turned
-from slam.path import PosePath
+from slam.estimate import Changes, Raster
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map import export
-from slam.shunting.map import io as memory
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import rasterise
-from slam.shunting.matching.local_search import SearchWindow
-from slam.shunting.matching.matcher import Match, Matcher, unmatched
-from slam.shunting.tracking.loops import Loops
-from slam.shunting.tracking.quality import TrackingQuality
-from slam.shunting.tracking.relocalise import Relocalisation, coarse, slip, slipped
-from slam.shunting.uncertainty.odometry_noise import OdometryNoise
-from slam.shunting.uncertainty.pose_covariance import PoseCovariance
-from slam.shunting.uncertainty.residuals import Evidence, look
-from slam.shunting.warmup import warm_up
 from slam.system import register
-from slam.trajectory import Trajectory
+from slam.tracker.tracker import Tracker
 
 
 @register("shunting")
-class ShuntingSlam:
+class ShuntingSlam(Tracker):
     """Localise on the network, then let the network see the frame (Eqs. 8 and 13).
 
     ``config`` is a ``ShuntingConfig``, the name of a preset, "robust" (default) or "paper", or
@@ -50,223 +25,15 @@ class ShuntingSlam:
     config_class: ClassVar[type[ShuntingConfig]] = ShuntingConfig
     cells_hold = "activities"
 
-    def __init__(self, config: ShuntingConfig | str | Mapping[str, Any] = "robust") -> None:
-        self.config = self.config_class.of(config)
-        warm_up()
-        self.reset()
+    @staticmethod
+    def _new_map(config: ShuntingConfig) -> Network:
+        return Network(config)
 
-    def reset(self) -> None:
-        """Forget everything; the next frame is the origin of the map."""
-        self.network = self._new_network()
-        self._matcher = Matcher(self.config)
-        self._before: Odometry | None = None
-        self._resumed: Float | None = None
-        self._T_map_robot: Float = np.zeros(3)
-        self._numbers = self.config.tracking
-        self._pose_covariance = PoseCovariance(self.config)
-        self._odometry_noise = OdometryNoise.of_beams(self.config)
-        self._quality = TrackingQuality(self.config.freeze_below, self._numbers.quality)
-        self._relocalisation: Relocalisation | None = None
-        self._loops = Loops(self.config, self._matcher)
-        self._trusted = True  # the pose of the frame before
-        self._path = PosePath()
-
-    def _new_network(self) -> Network:
-        return Network(self.config)
-
-    def update(self, frame: Frame) -> Estimate:
-        """One frame in seven steps: from odometry and scan to pose, covariance and map.
-
-        Not converged while frozen, lost, or blind: a scan without a single return.
-        """
-        if self._before is None and self._resumed is None:
-            return self._first(frame)
-        self._path.check_order(frame.stamp_ns)
-        prediction = self._predict(frame.odometry)  # 1 odometry prior
-        observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
-        prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
-        evidence = self._compare(observations, match, prediction, state)  # 4 residuals
-        state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
-        self._update_uncertainty(
-            observations, prediction, match, evidence, state
-        )  # 6 pose, odometry noise
-        self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
-        return self._report(frame, match, state)
-
-    def _first(self, frame: Frame) -> Estimate:
-        twist = frame.odometry.twist
-        moving = np.zeros(3) if twist is None else np.asarray(twist)
-        observations = observe(frame, moving, self.config)
-        rasterise(self.network, observations, self._T_map_robot)
-        T_map_laser = se2.compose(self._T_map_robot, observations.T_robot_laser)
-        first_s = self.config.map.first_look_s
-        self.network.integrate(observations.view, T_map_laser, first_s, write=True)
-        match = unmatched(np.zeros(3), matched=1.0, score=0.0)
-        self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
-        return self._report(frame, match, "tracking" if len(observations.points_robot) else "blind")
-
-    def _predict(self, odometry: Odometry) -> Prediction:
-        """By odometry; on the first frame with a loaded map, where the robot was before."""
-        if self._before is not None:
-            return self._odometry_noise.predict(self._T_map_robot, self._before, odometry)
-        assert self._resumed is not None
-        return Prediction(
-            T_map_robot=self._T_map_robot,
-            increment=np.zeros(3),
-            covariance=self._resumed,
-            twist=np.zeros(3) if odometry.twist is None else np.asarray(odometry.twist),
-            elapsed=self.config.map.resumed_look_s,
-        )
-
-    def _localise(
-        self, observations: Observations, prediction: Prediction
-    ) -> tuple[Prediction, Match, str]:
-        """The pose by scan matching, or by relocalisation where the robot was lost; the state.
-
-        The prior comes back wider where enough is in view to correct what odometry alone told of
-        the pose before, and after a slip.
-        """
-        if float(observations.weights.sum()) >= self._numbers.relocalise.least_weight:
-            motion = prediction.T_map_robot - self._T_map_robot
-            prediction = replace(prediction, carried=self._pose_covariance.odometry_part(motion))
-        if self._relocalisation is not None:
-            match, state = self._recover(self._relocalisation, observations, prediction)
-            return prediction, match, state
-        match = _near(self._match(observations, prediction), prediction)
-        if match.slipped:
-            prediction = replace(prediction, covariance=slip(self._numbers.relocalise))
-        return prediction, match, "tracking"
-
-    def _match(self, observations: Observations, prediction: Prediction) -> Match:
-        """Climb from the prediction; search around it when that is vague or finds too little."""
-        predicted = prediction.T_map_robot
-        prior = prediction.prior
-        precision = inverted(prior)
-        start = self._matcher.approach(self.network, observations, predicted, prior)
-        match = self._matcher.climb(self.network, observations, start, predicted, precision)
-        numbers = self.config.matching.local
-        near, widest = SearchWindow.about(prior, numbers), SearchWindow.widest(numbers)
-        good = numbers.good_share * self._quality.usual_match()
-        poor = numbers.widest_share * good
-        vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > numbers.vague_cells * self.config.cell_m
-        for window, wanted in ((near, vague or match.matched < good), (widest, True)):
-            if not wanted or (window is widest and match.matched >= poor):
-                break
-            found = self._matcher.search(self.network, observations, predicted, precision, window)
-            if found.score > match.score:
-                match = found
-        if match.matched >= poor or not self._quality.is_worth_searching():
-            return match
-        usual = self._quality.usual_support()
-        shoved = slipped(self.network, self._matcher, observations, prediction, usual)
-        return match if shoved is None else shoved
-
-    def _recover(
-        self, recovery: Relocalisation, observations: Observations, prediction: Prediction
-    ) -> tuple[Match, str]:
-        """Dead reckoning, until one hypothesis alone explains what is seen."""
-        predicted = prediction.T_map_robot
-        precision = inverted(prediction.prior)
-        here = self._matcher.climb(self.network, observations, predicted, predicted, precision)
-        match = recovery.step(observations, prediction, here, self._quality.usual_support())
-        if match is not None:
-            self._relocalisation = None
-            self._quality.count(False)
-            self._pose_covariance.relocated(coarse(self._numbers.relocalise))
-            return match, "relocated"
-        if recovery.elapsed_s > self._numbers.quality.give_up_s:
-            # elsewhere: go on from here, as on the first frame
-            self._relocalisation = None
-            self._quality.give_up()
-        return unmatched(predicted, matched=here.matched, score=here.score), "lost"
-
-    def _compare(
-        self, observations: Observations, match: Match, prediction: Prediction, state: str
-    ) -> Evidence | None:
-        """What the observed surfaces say about the pose, before the map takes them in."""
-        if state != "tracking":
-            return None
-        short_term = self._matcher.reward.short_term
-        step, turn = min(prediction.elapsed, self.config.map.longest_look_s), len(self._path)
-        return look(self.network, short_term, observations, match.T_map_robot, step, turn)
-
-    def _update_map(
-        self, observations: Observations, match: Match, prediction: Prediction, state: str
-    ) -> str:
-        """Let the network see the frame, unless the map in view contradicts it; the state."""
-        if state != "tracking":
-            return state
-        rasterise(self.network, observations, match.T_map_robot)
-        T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
-        step = min(prediction.elapsed, self.config.map.longest_look_s)
-        doubt, doubtful = self._quality, False
-        enough = self._numbers.relocalise.least_weight
-        if float(observations.weights.sum()) >= enough and doubt.arises(match.matched):
-            confirmed, contradicted, _ = self.network.integrate(
-                observations.view, T_map_laser, step, write=False
-            )
-            motion = match.T_map_robot - self._T_map_robot
-            doubtful = doubt.denied(match.matched, confirmed, contradicted, motion)
-        doubt.count(doubtful)
-        if doubtful and doubt.scans <= doubt.config.patience:
-            self.network.release()
-            if doubt.scans >= doubt.config.lost_after and doubt.suspicious:
-                self._relocalisation = Relocalisation(self.network, self._matcher)
-            return "lost" if doubt.scans > doubt.config.lost_after else "frozen"
-        confirmed, contradicted, _ = self.network.integrate(
-            observations.view, T_map_laser, step, write=True
-        )
-        if len(observations.points_robot) == 0:
-            return "lost" if doubtful else "blind"  # odometry alone
-        if not doubtful:
-            doubt.learn(match.matched, confirmed, contradicted, prediction.elapsed)
-        return "lost" if doubtful else "tracking"
-
-    def _update_uncertainty(
-        self,
-        observations: Observations,
-        prediction: Prediction,
-        match: Match,
-        evidence: Evidence | None,
-        state: str,
-    ) -> None:
-        self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
-        if state == "tracking" and not match.slipped:
-            self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m)
-        else:
-            self._odometry_noise.skip()
-
-    def _add_to_path(
-        self, observations: Observations, match: Match, prediction: Prediction, state: str
-    ) -> None:
-        """For closing loops: motion as matched, or by odometry where an end of it is in doubt."""
-        motion = se2.between(self._T_map_robot, match.T_map_robot)
-        covariance = self._pose_covariance.newest_drift
-        if state != "tracking" or not self._trusted:
-            motion, covariance = prediction.increment, prediction.covariance
-        self._trusted = state in ("tracking", "relocated")
-        covariance = turned(covariance, -float(self._T_map_robot[2]))
-        self._loops.add(len(self._path), match.T_map_robot, motion, covariance, observations)
-
-    def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
-        self._before = frame.odometry
-        self._T_map_robot = match.T_map_robot
-        self._path.add(frame.stamp_ns, match.T_map_robot)
-        return Estimate(
-            stamp_ns=frame.stamp_ns,
-            T_map_robot=match.T_map_robot,
-            covariance=self._pose_covariance.covariance,
-            converged=state in ("tracking", "relocated"),
-            diagnostics={
-                "state": state,
-                "matched": match.matched,
-                "searched": match.searched,
-                "evaluations": match.evaluations,
-                "unobservable": self._pose_covariance.unobservable,
-                "unobservable_rad": self._pose_covariance.along_rad,
-                "nis": self._odometry_noise.nis,
-            },
-        )
+    @property
+    def network(self) -> Network:
+        """The map: neurons of Eq. (8)."""
+        assert isinstance(self.cell_map, Network)
+        return self.cell_map
 
     def map(self) -> Raster | None:
         """What exists, from either memory; NaN where no neuron lives (never seen, or seen empty:
@@ -277,58 +44,3 @@ class ShuntingSlam:
     def changes(self) -> Changes | None:
         """What appeared and what is gone lately; None without a map or a long-term memory."""
         return export.changes(self.network)
-
-    def window(
-        self, xmin: float, ymin: float, xmax: float, ymax: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Dense short-term x and long-term y of the neurons centred in the rectangle (map, m)."""
-        return self.network.window(xmin, ymin, xmax, ymax)
-
-    def save(self, path: Path) -> None:
-        """Write map, knobs and pose to a file for ``load``; raises ``OutputError``."""
-        state = memory.State(
-            kind=type(self).__name__,
-            T_map_robot=self._T_map_robot,
-            covariance=self._pose_covariance.covariance,
-            usual=tuple(self._quality.matches),
-            supports=tuple(self._quality.supports),
-            tracked_s=self._quality.tracked_s,
-            tracked=self._quality.tracked,
-        )
-        memory.save(path, self.network, state)
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """A SLAM that goes on in the map of a file, with new odometry and a new clock.
-
-        The robot is looked for around where it was, then in the whole map. The trajectory begins
-        with the first frame. Raises ``LogFormatError`` for a file that is not one of ``save``.
-        """
-        config, state, arrays = memory.read(path, cls.config_class)
-        if state.kind != cls.__name__:
-            raise LogFormatError(path, f"a map of {state.kind}, not of {cls.__name__}")
-        slam = cls.__new__(cls)
-        slam.config = config
-        warm_up()
-        slam.reset()
-        try:
-            memory.fill(slam.network, arrays)
-        except InvalidValueError as error:  # blocks farther apart than a map can be
-            raise LogFormatError(path, str(error)) from error
-        slam._T_map_robot = state.T_map_robot
-        slam._resumed = state.covariance + coarse(config.tracking.relocalise)
-        slam._pose_covariance.resumed(state.covariance)
-        slam._quality.resume(state.usual, state.supports, state.tracked_s, state.tracked)
-        return slam
-
-    def trajectory(self) -> Trajectory:
-        """The poses with loops closed; the online ones up to 100 m of way, or without a loop."""
-        return self._path.trajectory(self._loops.corrected(self._path.poses()))
-
-
-def _near(match: Match, prediction: Prediction) -> Match:
-    """The match, or odometry alone where rounding has carried it past all places and numbers."""
-    off = np.abs(match.T_map_robot - prediction.T_map_robot)
-    if off.max() <= odometry_steps.MOST_STEP_M and np.isfinite(match.information).all():
-        return match
-    return unmatched(prediction.T_map_robot, matched=0.0, score=0.0)

@@ -17,6 +17,7 @@ from slam.frames import Frame
 from slam.odometry import OdometrySlam
 from slam.settings import Settings, number
 from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.tracker.tracker import Tracker
 from slam.variants import named, parsed, with_set
 from tests.world2d import Drive, World2D, arena, frames, laser
 
@@ -55,11 +56,11 @@ def test_a_name_carries_numbers_there_and_back() -> None:
 @pytest.mark.parametrize("name", ["shunting", "shunting-features", "occupancy"])
 def test_create_sets_the_numbers_of_a_name(name: str) -> None:
     system = slam.create(name + "{cell_m=0.1,tracking.relocalise.most=3}")
-    assert isinstance(system, ShuntingSlam)
+    assert isinstance(system, Tracker)
     assert system.config.cell_m == 0.1
     assert system.config.tracking.relocalise.most == 3
     same = slam.create(name, config={"cell_m": 0.1, "tracking.relocalise.most": 3})
-    assert isinstance(same, ShuntingSlam)
+    assert isinstance(same, Tracker)
     assert same.config == system.config
 
 

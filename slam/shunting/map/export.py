@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.estimate import Changes, Raster
-from slam.shunting.map.grid import dense
 from slam.shunting.map.network import Network
+from slam.tracker.cells import dense
 
 
 def existence(network: Network) -> Raster | None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from slam._jit import inner, njit
 from slam.frontend.surfaces import opposite
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
-from slam.shunting.map.grid import FREE_COUNT, MASK, SHIFT, SIDE, Cells
+from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells, in_reach
 
 
 class Law(NamedTuple):
@@ -71,20 +71,6 @@ def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
                 if above > 0.0:
                     total += law.mu / d * above
     return total
-
-
-@inner
-def in_reach(
-    cells: Cells, view: View, ox: float, oy: float, size: float
-) -> tuple[int, int, int, int]:
-    """Directory rows and columns (first, past the last, each) that the view may reach."""
-    rows, columns = cells.directory.shape
-    return (
-        max(0, math.floor((oy - view.farthest) / size) - cells.corner[1] - 1),
-        min(rows, math.floor((oy + view.farthest) / size) - cells.corner[1] + 2),
-        max(0, math.floor((ox - view.farthest) / size) - cells.corner[0] - 1),
-        min(columns, math.floor((ox + view.farthest) / size) - cells.corner[0] + 2),
-    )
 
 
 @njit

@@ -16,7 +16,7 @@ from slam.frontend.seen_space import FREE_WITHOUT_RETURN_M
 from slam.frontend.visibility import View
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import rasterise
+from slam.tracker.rasterise import rasterise
 from tests.world2d import World2D, laser, rectangle
 
 Array = NDArray[np.float64]

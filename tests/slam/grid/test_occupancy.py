@@ -9,8 +9,8 @@ import pytest
 from slam import se2
 from slam.frontend.observations import from_scan
 from slam.grid.occupancy import Grid, OccupancySlam
-from slam.shunting.map.grid import living
-from slam.shunting.uncertainty.residuals import look
+from slam.tracker.cells import living
+from slam.tracker.uncertainty.residuals import look
 from tests.world2d import World2D, arena, frames, laser, wander
 
 CELL_M = 0.05
@@ -27,7 +27,7 @@ def driven():
 
 def test_cells_know_for_how_long_they_were_looked_at(driven):
     system, stream = driven
-    grid = system.network
+    grid = system.cell_map
     assert isinstance(grid, Grid)
     slots, _ = living(grid.cells)
     ages, log_odds = grid.cells.age[slots], grid.log_odds[slots]
@@ -46,13 +46,13 @@ def test_a_look_weighs_less_the_longer_a_cell_was_looked_at(driven):
     assert scan is not None
     seen = from_scan(scan, np.zeros(3), system.config)
     pose = se2.between(stream[0].truth, stream[-1].truth)
-    ages = system.network.cells.age.copy()
+    ages = system.cell_map.cells.age.copy()
     shares = []
     for factor in (0.0, 1.0, 10.0):
-        system.network.cells.age[:] = factor * ages
-        evidence = look(system.network, 0.0, seen, pose, 0.2, 0)
+        system.cell_map.cells.age[:] = factor * ages
+        evidence = look(system.cell_map, 0.0, seen, pose, 0.2, 0)
         shares.append(evidence.new / evidence.weighed)
-    system.network.cells.age[:] = ages
+    system.cell_map.cells.age[:] = ages
     assert 1.0 >= shares[0] > shares[1] > shares[2] > 0.0
 
 
@@ -61,6 +61,6 @@ def test_a_saved_grid_comes_back_with_its_log_odds(driven, tmp_path):
     system.save(tmp_path / "map.npz")
     back = OccupancySlam.load(tmp_path / "map.npz")
     np.testing.assert_array_equal(back.map().values, system.map().values)
-    slots, _ = living(back.network.cells)
-    ages = back.network.cells.age[slots]
+    slots, _ = living(back.cell_map.cells)
+    ages = back.cell_map.cells.age[slots]
     assert ages.min() == 0.0 < ages.max() < 60.0

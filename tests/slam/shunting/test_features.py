@@ -20,8 +20,8 @@ from slam.shunting.config import ShuntingConfig
 from slam.shunting.featured import PAPER_REWARD, FeaturedShuntingSlam
 from slam.shunting.map.network import Network
 from slam.shunting.map.peaks import peaks
-from slam.shunting.map.rasterise import rasterise
-from slam.shunting.matching.matcher import Match
+from slam.tracker.matching.matcher import Match
+from slam.tracker.rasterise import rasterise
 from slam.trajectory import Trajectory
 
 

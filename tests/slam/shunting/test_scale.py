@@ -12,12 +12,12 @@ from scripts.benches.slam import enlarge
 from slam import se2
 from slam.frontend.observations import from_scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.shunting.map.grid import FREE_COUNT, TOUCHED_COUNT, living
 from slam.shunting.map.network import Network
-from slam.shunting.map.rasterise import rasterise
-from slam.shunting.matching.branch_and_bound import Search
-from slam.shunting.matching.local_search import SearchWindow
-from slam.shunting.matching.matcher import Matcher
+from slam.tracker.cells import FREE_COUNT, TOUCHED_COUNT, living
+from slam.tracker.matching.branch_and_bound import Search
+from slam.tracker.matching.local_search import SearchWindow
+from slam.tracker.matching.matcher import Matcher
+from slam.tracker.rasterise import rasterise
 from tests.world2d import World2D, arena, frames, laser, office, office_loop, wander
 
 CONFIG = ShuntingConfig(cell_m=0.05)
@@ -121,7 +121,7 @@ def test_every_slot_is_either_free_or_lives_once() -> None:
 def test_the_whole_map_is_searched_alike_on_any_number_of_threads(
     saved: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from slam.shunting.matching import branch_and_bound, global_search
+    from slam.tracker.matching import branch_and_bound, global_search
 
     slam = ShuntingSlam.load(saved)
     assert STREAM[50].scan is not None

@@ -18,7 +18,7 @@ from slam.compiling import COMPILING
 from slam.errors import InvalidValueError
 from slam.frames import Features, Frame, Odometry, Scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.shunting.matching import local_search
+from slam.tracker.matching import local_search
 from tests.world2d import Chairs, Drive, World2D, arena, frames, going_on, laser, rectangle, wander
 
 Array = NDArray[np.float64]

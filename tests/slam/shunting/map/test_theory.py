@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from slam.frontend.visibility import View
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.energy import energy
-from slam.shunting.map.grid import FREE_COUNT, SIDE, TOUCHED_COUNT
 from slam.shunting.map.network import Network
+from slam.tracker.cells import FREE_COUNT, SIDE, TOUCHED_COUNT
 
 Array = NDArray[np.float64]
 CELL, ACROSS = 0.1, 2  # blocks along an edge of the test fields

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a map's cells are kept: blocks of 8 x 8 in a pool, found through a directory.
+
+A cell costs memory only where its block lives; a block is born under an impression and dies when
+every cell in it is silent.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import inner, njit
+from slam.frontend.visibility import View
+
+SIDE = 8  # cells along a block's edge
+SHIFT, MASK = 3, 7  # i >> SHIFT is the block of cell i, i & MASK its place inside
+
+FREE_COUNT, TOUCHED_COUNT = 0, 1  # places in ``Cells.counts``
+_FIRST_SLOTS, _FIRST_TOUCHED, _FIRST_ACROSS = 64, 64, 64
+
+
+class Cells(NamedTuple):
+    """The arrays of the map, as the kernels see them. S slots, T touched blocks.
+
+    directory   (rows, columns) int32: slot of a block, -1 where none lives
+    corner      (2,) int64: block index (x, y) of directory[0, 0]
+    x           (S, 8, 8) float32: short-term activity in [0, 1); indexed [slot, row, col]
+    y           (S, 8, 8) float32: long-term trace, the running mean of the input
+    age         (S, 8, 8) float32: s of looking that ``y`` averages over
+    facing      (S, 8, 8) uint8: the way the surface faces that was traced there (``surfaces.face``)
+    free        (S,) int32: stack of unused slots
+    scratch_of  (S,) int32: row of ``impression`` of a slot the present scan touches, else -1
+    impression  (T, 8, 8) float32: I of the present scan
+    faced       (T, 8, 8) uint8: the way the surface faces that makes the impression
+    touched     (T, 4) int32: slot with an impression, block index (x, y), 1 if it was born for it
+    counts      (2,) int64: unused slots, touched blocks
+    """
+
+    directory: NDArray[np.int32]
+    corner: NDArray[np.int64]
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    age: NDArray[np.float32]
+    facing: NDArray[np.uint8]
+    free: NDArray[np.int32]
+    scratch_of: NDArray[np.int32]
+    impression: NDArray[np.float32]
+    faced: NDArray[np.uint8]
+    touched: NDArray[np.int32]
+    counts: NDArray[np.int64]
+
+
+def no_cells() -> Cells:
+    """A plane on which nothing lives yet."""
+    shape = (_FIRST_SLOTS, SIDE, SIDE)
+    return Cells(
+        directory=np.full((_FIRST_ACROSS, _FIRST_ACROSS), -1, np.int32),
+        corner=np.array([-_FIRST_ACROSS // 2, -_FIRST_ACROSS // 2], np.int64),
+        x=np.zeros(shape, np.float32),
+        y=np.zeros(shape, np.float32),
+        age=np.zeros(shape, np.float32),
+        facing=np.zeros(shape, np.uint8),
+        free=np.arange(_FIRST_SLOTS, dtype=np.int32)[::-1].copy(),
+        scratch_of=np.full(_FIRST_SLOTS, -1, np.int32),
+        impression=np.zeros((_FIRST_TOUCHED, SIDE, SIDE), np.float32),
+        faced=np.zeros((_FIRST_TOUCHED, SIDE, SIDE), np.uint8),
+        touched=np.zeros((_FIRST_TOUCHED, 4), np.int32),
+        counts=np.array([_FIRST_SLOTS, 0], np.int64),
+    )
+
+
+def with_room(old: Cells) -> Cells:
+    """More of what ran out: slots in the pool, or scratch for impressions.
+
+    The pool grows by a sixteenth, so that little of it is ever unused.
+    """
+    cells = old
+    if old.counts[FREE_COUNT] == 0:
+        slots = len(old.free)
+        more = max(32, slots // 16)
+        free = np.zeros(slots + more, np.int32)
+        free[:more] = np.arange(slots + more - 1, slots - 1, -1)
+        cells = cells._replace(
+            x=_longer(old.x, more, 0),
+            y=_longer(old.y, more, 0),
+            age=_longer(old.age, more, 0),
+            facing=_longer(old.facing, more, 0),
+            free=free,
+            scratch_of=_longer(old.scratch_of, more, -1),
+        )
+        cells.counts[FREE_COUNT] = more
+    if old.counts[TOUCHED_COUNT] == len(old.touched):
+        more = len(old.touched) // 8
+        cells = cells._replace(
+            impression=_longer(old.impression, more, 0),
+            faced=_longer(old.faced, more, 0),
+            touched=_longer(old.touched, more, 0),
+        )
+    return cells
+
+
+def _longer(array: NDArray[Any], more: int, fill: float) -> NDArray[Any]:
+    return np.concatenate([array, np.full((more, *array.shape[1:]), fill, array.dtype)])
+
+
+def living(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Slots (n,) of the living blocks and their block indices (n, 2: x, y), by rows."""
+    rows, columns = np.nonzero(cells.directory >= 0)
+    return cells.directory[rows, columns], np.stack([columns, rows], axis=1) + cells.corner
+
+
+@njit
+def forget_impressions(cells: Cells) -> None:
+    """Release the scratch of the present impressions; blocks that never came to life die."""
+    for k in range(cells.counts[TOUCHED_COUNT]):
+        slot, born = cells.touched[k, 0], cells.touched[k, 3]
+        cells.scratch_of[slot] = -1
+        row, column = cells.touched[k, 2] - cells.corner[1], cells.touched[k, 1] - cells.corner[0]
+        if born == 0 or cells.directory[row, column] != slot:
+            continue  # what died in the update is free already
+        alive = False
+        for j in range(SIDE):
+            for i in range(SIDE):
+                alive |= cells.x[slot, j, i] != 0.0 or cells.age[slot, j, i] != 0.0
+        if not alive:
+            cells.directory[row, column] = -1
+            cells.free[cells.counts[FREE_COUNT]] = slot
+            cells.counts[FREE_COUNT] += 1
+    cells.counts[TOUCHED_COUNT] = 0
+
+
+def dense(
+    cells: Cells, i0: int, j0: int, shape: tuple[int, int]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """x and y of cells (i0 + column, j0 + row), 0 where nothing lives."""
+    top, left = j0 >> SHIFT, i0 >> SHIFT
+    rows = np.arange(top, ((j0 + shape[0] - 1) >> SHIFT) + 1) - int(cells.corner[1])
+    columns = np.arange(left, ((i0 + shape[1] - 1) >> SHIFT) + 1) - int(cells.corner[0])
+    x, y = (np.zeros((len(rows), SIDE, len(columns), SIDE), np.float32) for _ in range(2))
+    inside_r = np.flatnonzero((rows >= 0) & (rows < cells.directory.shape[0]))
+    inside_c = np.flatnonzero((columns >= 0) & (columns < cells.directory.shape[1]))
+    slots = cells.directory[np.ix_(rows[inside_r], columns[inside_c])]
+    a, b = np.nonzero(slots >= 0)
+    x[inside_r[a], :, inside_c[b]] = cells.x[slots[a, b]]
+    y[inside_r[a], :, inside_c[b]] = cells.y[slots[a, b]]
+    window = np.s_[j0 - top * SIDE :, i0 - left * SIDE :]
+    flat = (len(rows) * SIDE, len(columns) * SIDE)
+    return (
+        x.reshape(flat)[window][: shape[0], : shape[1]].copy(),
+        y.reshape(flat)[window][: shape[0], : shape[1]].copy(),
+    )
+
+
+@inner
+def in_reach(
+    cells: Cells, view: View, ox: float, oy: float, size: float
+) -> tuple[int, int, int, int]:
+    """Directory rows and columns (first, past the last, each) that the view may reach."""
+    rows, columns = cells.directory.shape
+    return (
+        max(0, math.floor((oy - view.farthest) / size) - cells.corner[1] - 1),
+        min(rows, math.floor((oy + view.farthest) / size) - cells.corner[1] + 2),
+        max(0, math.floor((ox - view.farthest) / size) - cells.corner[0] - 1),
+        min(columns, math.floor((ox + view.farthest) / size) - cells.corner[0] + 2),
+    )

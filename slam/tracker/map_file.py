@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A SLAM's memory as a file: its config, the living cells, and where the robot was.
+
+A NumPy archive (.npz) without pickled objects. ``header`` is JSON text with ``format``, ``version``
+and ``state``; ``places`` (n, 2) are the blocks' indices (x, y); ``x``, ``y``, ``age`` and
+``facing`` (n, 8, 8) their cells. The header's ``sha256`` is the sum of all the rest; maps of
+before it have none, which is said in the log. Older readers refuse newer versions.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam.archives import read_arrays
+from slam.checked import covariance, pose
+from slam.errors import InvalidValueError, LogFormatError
+from slam.files import replacing
+from slam.frames import Float
+from slam.tracker.cell_map import CellMap
+from slam.tracker.cells import FREE_COUNT, SIDE, living
+from slam.tracker.config import TrackerConfig
+
+FORMAT, VERSION = "mobilia shunting memory", 1
+Config = TypeVar("Config", bound=TrackerConfig)
+_ARRAYS = ("places", "x", "y", "age", "facing")
+# What a file may claim.
+MAX_BYTES = 1 << 30  # of all arrays: 1.2 million blocks, 70 000 m^2 of cells of 3 cm
+FARTHEST = 1 << 20  # blocks from the origin: 250 km
+MOST_AGE_S = 1.5e8  # 13 times the slowest pace, two minutes a scan
+MOST_ODDS = 3.5  # as in ``slam.grid.occupancy``
+MOST_POSE = 1e6  # m and rad, and standard deviations
+MOST_VALUES, MOST_COUNT = 10_000, 1e12
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State:
+    """What a SLAM must know beside its network to go on.
+
+    kind         which SLAM wrote the map: "ShuntingSlam", "OccupancySlam", ...
+    T_map_robot  (3,) where the robot was, and its (3, 3) covariance
+    usual        latest matched fractions; ``supports`` the same times the confirmed map
+    tracked_s    s of tracking on this map, and in how many scans
+    """
+
+    kind: str
+    T_map_robot: Float
+    covariance: Float
+    usual: tuple[float, ...]
+    supports: tuple[float, ...]
+    tracked_s: float
+    tracked: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_map_robot", pose("State", "T_map_robot", self.T_map_robot))
+        object.__setattr__(self, "covariance", covariance("State", "covariance", self.covariance))
+        if not isinstance(self.kind, str):
+            raise InvalidValueError(f"State.kind must be a word, got {self.kind!r:.40}")
+        if max(map(abs, self.T_map_robot.tolist())) > MOST_POSE:
+            raise InvalidValueError(f"State.T_map_robot must lie within {MOST_POSE:g} m and rad")
+        if self.covariance.max() > MOST_POSE**2:
+            raise InvalidValueError(f"State.covariance must lie within {MOST_POSE:g}^2")
+        for name in ("usual", "supports"):
+            values = getattr(self, name)
+            if not isinstance(values, (list, tuple)) or len(values) > MOST_VALUES:
+                raise InvalidValueError(f"State.{name} must be up to {MOST_VALUES} numbers")
+            for value in values:
+                _positive(name, value, (int, float))
+        _positive("tracked_s", self.tracked_s, (int, float))
+        _positive("tracked", self.tracked, (int,))
+
+
+def _positive(name: str, value: object, kinds: tuple[type, ...]) -> None:
+    """Raise ``InvalidValueError`` unless it is a number from 0 to ``MOST_COUNT``."""
+    number = isinstance(value, kinds) and not isinstance(value, bool)
+    if not number or not 0.0 <= value <= MOST_COUNT:  # type: ignore[operator]
+        raise InvalidValueError(
+            f"State.{name} must be a number in [0, {MOST_COUNT:g}], got {value!r:.40}"
+        )
+
+
+def save(path: Path, cell_map: CellMap, state: State) -> None:
+    """Write both; the file appears whole or not at all. Raises ``OutputError``."""
+    slots, places = living(cell_map.cells)
+    header: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "config": cell_map.config.as_words(),
+        "config_sha256": cell_map.config.sha256(),
+        "state": dataclasses.asdict(state)
+        | {"T_map_robot": state.T_map_robot.tolist(), "covariance": state.covariance.tolist()},
+    }
+    cells = cell_map.cells
+    arrays: dict[str, NDArray[Any]] = {
+        "places": places,
+        "x": cells.x[slots],
+        "y": cells.y[slots],
+        "age": cell_map.kept(slots),
+        "facing": cells.facing[slots],
+    }
+    header["sha256"] = _sum(header, arrays)
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        content: Any = {"header": np.array(json.dumps(header)), **arrays}
+        np.savez_compressed(file, **content)
+
+
+def _sum(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> str:
+    """Of the header but its own entry, and of all arrays."""
+    rest = {name: value for name, value in header.items() if name != "sha256"}
+    found = hashlib.sha256(json.dumps(rest, sort_keys=True).encode())
+    for name in _ARRAYS:
+        array = np.ascontiguousarray(arrays[name])
+        found.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        found.update(array.tobytes())
+    return found.hexdigest()
+
+
+def check(path: Path) -> None:
+    """Raise ``LogFormatError`` for a file that is not whole, whatever SLAM wrote it."""
+    _whole(path)
+
+
+def read(path: Path, kind: type[Config]) -> tuple[Config, State, dict[str, NDArray[Any]]]:
+    """Config of that ``kind``, state and arrays of a file that ``save`` wrote.
+
+    Raises ``LogFormatError`` for a file that is missing, cut short, damaged, of another kind, of a
+    newer version, or that claims more than a map can have (``MAX_BYTES``, checked before anything
+    is unpacked).
+    """
+    header, state, arrays = _whole(path)
+    try:
+        config = kind.from_words(header["config"])
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise LogFormatError(path, f"damaged {FORMAT}: {error}") from error
+    return config, state, arrays
+
+
+def _whole(path: Path) -> tuple[dict[str, Any], State, dict[str, NDArray[Any]]]:
+    arrays = read_arrays(path, ("header", *_ARRAYS), max_bytes=MAX_BYTES)
+    header = _header(path, arrays.pop("header"))
+    _check(path, arrays)
+    if "sha256" not in header:
+        _log.warning("%s: a map of before sums; damage to it would not be noticed", path)
+    elif header["sha256"] != _sum(header, arrays):
+        raise LogFormatError(path, f"damaged {FORMAT}: its content is not what was written")
+    try:
+        state = State(**header["state"])
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise LogFormatError(path, f"damaged {FORMAT}: {error}") from error
+    _check_ages(path, arrays["age"], state.kind)
+    return header, state, arrays
+
+
+def _header(path: Path, text: NDArray[Any]) -> dict[str, Any]:
+    """The words; a number in them that is NaN or infinite is no JSON."""
+
+    def refuse(word: str) -> None:
+        raise ValueError(f"{word} is no number")
+
+    try:
+        header = json.loads(str(text), parse_constant=refuse)
+    except (ValueError, RecursionError) as error:
+        raise LogFormatError(path, f"not a whole {FORMAT}: its header: {error}") from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise LogFormatError(path, f"not a {FORMAT}")
+    if header.get("version") != VERSION:
+        raise LogFormatError(
+            path, f"version {header.get('version')!r} of a {FORMAT}; {VERSION} is known"
+        )
+    unknown = sorted(
+        set(header) - {"format", "version", "config", "config_sha256", "state", "sha256"}
+    )
+    if unknown:
+        raise LogFormatError(path, f"damaged {FORMAT}: its header has {unknown[0][:40]!r}")
+    return header
+
+
+def _check(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
+    n = len(arrays["places"]) if arrays["places"].ndim else 0
+    for name, shape, kind in (
+        ("places", (n, 2), np.int64),
+        ("x", (n, SIDE, SIDE), np.float32),
+        ("y", (n, SIDE, SIDE), np.float32),
+        ("age", (n, SIDE, SIDE), np.float32),
+        ("facing", (n, SIDE, SIDE), np.uint8),
+    ):
+        array = arrays[name]
+        if array.shape != shape or array.dtype != kind or not np.isfinite(array).all():
+            raise LogFormatError(path, f"{name} must be finite {kind.__name__} of shape {shape}")
+    for name in ("x", "y"):
+        if n and not 0.0 <= arrays[name].min() <= arrays[name].max() <= 1.0:
+            raise LogFormatError(path, f"{name} must lie in [0, 1]")
+    places = arrays["places"]
+    if n and (places.min() <= -FARTHEST or places.max() >= FARTHEST):
+        raise LogFormatError(path, f"places must lie within {FARTHEST} blocks")
+    if len(np.unique(places, axis=0)) != n:
+        raise LogFormatError(path, "places: a block occurs twice")
+
+
+def _check_ages(path: Path, ages: NDArray[Any], kind: str) -> None:
+    """Seconds of looking; of an ordinary grid, log-odds."""
+    least = -MOST_ODDS if kind == "OccupancySlam" else 0.0
+    most = MOST_ODDS if kind == "OccupancySlam" else MOST_AGE_S
+    if ages.size and not least <= ages.min() <= ages.max() <= most:
+        raise LogFormatError(path, f"age must lie in [{least:g}, {most:g}] in a map of {kind}")
+
+
+def fill(cell_map: CellMap, arrays: dict[str, NDArray[Any]]) -> None:
+    """Let the blocks of a file live in an empty ``cell_map``."""
+    places = arrays["places"]
+    if len(places) == 0:
+        return
+    size = SIDE * cell_map.cell
+    low, high = places.min(axis=0) * size, (places.max(axis=0) + 1) * size
+    cell_map.cover(float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+    for k, (column, row) in enumerate((places - cell_map.cells.corner).tolist()):
+        if cell_map.cells.counts[FREE_COUNT] == 0:
+            cell_map.grow()
+        cells = cell_map.cells
+        cells.counts[FREE_COUNT] -= 1
+        slot = int(cells.free[cells.counts[FREE_COUNT]])
+        cells.directory[row, column] = slot
+        cells.x[slot], cells.y[slot] = arrays["x"][k], arrays["y"][k]
+        cells.facing[slot] = arrays["facing"][k]
+        cell_map.restore(slot, arrays["age"][k])

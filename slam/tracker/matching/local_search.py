@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Multi-resolution search for the pose in a wide window (section 3.4), by branch and bound.
+
+A field of smoothed activities in small integers is built once; its sliding maxima over 2, 4, 8
+cells bound the overlap of whole blocks of offsets from above. The prior enters a bound with what
+its heading alone costs, so no bound is ever too low and the result equals exhaustive search.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import njit
+from slam.compiling import announced
+from slam.frames import Float
+from slam.frontend.observations import Observations
+from slam.tracker.cell_map import CellMap
+from slam.tracker.cells import MASK, SHIFT, SIDE, Cells, no_cells
+from slam.tracker.matching.branch_and_bound import Lattice, Search, levels_of
+from slam.tracker.matching.config import LocalConfig
+
+LEVELS = 3  # coarsest block of offsets: 8 x 8 cells
+FULL = 255.0  # integer that stands for the field's value 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchWindow:
+    """Half widths about the prediction: ``reach_m`` along x and y, ``turn_rad`` in heading."""
+
+    reach_m: float
+    turn_rad: float
+
+    @classmethod
+    def about(cls, prior: Float, config: LocalConfig) -> SearchWindow:
+        """Some standard deviations of a (3, 3) prior, within the widest."""
+        reach_m = config.sigmas * math.sqrt(max(prior[0, 0], prior[1, 1]))
+        turn_rad = config.sigmas * math.sqrt(prior[2, 2])
+        return cls(
+            reach_m=min(max(reach_m, config.least_m), config.reach_m),
+            turn_rad=min(max(turn_rad, config.least_rad), config.turn_rad),
+        )
+
+    @classmethod
+    def widest(cls, config: LocalConfig) -> SearchWindow:
+        """As far as is ever searched around a prediction."""
+        return cls(reach_m=config.reach_m, turn_rad=config.turn_rad)
+
+
+@njit
+def _field(  # noqa: C901, PLR0912 (kernel)
+    cells: Cells,
+    short_term: float,
+    i0: int,
+    j0: int,
+    kernel: NDArray[np.float64],
+    out: NDArray[np.uint8],
+) -> None:
+    """Activities smoothed by the (5,) kernel along both axes, in ``out[j - j0, i - i0]``.
+
+    (i0, j0) is the corner of a block, ``out`` a whole number of blocks. Zero where no block lives.
+    """
+    rows, columns = cells.directory.shape
+    padded = np.empty((SIDE + 4, SIDE + 4))
+    smooth = np.empty((SIDE + 4, SIDE))
+    for block_row in range(out.shape[0] >> SHIFT):
+        row = (j0 >> SHIFT) + block_row - cells.corner[1]
+        if row < 0 or row >= rows:
+            continue
+        for block_column in range(out.shape[1] >> SHIFT):
+            column = (i0 >> SHIFT) + block_column - cells.corner[0]
+            if column < 0 or column >= columns or cells.directory[row, column] < 0:
+                continue
+            for a in range(SIDE + 4):
+                for b in range(SIDE + 4):
+                    r, q = row + ((a - 2) >> SHIFT), column + ((b - 2) >> SHIFT)
+                    value = 0.0
+                    if 0 <= r < rows and 0 <= q < columns:
+                        slot = cells.directory[r, q]
+                        if slot >= 0:
+                            y = cells.y[slot, (a - 2) & MASK, (b - 2) & MASK]
+                            x = cells.x[slot, (a - 2) & MASK, (b - 2) & MASK]
+                            value = y + (1.0 - y) * short_term * x
+                    padded[a, b] = value
+            for a in range(SIDE + 4):
+                for b in range(SIDE):
+                    total = 0.0
+                    for m in range(5):
+                        total += kernel[m] * padded[a, b + m]
+                    smooth[a, b] = total
+            for a in range(SIDE):
+                for b in range(SIDE):
+                    total = 0.0
+                    for m in range(5):
+                        total += kernel[m] * smooth[a + m, b]
+                    out[block_row * SIDE + a, block_column * SIDE + b] = np.uint8(
+                        min(255.0, 255.0 * total + 0.5)
+                    )
+
+
+@njit
+def place(  # noqa: PLR0913 (kernel)
+    points: NDArray[np.float64],
+    prediction: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    cell: float,
+    i0: int,
+    j0: int,
+    out: NDArray[np.int32],
+) -> None:
+    """Column and row of each point at each heading, for the predicted position."""
+    for h in range(len(turns)):
+        c, s = math.cos(prediction[2] + turns[h]), math.sin(prediction[2] + turns[h])
+        for k in range(len(points)):
+            x = c * points[k, 0] - s * points[k, 1] + prediction[0]
+            y = s * points[k, 0] + c * points[k, 1] + prediction[1]
+            out[h, k, 0] = math.floor(x / cell) - i0
+            out[h, k, 1] = math.floor(y / cell) - j0
+
+
+@functools.cache
+def _kernel(sigma: float) -> Float:
+    """Gaussian taps such that a lone landmark's field is 1 at its centre."""
+    taps = np.array([math.exp(-0.5 * (m / sigma) ** 2) for m in (-2, -1, 0, 1, 2)])
+    return taps / math.sqrt(math.pi * sigma**2)
+
+
+@functools.cache
+def _get_ready() -> None:
+    """Run every kernel of a search once, the first time in a process."""
+    with announced("the kernels of the wide search"):
+        field, bases = np.zeros((2 * SIDE, 2 * SIDE), np.uint8), np.empty((1, 1, 2), np.int32)
+        _field(no_cells(), 0.3, 0, 0, _kernel(1.0), field)
+        place(np.ones((1, 2)), np.zeros(3), np.zeros(1), 0.2, 0, 0, bases)
+        lattice = Lattice(
+            levels=levels_of(field, 1), bases=bases, turns=np.zeros(1), reach=1, pitch=0.2,
+            precision=np.eye(3), gain=1.0,
+        )  # fmt: skip
+        Search(lattice, threads=1).best()
+
+
+def field_of(
+    cell_map: CellMap, short_term: float, i0: int, j0: int, rows: int, columns: int
+) -> NDArray[np.uint8]:
+    """(rows, columns) smoothed activities from cell (i0, j0) on, which begins a block."""
+    _get_ready()
+    field = np.zeros((rows, columns), np.uint8)
+    sigma = cell_map.config.frontend.sigma_cells
+    _field(cell_map.cells, short_term, i0, j0, _kernel(sigma), field)
+    return field
+
+
+def headings(points: Float, window: SearchWindow, cell: float, config: LocalConfig) -> Float:
+    """Turns to try, rad: a far point moves little between two of them."""
+    distances = np.sqrt((points * points).sum(axis=1))
+    far = float(np.sort(distances)[(3 * len(distances)) // 4])
+    step = config.heading_cells * cell / max(far, cell)
+    step = min(max(step, config.finest_rad), config.coarsest_rad)
+    half = math.ceil(window.turn_rad / step)
+    return np.asarray(np.arange(-half, half + 1) * step, dtype=np.float64)
+
+
+def search(  # noqa: PLR0913 (arrays of one problem)
+    cell_map: CellMap,
+    short_term: float,
+    observations: Observations,
+    prediction: Float,
+    precision: Float,
+    window: SearchWindow,
+    gain: float,
+) -> tuple[Float, int]:
+    """Best pose on the lattice of the window, and how many candidates were scored."""
+    cell, config = cell_map.cell, cell_map.config.matching.local
+    points = observations.points_robot
+    if len(points) == 0:
+        return prediction, 0
+    every = math.ceil(len(points) / config.points)
+    chosen = np.ascontiguousarray(points[::every])
+    turns = headings(chosen, window, cell, config)
+    reach = math.ceil(window.reach_m / cell)
+    radius = math.sqrt(float((chosen * chosen).sum(axis=1).max()))
+    # Offsets may overshoot by a block of the coarsest level.
+    edge = reach + (1 << LEVELS) + 2
+    i0 = ((math.floor((prediction[0] - radius) / cell) - edge) >> SHIFT) * SIDE
+    j0 = ((math.floor((prediction[1] - radius) / cell) - edge) >> SHIFT) * SIDE
+    across = ((math.ceil(2.0 * radius / cell) + 2 * edge) // SIDE + 3) * SIDE
+    field = field_of(cell_map, short_term, i0, j0, across, across)
+    bases = np.empty((len(turns), len(chosen), 2), np.int32)
+    place(chosen, prediction, turns, cell, i0, j0, bases)
+    scale = gain * float(observations.weights.mean()) * len(points) / len(chosen) / FULL
+    lattice = Lattice(
+        levels=levels_of(field, LEVELS),
+        bases=bases,
+        turns=turns,
+        reach=reach,
+        pitch=cell,
+        precision=precision,
+        gain=scale,
+    )
+    found = Search(lattice).best()
+    offset = np.array([found.column * cell, found.row * cell, turns[found.heading]])
+    return prediction + offset, found.evaluations

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scan matching, Eq. (13): the pose whose observations overlap the map most, against the prior."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float
+from slam.frontend.observations import Observations
+from slam.frontend.odometry_prior import inverted, turned
+from slam.tracker.cell_map import CellMap
+from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.local_search import SearchWindow, search
+from slam.tracker.matching.score import Climb, Reward, Seen, refine
+
+
+def _spread(points_robot: Float, T_map_robot: Float, covariance: Float) -> Float:
+    """(n, 3) xx, xy, yy of points (robot frame) that a pose's (3, 3) ``covariance`` smears."""
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = turned(covariance, -float(T_map_robot[2])).tolist()
+    x, y = points_robot[:, 0], points_robot[:, 1]
+    ttx, tty = tt * x, tt * y
+    out = np.empty((len(x), 3))
+    out[:, 0] = xx - 2.0 * xt * y + tty * y
+    out[:, 1] = xy + xt * x - yt * y - ttx * y
+    out[:, 2] = yy + 2.0 * yt * x + ttx * x
+    return out
+
+
+def seen_by(observations: Observations) -> Seen:
+    """The arrays of ``observations``."""
+    return Seen(
+        observations.points_robot,
+        observations.covariances,
+        observations.weights,
+        observations.tangents,
+        observations.facings,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Match:
+    """Result of matching one frame.
+
+    T_map_robot  (3,) best pose
+    information  (3, 3) of the data alone, by (x, y, theta) in the map frame
+    matched      share of the observations that overlap the map, 0 without observations
+    score        reward at full weight - 1/2 Mahalanobis^2: comparable between matches of a frame
+    tau          weight the reward had in the end
+    searched     whether the wide search ran; ``evaluations`` candidate poses it scored
+    slipped      whether it was found against the odometry
+    """
+
+    T_map_robot: Float
+    information: Float
+    matched: float
+    score: float
+    tau: float
+    searched: bool = False
+    evaluations: int = 0
+    slipped: bool = False
+
+
+def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
+    """A pose that comes from elsewhere: the data say nothing of it."""
+    return Match(
+        T_map_robot=T_map_robot,
+        information=np.zeros((3, 3)),
+        matched=matched,
+        score=score,
+        tau=0.0,
+    )
+
+
+class Matcher:
+    """Matches observations to a map."""
+
+    def __init__(self, config: TrackerConfig) -> None:
+        self.config = config
+        self.reward = Reward(
+            cell=config.cell_m,
+            short_term=config.short_term_weight / config.saturation,
+            logarithm=config.objective == "log",
+            matched_overlap=config.matching.matched_overlap,
+            log_floor=config.matching.log_floor,
+            tail=config.matching.tail,
+            tail_cells=config.matching.tail_cells,
+        )
+        self.numbers = config.matching
+        steps = self.numbers.climb
+        self._climb = Climb(*(getattr(steps, name) for name in Climb._fields))
+
+    def climb(
+        self,
+        cell_map: CellMap,
+        observations: Observations,
+        start: Float,
+        prediction: Float,
+        precision: Float,
+    ) -> Match:
+        """The local optimum reached from ``start``; the reward's weight falls with the match."""
+        seen = seen_by(observations)
+        full = float(observations.weights.sum())
+        pose = np.array(start, dtype=np.float64)
+        information = np.zeros((3, 3))
+        tau, matched, score = self.config.reward, 0.0, -math.inf
+        while full > 0.0:
+            rewarded, prior, count = refine(
+                cell_map.cells,
+                self.reward,
+                self._climb,
+                seen,
+                pose,
+                prediction,
+                precision,
+                tau,
+                information,
+            )
+            matched = count / full
+            score = self.config.reward * rewarded + prior
+            tempered = self.config.reward * matched**self.config.reward_exponent
+            tempered = max(tempered, self.numbers.climb.least_weight)
+            if tau < self.config.reward or tempered > self.numbers.climb.tempered * tau:
+                break
+            tau = tempered
+        pose[2] = se2.wrap(float(pose[2]))
+        return Match(
+            T_map_robot=pose, information=information, matched=matched, score=score, tau=tau
+        )
+
+    def approach(
+        self, cell_map: CellMap, observations: Observations, prediction: Float, covariance: Float
+    ) -> Float:
+        """Where to start climbing: the optimum for observations blurred by the prior's own spread.
+
+        Returns the prediction itself where the prior moves no observation by half a cell.
+        """
+        points = observations.points_robot
+        if len(points) == 0:
+            return prediction
+        numbers = self.numbers.climb
+        least = (numbers.moved_cells * self.config.cell_m) ** 2
+        (xx, _, _), (_, yy, _), (_, _, tt) = covariance.tolist()
+        farthest = float((points[:, 0] ** 2 + points[:, 1] ** 2).max())
+        if 2.0 * (xx + yy + farthest * tt) < least:  # (a + b)^2 <= 2 (a^2 + b^2)
+            return prediction
+        every = max(1, math.ceil(len(points) / numbers.few))
+        few = points[::every]
+        spread = _spread(few, prediction, covariance)
+        most = (numbers.widest_cells * self.config.cell_m) ** 2
+        widths = spread[:, 0] + spread[:, 2]
+        if not (widths > least).any():
+            return prediction
+        spread *= np.minimum(1.0, most / np.maximum(widths, 1e-12))[:, None]
+        pose = np.array(prediction, dtype=np.float64)
+        refine(
+            cell_map.cells,
+            self.reward,
+            self._climb,
+            Seen(
+                np.ascontiguousarray(few),
+                observations.covariances[::every] + spread,
+                np.ascontiguousarray(observations.weights[::every]) * every,
+                np.ascontiguousarray(observations.tangents[::every]),
+                np.ascontiguousarray(observations.facings[::every]),
+            ),
+            pose,
+            prediction,
+            inverted(covariance),
+            self.config.reward,
+            np.zeros((3, 3)),
+        )
+        return pose
+
+    def search(
+        self,
+        cell_map: CellMap,
+        observations: Observations,
+        prediction: Float,
+        precision: Float,
+        window: SearchWindow,
+    ) -> Match:
+        """The best optimum in ``window`` about the prediction: branch and bound, then climb."""
+        start, evaluations = search(
+            cell_map, self.reward.short_term, observations, prediction, precision,
+            window, self.config.reward,
+        )  # fmt: skip
+        match = self.climb(cell_map, observations, start, prediction, precision)
+        return Match(
+            T_map_robot=match.T_map_robot,
+            information=match.information,
+            matched=match.matched,
+            score=match.score,
+            tau=match.tau,
+            searched=True,
+            evaluations=evaluations,
+        )

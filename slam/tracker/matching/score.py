@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How well observations overlap the map, Eq. (13), and the climb to the pose where they do most.
+
+Sub-cell accuracy needs the overlap as a sum of Gaussians over the raw activities: interpolated or
+pre-blurred fields pull structure towards cell centres, and a map that is rewritten from its own
+poses then creeps. Gradient and curvature of that sum are analytic.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import inner, njit
+from slam.frontend.surfaces import opposite, turned_face
+from slam.tracker.cells import MASK, SHIFT, Cells
+
+
+class Reward(NamedTuple):
+    """How overlaps are rewarded; the last four as in ``MatchingConfig``.
+
+    cell        m
+    short_term  weight of x in v = y + (1 - y) * short_term * x
+    logarithm   Eq. (13) as printed instead of the sum of overlaps
+    """
+
+    cell: float
+    short_term: float
+    logarithm: bool
+    matched_overlap: float
+    log_floor: float
+    tail: float
+    tail_cells: float
+
+
+class Climb(NamedTuple):
+    """How the optimum is climbed to; fields as in ``ClimbConfig``."""
+
+    steps: int
+    enough: float
+    damping: float
+    damping_falls: float
+    damping_grows: float
+    damping_least: float
+    damping_again: float
+    damping_most: float
+
+
+class Seen(NamedTuple):
+    """Observations as the kernels see them; fields as in ``Observations``."""
+
+    points: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    tangents: NDArray[np.float64]
+    facings: NDArray[np.uint8]
+
+
+@inner
+def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
+    cells: Cells,
+    reward: Reward,
+    u: float,
+    v: float,
+    cov: tuple[float, float, float],
+    faced: int,
+    out: NDArray[np.float64],
+) -> None:
+    """Overlap f of a Gaussian at (u, v) with the map, its gradient and its negative curvature.
+
+    (u, v) and ``cov`` (xx, xy, yy) are in cells, cell (i, j) lies at (i, j). f is the sum over
+    cells of Gaussian times activity, divided so that a lone landmark scores 1 on itself. Cells
+    of a surface that faces away from the observed one (``faced``) do not count.
+    ``out``: f, df/du, df/dv, -d2f/du2, -d2f/dudv, -d2f/dv2.
+    """
+    a, b, d = cov
+    det = a * d - b * b
+    if det <= 0.0:  # rounding has left nothing across
+        b, det = 0.0, a * d
+    pa, pb, pd = d / det, -b / det, a / det
+    wide = max(reward.tail_cells, reward.tail / math.sqrt(pa))
+    high = max(reward.tail_cells, reward.tail * math.sqrt(d))
+    lean = b / d  # each row's Gaussian is centred at u + lean * dv, with precision pa,
+    j0, j1 = math.ceil(v - high), math.floor(v + high)
+    weight = math.exp(-0.5 * (j0 - v) * (j0 - v) / d)  # and weighs exp(-dv^2 / 2 d);
+    climb, falling = math.exp(-(j0 - v + 0.5) / d), math.exp(-pa)
+    slowing = falling if a == d else math.exp(-1.0 / d)  # by recurrence: no exp in the loops
+    i0, i1, t, first, second = 0, 0, 0.0, 0.0, 0.0
+    m0 = mu = mv = muu = muv = mvv = 0.0
+    rows, columns = cells.directory.shape
+    for j in range(j0, j1 + 1):
+        dv = j - v
+        shift = lean * dv
+        if j == j0 or b != 0.0:
+            i0, i1 = math.ceil(u + shift - wide), math.floor(u + shift + wide)
+            t = i0 - u - shift
+            first, second = math.exp(-0.5 * pa * t * t), math.exp(-pa * (t + 0.5))
+        row = (j >> SHIFT) - cells.corner[1]
+        if 0 <= row < rows:
+            s0 = s1 = s2 = 0.0
+            offset, kernel, ratio = t, first, second
+            column_before, slot = -1, -1
+            for i in range(i0, i1 + 1):
+                column = (i >> SHIFT) - cells.corner[0]
+                if column != column_before:
+                    column_before = column
+                    slot = cells.directory[row, column] if 0 <= column < columns else -1
+                if slot >= 0:
+                    x, y = cells.x[slot, j & MASK, i & MASK], cells.y[slot, j & MASK, i & MASK]
+                    value = kernel * (y + (1.0 - y) * reward.short_term * x)
+                    if opposite(faced, cells.facing[slot, j & MASK, i & MASK]):
+                        value = 0.0
+                    s0 += value
+                    value *= offset
+                    s1 += value
+                    s2 += value * offset
+                kernel *= ratio
+                ratio *= falling
+                offset += 1.0
+            s2 = weight * (s2 + shift * (2.0 * s1 + shift * s0))
+            s1 = weight * (s1 + shift * s0)
+            s0 *= weight
+            m0 += s0
+            mu += s1
+            mv += s0 * dv
+            muu += s2
+            muv += s1 * dv
+            mvv += s0 * dv * dv
+        weight *= climb
+        climb *= slowing
+    norm = 1.0 / (math.pi * math.sqrt(det))
+    out[0] = norm * m0
+    out[1] = norm * (pa * mu + pb * mv)
+    out[2] = norm * (pb * mu + pd * mv)
+    out[3] = norm * (pa * m0 - (pa * pa * muu + 2.0 * pa * pb * muv + pb * pb * mvv))
+    out[4] = norm * (pb * m0 - (pa * pb * muu + (pa * pd + pb * pb) * muv + pb * pd * mvv))
+    out[5] = norm * (pd * m0 - (pb * pb * muu + 2.0 * pb * pd * muv + pd * pd * mvv))
+
+
+@njit
+def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
+    cells: Cells,
+    reward: Reward,
+    seen: Seen,
+    pose: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+    along: NDArray[np.float64],
+    information: NDArray[np.float64],
+) -> tuple[float, float]:
+    """Sum of rewards of the observations seen from ``pose``, and the weight of those matched.
+
+    Fills the gradient (3,) by (x, y, theta), the part of it ``along`` the observed surfaces, and
+    the information (3, 3): the negative curvature, of each observation only where it is positive,
+    so that Newton's step goes uphill.
+    """
+    gradient[:] = 0.0
+    along[:] = 0.0
+    information[:] = 0.0
+    score, matched = 0.0, 0.0
+    out = np.empty(6)
+    scale = 1.0 / reward.cell
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for k in range(len(seen.points)):
+        rx = c * seen.points[k, 0] - s * seen.points[k, 1]
+        ry = s * seen.points[k, 0] + c * seen.points[k, 1]
+        xx, xy, yy = seen.covariances[k, 0], seen.covariances[k, 1], seen.covariances[k, 2]
+        cov = (
+            (c * c * xx - 2.0 * c * s * xy + s * s * yy) * scale * scale,
+            (c * s * (xx - yy) + (c * c - s * s) * xy) * scale * scale,
+            (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale * scale,
+        )
+        u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
+        _overlap(cells, reward, u, v, cov, turned_face(seen.facings[k], pose[2]), out)
+        f = out[0]
+        if f > reward.matched_overlap:
+            matched += seen.weights[k]
+        gx, gy = out[1] * scale, out[2] * scale
+        a, b, d = out[3] * scale * scale, out[4] * scale * scale, out[5] * scale * scale
+        if reward.logarithm:
+            inverse = 1.0 / (reward.log_floor + f)
+            score += seen.weights[k] * math.log(reward.log_floor + f)
+            gx, gy = gx * inverse, gy * inverse
+            a, b, d = a * inverse + gx * gx, b * inverse + gx * gy, d * inverse + gy * gy
+        else:
+            score += seen.weights[k] * f
+        # keep the positive part of [[a, b], [b, d]]
+        mean, half = 0.5 * (a + d), 0.5 * (a - d)
+        radius = math.sqrt(half * half + b * b)
+        low, high = mean - radius, mean + radius
+        if high <= 0.0:
+            a, b, d = 0.0, 0.0, 0.0
+        elif low < 0.0:
+            keep = high / (2.0 * radius)
+            a, b, d = keep * (half + radius), keep * b, keep * (radius - half)
+        w = seen.weights[k]
+        gx, gy, a, b, d = w * gx, w * gy, w * a, w * b, w * d
+        gradient[0] += gx
+        gradient[1] += gy
+        gradient[2] += gy * rx - gx * ry
+        tx = c * seen.tangents[k, 0] - s * seen.tangents[k, 1]
+        ty = s * seen.tangents[k, 0] + c * seen.tangents[k, 1]
+        slope = gx * tx + gy * ty
+        along[0] += slope * tx
+        along[1] += slope * ty
+        along[2] += slope * (ty * rx - tx * ry)
+        information[0, 0] += a
+        information[0, 1] += b
+        information[1, 1] += d
+        information[0, 2] += b * rx - a * ry
+        information[1, 2] += d * rx - b * ry
+        information[2, 2] += a * ry * ry - 2.0 * b * rx * ry + d * rx * rx
+    information[1, 0] = information[0, 1]
+    information[2, 0] = information[0, 2]
+    information[2, 1] = information[1, 2]
+    return score, matched
+
+
+@inner
+def _prior(
+    pose: NDArray[np.float64],
+    prediction: NDArray[np.float64],
+    precision: NDArray[np.float64],
+    slope: NDArray[np.float64],
+) -> float:
+    """-1/2 e' P^-1 e with e = pose - prediction (heading wrapped); its gradient in ``slope``."""
+    ex, ey = pose[0] - prediction[0], pose[1] - prediction[1]
+    et = pose[2] - prediction[2]
+    et -= math.tau * math.floor(et / math.tau + 0.5)
+    for k in range(3):
+        slope[k] = -(precision[k, 0] * ex + precision[k, 1] * ey + precision[k, 2] * et)
+    return float(0.5 * (slope[0] * ex + slope[1] * ey + slope[2] * et))
+
+
+@inner
+def _solve(
+    H: NDArray[np.float64], g: NDArray[np.float64], damping: float, step: NDArray[np.float64]
+) -> None:
+    """(H + damping diag H) step = g for a positive definite 3 x 3 H, by Cholesky."""
+    grow = 1.0 + damping
+    l00 = math.sqrt(H[0, 0] * grow)
+    l10, l20 = H[1, 0] / l00, H[2, 0] / l00
+    l11 = math.sqrt(max(H[1, 1] * grow - l10 * l10, 1e-12))
+    l21 = (H[2, 1] - l20 * l10) / l11
+    l22 = math.sqrt(max(H[2, 2] * grow - l20 * l20 - l21 * l21, 1e-12))
+    a = g[0] / l00
+    b = (g[1] - l10 * a) / l11
+    c = (g[2] - l20 * a - l21 * b) / l22
+    step[2] = c / l22
+    step[1] = (b - l21 * step[2]) / l11
+    step[0] = (a - l10 * step[1] - l20 * step[2]) / l00
+
+
+@njit
+def refine(  # noqa: C901, PLR0913 (kernel)
+    cells: Cells,
+    reward: Reward,
+    climb: Climb,
+    seen: Seen,
+    pose: NDArray[np.float64],
+    prediction: NDArray[np.float64],
+    precision: NDArray[np.float64],
+    tau: float,
+    information: NDArray[np.float64],
+) -> tuple[float, float, float]:
+    """Climb to the maximum of tau * reward - 1/2 Mahalanobis^2 from ``pose`` (changed in place).
+
+    Newton's method with Levenberg damping; a step is taken only if it rises, but for the last, tiny
+    one. The slope of the reward along observed surfaces is left out of it: there it only says where
+    the map is older, which would hold a robot back in a corridor. Returns reward, prior and the
+    weight of matched observations, and leaves the data's information (without tau and prior) in
+    ``information``, all as before the last step.
+    """
+    gradient, along, slope, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    trial, trial_gradient, trial_along = np.empty(3), np.empty(3), np.empty(3)
+    trial_information, H = np.empty((3, 3)), np.empty((3, 3))
+    rewarded, matched = evaluate(cells, reward, seen, pose, gradient, along, information)
+    prior = _prior(pose, prediction, precision, slope)
+    damping = climb.damping
+    for _ in range(climb.steps):
+        for a in range(3):
+            for b in range(3):
+                H[a, b] = tau * information[a, b] + precision[a, b]
+            slope[a] += tau * (gradient[a] - along[a])
+        _solve(H, slope, damping, step)
+        if step[0] * slope[0] + step[1] * slope[1] + step[2] * slope[2] < climb.enough:
+            for a in range(3):
+                pose[a] += step[a]  # so little that it needs no look at the score
+            break
+        for a in range(3):
+            trial[a] = pose[a] + step[a]
+        trial_rewarded, trial_matched = evaluate(
+            cells, reward, seen, trial, trial_gradient, trial_along, trial_information,
+        )  # fmt: skip
+        older = along[0] * step[0] + along[1] * step[1] + along[2] * step[2]
+        trial_prior = _prior(trial, prediction, precision, step)
+        if tau * (trial_rewarded - rewarded - older) + trial_prior > prior:
+            rewarded, prior, matched = trial_rewarded, trial_prior, trial_matched
+            for a in range(3):  # element by element: array assignment triples the compile time
+                pose[a], gradient[a], along[a] = trial[a], trial_gradient[a], trial_along[a]
+                for b in range(3):
+                    information[a, b] = trial_information[a, b]
+            damping = max(climb.damping_falls * damping, climb.damping_least)
+        else:
+            damping = max(climb.damping_grows * damping, climb.damping_again)
+            if damping > climb.damping_most:
+                break
+        _prior(pose, prediction, precision, slope)
+    return rewarded, prior, matched

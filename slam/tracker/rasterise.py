@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes impressions onto the map: the inspiration I that observations give to cells.
+
+I of a cell is the largest of the Gaussians around the observed points there; each has the
+analytic peak 1 (not the largest sampled value), as everything else makes structure creep towards
+cell centres (pixel locking).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam import se2
+from slam._jit import inner, njit
+from slam.frames import Float
+from slam.frontend.observations import Observations
+from slam.frontend.surfaces import turned_face
+from slam.tracker.cell_map import CellMap
+from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells
+from slam.tracker.map_config import MapConfig
+
+FINE = MapConfig().bell_steps
+
+
+@functools.cache
+def _bell(ends: float) -> NDArray[np.float32]:
+    """I by the squared Mahalanobis distance, ``FINE`` entries for each unit of it."""
+    entries = range(int(ends * FINE))
+    return np.array([math.exp(-0.5 * k / FINE) for k in entries] + [0.0], np.float32)
+
+
+@inner
+def _touch(cells: Cells, column: int, row: int) -> int:
+    """Open a place for the impressions of a block, which is born if need be. -1: no room is left.
+
+    The column and row are those of the directory.
+    """
+    scratch = cells.counts[TOUCHED_COUNT]
+    if scratch == len(cells.touched):
+        return -1
+    slot, born = cells.directory[row, column], 0
+    if slot < 0:
+        if cells.counts[FREE_COUNT] == 0:
+            return -1
+        cells.counts[FREE_COUNT] -= 1
+        slot = cells.free[cells.counts[FREE_COUNT]]
+        cells.directory[row, column] = slot
+        cells.scratch_of[slot], born = -1, 1
+        for j in range(SIDE):
+            for i in range(SIDE):
+                cells.x[slot, j, i] = cells.y[slot, j, i] = cells.age[slot, j, i] = 0.0
+                cells.facing[slot, j, i] = 0
+    cells.counts[TOUCHED_COUNT] += 1
+    cells.touched[scratch, 0] = slot
+    cells.touched[scratch, 1] = column + cells.corner[0]
+    cells.touched[scratch, 2] = row + cells.corner[1]
+    cells.touched[scratch, 3] = born
+    cells.scratch_of[slot] = scratch
+    for j in range(SIDE):
+        for i in range(SIDE):
+            cells.impression[scratch, j, i] = 0.0
+            cells.faced[scratch, j, i] = 0
+    return int(scratch)
+
+
+@inner
+def _rasterise_point(  # noqa: PLR0913 (kernel)
+    cells: Cells,
+    u: float,
+    v: float,
+    cov: tuple[float, float, float],
+    faced: int,
+    ends: float,
+    bell: NDArray[np.float32],
+) -> bool:
+    """Gaussian with covariance ``cov`` (xx, xy, yy) about (u, v), in cells."""
+    a, b, d = cov
+    det = a * d - b * b
+    wide = math.sqrt(ends * max(a, d))
+    i0, i1 = math.ceil(u - wide), math.floor(u + wide)
+    j0, j1 = math.ceil(v - wide), math.floor(v + wide)
+    pa, pb, pd = d / det, -2.0 * b / det, a / det
+    cx, cy = cells.corner[0], cells.corner[1]
+    for row in range(j0 >> SHIFT, (j1 >> SHIFT) + 1):
+        for column in range(i0 >> SHIFT, (i1 >> SHIFT) + 1):  # block by block: looked up once
+            first, last = max(i0, column * SIDE), min(i1, column * SIDE + MASK)
+            low, high = max(j0, row * SIDE), min(j1, row * SIDE + MASK)
+            du, dv = min(max(u, first), last) - u, min(max(v, low), high) - v
+            if b == 0.0 and pa * du * du + pd * dv * dv >= ends:
+                continue
+            # As below; in a function for both, stamping takes half as long again.
+            slot = cells.directory[row - cy, column - cx]
+            scratch = cells.scratch_of[slot] if slot >= 0 else -1
+            if scratch < 0:
+                scratch = _touch(cells, column - cx, row - cy)
+                if scratch < 0:
+                    return False
+            for j in range(low, high + 1):
+                dv = j - v
+                whole, part = pd * dv * dv, pb * dv
+                for i in range(first, last + 1):
+                    du = i - u
+                    m = min(whole + du * (part + pa * du), ends)
+                    value = bell[int(m * FINE)]
+                    if value > cells.impression[scratch, j & MASK, i & MASK]:
+                        cells.impression[scratch, j & MASK, i & MASK] = value
+                        cells.faced[scratch, j & MASK, i & MASK] = faced
+    return True
+
+
+@inner
+def _rasterise_stretch(  # noqa: PLR0913 (kernel)
+    cells: Cells,
+    u: float,
+    v: float,
+    du: float,
+    dv: float,
+    variance: float,
+    faced: int,
+    ends: float,
+    bell: NDArray[np.float32],
+) -> bool:
+    """Gaussian ridge about the stretch from (u, v) to (u + du, v + dv), in cells."""
+    square = du * du + dv * dv
+    flat = abs(du) >= abs(dv)
+    slope = dv / du if flat else du / dv
+    across = math.sqrt(ends * variance * (1.0 + slope * slope))
+    scale = 1.0 / (square * variance)
+    cx, cy = cells.corner[0], cells.corner[1]
+    start, end = (min(u, u + du), max(u, u + du)) if flat else (min(v, v + dv), max(v, v + dv))
+    for along in range(math.ceil(start), math.floor(end) + 1):
+        centre = v + slope * (along - u) if flat else u + slope * (along - v)
+        column, row, scratch = 0, 0, -1
+        for aside in range(math.ceil(centre - across), math.floor(centre + across) + 1):
+            i, j = (along, aside) if flat else (aside, along)
+            cross = (i - u) * dv - (j - v) * du
+            m = cross * cross * scale
+            if m >= ends:
+                continue
+            if scratch < 0 or i >> SHIFT != column or j >> SHIFT != row:
+                column, row = i >> SHIFT, j >> SHIFT
+                slot = cells.directory[row - cy, column - cx]
+                scratch = cells.scratch_of[slot] if slot >= 0 else -1
+                if scratch < 0:
+                    scratch = _touch(cells, column - cx, row - cy)
+                    if scratch < 0:
+                        return False
+            value = bell[int(m * FINE)]
+            if value > cells.impression[scratch, j & MASK, i & MASK]:
+                cells.impression[scratch, j & MASK, i & MASK] = value
+                cells.faced[scratch, j & MASK, i & MASK] = faced
+    return True
+
+
+@njit
+def _stamp(  # noqa: PLR0913 (kernel)
+    cells: Cells,
+    points: NDArray[np.float64],
+    covariances: NDArray[np.float64],
+    joined: NDArray[np.bool_],
+    facings: NDArray[np.uint8],
+    theta: float,
+    cell: float,
+    ends: float,
+    bell: NDArray[np.float32],
+    start: int,
+) -> int:
+    """Raise I around the points (map frame) from ``start`` on; the index where room ran out, or n.
+
+    ``covariances`` are in the robot frame, which is turned by ``theta``.
+    """
+    c, s = math.cos(theta), math.sin(theta)
+    scale = 1.0 / (cell * cell)
+    for k in range(start, len(points)):
+        xx, xy, yy = covariances[k, 0], covariances[k, 1], covariances[k, 2]
+        a = (c * c * xx - 2.0 * c * s * xy + s * s * yy) * scale
+        b = (c * s * (xx - yy) + (c * c - s * s) * xy) * scale
+        d = (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale
+        u, v = points[k, 0] / cell - 0.5, points[k, 1] / cell - 0.5
+        faced = turned_face(facings[k], theta)
+        if not _rasterise_point(cells, u, v, (a, b, d), faced, ends, bell):
+            return k
+        if joined[k]:
+            du, dv = points[k + 1, 0] / cell - 0.5 - u, points[k + 1, 1] / cell - 0.5 - v
+            if du * du + dv * dv > 1.0 and not _rasterise_stretch(
+                cells, u, v, du, dv, a, faced, ends, bell
+            ):
+                return k
+    return len(points)
+
+
+def rasterise(cell_map: CellMap, observations: Observations, T_map_robot: Float) -> None:
+    """Write the impressions of ``observations`` seen from ``T_map_robot`` onto the map."""
+    points_map = se2.transform(T_map_robot, observations.points_robot)
+    if len(points_map) == 0:
+        return
+    largest = float(observations.covariances[:, ::2].max())
+    edge = max(3.0 * cell_map.cell, 4.0 * math.sqrt(largest)) + cell_map.cell
+    x, y = points_map[:, 0], points_map[:, 1]
+    cell_map.cover(
+        float(x.min()) - edge, float(y.min()) - edge, float(x.max()) + edge, float(y.max()) + edge
+    )
+    done, ends = 0, cell_map.config.map.bell_ends
+    while done < len(points_map):
+        done = _stamp(
+            cell_map.cells,
+            points_map,
+            observations.covariances,
+            observations.joined,
+            observations.facings,
+            float(T_map_robot[2]),
+            cell_map.cell,
+            ends,
+            _bell(ends),
+            done,
+        )
+        if done < len(points_map):
+            cell_map.grow()

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How well the map usually explains what is seen, and when it denies a frame.
+
+A robot that was carried away, or a map that is wrong, shows as a match far below the usual and a
+map in view that is contradicted. Then nothing is written until it is clear where the robot is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from statistics import median
+
+from slam import se2
+from slam.frames import Float
+from slam.tracker.tracking.config import QualityConfig
+
+
+class TrackingQuality:
+    """What frames so far were like, and whether the next one fits.
+
+    freeze_below  share of the usual match, see ``TrackerConfig``; 0: never in doubt
+    matches       latest matched fractions; ``supports`` the same times the share of map confirmed
+    tracked_s     s of tracking on this map, in ``tracked`` scans
+    scans         doubtful frames in a row
+    """
+
+    def __init__(self, freeze_below: float, config: QualityConfig) -> None:
+        self.freeze_below, self.config = freeze_below, config
+        self.matches: deque[float] = deque(maxlen=config.remembered)
+        self.supports: deque[float] = deque(maxlen=config.remembered)
+        self.tracked_s, self.tracked, self.scans = 0.0, 0, 0
+
+    def resume(
+        self, matches: Sequence[float], supports: Sequence[float], tracked_s: float, tracked: int
+    ) -> None:
+        """Go on with what a saved map had."""
+        self.matches.extend(matches)
+        self.supports.extend(supports)
+        self.tracked_s, self.tracked = tracked_s, tracked
+
+    def usual_match(self) -> float:
+        """Median matched fraction."""
+        return median(self.matches) if self.matches else 1.0
+
+    def usual_support(self) -> float:
+        """Median of it times the share of the map in view that is confirmed."""
+        return median(self.supports) if self.supports else 1.0
+
+    def is_worth_searching(self, share: float = 1.0) -> bool:
+        """Grown (or to that share), and explains what is seen: else it cannot deny it either."""
+        config = self.config
+        grown = self.tracked_s >= share * config.grown_s and self.tracked >= config.grown_scans
+        return grown and self.usual_support() >= config.worth_searching
+
+    @property
+    def suspicious(self) -> bool:
+        """Only a map that for long explained what is seen can tell where the robot is."""
+        return self.freeze_below > 0.0 and self.is_worth_searching()
+
+    def arises(self, matched: float) -> bool:
+        """Whether a match is so poor that the map in view is to be asked."""
+        least = self.config.suspicious if self.suspicious else 0.0
+        return self._share(matched) < max(self.freeze_below, least)
+
+    def _share(self, matched: float) -> float:
+        return matched / max(self.usual_match(), 1e-9)
+
+    def denied(self, matched: float, confirmed: float, contradicted: float, motion: Float) -> bool:
+        """Whether what the frame says of the map in view, or a sudden change, denies the match.
+
+        ``motion`` (x m, y m, theta rad) since the frame before.
+        """
+        share, suspicious, config = self._share(matched), self.suspicious, self.config
+        doubtful = self.is_worth_searching(config.known) and contradicted > confirmed
+        doubtful &= share < self.freeze_below
+        denied = config.still_denied if self.scans else config.denied
+        # A corridor looked at the other way round still fits by two thirds.
+        doubtful |= suspicious and contradicted > denied * (confirmed + contradicted)
+        x, y, turn = motion.tolist()
+        near = math.hypot(x, y) < config.sudden_m and abs(se2.wrap(turn)) < config.sudden_rad
+        return doubtful or (suspicious and share < config.sudden and near)
+
+    def count(self, doubtful: bool) -> None:
+        """Another frame in doubt, or one that is not."""
+        self.scans = self.scans + 1 if doubtful else 0
+
+    def learn(self, matched: float, confirmed: float, contradicted: float, elapsed: float) -> None:
+        """From a frame that was tracked, ``elapsed`` s after the one before."""
+        self.matches.append(matched)
+        self.tracked_s, self.tracked = self.tracked_s + elapsed, self.tracked + 1
+        if confirmed + contradicted > 0.0:
+            self.supports.append(matched * confirmed / (confirmed + contradicted))
+
+    def give_up(self) -> None:
+        """The next frame is written, as the first on this map."""
+        self.scans = self.config.patience
+        self.tracked_s, self.tracked = 0.0, 0

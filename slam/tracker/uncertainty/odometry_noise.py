@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far to trust odometry: its covariance, scaled until it explains what matching corrects.
+
+An innovation is where a match alone puts the robot, against where odometry does. Its covariance is
+that of the increment plus that of a match. What was driven lately says by how much to multiply the
+first, apart for translation and for rotation, whether a log states it or it had to be assumed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Self
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float, Odometry
+from slam.frontend.odometry_bias import HeadingBias
+from slam.frontend.odometry_prior import Prediction, predict
+from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.matcher import Match
+from slam.tracker.uncertainty.covariances import innovation
+
+
+def _noise_share(config: TrackerConfig, sensor_sigma_m: float) -> float:
+    """Variance of a match by the noise of its beams over what the overlaps' curvature claims."""
+    return (sensor_sigma_m / (config.frontend.sigma_cells * config.cell_m)) ** 2 / 2.0
+
+
+class OdometryNoise:
+    """Predicts, and learns from what became of it.
+
+    scales  (2,) of the variances of translation and rotation
+    nis     of the latest frame; None where its match is not believed
+    bias    what odometry adds to the heading by itself; taken out of it. None: not learnt
+    """
+
+    def __init__(
+        self,
+        config: TrackerConfig,
+        *,
+        overlaps: bool,
+        least_stated: float,
+        bias: HeadingBias | None,
+    ) -> None:
+        """``overlaps``: a match's information is the curvature of overlaps, which claims more than
+        the noise of beams says; ``least_stated``: least scale of a covariance that a log states.
+        """
+        self._whole, self._overlaps = config, overlaps
+        self._config, self._prior = config.uncertainty.odometry, config.frontend.prior
+        self._least_stated = least_stated
+        self.scales: Float = np.ones(2)
+        self.nis: float | None = None
+        self.bias = bias
+        self._stated = False
+        self._least = least_stated
+        self._squares: Float = np.zeros(2)
+        self._expected: Float = np.zeros(2)
+
+    @classmethod
+    def of_beams(cls, config: TrackerConfig) -> Self:
+        """Matches of scans, whose information is the curvature of overlaps between bells."""
+        least, bias = config.uncertainty.odometry.least_stated, HeadingBias(config.frontend.bias)
+        return cls(config, overlaps=True, least_stated=least, bias=bias)
+
+    @classmethod
+    def of_points(cls, config: TrackerConfig, *, overlaps: bool) -> Self:
+        """Matches of points, whose information is what the covariances of points say, or with
+        ``overlaps`` the curvature of those.
+
+        A point is off in the same way for many frames (which side of a trunk is seen): odometry
+        looks too good beside such matches, and a bias learnt from them is theirs. So a stated
+        covariance is never made smaller, and no bias is learnt.
+        """
+        return cls(config, overlaps=overlaps, least_stated=1.0, bias=None)
+
+    def noise_share(self, sensor_sigma_m: float) -> float:
+        """Variance of a match by the noise of what was seen over what its information claims."""
+        return _noise_share(self._whole, sensor_sigma_m) if self._overlaps else 1.0
+
+    def predict(self, T_map_before: Float, before: Odometry, now: Odometry) -> Prediction:
+        """The prior of a frame."""
+        stated = now.increment_covariance is not None
+        self._least = self._least_stated if stated else self._config.least_assumed
+        if self._expected[0] == 0.0:
+            self._expected[:] = self._config.at_first
+            first = self._config.stated if stated else self._config.assumed
+            self._squares[:] = self._config.at_first * first
+            self.scales = self._squares / self._expected
+        scales = float(self.scales[0]), float(self.scales[1])
+        self._stated = stated
+        return predict(T_map_before, before, now, scales, self.bias, self._prior)
+
+    def learn(self, prediction: Prediction, match: Match, sensor_sigma_m: float) -> None:
+        """Compare the increment with a match that is believed, by ranges of that sigma."""
+        off = match.T_map_robot - prediction.T_map_robot
+        off[2] = se2.wrap(float(off[2]))
+        data = match.tau * match.information
+        if (
+            self.bias is not None and self._stated
+        ):  # an assumed variance says nothing of what is bias and what is chance
+            variances = float(prediction.covariance[2, 2]), float(prediction.prior[2, 2])
+            found_out = match.matched, float(off[2]), data
+            self.bias.learn(prediction.increment, prediction.elapsed, variances, found_out)
+        share = min(match.tau * self.noise_share(sensor_sigma_m), 1.0)
+        self.nis, *found = innovation(
+            prediction.covariance + prediction.carried, prediction.prior, data, off, share
+        )
+        (a, _, _), (_, b, _), (_, _, c) = prediction.unscaled.tolist()
+        (x, _, _), (_, y, _), (_, _, t) = prediction.carried.tolist()
+        floor_m2, floor_rad2 = prediction.floor
+        config = self._config
+        frames = max(config.memory, config.memory_s / max(prediction.elapsed, 1e-3))
+        keep = math.exp(-1.0 / frames)
+        for k, unit, rest in (
+            (0, a + b, 2.0 * floor_m2 + x + y + found[2]),
+            (1, c, floor_rad2 + t + found[3]),
+        ):
+            expected = float(self.scales[k]) * unit + rest
+            square = min(found[k], config.wild * expected)
+            # Least squares of square = scale * unit + rest, weighed by what scatter to expect.
+            weight = unit / expected**2
+            self._squares[k] = keep * self._squares[k] + weight * (square - rest)
+            self._expected[k] = keep * self._expected[k] + weight * unit
+            scale = float(self._squares[k]) / max(float(self._expected[k]), 1e-9)
+            self.scales[k] = min(max(scale, self._least), config.most)
+
+    def skip(self) -> None:
+        """The match of this frame is not believed."""
+        self.nis = None

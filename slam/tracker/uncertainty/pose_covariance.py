@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How sure a tracker is of its pose, in the map of the known start.
+
+Three errors, kept apart because they grow differently:
+
+- the map in view is off as a whole, by what it was off when its parts were first written. Grows
+  with the share of the map that is new (trace gain), and turns with the robot about it;
+- the scan lies off the map by what surfaces share: the scanner's errors by range and slant, and the
+  lattice's. Does not grow; its size is read off the residuals (``residuals``);
+- odometry, where the scan says nothing: the map's share of the pose ends, and this one grows.
+
+Every constant is in units of what is observed, so that one set serves many scanners and rates.
+Errors that surfaces share average out over the surfaces in view, so their variance is in inverse
+proportion to how much of them is seen.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from slam.frames import Float
+from slam.frontend.odometry_prior import Prediction
+from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.matcher import Match
+from slam.tracker.uncertainty.covariances import advance, carried, observable
+from slam.tracker.uncertainty.residuals import Evidence
+
+
+class PoseCovariance:
+    """The covariance of the pose.
+
+    covariance    (3, 3) of (x, y, theta) in the map frame; zero at the known start
+    newest_drift  (3, 3) what the latest frame added to the error of the map
+    unobservable  directions of position (0, 1 or 2) about which the latest scans say no more than
+                  the noise of their beams would
+    along_rad     direction in the map of the one that is not observable, None unless it is one
+    """
+
+    def __init__(self, config: TrackerConfig, *, of_points: bool = False) -> None:
+        """``of_points``: they share no errors, so none averages out less than in a room."""
+        numbers = config.uncertainty.pose
+        self._config = numbers
+        self.covariance: Float = np.zeros((3, 3))
+        self.newest_drift: Float = np.zeros((3, 3))
+        self.unobservable = 0
+        self.along_rad: float | None = None
+        self._whole = 0.0 if of_points else numbers.room_weight
+        self._lattice = (numbers.lattice_cells * config.cell_m) ** 2
+        self._products, self._pairs = numbers.at_first * numbers.usual_m**2, numbers.at_first
+        self._geometry: Float = np.zeros((3, 3))
+        self._feigned, self._weighed = 0.0, 0.0
+        self._in_view, self._looks = 0.0, 0.0
+        self._drift: Float = np.zeros((3, 3))
+        self._blind: Float = np.zeros((3, 3))
+        self._shared: Float = np.zeros((3, 3))
+
+    @property
+    def shared_m2(self) -> float:
+        """Variance, m^2, of the residual that neighbouring points of a surface share."""
+        # the usual one where nothing was seen for so long that the sums are used up
+        least = self._config.forgotten
+        return (max(self._products, 0.0) + least * self._config.usual_m**2) / (self._pairs + least)
+
+    def relocated(self, covariance: Float) -> None:
+        """Found again somewhere in the map, to within ``covariance`` (3, 3)."""
+        self._blind = covariance.copy()
+
+    def resumed(self, covariance: Float) -> None:
+        """Going on in a map of before, which is off by ``covariance`` (3, 3) as a whole."""
+        self._drift = covariance.copy()
+        self.covariance = covariance.copy()
+
+    def odometry_part(self, motion: Float) -> Float:
+        """Covariance (3, 3), after ``motion`` in the map, of what odometry alone has told lately.
+
+        By so much the robot may be off the map in view; the map's own error is not in it. Nor is
+        what adds up along a corridor: there a match given leave to correct it would follow noise.
+        """
+        x, y = 0.0, 0.0
+        if self.along_rad is not None:
+            x, y = math.cos(self.along_rad), math.sin(self.along_rad)
+        out = np.empty((3, 3))
+        carried(self._blind, motion, x, y, out)
+        return out
+
+    def update(
+        self, T_map_before: Float, prediction: Prediction, match: Match, evidence: Evidence | None
+    ) -> None:
+        """Take the motion from ``T_map_before`` and the match at its end in.
+
+        Without ``evidence`` the match was not believed: odometry alone moved the robot.
+        """
+        config, data = self._config, np.zeros((3, 3))
+        strength, new = 0.0, 0.0
+        if evidence is not None:
+            self._learn(evidence, prediction.elapsed)
+            strength = match.tau * float(match.information[0, 0] + match.information[1, 1])
+            new = evidence.new / max(evidence.weighed, 1e-9)
+        if strength > 0.0 and self._weighed > config.forgotten:
+            feigned = self._feigned / self._weighed
+            geometry = self._geometry * (1.0 / self._weighed)
+            self.unobservable, along = observable(geometry, feigned, config.noisy, data)
+            self.along_rad = along if self.unobservable == 1 else None
+            data *= strength
+        else:
+            self.unobservable, self.along_rad = 2, None
+            self._blind = self._blind + self._shared
+        variance = (self._lattice + config.shared_times**2 * self.shared_m2) * self._fewer()
+        frames = max(1.0, config.correlated_s / max(prediction.elapsed, 1e-3))
+        advance(
+            self._drift,
+            self._blind,
+            self._shared,
+            self.newest_drift,
+            prediction.T_map_robot - T_map_before,
+            prediction.covariance,
+            data,
+            (
+                variance * strength,
+                config.new_times**2 * new * variance * strength,
+                frames,
+                config.turn_times,
+            ),
+            min(config.written * new, 1.0),
+        )
+        self.covariance = self._drift + self._blind + self._shared
+
+    def _fewer(self) -> float:
+        """By how much the shared errors of surfaces average out less than in a whole room."""
+        config = self._config
+        seen = self._in_view / max(self._looks, config.forgotten)
+        return max(self._whole / max(seen, config.least_share * config.room_weight), 1.0)
+
+    def _learn(self, evidence: Evidence, elapsed: float) -> None:
+        keep = math.exp(-elapsed / self._config.shared_s)
+        self._products = keep * self._products + evidence.shared
+        self._pairs = keep * self._pairs + evidence.paired
+        keep = math.exp(-elapsed / self._config.view_s)
+        self._geometry = keep * self._geometry + evidence.geometry
+        self._feigned = keep * self._feigned + evidence.feigned
+        self._weighed = keep * self._weighed + evidence.weighed
+        self._in_view = keep * self._in_view + evidence.in_view
+        self._looks = keep * self._looks + 1.0

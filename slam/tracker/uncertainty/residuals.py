@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What observed surfaces say about the pose, and by how much they lie off the map together.
+
+A match leaves each point of a surface off the mapped one, by the noise of its beam and by what its
+neighbours share with it: an error of the scanner that depends on range or slant, a wrong place of
+the wall in the map. Products of the offsets of *two* points of one surface, apart by more than the
+map is blurred, are free of the first and measure the second, from the data alone.
+
+Chords between such points also give the direction of a surface better than neighbouring hits do,
+whose noise alone would make a smooth corridor look rough.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import inner, njit
+from slam.frames import Float
+from slam.frontend.observations import Observations
+from slam.tracker.cell_map import CellMap
+from slam.tracker.cells import MASK, SHIFT, Cells
+
+SHARED, PAIRED, FEIGNED, NEW, WEIGHED = range(5)  # places in the sums of ``_look``
+
+
+class Pairing(NamedTuple):
+    """How points are paired and compared; lengths in m, the others as in ``ResidualConfig``."""
+
+    apart: float
+    longest: float
+    faint_overlap: float
+    bent: float
+    sensor_sigma: float
+
+
+@inner
+def _offset(  # noqa: PLR0913 (kernel)
+    cells: Cells,
+    short_term: float,
+    u: float,
+    v: float,
+    variance: float,
+    faint_overlap: float,
+    out: NDArray[np.float64],
+) -> bool:
+    """How far the point (u, v) lies off the mapped surface (``out``); False where there is none.
+
+    All in cells. Twice the mean shift: point and surface are equally blurred.
+    """
+    p = 1.0 / variance
+    wide = 3.0 * math.sqrt(variance)
+    i0, i1 = math.ceil(u - wide), math.floor(u + wide)
+    rows, columns = cells.directory.shape
+    falling = math.exp(-p)
+    m0 = mu = mv = 0.0
+    for j in range(math.ceil(v - wide), math.floor(v + wide) + 1):
+        row = (j >> SHIFT) - cells.corner[1]
+        if row < 0 or row >= rows:
+            continue
+        dv, du = j - v, i0 - u
+        kernel = math.exp(-0.5 * p * (du * du + dv * dv))
+        ratio = math.exp(-p * (du + 0.5))
+        column_before, slot = -1, -1
+        for i in range(i0, i1 + 1):
+            column = (i >> SHIFT) - cells.corner[0]
+            if column != column_before:
+                column_before = column
+                slot = cells.directory[row, column] if 0 <= column < columns else -1
+            if slot >= 0:
+                x, y = cells.x[slot, j & MASK, i & MASK], cells.y[slot, j & MASK, i & MASK]
+                value = kernel * (y + (1.0 - y) * short_term * x)
+                m0 += value
+                mu += value * du
+                mv += value * dv
+            kernel *= ratio
+            ratio *= falling
+            du += 1.0
+    if m0 < faint_overlap * math.pi * variance:
+        return False
+    out[0], out[1] = -2.0 * mu / m0, -2.0 * mv / m0
+    return True
+
+
+@inner
+def _age(cells: Cells, u: float, v: float) -> float:
+    """For how long, s, the cell nearest to (u, v) was looked at; 0 where none lives."""
+    i, j = math.floor(u + 0.5), math.floor(v + 0.5)
+    row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
+    rows, columns = cells.directory.shape
+    if row < 0 or column < 0 or row >= rows or column >= columns:
+        return 0.0
+    slot = cells.directory[row, column]
+    return float(cells.age[slot, j & MASK, i & MASK]) if slot >= 0 else 0.0
+
+
+@inner
+def _partner(
+    points: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64],
+    first: int, pairing: Pairing,
+) -> int:  # fmt: skip
+    """A point of the same straight surface, far enough from ``first``; -1: there is none."""
+    n = len(points)
+    ax, ay = points[first, 0] - laser[0], points[first, 1] - laser[1]
+    away = math.sqrt(ax * ax + ay * ay)
+    if away == 0.0:  # at the laser itself
+        return -1
+    k, aside, onward, dx, dy = first, 0.0, 0.0, 0.0, 0.0
+    # Across the beams: along the wall, the noise of the two would decide which are paired.
+    while k + 1 < n and joined[k] and aside < pairing.apart:
+        k += 1
+        dx, dy = points[k, 0] - points[first, 0], points[k, 1] - points[first, 1]
+        aside = abs(ax * dy - ay * dx) / away
+    onward = math.sqrt(dx * dx + dy * dy)
+    if aside < pairing.apart or onward > pairing.longest:
+        return -1
+    for m in range(first + 1, k):
+        ex, ey = points[m, 0] - points[first, 0], points[m, 1] - points[first, 1]
+        if abs(dx * ey - dy * ex) > pairing.bent * onward * onward:
+            return -1
+    return k
+
+
+@inner
+def _free_standing(
+    points: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64], k: int
+) -> bool:
+    """Whether point ``k`` is a thing of its own: joined to nothing and nearer than its neighbours.
+
+    Where a wall is seen at so grazing an angle that its hits are far apart, they are neither.
+    """
+    if joined[k] or (k > 0 and joined[k - 1]):
+        return False
+    x, y = points[k, 0] - laser[0], points[k, 1] - laser[1]
+    here = x * x + y * y
+    for m in (k - 1, k + 1):
+        if 0 <= m < len(points):
+            x, y = points[m, 0] - laser[0], points[m, 1] - laser[1]
+            if x * x + y * y <= here:
+                return False
+    return True
+
+
+@njit
+def _look(  # noqa: PLR0913 (kernel)
+    cells: Cells, short_term: float, cell: float,
+    points: NDArray[np.float64], covariances: NDArray[np.float64], weights: NDArray[np.float64],
+    joined: NDArray[np.bool_], laser: NDArray[np.float64], pose: NDArray[np.float64],
+    start: int, step: int, times: tuple[float, float], pairing: Pairing,
+    geometry: NDArray[np.float64], sums: NDArray[np.float64],
+) -> None:  # fmt: skip
+    """Add up what ``Evidence`` holds; ``times``: s of one look, and of a trace's prior age."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    off = np.empty(2)
+    surfaces = False
+    for k in range(len(joined)):
+        surfaces = surfaces or joined[k]
+    for first in range(start, len(points), step):
+        u = (c * points[first, 0] - s * points[first, 1] + pose[0]) / cell - 0.5
+        v = (s * points[first, 0] + c * points[first, 1] + pose[1]) / cell - 0.5
+        variance = covariances[first, 0] / (cell * cell)
+        if not _offset(cells, short_term, u, v, variance, pairing.faint_overlap, off):
+            continue
+        k = _partner(points, joined, laser, first, pairing)
+        if k < 0 and surfaces and not _free_standing(points, joined, laser, first):
+            continue
+        w = weights[first]
+        sums[WEIGHED] += w
+        sums[NEW] += w * times[0] / (_age(cells, u, v) + times[0] + times[1])
+        rx, ry = (u + 0.5) * cell - pose[0], (v + 0.5) * cell - pose[1]
+        a, b, d = 1.0, 0.0, 1.0
+        if k >= 0:
+            dx, dy = points[k, 0] - points[first, 0], points[k, 1] - points[first, 1]
+            length = math.sqrt(dx * dx + dy * dy)
+            nx, ny = -(s * dx + c * dy) / length, (c * dx - s * dy) / length
+            a, b, d = nx * nx, nx * ny, ny * ny
+            first_off = off[0] * nx + off[1] * ny
+            u = (c * points[k, 0] - s * points[k, 1] + pose[0]) / cell - 0.5
+            v = (s * points[k, 0] + c * points[k, 1] + pose[1]) / cell - 0.5
+            if _offset(cells, short_term, u, v, variance, pairing.faint_overlap, off):
+                sums[SHARED] += w * first_off * (off[0] * nx + off[1] * ny) * cell * cell
+                sums[PAIRED] += w
+            sums[FEIGNED] += w * min(2.0 * (pairing.sensor_sigma / length) ** 2, 0.5)
+        a, b, d = w * a, w * b, w * d
+        geometry[0, 0] += a
+        geometry[0, 1] += b
+        geometry[1, 1] += d
+        geometry[0, 2] += b * rx - a * ry
+        geometry[1, 2] += d * rx - b * ry
+        geometry[2, 2] += a * ry * ry - 2.0 * b * rx * ry + d * rx * rx
+    geometry[1, 0], geometry[2, 0] = geometry[0, 1], geometry[0, 2]
+    geometry[2, 1] = geometry[1, 2]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evidence:
+    """What a sample of one frame's points shows.
+
+    geometry  (3, 3) weighted sum over matched points of the outer product of their normal's
+              (x, y, theta) direction in the map frame, about the robot; both directions of a
+              thing that stands free. Ends and corners of surfaces are left out
+    weighed   weight of those points
+    in_view   weight of all points like them: the sample stands for so many
+    shared    m^2, sum over pairs of the weighted product of their offsets from the map
+    paired    weight of those pairs
+    feigned   what the noise of beams adds to the geometry along surfaces
+    new       weighted sum of the share that this look has in the trace it writes
+    """
+
+    geometry: Float
+    weighed: float
+    in_view: float
+    shared: float
+    paired: float
+    feigned: float
+    new: float
+
+
+def look(
+    cell_map: CellMap,
+    short_term: float,
+    seen: Observations,
+    T_map_robot: Float,
+    elapsed: float,
+    turn: int,
+) -> Evidence:
+    """Compare a sample of what is ``seen`` from ``T_map_robot`` with the map, before it is written.
+
+    ``elapsed`` s since the last frame; ``turn`` counts frames: others are looked at each time.
+    """
+    config, cell = cell_map.config.uncertainty.residuals, cell_map.cell
+    step = max(1, len(seen.points_robot) // config.samples)
+    pairing = Pairing(
+        apart=config.apart_cells * cell,
+        longest=config.longest_cells * cell,
+        faint_overlap=config.faint_overlap,
+        bent=config.bent,
+        sensor_sigma=seen.sensor_sigma_m,
+    )
+    geometry, sums = np.zeros((3, 3)), np.zeros(5)
+    _look(
+        cell_map.cells, short_term, cell_map.cell,
+        seen.points_robot, seen.covariances, seen.weights, seen.joined, seen.T_robot_laser,
+        T_map_robot, turn % step, step, (elapsed, cell_map.pace(elapsed)), pairing, geometry, sums,
+    )  # fmt: skip
+    shared, paired, feigned, new, weighed = sums.tolist()
+    return Evidence(
+        geometry=geometry,
+        weighed=weighed,
+        in_view=weighed * step,
+        shared=shared,
+        paired=paired,
+        feigned=feigned,
+        new=new,
+    )

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Get the kernels of an ordinary scan ready before the first frame, so that none waits for them.
+
+Those of the wide search get ready when it is first wanted (``search``), which may be never.
+
+Compiled code is cached on disk: the seconds are spent once after an installation, or in every
+process where no folder for the cache can be written.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from slam.compiling import announced
+from slam.frames import LaserSpec, Scan
+from slam.frontend.observations import from_scan
+from slam.tracker.cell_map import CellMap
+from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.matcher import Matcher
+from slam.tracker.rasterise import rasterise
+from slam.tracker.uncertainty.covariances import advance, carried, innovation, observable
+from slam.tracker.uncertainty.residuals import look
+
+
+@functools.cache
+def warm_up(config_class: type[TrackerConfig], new_map: Callable[[Any], CellMap]) -> None:
+    """Run every kernel of an ordinary scan once on a little room, the first time in a process.
+
+    ``new_map`` makes the map of a SLAM, whose own kernels run as well.
+    """
+    with announced("the SLAM's kernels"):
+        _run_all(config_class(cell_m=0.2), new_map)
+
+
+def _run_all(config: TrackerConfig, new_map: Callable[[Any], CellMap]) -> None:
+    spec = LaserSpec(n_beams=9, angle_min=-1.0, angle_increment=0.25)
+    ranges = np.array([2.0, 2.0, 2.0, 1.0, 3.0, 3.0, 2.0, 2.0, np.inf], np.float32)
+    cell_map, matcher = new_map(config), Matcher(config)
+    origin, covariance = np.zeros(3), np.diag([0.1, 0.1, 0.1])
+    seen = from_scan(Scan(stamp_ns=0, ranges=ranges, spec=spec), np.zeros(3), config)
+    look(cell_map, 0.3, seen, origin, 1.0, 0)
+    whole = [np.eye(3) for _ in range(4)]
+    advance(
+        whole[0],
+        whole[1],
+        whole[2],
+        whole[3],
+        origin,
+        covariance,
+        covariance,
+        (1.0, 1.0, 1.0, 1.0),
+        0.0,
+    )
+    carried(covariance, origin, 0.0, 0.0, np.eye(3))
+    observable(covariance, 0.0, 2.0, np.eye(3))
+    innovation(covariance, covariance, covariance, origin, 1.0)
+    for write in (False, True):
+        rasterise(cell_map, seen, origin)
+        cell_map.integrate(seen.view, origin, 1.0, write=write)
+    start = matcher.approach(cell_map, seen, origin, covariance)
+    matcher.climb(cell_map, seen, start, origin, np.linalg.inv(covariance))
+    cell_map.window(0.0, 0.0, 1.0, 1.0)

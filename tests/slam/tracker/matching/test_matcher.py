@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Matching: derivatives, branch and bound, impressions, prior."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from slam import se2
+from slam.frames import Features, Odometry, Scan
+from slam.frontend.config import Joining
+from slam.frontend.observations import Observations, from_features, from_scan
+from slam.frontend.odometry_prior import inverted, predict, turned
+from slam.frontend.surfaces import join
+from slam.shunting.config import ShuntingConfig
+from slam.shunting.map.network import Network
+from slam.tracker.matching.local_search import SearchWindow
+from slam.tracker.matching.matcher import Matcher, seen_by
+from slam.tracker.matching.score import evaluate
+from slam.tracker.rasterise import rasterise
+from tests.world2d import World2D, arena, laser, rectangle
+
+Array = NDArray[np.float64]
+CONFIG = ShuntingConfig(cell_m=0.05)
+
+
+def joining(near_m: float) -> Joining:
+    return CONFIG.frontend.surfaces.joining(CONFIG.cell_m)._replace(near_m=near_m)
+
+
+def room_scan(pose: Array, n_beams: int = 181) -> Scan:
+    spec = laser(n_beams)
+    poses = np.tile(se2.compose(pose, spec.T_robot_laser), (n_beams, 1))
+    ranges = World2D(arena()).ranges(0.0, poses, spec.angles, 80.0)
+    return Scan(stamp_ns=0, ranges=ranges.astype(np.float32), spec=spec)
+
+
+def room(T_map_robot: Array | None = None) -> Network:
+    pose = np.zeros(3) if T_map_robot is None else T_map_robot
+    network = Network(CONFIG)
+    observations = from_scan(room_scan(pose), np.zeros(3), CONFIG)
+    rasterise(network, observations, pose)
+    T_map_laser = se2.compose(pose, observations.T_robot_laser)
+    network.integrate(observations.view, T_map_laser, 1.0, write=True)
+    return network
+
+
+def features_at(points: Array, spread: float) -> Features:
+    covariance = spread**2 * np.array([[1.0, 0.4], [0.4, 0.5]])
+    return Features(
+        stamp_ns=0, points_robot=points, covariances=np.tile(covariance, (len(points), 1, 1))
+    )
+
+
+@pytest.mark.parametrize("objective", ["sum", "log"])
+def test_gradient_and_curvature_agree_with_differences(objective: str) -> None:
+    network = room()
+    matcher = Matcher(ShuntingConfig(cell_m=0.05, objective=objective))  # type: ignore[arg-type]
+    seen = from_scan(room_scan(np.zeros(3)), np.zeros(3), CONFIG)
+
+    def score(pose: Array) -> tuple[float, Array, Array]:
+        gradient, along, information = np.empty(3), np.empty(3), np.empty((3, 3))
+        value, _ = evaluate(
+            network.cells, matcher.reward, seen_by(seen), pose, gradient, along, information
+        )  # fmt: skip
+        return value, gradient, information
+
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        pose = rng.normal(0.0, [0.02, 0.02, 0.004])
+        gradient = score(pose)[1]
+        for k, h in enumerate((1e-4, 1e-4, 1e-5)):
+            step = np.zeros(3)
+            step[k] = h
+            slope = (score(pose + step)[0] - score(pose - step)[0]) / (2.0 * h)
+            assert slope == pytest.approx(gradient[k], rel=0.02, abs=0.005 * abs(gradient).max())
+    # near the optimum hardly any observation is clipped: information = -second difference
+    step = np.array([2e-3, 0.0, 0.0])
+    best = np.zeros(3)
+    second = (score(best + step)[0] - 2.0 * score(best)[0] + score(best - step)[0]) / 4e-6
+    assert -second == pytest.approx(score(best)[2][0, 0], rel=0.15)
+
+
+def test_climbing_finds_a_known_pose() -> None:
+    network, matcher = room(), Matcher(CONFIG)
+    truth = np.array([0.04, -0.03, 0.01])
+    seen = from_scan(room_scan(truth), np.zeros(3), CONFIG)
+    match = matcher.climb(network, seen, np.zeros(3), np.zeros(3), np.eye(3) * 10.0)
+    assert match.matched > 0.9
+    np.testing.assert_allclose(match.T_map_robot, truth, atol=0.004)
+
+
+def test_search_finds_a_far_pose() -> None:
+    network, matcher = room(), Matcher(CONFIG)
+    truth = np.array([0.45, -0.38, 0.35])
+    seen = from_scan(room_scan(truth), np.zeros(3), CONFIG)
+    precision = np.diag([4.0, 4.0, 4.0])
+    window = SearchWindow(reach_m=0.6, turn_rad=0.5)
+    match = matcher.search(network, seen, np.zeros(3), precision, window)
+    assert match.searched
+    np.testing.assert_allclose(match.T_map_robot, truth, atol=0.02)
+
+
+def test_features_match_through_the_same_interface() -> None:
+    rng = np.random.default_rng(2)
+    landmarks = rng.uniform(-8.0, 8.0, (25, 2))
+    network, matcher = Network(CONFIG), Matcher(CONFIG)
+    seen = from_features(features_at(landmarks, 0.05), CONFIG)
+    rasterise(network, seen, np.zeros(3))
+    network.integrate(seen.view, np.zeros(3), 1.0, write=True)
+    truth = np.array([0.05, 0.04, -0.006])
+    again = features_at(se2.transform(se2.inverse(truth), landmarks), 0.05)
+    match = matcher.climb(
+        network, from_features(again, CONFIG), np.zeros(3), np.zeros(3), np.eye(3)
+    )
+    np.testing.assert_allclose(match.T_map_robot, truth, atol=0.005)
+
+
+def test_returns_of_one_wall_are_joined_and_those_across_a_gap_are_not() -> None:
+    wall = np.stack([np.linspace(0.0, 4.0, 11), np.full(11, 2.0)], axis=1)
+    post = np.array([[4.4, 1.0], [4.8, 3.5]])
+    points = np.vstack([wall, post])
+    joined, tangents = np.zeros(13, np.bool_), np.zeros((13, 2))
+    join(points, np.arange(13), np.array([2.0, 0.0, 0.0]), joining(0.1), joined, tangents)
+    assert joined[:10].all()
+    assert not joined[10:].any()
+    np.testing.assert_allclose(tangents[1:10], np.tile([1.0, 0.0], (9, 1)))
+    beams = np.arange(13)
+    beams[5:] += 1  # a beam without a return between the fifth and the sixth
+    join(points, beams, np.array([2.0, 0.0, 0.0]), joining(0.1), joined, tangents)
+    assert not joined[4]
+
+
+def test_table_legs_in_line_with_a_wall_are_not_joined_to_it() -> None:
+    """A near leg, a far leg and the wall, nearly radial and evenly spaced: three hits in line."""
+    points = np.array([[1.00, 0.0], [1.60, 0.02], [2.25, 0.04], [2.25, 0.09], [2.25, 0.14]])
+    joined, tangents = np.zeros(5, np.bool_), np.zeros((5, 2))
+    join(points, np.arange(5), np.zeros(3), joining(0.06), joined, tangents)
+    assert joined.tolist() == [False, False, True, True, False]
+
+
+def test_a_mixed_pixel_is_left_out_and_a_thin_leg_is_not() -> None:
+    spec = laser(181)
+    for ranges, seen in (
+        ([2.0, 2.0, 2.0, 2.4, 2.9, 2.9, 2.9], 6),
+        ([3.0] * 3 + [1.5] + [3.0] * 3, 7),
+    ):
+        scan = Scan(stamp_ns=0, ranges=np.array(ranges + [np.inf] * 174, np.float32), spec=spec)
+        assert len(from_scan(scan, np.zeros(3), CONFIG).points_robot) == seen
+
+
+def test_coming_near_helps_where_the_heading_is_vague() -> None:
+    network, matcher = room(), Matcher(CONFIG)
+    truth = np.array([0.02, -0.01, 0.05])
+    seen = from_scan(room_scan(truth), np.zeros(3), CONFIG)
+    sure, vague = np.diag([1e-6, 1e-6, 1e-8]), np.diag([4e-4, 4e-4, 9e-4])
+    still = matcher.approach(network, seen, np.zeros(3), sure)
+    np.testing.assert_array_equal(still, np.zeros(3))
+    start = matcher.approach(network, seen, np.zeros(3), vague)
+    np.testing.assert_allclose(start, truth, atol=0.02)
+
+
+def test_deskewing_puts_beams_where_they_were_measured() -> None:
+    """A robot turning on the spot, each beam cast from the pose at its own time."""
+    spec = laser(361, interlaced=True)
+    twist = np.array([0.5, 0.0, 2.5])
+    poses = np.array(
+        [se2.compose(se2.exp(twist, float(t)), spec.T_robot_laser) for t in spec.beam_time_offsets]
+    )
+    world = World2D(rectangle(-5.0, -4.0, 5.0, 4.0))
+    ranges = world.ranges(0.0, poses, spec.angles, 80.0).astype(np.float32)
+    scan = Scan(stamp_ns=0, ranges=ranges, spec=spec)
+    ends = np.stack([np.cos(poses[:, 2] + spec.angles), np.sin(poses[:, 2] + spec.angles)], 1)
+    truth = poses[:, :2] + ranges[:, None].astype(np.float64) * ends
+    moved = from_scan(scan, twist, CONFIG).points_robot
+    order = np.argsort(np.arctan2(truth[:, 1], truth[:, 0] - 0.1), kind="stable")
+    at_stamp = np.stack([np.cos(spec.angles), np.sin(spec.angles)], 1)
+    still = spec.T_robot_laser[:2] + ranges[:, None].astype(np.float64) * at_stamp
+    assert np.abs(moved - truth[order]).max() < 1e-4
+    assert np.abs(still - truth).max() > 0.1
+
+
+def test_prior_comes_from_the_frames_own_covariance() -> None:
+    covariance = np.diag([0.04, 0.01, 0.0025])
+    before = Odometry(stamp_ns=0, T_odom_robot=np.array([1.0, 2.0, 0.3]))
+    now = Odometry(
+        stamp_ns=200_000_000,
+        T_odom_robot=se2.compose(before.T_odom_robot, [0.2, 0.0, 0.1]),
+        increment_covariance=covariance,
+    )
+    T_map = np.array([5.0, 5.0, math.pi / 2.0])
+    prediction = predict(T_map, before, now, (2.25, 4.0))
+    np.testing.assert_allclose(prediction.T_map_robot, se2.compose(T_map, [0.2, 0.0, 0.1]))
+    assert prediction.covariance[1, 1] == pytest.approx(2.25 * 0.04, rel=0.01)  # x is map's y
+    assert prediction.covariance[0, 0] == pytest.approx(2.25 * 0.01, rel=0.01)
+    assert prediction.covariance[2, 2] == pytest.approx(4.0 * 0.0025, rel=0.01)
+    silent = Odometry(stamp_ns=200_000_000, T_odom_robot=now.T_odom_robot)
+    assumed = predict(T_map, before, silent).covariance
+    assert 0.01 < math.sqrt(assumed[0, 0]) < 0.1
+
+
+def test_small_matrices_agree_with_numpy() -> None:
+    rng = np.random.default_rng(4)
+    root = rng.normal(size=(3, 3))
+    m = root @ root.T + np.eye(3)
+    np.testing.assert_allclose(inverted(m), np.linalg.inv(m), atol=1e-12)
+    c, s = math.cos(0.7), math.sin(0.7)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(turned(m, 0.7), R @ m @ R.T, atol=1e-12)
+
+
+def test_the_other_face_of_a_thin_wall_does_not_count() -> None:
+    """A wall of 8 cm mapped from its south, then seen from its north and from its south again."""
+    spec = laser(181)
+    south, north = np.array([0.0, -1.5, math.pi / 2.0]), np.array([0.0, 1.5, -math.pi / 2.0])
+    wall = World2D(rectangle(-4.0, -0.04, 4.0, 0.04))
+
+    def seen_from(pose: Array) -> Observations:
+        poses = np.tile(se2.compose(pose, spec.T_robot_laser), (181, 1))
+        ranges = wall.ranges(0.0, poses, spec.angles, 80.0).astype(np.float32)
+        return from_scan(Scan(stamp_ns=0, ranges=ranges, spec=spec), np.zeros(3), CONFIG)
+
+    network = Network(CONFIG)
+    matcher = Matcher(CONFIG)
+    known = seen_from(south)
+    for _ in range(20):
+        rasterise(network, known, south)
+        laser_pose = se2.compose(south, known.T_robot_laser)
+        network.integrate(known.view, laser_pose, 0.2, write=True)
+    firm = 1e6 * np.eye(3)
+    moved = north - np.array([0.0, 0.08, 0.0])  # where its two faces fall into one
+    assert matcher.climb(network, known, south, south, firm).matched > 0.95
+    assert matcher.climb(network, seen_from(north), moved, moved, firm).matched < 0.05
+    rasterise(network, seen_from(north), moved)
+    confirmed, _, _ = network.integrate(
+        known.view, se2.compose(moved, spec.T_robot_laser), 0.2, write=False
+    )
+    network.release()
+    assert confirmed < 1.0

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Loops of long runs."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from slam import create, se2
+from slam.frames import Frame
+from slam.frontend.observations import Observations, from_scan
+from slam.posegraph import Edge
+from slam.replay import Track
+from slam.shunting import ShuntingConfig
+from slam.shunting.map.network import Network
+from slam.tracker.matching.matcher import Matcher
+from slam.tracker.tracking.loops import Loops
+from tests.world2d import Drive, World2D, frames, laser, office, office_loop, rectangle
+
+CONFIG = ShuntingConfig().changed({"cell_m": 0.05, "loops.long_m": 50.0})
+
+
+def seen(frame: Frame) -> Observations:
+    assert frame.scan is not None
+    return from_scan(frame.scan, np.zeros(3), CONFIG)
+
+
+Drifted = tuple[list[Frame], np.ndarray, np.ndarray, list[Observations]]
+
+
+@pytest.fixture(scope="module")
+def drifted() -> Drifted:
+    """Once round the office and 10 m on, with a heading that creeps: 1 m off at the end."""
+    once = office_loop()
+    drive = Drive(once.start, (*once.pieces, (0.8, 0.0, 12.0)))
+    stream = frames(World2D(office()), drive, rate_hz=1.0, spec=laser(181), seed=3)
+    truth = np.array([se2.between(stream[0].truth, frame.truth) for frame in stream])  # type: ignore[arg-type]
+    poses = [np.zeros(3)]
+    for before, now in itertools.pairwise(truth):
+        motion = se2.between(before, now) + np.array([0.002, 0.0, 0.0008])
+        poses.append(se2.compose(poses[-1], motion))
+    return stream, truth, np.array(poses), [seen(frame) for frame in stream]
+
+
+def filled(graph: Loops, drifted: Drifted) -> Loops:
+    _, _, poses, observations = drifted
+    graph.add(0, poses[0], np.zeros(3), np.zeros((3, 3)), observations[0])
+    for k in range(1, len(poses)):
+        motion = se2.between(poses[k - 1], poses[k])
+        graph.add(k, poses[k], motion, np.diag([1e-4, 1e-4, 1e-6]), observations[k])
+    return graph
+
+
+def errors(poses: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    return np.asarray(np.hypot(*(poses - truth)[:, :2].T))
+
+
+def test_a_drifted_way_is_bent_back_onto_itself(drifted: Drifted) -> None:
+    _, truth, poses, _ = drifted
+    graph = filled(Loops(CONFIG, Matcher(CONFIG), lambda: Network(CONFIG)), drifted)
+    corrected = graph.corrected(poses)
+    assert len(graph.edges) >= 3
+    error, left = errors(poses, truth), errors(corrected, truth)
+    assert error[-1] > 0.3
+    assert left[-1] < 0.12
+    assert left.max() < 0.6 * error.max()
+    np.testing.assert_array_equal(graph.corrected(poses), corrected)
+
+
+class Aliased(Loops):
+    """Some of the closures that it finds are of another place, 2 to 4 m off and turned."""
+
+    def __init__(self, share: float) -> None:
+        super().__init__(CONFIG, Matcher(CONFIG), lambda: Network(CONFIG))
+        self.share, self.rng, self.forced = share, np.random.default_rng(1), 0
+
+    def _loop(self, middle: int, j: int, predicted: np.ndarray, gate: float) -> Edge | None:
+        edge = super()._loop(middle, j, predicted, gate)
+        if edge is None or self.rng.uniform() >= self.share:
+            return edge
+        self.forced += 1
+        x, y = self.rng.choice([-1.0, 1.0], 2) * self.rng.uniform(2.0, 4.0, 2)
+        wrong = se2.compose(edge.T_a_b, [x, y, self.rng.uniform(-0.4, 0.4)])
+        return replace(edge, T_a_b=wrong)
+
+
+@pytest.mark.parametrize("share", [0.4, 1.0])
+def test_wrong_closures_do_not_wreck_a_good_map(drifted: Drifted, share: float) -> None:
+    _, truth, poses, _ = drifted
+    graph = filled(Aliased(share), drifted)
+    left, error = errors(graph.corrected(poses), truth), errors(poses, truth)
+    assert graph.forced >= 2
+    assert left.max() < (0.8 if share < 1.0 else 1.2) * error.max()
+
+
+LONG, WIDE = 100.0, 68.0  # m, of the ring
+
+
+def ring(seed: int) -> np.ndarray:
+    """Segments of a corridor of 2.5 m round a block, with cupboards at random along its walls."""
+    rng = np.random.default_rng(seed)
+    half = 1.25
+    walls = [
+        rectangle(-half, -half, LONG + half, WIDE + half),
+        rectangle(half, half, LONG - half, WIDE - half),
+    ]
+    for length, lengthwise, across in (
+        (LONG, True, 0.0), (WIDE, False, LONG), (LONG, True, WIDE), (WIDE, False, 0.0),
+    ):  # fmt: skip
+        at = 3.0
+        while at < length - 3.0:
+            side = across + rng.choice([-1.0, 1.0]) * 1.05
+            h = rng.uniform(0.15, 0.5)
+            box = (at - h, side - 0.2, at + h, side + 0.2)
+            walls.append(rectangle(*box) if lengthwise else rectangle(*np.array(box)[[1, 0, 3, 2]]))
+            at += rng.uniform(2.0, 7.0)
+    return np.vstack(walls)
+
+
+def test_a_ring_of_335_m_closes() -> None:
+    """Round it once and 15 m on: the online pose finds no way back, the final one ends right."""
+    corner = (0.4, 0.8, np.pi / 2.0 / 0.8)
+    pieces = [piece for s in (LONG, WIDE) * 2 for piece in ((0.8, 0.0, (s - 1.0) / 0.8), corner)]
+    drive = Drive((0.5, 0.0, 0.0), (*pieces, (0.8, 0.0, 15.0 / 0.8)))
+    stream = frames(World2D(ring(2)), drive, rate_hz=1.0, spec=laser(181), seed=2)
+    track = Track("shunting", create("shunting"))
+    assert track.survive(stream) is None
+    truth = np.array([se2.between(stream[0].truth, frame.truth) for frame in stream])  # type: ignore[arg-type]
+    final = track.final()
+    assert final is not None
+    before, after = errors(track.online().poses, truth), errors(final.poses, truth)
+    assert after[-1] <= 0.10
+    assert after.max() < 0.6 * before.max()
+
+
+def test_short_ways_stay_as_they_are() -> None:
+    graph = Loops(CONFIG, Matcher(CONFIG), lambda: Network(CONFIG))
+    poses = np.zeros((4, 3))
+    assert graph.corrected(poses) is poses

@@ -1,0 +1,352 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Honest covariances: against sampling, with known errors, and where walls say nothing."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from slam import se2
+from slam.frames import Float, Frame, Odometry, Scan
+from slam.frontend.observations import from_scan
+from slam.frontend.odometry_prior import Prediction
+from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.shunting.map.network import Network
+from slam.system import Estimate
+from slam.tracker.matching.matcher import Match, Matcher
+from slam.tracker.rasterise import rasterise
+from slam.tracker.uncertainty.covariances import innovation, observable
+from slam.tracker.uncertainty.odometry_noise import OdometryNoise
+from slam.tracker.uncertainty.pose_covariance import PoseCovariance
+from slam.tracker.uncertainty.residuals import Evidence, look
+from tests.world2d import Drive, World2D, arena, frames, laser, rectangle, wander
+
+CONFIG = ShuntingConfig.robust(cell_m=0.05)
+SIGMA_M = CONFIG.frontend.sensor_sigma_m
+LONG = World2D(rectangle(-60.0, -1.0, 60.0, 1.01))
+
+
+def driven(stream: list[Frame]) -> list[Estimate]:
+    system = ShuntingSlam(CONFIG)
+    return [system.update(frame.without_truth()) for frame in stream]
+
+
+@pytest.mark.parametrize("beams", [181, 361])
+def test_a_corridor_is_not_observable_along_and_the_covariance_grows_there(beams: int) -> None:
+    turned = 0.4  # so that the axis is none of the map's
+    drive = Drive((0.0, 0.0, turned), ((0.0, -0.4, 1.0), (0.6, 0.0, 12.0)))
+    stream = frames(LONG, drive, rate_hz=5.0, spec=laser(beams), seed=1)
+    found = driven(stream)[10:]
+    flagged = [e.diagnostics["unobservable"] == 1 for e in found]
+    assert np.mean(flagged) > 0.95
+    along = np.array([math.cos(-turned), math.sin(-turned)])
+    across = np.array([-along[1], along[0]])
+    for estimate in found:
+        if estimate.diagnostics["unobservable"] == 1:
+            angle = estimate.diagnostics["unobservable_rad"]
+            assert abs(math.sin(angle + turned)) < 0.05
+    variances = np.array([e.covariance[:2, :2] for e in found])
+    grown, bounded = variances @ along @ along, variances @ across @ across
+    assert (np.diff(grown) > 0.0).mean() > 0.95
+    assert grown[-1] > 3.0 * grown[0]
+    assert bounded.max() < 0.02**2
+    assert all(e.converged for e in found)
+    error = found[-1].T_map_robot - se2.between(stream[0].truth, stream[-1].truth)
+    assert abs(error[:2] @ along) < 3.0 * math.sqrt(grown[-1])
+    assert abs(error[:2] @ across) < 3.0 * math.sqrt(bounded[-1])
+
+
+@pytest.mark.parametrize("beams", [91, 361])
+def test_a_room_is_observable(beams: int) -> None:
+    stream = frames(World2D(arena()), wander(6.0), rate_hz=5.0, spec=laser(beams), seed=2)
+    found = driven(stream)[1:]
+    assert [e.diagnostics["unobservable"] for e in found] == [0] * len(found)
+    assert max(float(e.covariance[k, k]) for e in found for k in (0, 1)) < 0.03**2
+
+
+def test_nothing_in_view_leaves_odometry_alone() -> None:
+    stream = frames(World2D(arena()), wander(3.0), rate_hz=5.0, spec=laser(91))[:12]
+    system = ShuntingSlam(CONFIG)
+    for frame in stream[:6]:
+        before = system.update(frame)
+    variances = [float(before.covariance[0, 0] + before.covariance[1, 1])]
+    for frame in stream[6:]:
+        assert frame.scan is not None
+        nothing = Scan(
+            stamp_ns=frame.stamp_ns, ranges=np.full(91, np.inf, np.float32), spec=frame.scan.spec
+        )
+        estimate = system.update(dataclasses.replace(frame, scan=nothing, truth=None))
+        assert estimate.diagnostics["unobservable"] == 2
+        variances.append(float(estimate.covariance[0, 0] + estimate.covariance[1, 1]))
+    assert (np.diff(variances) > 0.0).all()
+
+
+def mapped(world: World2D) -> tuple[Network, list[Scan]]:
+    """A network that has seen the world from the origin for long, and fresh scans from there."""
+    drive = Drive((0.0, 0.0, 0.0), ((0.0, 0.0, 40.0),))
+    scans = [f.scan for f in frames(world, drive, rate_hz=5.0, spec=laser(181), seed=3)]
+    network = Network(CONFIG)
+    for scan in scans[:80]:
+        assert scan is not None
+        seen = from_scan(scan, np.zeros(3), CONFIG)
+        rasterise(network, seen, np.zeros(3))
+        network.integrate(seen.view, seen.T_robot_laser, 0.2, write=True)
+    return network, [scan for scan in scans[80:] if scan is not None]
+
+
+def test_matches_scatter_as_their_information_says() -> None:
+    """One place, many draws of the beams' noise, a fixed map: sample covariance against claimed."""
+    network, scans = mapped(World2D(arena()))
+    matcher, flat = Matcher(CONFIG), np.diag([1.0, 1.0, 1.0])
+    poses, claimed = [], []
+    share = (
+        CONFIG.frontend.sensor_sigma_m / (CONFIG.frontend.sigma_cells * CONFIG.cell_m)
+    ) ** 2 / 2.0
+    for scan in scans:
+        seen = from_scan(scan, np.zeros(3), CONFIG)
+        match = matcher.climb(network, seen, np.zeros(3), np.zeros(3), flat)
+        poses.append(match.T_map_robot)
+        claimed.append(share * np.linalg.inv(match.information))
+    sampled, expected = np.cov(np.array(poses).T), np.mean(claimed, axis=0)
+    ratios = np.linalg.eigvals(np.linalg.solve(expected, sampled)).real
+    assert ratios.min() > 0.2
+    assert ratios.max() < 3.0
+
+
+def test_residuals_of_noise_are_not_shared_and_a_moved_wall_is() -> None:
+    network, scans = mapped(World2D(arena()))
+    totals = {}
+    for name, longer in (("noise", 0.0), ("moved", 0.02)):
+        shared = paired = 0.0
+        for turn, scan in enumerate(scans):
+            ranges = scan.ranges + np.float32(longer)
+            moved = Scan(stamp_ns=scan.stamp_ns, ranges=ranges, spec=scan.spec)
+            seen = from_scan(moved, np.zeros(3), CONFIG)
+            evidence = look(network, 0.3, seen, np.zeros(3), 0.2, turn)
+            shared, paired = shared + evidence.shared, paired + evidence.paired
+        totals[name] = shared / paired
+    assert abs(totals["noise"]) < 0.003**2
+    assert 0.008**2 < totals["moved"] < 0.021**2  # the part of 2 cm along the walls' normals
+
+
+def test_what_noise_feigns_is_taken_out_of_the_geometry() -> None:
+    out = np.empty((3, 3))
+    c, s = math.cos(0.3), math.sin(0.3)
+    for small, lost in ((0.01, 1), (0.05, 0)):
+        R = np.array([[c, -s], [s, c]])
+        geometry = np.diag([0.0, 0.0, 4.0])
+        geometry[:2, :2] = R @ np.diag([small, 0.9]) @ R.T
+        geometry[0, 2] = geometry[2, 0] = 0.02
+        count, along = observable(geometry, 0.01, CONFIG.uncertainty.pose.noisy, out)
+        assert count == lost
+        assert np.linalg.eigvalsh(out).min() > -1e-12
+        values = np.linalg.eigvalsh(out[:2, :2])
+        np.testing.assert_allclose(values, [max(small - 0.02, 0.0), 0.88], atol=1e-12)
+        if lost:
+            assert abs(math.sin(along - 0.3)) < 1e-9
+
+
+def test_innovations_have_the_nis_of_prior_and_match_together() -> None:
+    rng = np.random.default_rng(5)
+    prior, data = np.diag([0.02**2, 0.01**2, 0.01**2]), np.diag([4e4, 1e4, 9e4])
+    data[0, 2] = data[2, 0] = 1e4
+    for share in (1.0, 0.25):
+        R = share * np.linalg.inv(data)
+        gain = np.linalg.solve(data + np.linalg.inv(prior), data)
+        root = np.linalg.cholesky(prior + R)
+        values = [
+            innovation(prior, prior, data, gain @ root @ rng.normal(size=3), share)[0]
+            for _ in range(3000)
+        ]
+        assert np.mean(values) == pytest.approx(3.0, abs=0.2)
+
+
+def corrected(
+    increments: OdometryNoise, rng: np.random.Generator, given: Float | None, true: Float
+) -> float | None:
+    """One step of 0.2 m whose odometry errs by ``true`` (3,) standard deviations; its NIS."""
+    before = Odometry(stamp_ns=0, T_odom_robot=np.zeros(3))
+    now = Odometry(
+        stamp_ns=200_000_000,
+        T_odom_robot=np.array([0.2, 0.0, 0.05]),
+        increment_covariance=given,
+    )
+    prediction = increments.predict(np.zeros(3), before, now)
+    match = np.diag([1e-3, 1e-3, 5e-4]) ** 2
+    share = increments.noise_share(SIGMA_M)
+    information = np.linalg.inv(match) * share  # what the reward's curvature says
+    e = true * rng.normal(size=3) + np.sqrt(np.diag(match)) * rng.normal(size=3)
+    gain = np.linalg.solve(information + np.linalg.inv(prediction.prior), information)
+    increments.learn(
+        prediction,
+        Match(
+            T_map_robot=prediction.T_map_robot + gain @ e,
+            information=information,
+            matched=1.0,
+            score=0.0,
+            tau=1.0,
+        ),
+        SIGMA_M,
+    )
+    return increments.nis
+
+
+@pytest.mark.parametrize("stated", [None, 0.3, 1.0, 1.8])
+def test_scales_of_odometry_are_found_whatever_is_stated(stated: float | None) -> None:
+    """``stated`` times the true standard deviations, or nothing: the NIS settles near 3."""
+    true = np.array([0.01, 0.006, 0.012])
+    given = None if stated is None else np.diag((stated * true) ** 2)
+    increments, rng = OdometryNoise.of_beams(CONFIG), np.random.default_rng(6)
+    values = [corrected(increments, rng, given, true) for _ in range(1200)]
+    settled = np.array([v for v in values[400:] if v is not None])
+    assert 0.6 < settled.mean() / 3.0 < 1.6
+    if stated == 0.3:
+        assert increments.scales[0] > 4.0
+
+
+def test_nees_is_right_when_the_errors_are_what_the_belief_was_told() -> None:
+    """A toy: odometry with known Gaussian increments and nothing seen. NEES / 3 is 1."""
+    rng = np.random.default_rng(7)
+    values = []
+    increment = np.array([0.2, 0.0, 0.1])
+    Q = np.diag([0.01**2, 0.005**2, 0.01**2])
+    root = np.linalg.cholesky(Q)
+    for _ in range(300):
+        belief, estimate, truth = PoseCovariance(CONFIG), np.zeros(3), np.zeros(3)
+        for _ in range(20):
+            c, s = math.cos(estimate[2]), math.sin(estimate[2])
+            R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+            predicted = se2.compose(estimate, increment)
+            prediction = Prediction(
+                T_map_robot=predicted,
+                increment=increment,
+                covariance=R @ Q @ R.T,
+                twist=np.zeros(3),
+                elapsed=0.2,
+            )
+            blind = Match(
+                T_map_robot=predicted, information=np.zeros((3, 3)), matched=0.0, score=0.0, tau=0.0
+            )
+            belief.update(estimate, prediction, blind, None)
+            estimate = predicted
+            truth = se2.compose(truth, increment + root @ rng.normal(size=3))
+        e = estimate - truth
+        e[2] = se2.wrap(float(e[2]))
+        values.append(e @ np.linalg.solve(belief.covariance, e))
+    assert np.mean(values) / 3.0 == pytest.approx(1.0, abs=0.15)
+
+
+def standing(shared_m: float, in_view: float) -> tuple[Float, Float]:
+    """Covariances of a robot that stands and sees the same surfaces, after 300 and 600 scans."""
+    geometry = np.diag([0.5, 0.5, 4.0])
+    belief = PoseCovariance(ShuntingConfig())
+    evidence = Evidence(
+        geometry=20.0 * geometry,
+        weighed=20.0,
+        in_view=in_view,
+        shared=20.0 * shared_m**2,
+        paired=20.0,
+        feigned=0.0,
+        new=0.0,
+    )
+    still = Prediction(
+        T_map_robot=np.zeros(3),
+        increment=np.zeros(3),
+        covariance=np.diag([0.002**2, 0.002**2, 0.001**2]),
+        twist=np.zeros(3),
+        elapsed=0.2,
+    )
+    match = Match(
+        T_map_robot=np.zeros(3), information=1e5 * geometry, matched=1.0, score=0.0, tau=5.0
+    )
+    out = []
+    for _ in range(2):
+        for _ in range(300):
+            belief.update(np.zeros(3), still, match, evidence)
+        out.append(belief.covariance.copy())
+    return out[0], out[1]
+
+
+def test_shared_residuals_widen_the_belief_and_standing_still_does_not() -> None:
+    sizes = {}
+    for shared_m in (0.0, 0.005):
+        settled, later = standing(shared_m, in_view=75.0)
+        np.testing.assert_allclose(later, settled, rtol=0.05, atol=1e-12)
+        sizes[shared_m] = float(settled[0, 0])
+    assert sizes[0.005] > 3.0 * sizes[0.0]
+
+
+def test_errors_of_surfaces_average_out_over_those_in_view() -> None:
+    """Five times fewer of them: five times the variance, but for what odometry leaves."""
+    room, little = (standing(0.005, in_view)[1] for in_view in (75.0, 15.0))
+    assert little[0, 0] / room[0, 0] == pytest.approx(5.0, rel=0.2)
+    assert little[2, 2] / room[2, 2] == pytest.approx(5.0, rel=0.2)
+
+
+def test_what_is_written_blindly_keeps_odometrys_error() -> None:
+    """A match to a map that was just written takes off less of it than one to an old map."""
+    geometry = np.diag([0.5, 0.5, 4.0])
+    left = {}
+    for new in (0.0, 0.2):
+        belief = PoseCovariance(ShuntingConfig())
+        T = np.zeros(3)
+        drive = Prediction(
+            T_map_robot=T,
+            increment=np.zeros(3),
+            covariance=np.diag([0.01**2, 0.01**2, 0.01**2]),
+            twist=np.zeros(3),
+            elapsed=0.2,
+        )
+        nothing = Match(
+            T_map_robot=T, information=np.zeros((3, 3)), matched=0.0, score=0.0, tau=0.0
+        )
+        match = Match(T_map_robot=T, information=1e5 * geometry, matched=1.0, score=0.0, tau=5.0)
+        for _ in range(100):
+            belief.update(T, drive, nothing, None)
+        blind = belief.covariance[0, 0]
+        evidence = Evidence(
+            geometry=20.0 * geometry,
+            weighed=20.0,
+            in_view=75.0,
+            shared=0.0,
+            paired=20.0,
+            feigned=0.0,
+            new=20.0 * new,
+        )
+        belief.update(T, drive, match, evidence)
+        left[new] = belief.covariance[0, 0] / blind
+        assert np.linalg.eigvalsh(belief.covariance)[0] > 0.0
+    assert left[0.0] < 0.05
+    assert left[0.2] == pytest.approx(2.4 * 0.2, abs=0.05)
+
+
+@pytest.mark.parametrize("blind_s", [700.0, 16000.0])
+def test_long_blindness_leaves_a_covariance_that_can_be(blind_s: float) -> None:
+    """Faded sums come to stand at the smallest numbers there are; they must count as nothing."""
+    belief, T = PoseCovariance(CONFIG), np.zeros(3)
+    nothing = Evidence(
+        geometry=np.zeros((3, 3)),
+        weighed=0.0,
+        in_view=0.0,
+        shared=0.0,
+        paired=0.0,
+        feigned=0.0,
+        new=0.0,
+    )
+    still = Prediction(
+        T_map_robot=T,
+        increment=T,
+        covariance=np.diag([1e-6, 1e-6, 1e-6]),
+        twist=T,
+        elapsed=0.5,
+    )
+    match = Match(T_map_robot=T, information=1e4 * np.eye(3), matched=1.0, score=0.0, tau=1.0)
+    seen = dataclasses.replace(nothing, geometry=np.eye(3), weighed=1.0, in_view=75.0)
+    belief.update(T, still, match, seen)
+    for _ in range(round(blind_s / still.elapsed)):
+        belief.update(T, still, match, nothing)
+    assert np.isfinite(belief.covariance).all()
+    assert belief.shared_m2 < 1e-4
