@@ -199,27 +199,27 @@ class ShuntingSlam:
         rasterise(self.network, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
         step = min(prediction.elapsed, self.config.map.longest_look_s)
-        doubt, doubtful = self._quality, False
+        quality, doubtful = self._quality, False
         enough = self._numbers.relocalise.least_weight
-        if float(observations.weights.sum()) >= enough and doubt.arises(match.matched):
+        if float(observations.weights.sum()) >= enough and quality.arises(match.matched):
             confirmed, contradicted, _ = self.network.integrate(
                 observations.view, T_map_laser, step, write=False
             )
             motion = match.T_map_robot - self._T_map_robot
-            doubtful = doubt.denied(match.matched, confirmed, contradicted, motion)
-        doubt.count(doubtful)
-        if doubtful and doubt.scans <= doubt.config.patience:
+            doubtful = quality.denied(match.matched, confirmed, contradicted, motion)
+        quality.count(doubtful)
+        if doubtful and quality.scans <= quality.config.patience:
             self.network.release()
-            if doubt.scans >= doubt.config.lost_after and doubt.suspicious:
+            if quality.scans >= quality.config.lost_after and quality.suspicious:
                 self._relocalisation = Relocalisation(self.network, self._matcher)
-            return "lost" if doubt.scans > doubt.config.lost_after else "frozen"
+            return "lost" if quality.scans > quality.config.lost_after else "frozen"
         confirmed, contradicted, _ = self.network.integrate(
             observations.view, T_map_laser, step, write=True
         )
         if len(observations.points_robot) == 0:
             return "lost" if doubtful else "blind"  # odometry alone
         if not doubtful:
-            doubt.learn(match.matched, confirmed, contradicted, prediction.elapsed)
+            quality.learn(match.matched, confirmed, contradicted, prediction.elapsed)
         return "lost" if doubtful else "tracking"
 
     def _update_uncertainty(
@@ -239,7 +239,7 @@ class ShuntingSlam:
     def _add_to_path(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
     ) -> None:
-        """For closing loops: motion as matched, or by odometry where an end of it is in doubt."""
+        """For closing loops: motion as matched, or by odometry where an end of it is in quality."""
         motion = se2.between(self._T_map_robot, match.T_map_robot)
         covariance = self._pose_covariance.newest_drift
         if state != "tracking" or not self._trusted:
@@ -285,7 +285,7 @@ class ShuntingSlam:
         return self.network.window(xmin, ymin, xmax, ymax)
 
     def save(self, path: Path) -> None:
-        """Write map, knobs and pose to a file for ``load``; raises ``OutputError``."""
+        """Write map, config and pose to a file for ``load``; raises ``OutputError``."""
         state = memory.State(
             kind=type(self).__name__,
             T_map_robot=self._T_map_robot,
