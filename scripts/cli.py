@@ -69,8 +69,8 @@ def options(
         list[str] | None,
         typer.Option(
             "--with",
-            help="Import this Python module of yours first, so that the scanner, topic or film "
-            "pane that it registers is known.",
+            help="Import this Python module of yours first, so that the scene, scanner, SLAM, "
+            "topic or film pane that it registers is known.",
         ),
     ] = None,
 ) -> None:

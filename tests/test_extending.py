@@ -241,7 +241,7 @@ def test_a_pane_of_another_size_is_refused_by_name(outside: Path):
 def test_numbers(outside: Path, heading: str):
     follow(heading, outside)
     if heading != "Dynamism rate":
-        folder = "decay" if heading == "Number of a SLAM" else "doubt"
+        folder = "decay" if heading == "Number of a SLAM" else "lost"
         assert (outside / "out" / folder / "results.json").exists()
 
 

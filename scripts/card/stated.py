@@ -11,7 +11,7 @@ import numpy as np
 
 from scripts.card.bench import Bench, box, plate
 from scripts.card.rows import Row, table
-from sim.sensors.lidar.registry import describe, scanner_of
+from sim.sensors.lidar.registry import describe, names, scanner_of
 from sim.sensors.lidar.scanner import Scanner
 from sim.sensors.lidar.sheet import NOT_STATED, QUANTITIES, Stated, sheet_of
 from slam.errors import InvalidValueError
@@ -26,8 +26,14 @@ UNIT_OF = {"deg": ("°", 1.0), "hz": ("Hz", 1.0), "us": ("µs", 1.0), "m": ("mm"
 def rows_of(name: str) -> list[Row]:
     """Every row of a scanner's data sheet, measured anew; a few seconds.
 
-    Raises ``InvalidValueError`` for a scanner without a data sheet.
+    Raises ``InvalidValueError`` for a scanner without a data sheet, and for one with settings or
+    errors in its name; ``UnknownNameError`` for one that is not registered.
     """
+    if name not in names():
+        scanner_of(name)  # says what is wrong with a name that is none
+        raise InvalidValueError(
+            f"a sensor card shows a whole model, one of {', '.join(names())}; got {name!r}"
+        )
     sheet = sheet_of(name)
     if not sheet:
         raise InvalidValueError(f"scanner '{name}' has no data sheet to be measured against")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the EKF's knobs were set: ``python -m scripts.experiments.tune_ekf points`` (or ``corners``).
+"""How the EKF was tuned: ``python -m scripts.experiments.tune_ekf points`` (or ``corners``).
 
-One pass over the knobs, each in turn over a few values with the others as they are in the preset,
+One pass over the numbers, each in turn over a few values with the others as they are in the preset,
 on the training seeds 0 to 19 and nothing else; results are shown on seeds from 200 on. The score is
 the mean over the runs of log10(RMSE / 1 m): a factor counts the same wherever it happens, and a run
 that is lost counts, but not for everything. Seeds are paired: beside each value's change of the

@@ -52,10 +52,10 @@ def config(
 
 
 def _print_dynamism(as_json: bool) -> None:
-    """Each rate at five levels of the knob."""
-    from sim.core.dynamism import KNOB
+    """The dynamism curves: each rate at five levels."""
+    from sim.core.dynamism import CURVES
 
-    rows = [(rate, [rate.at(level) for level in LEVELS]) for rate in KNOB]
+    rows = [(rate, [rate.at(level) for level in LEVELS]) for rate in CURVES]
     if as_json:
         words = [
             {"field": rate.field, "meaning": rate.meaning, "unit": rate.unit,

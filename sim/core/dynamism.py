@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One number in [0, 1] for how much a room moves, and the table of what it means.
 
-``KNOB`` is that table; ``mobilia config dynamism`` prints it.
+``CURVES`` is that table: the dynamism curves. ``mobilia config dynamism`` prints it.
 
 The rates are set so that what is on the move rises in proportion to d: a shove keeps a
 chair rolling for about a second, so at 1 one office chair in seven moves at any time; a way
@@ -42,7 +42,7 @@ class Rate:
     at: Callable[[float], float]
 
 
-KNOB = (
+CURVES = (
     Rate("chair_push_rate", "shoves of each chair", "1/s", lambda d: 0.15 * d),
     Rate("bin_kick_rate", "kicks of each bin", "1/s", lambda d: 0.06 * d),
     Rate("load_push_rate", "moves of each trolley or pallet", "1/s", lambda d: 0.06 * d),
@@ -57,7 +57,7 @@ KNOB = (
 
 @dataclass(frozen=True, kw_only=True)
 class Dynamism:
-    """All rates of a moving room. ``Dynamism.from_knob`` fills them from the table above.
+    """All rates of a moving room. ``Dynamism.at`` fills them from the table above.
 
     chair_push_rate  1/s for each chair          bin_kick_rate  1/s for each bin
     load_push_rate   1/s for each trolley, pallet or whatever else rolls in the plane
@@ -104,17 +104,17 @@ class Dynamism:
                 )
 
     @classmethod
-    def from_knob(cls, dynamism: float) -> Dynamism:
+    def at(cls, dynamism: float) -> Dynamism:
         """Rates at a dynamism in [0, 1]; ``InvalidValueError`` outside."""
         if isinstance(dynamism, bool) or not isinstance(dynamism, (int, float)):
             raise InvalidValueError(f"dynamism must be a number in [0, 1], got {dynamism!r}")
         d = float(dynamism)
         if not 0.0 <= d <= 1.0:
             raise InvalidValueError(f"dynamism must lie in [0, 1], got {dynamism}")
-        return cls(**{rate.field: rate.at(d) for rate in KNOB})
+        return cls(**{rate.field: rate.at(d) for rate in CURVES})
 
     @classmethod
     def of(cls, dynamism: float | Dynamism, moving_share: float | None = None) -> Dynamism:
         """A number in [0, 1], or the rates; with ``moving_share`` put in if it is not None."""
-        rates = dynamism if isinstance(dynamism, Dynamism) else cls.from_knob(dynamism)
+        rates = dynamism if isinstance(dynamism, Dynamism) else cls.at(dynamism)
         return rates if moving_share is None else replace(rates, moving_share=moving_share)

@@ -26,7 +26,7 @@ CHANGES: Mapping[int, str] = {
         "one now. At dynamism d of v0 chairs, bins and loads were pushed as at d / 3 now, doors "
         "moved as at d / 2, and people stayed as long as at 3 d / (1 + 2 d)"
     ),
-    1: "v1 has the table of sim.core.dynamism: what is on the move rises in proportion to the knob",
+    1: "v1 has the table of sim.core.dynamism: what is on the move rises in proportion to d",
 }
 
 

@@ -68,7 +68,7 @@ class Recipe:
         if not isinstance(self.scene, str) or not self.scene:
             raise InvalidValueError(f"Recipe.scene must be a name, got {self.scene!r}")
         Seeds(self.seed)
-        Dynamism.from_knob(self.dynamism)
+        Dynamism.at(self.dynamism)
         if isinstance(self.seconds, bool) or not isinstance(self.seconds, (int, float)):
             raise InvalidValueError(f"Recipe.seconds must be a number, got {self.seconds!r}")
         if not 0.0 < self.seconds <= MAX_SECONDS:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observations as Gaussians: beams and point features enter through one type.
 
-What they give to neurons is written by ``stamping``.
+What they give to neurons is written by ``shunting.map.rasterise``.
 """
 
 from __future__ import annotations

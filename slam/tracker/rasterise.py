@@ -92,7 +92,7 @@ def _rasterise_point(  # noqa: PLR0913 (kernel)
             du, dv = min(max(u, first), last) - u, min(max(v, low), high) - v
             if b == 0.0 and pa * du * du + pd * dv * dv >= ends:
                 continue
-            # As below; in a function for both, stamping takes half as long again.
+            # As below; in a function for both, rasterising takes half as long again.
             slot = cells.directory[row - cy, column - cx]
             scratch = cells.scratch_of[slot] if slot >= 0 else -1
             if scratch < 0:

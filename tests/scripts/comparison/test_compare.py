@@ -265,7 +265,7 @@ def rows_rising(slam: str, errors) -> list[dict]:
     ]  # fmt: skip
 
 
-def test_the_knob(tmp_path, capsys):
+def test_the_dynamism_curve(tmp_path, capsys):
     """Rank correlations over the medians of the levels, and a picture."""
     from scripts.output import write_recipe
 
@@ -278,7 +278,7 @@ def test_the_knob(tmp_path, capsys):
     assert found["ekf"]["ATE"] == pytest.approx(1.0)
     assert found["odometry"]["ATE"] == pytest.approx(-0.5)
     assert np.isnan(found["ekf"]["lost"])
-    assert dynamism_curve.main([str(tmp_path), "--out", str(tmp_path / "knob.png")]) == 0
+    assert dynamism_curve.main([str(tmp_path), "--out", str(tmp_path / "curve.png")]) == 0
     assert "ekf" in capsys.readouterr().out
-    assert (tmp_path / "knob.png").stat().st_size > 10_000
+    assert (tmp_path / "curve.png").stat().st_size > 10_000
     assert dynamism_curve.main([str(tmp_path / "nowhere")]) == 1

@@ -69,6 +69,12 @@ def test_a_card_can_be_broken(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [row.kept for row in stated.rows_of("tim561")] == [False]
 
 
+@pytest.mark.parametrize("name", ["full", "utm30lx:noise", "lms221(resolution_deg=0.25)"])
+def test_a_card_is_of_a_whole_model(name: str) -> None:
+    with pytest.raises(InvalidValueError, match=r"a whole model, one of lms221, .*utm30lx; got"):
+        sensor_card(scanner=name)
+
+
 def test_a_scanner_without_a_data_sheet_has_no_card() -> None:
     with pytest.raises(InvalidValueError, match="'scanner' has no data sheet"):
         sensor_card(scanner="scanner")

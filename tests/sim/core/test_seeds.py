@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Streams of randomness and the dynamism knob."""
+"""Streams of randomness and the dynamism curves."""
 
 from __future__ import annotations
 
@@ -74,13 +74,13 @@ def test_compiled_draws_have_their_distributions():
 
 
 def test_dynamism_zero_stops_everything():
-    still = Dynamism.from_knob(0)
+    still = Dynamism.at(0)
     assert still.chair_push_rate == still.bin_kick_rate == still.door_rate == 0.0
     assert still.stay_mean == math.inf
 
 
-def test_every_rate_rises_with_the_knob():
-    rows = [Dynamism.from_knob(d) for d in (0.0, 0.25, 0.5, 1.0)]
+def test_every_rate_rises_with_the_dynamism():
+    rows = [Dynamism.at(d) for d in (0.0, 0.25, 0.5, 1.0)]
     for name in ("chair_push_rate", "bin_kick_rate", "door_rate"):
         rates = [getattr(row, name) for row in rows]
         assert rates == sorted(set(rates))
@@ -89,22 +89,22 @@ def test_every_rate_rises_with_the_knob():
 
 
 def test_the_documented_table_is_the_one_in_use():
-    half = Dynamism.from_knob(0.5)
+    half = Dynamism.at(0.5)
     assert half.chair_push_rate == pytest.approx(0.075)
     assert half.stay_mean == pytest.approx(14.0)
     assert half.pace == pytest.approx(0.85)
 
 
-def test_people_walk_in_proportion_to_the_knob():
+def test_people_walk_in_proportion_to_the_dynamism():
     way_s = 10.0  # between two goals
-    walking = [way_s / (way_s + Dynamism.from_knob(d).stay_mean) for d in (0.25, 0.5, 0.75, 1.0)]
+    walking = [way_s / (way_s + Dynamism.at(d).stay_mean) for d in (0.25, 0.5, 0.75, 1.0)]
     assert walking == pytest.approx([d * 5.0 / 6.0 for d in (0.25, 0.5, 0.75, 1.0)])
 
 
-@pytest.mark.parametrize("knob", [-0.1, 1.1, 2, math.nan, "much", True])
-def test_dynamism_lies_between_0_and_1(knob):
+@pytest.mark.parametrize("dynamism", [-0.1, 1.1, 2, math.nan, "much", True])
+def test_dynamism_lies_between_0_and_1(dynamism):
     with pytest.raises(InvalidValueError, match="dynamism"):
-        Dynamism.from_knob(knob)
+        Dynamism.at(dynamism)
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ from slam.errors import InvalidValueError, LogFormatError
 
 # of the worlds below, by version: a new one gets a line, the others stay
 DIGESTS = {1: "390da08e98501105aebbe408c65928bd4a949b67349cb050c507a324d7983a9c"}
-SCENES, KNOBS, SEED, SECONDS = ("office", "warehouse"), (0.25, 1.0), 7, 1.0
+SCENES, LEVELS, SEED, SECONDS = ("office", "warehouse"), (0.25, 1.0), 7, 1.0
 
 
 def digest() -> str:
@@ -39,12 +39,12 @@ def digest() -> str:
         rounded = np.round(np.nan_to_num(np.asarray(values, dtype=np.float64), posinf=-1.0), 6)
         whole.update((rounded + 0.0).tobytes())  # no negative zeros
 
-    for knob in np.linspace(0.0, 1.0, 5):
-        rates = vars(Dynamism.from_knob(float(knob)))
+    for level in np.linspace(0.0, 1.0, 5):
+        rates = vars(Dynamism.at(float(level)))
         note([-2.0 if value is None else value for _, value in sorted(rates.items())])
     for scene in SCENES:
-        for knob in KNOBS:
-            simulation = Simulation(scene, seed=SEED, dynamism=knob)
+        for level in LEVELS:
+            simulation = Simulation(scene, seed=SEED, dynamism=level)
             note(simulation.world.model.geom_size)
             note(simulation.world.model.geom_pos)
             for frame in tour(simulation, SECONDS):
@@ -70,11 +70,11 @@ def test_another_world_is_another_version():
 def test_what_is_said_of_version_0_is_true():
     """The table of then: pushes 0.05, 0.02 and 0.02 d, doors 0.02 d, stays 4 / d - 2."""
     for d in (0.2, 0.5, 1.0):
-        now = Dynamism.from_knob(d / 3.0)
+        now = Dynamism.at(d / 3.0)
         assert now.chair_push_rate == pytest.approx(0.05 * d)
         assert now.bin_kick_rate == now.load_push_rate == pytest.approx(0.02 * d)
-        assert Dynamism.from_knob(d / 2.0).door_rate == pytest.approx(0.02 * d)
-        stay_s = Dynamism.from_knob(3.0 * d / (1.0 + 2.0 * d)).stay_mean
+        assert Dynamism.at(d / 2.0).door_rate == pytest.approx(0.02 * d)
+        stay_s = Dynamism.at(3.0 * d / (1.0 + 2.0 * d)).stay_mean
         assert stay_s == pytest.approx(4.0 / d - 2.0)
 
 

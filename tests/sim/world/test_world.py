@@ -21,7 +21,7 @@ from sim.world.world import SUBSTEPS_PER_S, World
 from slam import se2
 from slam.errors import InvalidValueError, UnknownNameError
 
-STILL = Dynamism.from_knob(0)
+STILL = Dynamism.at(0)
 
 
 def run(world: World, seconds: float) -> World:
