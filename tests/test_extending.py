@@ -30,7 +30,7 @@ BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
 MOST_LINES = 15
 MODULES = (
     "shed",
-    "crated",
+    "storeroom",
     "carts",
     "lab_lidar",
     "my_slam",
@@ -145,9 +145,9 @@ def test_an_include_of_ones_own_is_left_as_it_is(outside: Path):
 
 def test_furniture(outside: Path):
     follow("Furniture", outside)
-    model = scenes.build("crated:crated", 1).compile()
+    model = scenes.build("storeroom:storeroom", 1).compile()
     np.testing.assert_allclose(model.body("crate0/base").pos, [1.0, 2.0, 0.0])
-    assert scenes.build("crated:crated", 1).static_map.values.sum() > (
+    assert scenes.build("storeroom:storeroom", 1).static_map.values.sum() > (
         scenes.filled("arena", 1).static_map.values.sum()
     )
     (_, _, part), *_ = blocks("Furniture")
