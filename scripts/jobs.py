@@ -27,7 +27,7 @@ from scripts.output import versions
 from sim.recording.sums import damage_beside, write_beside
 from slam import locks
 from slam.errors import InvalidValueError, MobiliaError, OutputError, SlamFailedError
-from slam.files import PART, is_full, make_folder, put, reason
+from slam.files import PART, is_full, is_part, make_folder, put, reason, remove
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +115,12 @@ def run_jobs(
         raise InvalidValueError(f"processes must be >= 1, got {processes}")
     make_folder(folder)
     with locks.locked(folder):
-        return _make_missing(wanted, folder, processes, cluster, title)
+        try:
+            return _make_missing(wanted, folder, processes, cluster, title)
+        finally:  # of workers that were stopped, or killed earlier
+            for left in folder.iterdir():
+                if is_part(left.name):
+                    remove(left)
 
 
 def _make_missing(

@@ -44,7 +44,7 @@ def disk(tmp_path: Path) -> Iterator[Disk]:
 
     yield of
     if os.path.ismount(place):
-        subprocess.run(["umount", str(place)], check=True)
+        subprocess.run(["umount", "--lazy", str(place)], check=True)  # a worker may still end
 
 
 @pytest.fixture(autouse=True)
