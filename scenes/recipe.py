@@ -61,8 +61,8 @@ def switch(field: str, value: bool) -> bool:
 
 def choice(field: str, value: str, known: Sequence[str]) -> str:
     """An option that is one of a few words."""
-    if value not in known:
-        raise InvalidValueError(f"{field} must be one of {', '.join(known)}, got {value!r}")
+    if not isinstance(value, str) or value not in known:
+        raise InvalidValueError(f"{field} must be one of {', '.join(known)}, got {value!r:.200}")
     return value
 
 

@@ -243,6 +243,7 @@ def test_finite_actions_beyond_the_space_are_clipped():
         ({"options": {3: 1}}, "words as keys"),
         ({"options": {"goal": (1e9, 0.0)}}, "option goal must lie within 10000 m"),
         ({"options": {"goal": "ab"}}, "option goal must be"),
+        ({"options": {"scene": {"walls": np.zeros(2)}}}, "walls must be one of"),
         ({"seed": -1}, "seed must be a whole number >= 0"),
         ({"seed": "a"}, "seed must be a whole number"),
         ({"seed": 3.5}, "seed must be a whole number"),
