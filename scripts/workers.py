@@ -7,6 +7,7 @@ import ctypes
 import importlib
 import os
 import signal
+import sys
 import threading
 import time
 import uuid
@@ -29,6 +30,7 @@ MAX_JOBS = 1024
 WORKERS_TIMEOUT_S = 30
 _LOOK_S = 0.25  # between a worker's looks at its parent
 _PDEATHSIG = 1  # linux/prctl.h
+_TRACKER = "ignore::UserWarning:joblib.externals.loky.backend.resource_tracker"
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -64,6 +66,8 @@ def each(
         }
         if cluster is None:
             stack.enter_context(guarding.guarded_workers())
+            if _TRACKER not in sys.warnoptions:  # handed to the tracker of semaphores: what it
+                sys.warnoptions.append(_TRACKER)  # finds left over, it removes without a word
         if cluster is not None:
             client = stack.enter_context(_client(cluster))
             if shared is not None:
