@@ -6,6 +6,7 @@ The physics reads ``group`` and ``feet``, the bag ``height_m``, pictures ``icon`
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -41,6 +42,8 @@ class KindOfMover:
     icon      its drawing, one of ``sim.view.icons.DRAWINGS``
     feet      None: it slides in the plane at every level
     part      path of its MJCF file; "" for ``parts/<kind>.xml``
+    half_length_m  0: round, one hull. Else its hulls stand in a row along its x axis, and this is
+                   half the distance between the centres of the outer two
     """
 
     group: Group
@@ -49,12 +52,15 @@ class KindOfMover:
     icon: str
     feet: Feet | None = None
     part: str = ""
+    half_length_m: float = 0.0
 
     def __post_init__(self) -> None:
         if self.group not in get_args(Group):
             raise InvalidValueError(f"group must be one of {get_args(Group)}, got {self.group!r}")
         if not self.height_m > 0.0:
             raise InvalidValueError(f"height_m must be > 0, got {self.height_m}")
+        if not 0.0 <= self.half_length_m < math.inf:
+            raise InvalidValueError(f"half_length_m must be >= 0, got {self.half_length_m}")
 
 
 KINDS = {
@@ -69,6 +75,13 @@ KINDS = {
     "bin": KindOfMover(group="bin", height_m=0.4, z_order=0, icon="bin"),
     "trolley": KindOfMover(group="load", height_m=1.0, z_order=1, icon="trolley"),
     "pallet": KindOfMover(group="load", height_m=0.15, z_order=0, icon="pallet"),
+    "board": KindOfMover(
+        group="load", height_m=1.8, z_order=1, icon="board", half_length_m=0.55
+    ),
+    "hospital_bed": KindOfMover(
+        group="load", height_m=1.0, z_order=1, icon="hospital_bed", half_length_m=0.55
+    ),
+    "couch": KindOfMover(group="load", height_m=0.8, z_order=1, icon="couch", half_length_m=0.37),
     "person": KindOfMover(group="person", height_m=1.75, z_order=4, icon="person"),
     "door": KindOfMover(group="door", height_m=2.0, z_order=2, icon="door"),
     "robot": KindOfMover(group="robot", height_m=0.45, z_order=3, icon="robot"),

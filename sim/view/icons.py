@@ -28,6 +28,7 @@ RED: Colour = (206, 74, 66)
 WOOD: Colour = (160, 108, 66)
 GREEN: Colour = (84, 132, 116)
 CARTON: Colour = (202, 164, 116)
+PAPER: Colour = (244, 244, 240)
 NAVY: Colour = (48, 74, 140)
 SICK_BLUE: Colour = (34, 84, 196)
 ROBOT_RED: Colour = (196, 36, 44)
@@ -153,6 +154,34 @@ def _pallet() -> tuple[Shape, ...]:
     return (Shape(lines=boards, colour=WOOD), Shape(lines=loads, colour=CARTON))
 
 
+def _board() -> tuple[Shape, ...]:
+    feet = tuple(np.array([[x, -0.25], [x, 0.25]]) for x in (-0.70, 0.70))
+    panel = np.array([[-0.80, 0.0], [0.80, 0.0]])
+    return (
+        Shape(lines=feet, colour=INK, width=0.05),
+        Shape(lines=(panel,), colour=STEEL, width=0.07),
+        Shape(lines=(0.95 * panel,), colour=PAPER, width=0.035),
+    )
+
+
+def _hospital_bed() -> tuple[Shape, ...]:
+    ends = tuple(np.array([[x, -0.45], [x, 0.45]]) for x in (-0.98, 0.98))
+    return (
+        Shape(lines=(block(0.0, 0.0, 0.97, 0.43, 0.03),), colour=PAPER),
+        Shape(lines=(block(0.31, 0.0, 0.62, 0.43),), colour=BLUE),
+        Shape(lines=(block(-0.70, 0.0, 0.16, 0.30, 0.06),), colour=SHADE),
+        Shape(lines=ends, colour=WOOD, width=0.05),
+    )
+
+
+def _couch(cloth: Colour) -> tuple[Shape, ...]:
+    seats = (block(-0.29, -0.09, 0.27, 0.26, 0.04), block(0.29, -0.09, 0.27, 0.26, 0.04))
+    return (
+        Shape(lines=(block(0.0, 0.0, 0.75, 0.38, 0.06),), colour=_darker(cloth)),
+        Shape(lines=seats, colour=cloth),
+    )
+
+
 def _person(shirt: Colour) -> tuple[Shape, ...]:
     arms = (
         np.array([[0.0, 0.21], [0.10, 0.235]]),
@@ -198,6 +227,9 @@ DRAWINGS: dict[str, Callable[[float, Colour | None], tuple[Shape, ...]]] = {
     "bin": lambda size, colour: _bin(),
     "trolley": lambda size, colour: _trolley(),
     "pallet": lambda size, colour: _pallet(),
+    "board": lambda size, colour: _board(),
+    "hospital_bed": lambda size, colour: _hospital_bed(),
+    "couch": lambda size, colour: _couch(colour or GREEN),
     "person": lambda size, colour: _person(colour or BLUE),
     "door": lambda size, colour: _door(size),
     "robot": lambda size, colour: _robot(),

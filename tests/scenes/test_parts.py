@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import mujoco
@@ -11,10 +12,12 @@ import pytest
 
 import scenes.assembly
 from scenes import textures
+from scenes.kinds import KINDS
 from scenes.placement import Floor, gap_to_boxes
 
 PARTS = sorted((Path(scenes.assembly.__file__).parent / "parts").glob("*.xml"))
 PLANAR = ("chair_swivel", "chair_visitor", "bin", "trolley", "pallet", "person", "robot")
+LONG = sorted(name for name, row in KINDS.items() if row.half_length_m)
 
 
 @pytest.mark.parametrize("path", PARTS, ids=lambda path: path.stem)
@@ -32,6 +35,42 @@ def test_a_planar_part_collides_with_one_sphere(kind):
     solid = np.flatnonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))
     assert [model.geom(int(g)).name for g in solid] == ["hull"]
     assert model.geom_type[solid[0]] == mujoco.mjtGeom.mjGEOM_SPHERE
+
+
+@pytest.mark.parametrize("kind", LONG)
+def test_a_long_part_collides_with_three_spheres_in_a_row(kind):
+    model = mujoco.MjModel.from_xml_path(str(PARTS[0].parent / f"{kind}.xml"))
+    solid = np.flatnonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+    assert [model.geom(int(g)).name for g in solid] == ["hull", "hull1", "hull2"]
+    assert (model.geom_type[solid] == mujoco.mjtGeom.mjGEOM_SPHERE).all()
+    assert set(model.geom_contype[solid]) == {2}
+    assert set(model.geom_conaffinity[solid]) == {79}
+    half = KINDS[kind].half_length_m
+    centres = np.array([[0.0, 0.0, 0.3], [-half, 0.0, 0.3], [half, 0.0, 0.3]])
+    np.testing.assert_allclose(model.geom_pos[solid], centres)
+    assert len(set(model.geom_size[solid, 0])) == 1
+
+
+def seen_across(kind, x, turn=1.0):
+    """How far in front of the x axis of a part a laser at its height meets it; nan if it passes."""
+    model = mujoco.MjModel.from_xml_path(str(PARTS[0].parent / f"{kind}.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    groups, hit = np.array([1, 1, 1, 0, 0, 0], dtype=np.uint8), np.zeros(1, dtype=np.int32)
+    start, way = np.array([x, -2.0 * turn, scenes.SCAN_HEIGHT]), np.array([0.0, turn, 0.0])
+    far = mujoco.mj_ray(model, data, start, way, groups, 1, -1, hit, None)
+    return 2.0 - far if far >= 0.0 else math.nan
+
+
+def test_a_laser_meets_a_board_over_its_whole_length_and_a_bed_at_ends_and_columns():
+    for x in np.linspace(-0.79, 0.79, 41).tolist():
+        assert abs(seen_across("board", x)) < 0.03
+        assert abs(seen_across("board", x, turn=-1.0)) < 0.03
+    met = [
+        math.isfinite(seen_across("hospital_bed", x)) for x in (-0.98, -0.8, -0.55, 0, 0.55, 0.98)
+    ]
+    assert met == [True, False, True, False, True, True]
+    assert seen_across("couch", 0.0) == pytest.approx(0.36)
 
 
 def test_a_chair_shows_its_column_or_its_legs_to_the_laser():
