@@ -43,8 +43,8 @@ class Builder:
         def prepare(child: mujoco.MjSpec) -> None:
             for geom in child.geoms if paint else ():
                 geom.material = (paint or {}).get(geom.material, geom.material)
-            if kind == "person":
-                _stand(child, pose)
+            if kind_of(kind).group == "person":
+                stand(child, pose)
 
         self._parts.put(kind, name, (0.0, 0.0, 0.0), prepare)
         mover = Mover(name=name, kind=kind, radius=hull_radius(kind))
@@ -96,7 +96,7 @@ class Builder:
         return next(m.radius for m in self.movers if m.name == name)
 
 
-def _stand(child: mujoco.MjSpec, pose: Pose) -> None:
+def stand(child: mujoco.MjSpec, pose: Pose) -> None:
     """Put the mocap limbs under the torso; the gait moves them from then on."""
     for limb in LIMBS:
         body = child.body(limb)

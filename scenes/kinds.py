@@ -83,6 +83,7 @@ KINDS = {
     ),
     "couch": KindOfMover(group="load", height_m=0.8, z_order=1, icon="couch", half_length_m=0.37),
     "person": KindOfMover(group="person", height_m=1.75, z_order=4, icon="person"),
+    "person_coat": KindOfMover(group="person", height_m=1.75, z_order=4, icon="person"),
     "door": KindOfMover(group="door", height_m=2.0, z_order=2, icon="door"),
     "robot": KindOfMover(group="robot", height_m=0.45, z_order=3, icon="robot"),
 }  # fmt: skip

@@ -56,10 +56,18 @@ def describe(name: str) -> str:
     return (inspect.getdoc(_find(name)) or "").partition("\n")[0]
 
 
-def build(name: str, seed: int = 0, *, scan_height_m: float = SCAN_HEIGHT, **options: Any) -> Scene:
+def build(
+    name: str,
+    seed: int = 0,
+    *,
+    scan_height_m: float = SCAN_HEIGHT,
+    crowd: str = "none",
+    **options: Any,
+) -> Scene:
     """The scene of that name and seed; ``module:function`` names any recipe.
 
     scan_height_m  of the robot's scanner above the floor, 0.05 to 1 m
+    crowd          who is there besides, like "escorts:6,boards:2" (``scenes.crowd``)
     options        of the recipe
 
     Raises ``UnknownNameError`` with the nearest known name, ``InvalidValueError`` for an option the
@@ -73,13 +81,14 @@ def build(name: str, seed: int = 0, *, scan_height_m: float = SCAN_HEIGHT, **opt
         inspect.signature(recipe).bind(seed, **options)
     except TypeError as error:
         raise InvalidValueError(f"scene '{name}' cannot take these options: {error}") from None
+    from scenes.crowd import crowd_of, with_crowd
     from scenes.mounting import at_scan_height
     from scenes.scene import Scene
 
     scene = recipe(seed, **options)
     if not isinstance(scene, Scene):
         raise UnknownNameError(f"'{name}' is no recipe: it returned {type(scene).__name__}")
-    return at_scan_height(scene, scan_height_m)
+    return at_scan_height(with_crowd(scene, crowd_of(crowd)), scan_height_m)
 
 
 def find(name: str) -> Recipe:

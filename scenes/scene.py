@@ -47,6 +47,44 @@ class Mover:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Role:
+    """What somebody of a crowd does (``scenes.crowd``); whoever has none walks between all goals.
+
+    does    "walk" from goal to goal, "follow" a leader, "queue", "clean" (take chairs along)
+    leader  mover that is followed, the robot or a person
+    slot    (m ahead, m left) of the leader
+    goals   of the scene between which one walks; () for all
+    stay    factor on the stays at goals
+    slow    factor on the pace
+    places  of a queue, (x, y) m, the first in line first; ``turn``: which one is one's own
+    """
+
+    does: str
+    leader: str = ""
+    slot: tuple[float, float] = (0.0, 0.0)
+    goals: tuple[str, ...] = ()
+    stay: float = 1.0
+    slow: float = 1.0
+    places: tuple[tuple[float, float], ...] = ()
+    turn: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hold:
+    """Somebody, or a thing before it in a train, that holds a thing.
+
+    holder, held  movers
+    pose          of what is held in the frame of the holder, x m, y m, yaw rad
+    hinged        whether it may turn about the hand, as what is pulled does
+    """
+
+    holder: str
+    held: str
+    pose: Pose
+    hinged: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
 class Scene:
     """One built room or building, the same for the same name, seed and options.
 
@@ -63,6 +101,8 @@ class Scene:
                  count
     start        the robot's pose at reset, equal to ``initial["robot"]``
     scan_height_m  of the robot's scanner above the floor; ``scenes.at_scan_height`` changes it
+    roles        what those of a crowd do, by mover name
+    holds        who holds what
     """
 
     name: str
@@ -78,6 +118,8 @@ class Scene:
     start: Pose
     options: Mapping[str, object] = field(default_factory=dict)
     scan_height_m: float = SCAN_HEIGHT
+    roles: Mapping[str, Role] = field(default_factory=dict)
+    holds: tuple[Hold, ...] = ()
 
     @cached_property
     def static_map(self) -> Raster:

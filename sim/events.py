@@ -74,7 +74,7 @@ class EventWatch:
             None if m.kind == "robot" else _Mover(_KIND.get(m.kind, CHAIR), m.name, m.radius)
             for m in movers
         ]
-        self._people = np.array([m.kind == "person" for m in movers], dtype=bool)
+        self._people = np.array([m.group == "person" for m in movers], dtype=bool)
         self._kidnaps: list[Event] = []
         self._first_ns: int | None = None
         self._last: Frame | None = None

@@ -49,6 +49,7 @@ class Simulation:
     scene      name of a registered scene, or ``module:function``
     seed       whole number or ``Seeds``; every part draws from its own stream
     dynamism   0 (nothing moves) to 1, or the rates themselves
+    motion, change  one of the two axes alone, in [0, 1] (``sim.core.dynamism``)
     moving_share  in [0, 1]: of the chairs, on the move at any time (``sim.actors.rolling``)
     laser      a scanner by name ("utm30lx", "lms221:noise"; ``sim.sensors.lidar.registry``), a
                ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
@@ -73,6 +74,8 @@ class Simulation:
         seed: int | Seeds = 0,
         dynamism: float | Dynamism = 0.5,
         moving_share: float | None = None,
+        motion: float | None = None,
+        change: float | None = None,
         laser: ScannerConfig | str | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
@@ -83,7 +86,7 @@ class Simulation:
         **options: Any,
     ) -> None:
         drive = drive or DriveConfig()
-        rates = Dynamism.of(dynamism, moving_share)
+        rates = Dynamism.of(dynamism, moving_share, motion=motion, change=change)
         self.world = World(
             scene, seed=seed, dynamism=rates, drive=drive, start=start, chairs=chairs, **options
         )

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.scene import Mover
+from scenes.scene import Scene
 from sim.actors.config import ACTORS
 from sim.actors.rolling import Rolling, inertia_of
 from sim.core.draws import between, waiting
@@ -104,15 +104,17 @@ class Shoves:
 
 
 def pushers(
-    model: mujoco.MjModel, movers: Sequence[Mover], rates: Dynamism, seeds: Seeds
+    model: mujoco.MjModel, scene: Scene, rates: Dynamism, seeds: Seeds
 ) -> dict[str, Shoves | Rolling]:
     """What moves the planar things without a will of their own, by the group they belong to.
 
-    The groups are those of ``scenes.kinds``; people, doors and the robot have a will of their own.
+    The groups are those of ``scenes.kinds``; people, doors and the robot have a will of their own,
+    and what somebody holds is moved by them.
     """
+    movers, held = scene.movers, {hold.held for hold in scene.holds}
     groups: dict[str, list[str]] = {group: [] for group in GROUPS}
     for mover in movers:
-        if mover.group in groups:
+        if mover.group in groups and mover.name not in held:
             groups[mover.group].append(mover.name)
     shove = (rates.push_speed_min, rates.push_speed_max, rates.push_spin_max)
     kick = (rates.kick_speed_min, rates.kick_speed_max, rates.push_spin_max)

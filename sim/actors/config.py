@@ -120,6 +120,58 @@ class SittingConfig(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class FollowingConfig(Settings):
+    """People who accompany the robot or each other, and lines of them."""
+
+    crumb_m: float = _fixed(0.25, "m", "between two remembered places of a leader's way")
+    course_rate: float = _fixed(0.8, "rad/s", "the formation turns after its leader, at most")
+    moving_mps: float = _fixed(0.15, "m/s", "a leader slower than this stands")
+    give_way_s: float = _fixed(1.5, "s", "a leader stands so long: those around it step back")
+    step_back: float = _fixed(0.6, "m/s", "as fast as this")
+    step_back_m: float = _fixed(1.6, "m", "so far, at most")
+    margin_m: float = _fixed(0.3, "m", "clearance of a place in the formation")
+    sight_m: float = _fixed(0.2, "m", "clearance of a line of sight")
+    gain: float = _fixed(1.5, "1/s", "speed by the distance left")
+    fastest_mps: float = _fixed(1.8, "m/s", "to catch up")
+    narrow_m: float = _fixed(0.95, "m", "clearance of a leader in a doorway or a narrow corridor")
+    way_m: float = _fixed(1.5, "m", "before the robot, its way is left free")
+    way_half_m: float = _fixed(0.5, "m", "to both sides")
+    aside_mps: float = _fixed(0.8, "m/s", "out of its way")
+    crossing_m2: float = _fixed(0.5, "m²", "two take each other's place to save this much")
+    held_up_s: float = _fixed(0.6, "s", "held up so long near one's place: one rests there")
+    near_m: float = _fixed(2.2, "m", "near one's place")
+    rest_s: float = _fixed(1.5, "s", "of that rest")
+    taken_m: float = _fixed(1.5, "m", "so near a place that is taken one has arrived")
+    there_m: float = _fixed(0.15, "m", "so near one has arrived")
+    asks_m: float = _fixed(1.4, "m", "a door this near is opened for those who follow")
+    served_s: float = _fixed(12.0, "s", "between two who are served in a queue")
+
+
+@dataclass(frozen=True, kw_only=True)
+class HoldingConfig(Settings):
+    """Hands on what is pushed, pulled or carried: springs with dampers, bounded."""
+
+    stiffness: float = _fixed(9.0, "1/s²", "force by the distance, over the mass of the thing")
+    damping: float = _fixed(6.0, "1/s", "force by the speed, over the mass of the thing")
+    force_max: float = _fixed(180.0, "N", "of two hands, at most")
+    torque_max: float = _fixed(120.0, "N m", "of two hands, at most")
+    lost_m: float = _fixed(0.8, "m", "farther from the hand a thing is let go")
+    turn_most: float = _fixed(0.8, "rad/s", "turn rate of who pushes something long")
+    stop_m: float = _fixed(0.12, "m", "before what stands in its way")
+    brake: float = _fixed(1.5, "1/s", "speed by the distance left to that")
+    shoves_s: float = _fixed(0.8, "s", "held up by a chair so long: it is pushed along")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CleaningConfig(Settings):
+    """Who takes chairs from place to place."""
+
+    hand_m: float = _fixed(6.0, "m", "a chair this near is taken next")
+    near_m: float = _fixed(0.12, "m", "between hulls from where it is taken")
+    rest_s: float = _fixed(1.5, "s", "between putting one down and taking the next")
+
+
+@dataclass(frozen=True, kw_only=True)
 class ChairConfig(Settings):
     """Chairs that are pushed or rolled by nobody in sight."""
 
@@ -169,6 +221,9 @@ class ActorsConfig(Settings):
     steering: SteeringConfig = field(default=SteeringConfig())
     walking: WalkingConfig = field(default=WalkingConfig())
     sitting: SittingConfig = field(default=SittingConfig())
+    following: FollowingConfig = field(default=FollowingConfig())
+    holding: HoldingConfig = field(default=HoldingConfig())
+    cleaning: CleaningConfig = field(default=CleaningConfig())
     chairs: ChairConfig = field(default=ChairConfig())
     driver: DriverConfig = field(default=DriverConfig())
 

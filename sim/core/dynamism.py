@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One number in [0, 1] for how much a room moves, and the table of what it means.
+"""One number in [0, 1] for how much a room moves, and the tables of what it means.
 
-``CURVES`` is that table: the dynamism curves. ``mobilia config dynamism`` prints it.
+Two axes, both at ``d`` when one number ``dynamism`` is given:
 
-The rates are set so that what is on the move rises in proportion to d: a shove keeps a
-chair rolling for about a second, so at 1 one office chair in seven moves at any time; a way
-between two goals takes a person about ten seconds, so at 1 five in six are walking, and a stay of
-12 / d - 10 seconds makes that (5 / 6) d. ``scripts.experiments.dynamism_curve`` shows what the
-scanner sees of it.
+**motion**  what moves now. ``CURVES`` below are the rates of shoves, doors and trips, as they were
+            in world 1; ``crowd`` brings people, boards and trains into the room besides, at 1 the
+            whole mix of the scene (``scenes.crowd.MIXES``), which is calibrated on the share of
+            returns that the scanner sees from what moves (``scripts.experiments.share_seen``).
+**change**  of what can move, the share that stands elsewhere than when the robot last saw it
+            (``sim.actors.rearranging``).
+
+``Dynamism.world_1(d)`` are the rates alone, without a crowd or change: exactly what dynamism d was
+in world 1. ``mobilia config dynamism`` prints the curves.
 
 At 0 nothing moves by itself: people are present and stand perfectly still, chairs and bins are
 never pushed and doors stay at their angle of rest (a door still gives way to the robot). How hard
@@ -52,6 +56,7 @@ CURVES = (
         lambda d: 12.0 / d - 10.0 if d > 0.0 else math.inf,
     ),
     Rate("pace", "walking pace, times a person's own", "1", lambda d: 0.7 + 0.3 * d),
+    Rate("crowd", "share of the scene's whole crowd that is there", "1", lambda d: d),
 )  # fmt: skip
 
 
@@ -65,6 +70,8 @@ class Dynamism:
                      shoves unless it is None
     door_rate        1/s for each door           stay_mean      s, infinite: nobody ever leaves
     pace             factor on each person's preferred speed
+    crowd            in [0, 1]: of the scene's whole crowd (``scenes.crowd``), the share that is there
+    change           in [0, 1]: of what can move, elsewhere than when the robot last saw it
     push_speed_min/max  m/s a shove gives a chair
     kick_speed_min/max  m/s a kick gives a bin
     push_spin_max       rad/s a shove adds in yaw, either way
@@ -77,6 +84,8 @@ class Dynamism:
     door_rate: float = 0.0
     stay_mean: float = math.inf
     pace: float = 1.0
+    crowd: float = 0.0
+    change: float = 0.0
     push_speed_min: float = 0.25
     push_speed_max: float = 1.5
     kick_speed_min: float = 0.4
@@ -93,9 +102,10 @@ class Dynamism:
         for name in ("stay_mean", "pace"):
             if not getattr(self, name) > 0.0:
                 raise InvalidValueError(f"Dynamism.{name} must be > 0, got {getattr(self, name)}")
-        share = self.moving_share
-        if share is not None and not 0.0 <= share <= 1.0:
-            raise InvalidValueError(f"Dynamism.moving_share must lie in [0, 1], got {share}")
+        for name in ("moving_share", "crowd", "change"):
+            share = getattr(self, name)
+            if share is not None and not 0.0 <= share <= 1.0:
+                raise InvalidValueError(f"Dynamism.{name} must lie in [0, 1], got {share}")
         for what in ("push", "kick"):
             low, high = getattr(self, f"{what}_speed_min"), getattr(self, f"{what}_speed_max")
             if not 0.0 <= low <= high < math.inf:
@@ -104,17 +114,46 @@ class Dynamism:
                 )
 
     @classmethod
-    def at(cls, dynamism: float) -> Dynamism:
-        """Rates at a dynamism in [0, 1]; ``InvalidValueError`` outside."""
-        if isinstance(dynamism, bool) or not isinstance(dynamism, (int, float)):
-            raise InvalidValueError(f"dynamism must be a number in [0, 1], got {dynamism!r}")
-        d = float(dynamism)
-        if not 0.0 <= d <= 1.0:
-            raise InvalidValueError(f"dynamism must lie in [0, 1], got {dynamism}")
-        return cls(**{rate.field: rate.at(d) for rate in CURVES})
+    def at(cls, dynamism: float, *, change: float | None = None) -> Dynamism:
+        """Both axes at a dynamism in [0, 1], or motion at it and ``change`` apart.
+
+        Raises ``InvalidValueError`` outside.
+        """
+        d = _level("dynamism", dynamism)
+        both = d if change is None else _level("change", change)
+        return cls(**{rate.field: rate.at(d) for rate in CURVES}, change=both)
 
     @classmethod
-    def of(cls, dynamism: float | Dynamism, moving_share: float | None = None) -> Dynamism:
-        """A number in [0, 1], or the rates; with ``moving_share`` put in if it is not None."""
+    def world_1(cls, dynamism: float) -> Dynamism:
+        """What a dynamism was in world 1: the rates without a crowd or change."""
+        return replace(cls.at(dynamism, change=0.0), crowd=0.0)
+
+    @classmethod
+    def of(
+        cls,
+        dynamism: float | Dynamism,
+        moving_share: float | None = None,
+        *,
+        motion: float | None = None,
+        change: float | None = None,
+    ) -> Dynamism:
+        """A number in [0, 1] for both axes, or the rates; then what is given for one axis alone.
+
+        moving_share  as the field of that name
+        motion        in [0, 1]: rates and crowd at this level instead
+        change        in [0, 1]: the field of that name instead
+        """
         rates = dynamism if isinstance(dynamism, Dynamism) else cls.at(dynamism)
+        if motion is not None:
+            rates = cls.at(_level("motion", motion), change=rates.change)
+        if change is not None:
+            rates = replace(rates, change=_level("change", change))
         return rates if moving_share is None else replace(rates, moving_share=moving_share)
+
+
+def _level(field: str, value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InvalidValueError(f"{field} must be a number in [0, 1], got {value!r}")
+    if not 0.0 <= value <= 1.0:
+        raise InvalidValueError(f"{field} must lie in [0, 1], got {value}")
+    return float(value)

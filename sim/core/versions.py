@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 
 from slam.errors import LogFormatError, MobiliaError
 
-WORLD = 1
+WORLD = 2
 UNSAID = 1
 CHANGES: Mapping[int, str] = {
     0: (
@@ -26,7 +26,11 @@ CHANGES: Mapping[int, str] = {
         "one now. At dynamism d of v0 chairs, bins and loads were pushed as at d / 3 now, doors "
         "moved as at d / 2, and people stayed as long as at 3 d / (1 + 2 d)"
     ),
-    1: "v1 has the table of sim.core.dynamism: what is on the move rises in proportion to d",
+    1: (
+        "v1 had no crowds and no change out of sight: dynamism d of v1 is "
+        "Dynamism.world_1(d) of now (--dynamism d --crowd none --change 0)"
+    ),
+    2: "v2 has two axes, motion and change, and crowds that are calibrated for each scene",
 }
 
 

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.kinds import kind_of
 from sim.actors.config import ACTORS
 from sim.driving.drive import Driver, TourConfig, tour
 from sim.driving.navgrid import NavGrid
@@ -24,6 +25,7 @@ _D = ACTORS.driver
 SIGHT_M, AJAR, REPLAN_S, DECIDE_S = _D.sight_m, _D.ajar_rad, _D.replan_s, _D.decide_s
 LEAF_DISCS, LEAF_M = _D.leaf_discs, _D.leaf_m
 BODY, DOOR, ROBOT = 0, 1, 2
+PARTS = 3  # discs of what is long: its middle and its two ends
 
 
 class Pilot:
@@ -43,6 +45,8 @@ class Pilot:
         number = {"door": DOOR, "robot": ROBOT}
         self._kinds = np.array([number.get(m.kind, BODY) for m in scene.movers], dtype=np.int64)
         self._radii = np.array([m.radius for m in scene.movers], dtype=np.float64)
+        halves = [kind_of(m.kind).half_length_m for m in scene.movers]
+        self._halves = np.array(halves, dtype=np.float64)
         self._planned_ns = world.time_ns
         self._leaves_planned = self._open_leaves(world.mover_poses())
         goals = tour(scene.goals, world.seeds.generator("driving"))
@@ -77,7 +81,8 @@ class Pilot:
         return self._decided
 
     def _discs(self, poses: Float, before: Float, here: Float, sight: float, dt: float) -> Float:
-        return _surroundings(poses, before, self._kinds, self._radii, here, sight, dt)
+        sizes = (self._radii, self._halves)
+        return _surroundings(poses, before, self._kinds, sizes, here, sight, dt)
 
     def _replan(self, poses: Float) -> None:
         """Plan anew when a leaf stands elsewhere by more than about 20 degrees."""
@@ -117,18 +122,24 @@ def _surroundings(  # noqa: PLR0913 (kernel)
     poses: Float,
     before: Float,
     kinds: NDArray[np.int64],
-    radii: Float,
+    sizes: tuple[Float, Float],
     here: Float,
     sight: float,
     dt: float,
 ) -> Float:
-    """(k, 5) discs in sight: x, y, radius (m), velocity (m/s) of movers; six along each leaf."""
+    """(k, 5) discs in sight: x, y, radius (m), velocity (m/s) of movers.
+
+    Six along each leaf, three along what is long.
+    """
+    radii, halves = sizes
     discs = np.empty((len(poses) * LEAF_DISCS, 5))
     count = 0
     for k in range(len(poses)):
         if kinds[k] == ROBOT:
             continue
-        parts = LEAF_DISCS if kinds[k] == DOOR else 1
+        parts = PARTS if halves[k] > 0.0 else 1
+        if kinds[k] == DOOR:
+            parts = LEAF_DISCS
         for part in range(parts):
             x, y, radius, vx, vy = poses[k, 0], poses[k, 1], radii[k], 0.0, 0.0
             if kinds[k] == DOOR:
@@ -137,7 +148,14 @@ def _surroundings(  # noqa: PLR0913 (kernel)
                 y += reach * math.sin(poses[k, 2])
                 radius = LEAF_M
             else:
-                vx, vy = (x - before[k, 0]) / dt, (y - before[k, 1]) / dt
+                bx, by = before[k, 0], before[k, 1]
+                if parts == PARTS:
+                    reach = halves[k] * (part - 1)
+                    x += reach * math.cos(poses[k, 2])
+                    y += reach * math.sin(poses[k, 2])
+                    bx += reach * math.cos(before[k, 2])
+                    by += reach * math.sin(before[k, 2])
+                vx, vy = (x - bx) / dt, (y - by) / dt
             dx, dy = x - here[0], y - here[1]
             if dx * dx + dy * dy < sight * sight:
                 discs[count, 0], discs[count, 1], discs[count, 2] = x, y, radius

@@ -44,7 +44,7 @@ class Referee:
         self._world, self._near_m = world, near_m
         movers = world.scene.movers
         self._row = {m.name: k for k, m in enumerate(movers)}
-        self._people = [k for k, m in enumerate(movers) if m.kind == "person"]
+        self._people = [k for k, m in enumerate(movers) if m.group == "person"]
         self._radii = np.array([m.radius for m in movers])
         self._poses = self._before = world.mover_poses()
         self._last_ns: dict[str, int] = {}

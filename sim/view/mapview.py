@@ -50,7 +50,7 @@ class MapView:
         self.plan = FloorPlan(scene, width, height)
         self._n_movers = len(scene.movers)
         self._strokes = _strokes(scene)
-        self._people = [k for k, m in enumerate(scene.movers) if m.kind == "person"]
+        self._people = [k for k, m in enumerate(scene.movers) if m.group == "person"]
 
     def to_pixels(self, points_world: ArrayLike) -> Float:
         """(n, 2) px (column, row), fractional, of points (n, 2) m."""
@@ -210,7 +210,7 @@ def _strokes(scene: Scene) -> _Strokes:
         worn = cloth.get(mover.name, {})
         shapes = icons.icon(mover.kind, mover.radius, worn.get("shirt") or worn.get("fabric"))
         rank = kind_of(mover.kind).z_order
-        if mover.kind == "person":
+        if mover.group == "person":
             for foot in (foot_row, foot_row + 1):
                 drawn += [(rank, foot, shape) for shape in icons.foot()]
             foot_row += 2

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from sim.actors.chairs import Shoved, shove
 from sim.actors.doors import Leaves, swing
+from sim.actors.holding import Held, hold
 from sim.actors.people.crowd import People, decide
+from sim.actors.people.following import Leaders
 from sim.actors.people.gait import walk
 from sim.actors.people.right_of_way import Addresses, Crowd, Doors
 from sim.actors.people.sitting import Hulls, dress
@@ -136,10 +138,11 @@ def plain(table: Any) -> Any:
 def _actors(parts: Any) -> Actors:
     """Inverse of ``plain``."""
     folk, doors, shoved, rolled, pinned = parts
-    alive, rates, at, field, ways, crowd, servos, torsos, limbs, feet, sitting, hulls = folk
+    alive, rates, at, field, ways, crowd, servos, torsos, limbs, feet, sitting = folk[:11]
+    hulls, leaders, held, weights = folk[11:]
     people = People(
-        alive, rates, Addresses(*at), Field(*field), Doors(*ways), Crowd(*crowd),
-        servos, torsos, limbs, feet, sitting, Hulls(*hulls),
+        alive, rates, Addresses(*at), Field(*field), Doors(*ways), Crowd(*crowd), servos, torsos,
+        limbs, feet, sitting, Hulls(*hulls), Leaders(*leaders), Held(*held), weights,
     )  # fmt: skip
     return Actors(
         people,
@@ -203,6 +206,8 @@ def _advance(  # noqa: PLR0913 (kernel)
             call(engine.step2, engine.model, engine.data)
             clock[0] += 1
             roll(robot.drive, step)
+            if people.alive:
+                hold(people.held, physics.qpos, physics.qvel, physics.qfrc)
             pin(physics, actors.pinned)
             if people.alive:
                 walk(

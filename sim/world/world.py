@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes import build
+from scenes.crowd import mix
 from scenes.scene import Scene
 from sim.actors.castors import checked_level, stand_on_castors
 from sim.actors.chairs import pushers, tables
@@ -44,12 +45,14 @@ class World:
     scene     a built ``Scene``, or the name of one; a name is built from the "layout" stream
     seed      whole number or ``Seeds``
     dynamism  number in [0, 1] (see ``sim.core.dynamism``), or the rates themselves
+    motion, change  one of the two axes alone, in [0, 1]
     moving_share  in [0, 1]: keep that share of chairs and loads on the move, instead of shoves
     drive     limits of the robot
     start     (x m, y m, heading rad) of the robot instead of the scene's
     chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.castors``)
     options   passed on to ``scenes.build`` when the scene is given by name, e.g. ``n_chairs=10``;
-              ``scan_height_m`` is one that every scene has
+              ``scan_height_m`` and ``crowd`` are some that every scene has; the crowd is the
+              scene's mix at this motion (``scenes.crowd``) where none is given
 
     Raises ``InvalidValueError`` for a dynamism outside [0, 1], ``UnknownNameError`` for a scene.
     """
@@ -61,13 +64,15 @@ class World:
         seed: int | Seeds = 0,
         dynamism: float | Dynamism = 0.5,
         moving_share: float | None = None,
+        motion: float | None = None,
+        change: float | None = None,
         drive: DriveConfig | None = None,
         start: Sequence[float] | None = None,
         chairs: str = "planar",
         **options: Any,
     ) -> None:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
-        self.rates = Dynamism.of(dynamism, moving_share)
+        self.rates = Dynamism.of(dynamism, moving_share, motion=motion, change=change)
         built = self._built(scene, options)
         self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
         self.model: mujoco.MjModel = self.scene.compile()
@@ -79,7 +84,7 @@ class World:
         self.drive_config = DriveConfig() if drive is None else drive
         instance("drive", self.drive_config, DriveConfig)
         self._drive = Drive(self.model, self.drive_config, SUBSTEPS_PER_TICK / SUBSTEPS_PER_S)
-        self._shoves = pushers(self.model, self.scene.movers, self.rates, self.seeds)
+        self._shoves = pushers(self.model, self.scene, self.rates, self.seeds)
         self._doors = Doors(
             self.model,
             self.bodies,
@@ -109,6 +114,8 @@ class World:
 
     def _built(self, scene: Scene | str, options: dict[str, Any]) -> Scene:
         if isinstance(scene, str):
+            crowd = mix(scene, self.rates.crowd)
+            options = {"crowd": str(crowd), **options} if crowd else options
             return build(scene, seed=self.seeds.integer("layout"), **options)
         if options:
             raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")

@@ -123,21 +123,33 @@ def choose(
 
 @njit
 def spare_robot(
-    i: int, wanted: tuple[float, float], near: Int, discs: Float
+    i: int, wanted: tuple[float, float], near: Int, crowd: Crowd
 ) -> tuple[float, float]:
-    """The velocity less what would run into the robot: nobody pushes it, not even when held up."""
+    """The velocity less what would run into the robot: nobody pushes it, not even when held up.
+
+    Nor does anybody run into it with what is held.
+    """
     vx, vy = wanted
+    discs, held = crowd.discs, crowd.task[i, columns.HELD]
     for k in range(len(near)):
         robot = discs[near[k]]
         if robot[columns.KIND] != columns.ROBOT:
             continue
-        dx, dy = robot[columns.X] - discs[i, columns.X], robot[columns.Y] - discs[i, columns.Y]
-        far = math.sqrt(max(dx * dx + dy * dy, 1e-6))
-        ux, uy = dx / far, dy / far
-        gap = far - discs[i, columns.R] - robot[columns.R] - SPARE
-        # A person stops at ACCEL; what the robot itself comes nearer is stepped back from.
-        approach = vx * ux + vy * uy - (robot[columns.U] * ux + robot[columns.V] * uy)
-        allowed = math.sqrt(2.0 * ACCEL * gap) if gap > 0.0 else 4.0 * gap
-        excess = min(max(approach - allowed, 0.0), SPARE_MPS)
-        vx, vy = vx - excess * ux, vy - excess * uy
+        vx, vy = _spare(vx, vy, discs[i], robot)
+        for part in range(len(discs) if held >= 0 else 0):
+            if crowd.owner[part] == held:
+                vx, vy = _spare(vx, vy, discs[part], robot)
     return vx, vy
+
+
+@njit
+def _spare(vx: float, vy: float, disc: Float, robot: Float) -> tuple[float, float]:
+    dx, dy = robot[columns.X] - disc[columns.X], robot[columns.Y] - disc[columns.Y]
+    far = math.sqrt(max(dx * dx + dy * dy, 1e-6))
+    ux, uy = dx / far, dy / far
+    gap = far - disc[columns.R] - robot[columns.R] - SPARE
+    # A person stops at ACCEL; what the robot itself comes nearer is stepped back from.
+    approach = vx * ux + vy * uy - (robot[columns.U] * ux + robot[columns.V] * uy)
+    allowed = math.sqrt(2.0 * ACCEL * gap) if gap > 0.0 else 4.0 * gap
+    excess = min(max(approach - allowed, 0.0), SPARE_MPS)
+    return vx - excess * ux, vy - excess * uy

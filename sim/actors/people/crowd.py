@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How people decide, all of them in one compiled call per control tick.
 
-Each person stays somewhere, walks to the next goal down its flow field (``sim.core.flow``), gives
-way at
-doors, and picks a velocity that hits nothing soon (``sim.actors.people.avoidance``). A person
+Each person stays somewhere, walks to the next goal down its flow field (``sim.core.flow``) or
+follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that hits nothing soon (``sim.actors.people.avoidance``). A person
 whose way is blocked by a chair loses patience and pushes it; now and then one sits down
 (``sim.actors.people.sitting``).
 """
@@ -16,8 +15,21 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.actors.config import ACTORS
+from sim.actors.holding import Held
 from sim.actors.people import columns
 from sim.actors.people.avoidance import ACCEL, choose, spare_robot
+from sim.actors.people.carrying import may_take, pushes, put_down, to_what_is_taken
+from sim.actors.people.following import (
+    Leaders,
+    faces,
+    follow,
+    make_way,
+    near_place,
+    note_ways,
+    rests,
+    spread_out,
+    stand_in_line,
+)
 from sim.actors.people.right_of_way import (
     OPEN,
     Addresses,
@@ -53,6 +65,8 @@ class People(NamedTuple):
     limbs    (n, 4) mocap rows of thigh_l, shank_l, thigh_r, shank_r
     feet     (n, 8) of ``sim.actors.people.gait``; sitting (n,) 0 stands to 1 sits
     hulls    what of the model follows who sits
+    leaders  who is followed; held  who holds what
+    weights  (k, 2) mass kg and yaw inertia kg m2 of each planar disc row
     """
 
     alive: bool
@@ -67,6 +81,9 @@ class People(NamedTuple):
     feet: Float
     sitting: Float
     hulls: Hulls
+    leaders: Leaders
+    held: Held
+    weights: Float
 
 
 @njit
@@ -77,12 +94,16 @@ def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> No
     offset = 1 + int(uniform(draws, i) * (n_goals - 1))
     goal = task[i, columns.GOAL]
     state[i, columns.ARRIVE] = between(draws, i, ARRIVE_LEAST, ARRIVE_MOST)
-    state[i, columns.STAY_UNTIL] = waiting(draws, i, 1.0 / stay)  # a duration until the arrival
+    wait = waiting(draws, i, 1.0 / stay)
+    state[i, columns.STAY_UNTIL] = wait * state[i, columns.STAYS]  # a duration until the arrival
     state[i, columns.LOOK] = between(draws, i, -math.pi, math.pi)
     state[i, columns.LUCK] = uniform(draws, i)
     for _ in range(n_goals):
         goal = (task[i, columns.GOAL] + offset) % n_goals
-        if time_at(field, goal, discs[i, columns.X], discs[i, columns.Y]) < FAR:
+        if (
+            crowd.allowed[i, goal]
+            and time_at(field, goal, discs[i, columns.X], discs[i, columns.Y]) < FAR
+        ):
             break
         offset += 1
     task[i, columns.GOAL] = goal
@@ -102,7 +123,7 @@ def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[
     goal = task[i, columns.GOAL]
     wx, wy = way_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
     left = time_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
-    speed = min(pace * state[i, columns.SPEED], 0.3 + 1.2 * left)
+    speed = min(pace * state[i, columns.SPEED] * state[i, columns.SLOW], 0.3 + 1.2 * left)
     wx, wy = speed * wx, speed * wy
     for d in range(ways.doors.shape[0]):
         side, turn = ways.sides[i, d], ways.passage[d, columns.TURN]
@@ -138,7 +159,7 @@ def plan(  # noqa: C901, PLR0913 (kernel)
     discs, state, task, draws = crowd.discs, crowd.state, crowd.task, crowd.draws
     look = len(task) + i  # its generator
     sit(i, time, tick, crowd)
-    if task[i, columns.WALKING] == columns.TO_SEAT:
+    if task[i, columns.WALKING] == columns.TO_SEAT or task[i, columns.WALKING] >= columns.FOLLOWS:
         return
     if task[i, columns.WALKING] != columns.WALKS:
         if time >= state[i, columns.STAY_UNTIL]:
@@ -163,26 +184,29 @@ def plan(  # noqa: C901, PLR0913 (kernel)
         task[i, columns.WALKING] = columns.STANDS
         state[i, columns.STAY_UNTIL] += time
         state[i, columns.LOOK_UNTIL] = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
-        if task[i, columns.SEAT] < 0:
+        if task[i, columns.SEAT] < 0 and task[i, columns.HAND] < 0:
             may_sit(i, field, crowd)
     elif state[i, columns.BLOCKED] > GIVES_UP or time - state[i, columns.BEST_AT] > NO_PROGRESS:
         new_trip(i, time, stay, field, crowd)
 
 
 @njit
-def nearby(i: int, seat: int, discs: Float, sides: Int, near: Int) -> int:
-    """Rows of ``discs`` within 3 m of person ``i``, into ``near``; returns how many.
+def nearby(i: int, crowd: Crowd, sides: Int, near: Int) -> int:
+    """Rows of discs within 3 m of person ``i``, into ``near``; returns how many.
 
     The leaf of a door one wants to pass is no obstacle: ``at_door`` deals with it; nor is the chair
-    in row ``seat`` that one sits down on.
+    that one sits down on, nor what one holds.
     """
-    count = 0
+    discs, count = crowd.discs, 0
+    seat, held = crowd.task[i, columns.SEAT], crowd.task[i, columns.HELD]
     for k in range(discs.shape[0]):
         dx, dy = (
             discs[k, columns.X] - discs[i, columns.X],
             discs[k, columns.Y] - discs[i, columns.Y],
         )
         if k in (i, seat) or dx * dx + dy * dy > 9.0 or count == len(near):
+            continue
+        if held >= 0 and crowd.owner[k] == held:
             continue
         if (
             discs[k, columns.KIND] >= columns.LEAF
@@ -221,6 +245,16 @@ def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) ->
             discs[row, columns.X], discs[row, columns.Y] = x + length * c, y + length * s
             discs[row, columns.U] = -length * s * sign * qvel[v]
             discs[row, columns.V] = length * c * sign * qvel[v]
+    first = len(discs) - len(crowd.long)
+    for part in range(len(crowd.long)):
+        row = int(crowd.long[part, 0])
+        q, v = at.discs[row]
+        rx, ry = crowd.long[part, 1] * math.cos(qpos[q + 2]), crowd.long[part, 1] * math.sin(
+            qpos[q + 2]
+        )
+        end = discs[first + part]
+        end[columns.X], end[columns.Y] = qpos[q] + rx, qpos[q + 1] + ry
+        end[columns.U], end[columns.V] = qvel[v] - qvel[v + 2] * ry, qvel[v + 1] + qvel[v + 2] * rx
 
 
 @njit
@@ -232,15 +266,15 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
     share = min(1.0, ACCEL * tick / change) if change > 0.0 else 0.0
     state[i, columns.VX] += share * dvx
     state[i, columns.VY] += share * dvy
-    heading = yaw
-    if on_chair(i, crowd):
+    heading, most = yaw, state[i, columns.TURN_RATE]
+    if on_chair(i, crowd) or most < TURN_MOST:
         heading = state[i, columns.LOOK]
     elif state[i, columns.VX] ** 2 + state[i, columns.VY] ** 2 > 0.04:
         heading = math.atan2(state[i, columns.VY], state[i, columns.VX])
-    elif crowd.task[i, columns.WALKING] == columns.STANDS:
+    elif crowd.task[i, columns.WALKING] in (columns.STANDS, columns.FOLLOWS, columns.QUEUES):
         heading = state[i, columns.LOOK]
     out[0], out[1] = state[i, columns.VX], state[i, columns.VY]
-    out[2] = min(max(TURN_GAIN * wrap(heading - yaw), -TURN_MOST), TURN_MOST)
+    out[2] = min(max(TURN_GAIN * wrap(heading - yaw), -most), most)
 
 
 @njit
@@ -259,6 +293,54 @@ def patience(i: int, time: float, crowd: Crowd) -> float:
 
 
 @njit
+def wish(
+    i: int, time: float, tick: float, people: People
+) -> tuple[float, float]:
+    """The velocity person ``i`` would like to have, whatever it does; keeps account of the way."""
+    crowd, field = people.crowd, people.field
+    state, task = crowd.state, crowd.task
+    doing = task[i, columns.WALKING]
+    if doing < columns.FOLLOWS:
+        return want(i, people.rates[1], people.ways, field, crowd)
+    if doing == columns.FOLLOWS:
+        state[i, columns.LOOK] = faces(i, people.leaders, crowd)
+        if rests(i, time, crowd):
+            return 0.0, 0.0
+        wx, wy = follow(i, field, people.leaders, crowd)
+        wx, wy = make_way(i, (wx, wy), people.leaders, crowd)
+    elif doing == columns.QUEUES:
+        wx, wy = stand_in_line(i, time, people.leaders, crowd)
+    else:
+        wx, wy = to_what_is_taken(i, crowd)
+    if wx * wx + wy * wy > 0.09:
+        counts = 0.0 if doing == columns.FOLLOWS and near_place(i, crowd) else tick
+        state[i, columns.WALKED_S] += counts  # who is with the leader has nowhere to get on to
+        if crowd.discs[i, columns.U] ** 2 + crowd.discs[i, columns.V] ** 2 < STILL * STILL:
+            state[i, columns.BLOCKED] += tick
+            state[i, columns.BLOCKED_S] += counts
+            return wx, wy
+    state[i, columns.BLOCKED] = max(0.0, state[i, columns.BLOCKED] - 2.0 * tick)
+    return wx, wy
+
+
+@njit
+def hand(i: int, time: float, stay: float, goal: int, people: People) -> None:
+    """Who takes chairs along takes one, or puts it down where it has arrived or given up.
+
+    goal  where it was going before this tick
+    """
+    crowd, task = people.crowd, people.crowd.task
+    if task[i, columns.HAND] < 0:
+        return
+    if may_take(i, time, people.field, crowd, people.held, people.at.discs, people.weights):
+        new_trip(i, time, stay, people.field, crowd)
+    elif task[i, columns.HELD] >= 0 and task[i, columns.WALKING] == columns.STANDS:
+        put_down(i, time, crowd, people.held)
+    elif task[i, columns.GOAL] != goal:
+        put_down(i, time, crowd, people.held)
+
+
+@njit
 def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], people: People) -> None:
     """One tick of all people, from positions to the set points of their servos.
 
@@ -266,23 +348,30 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
     physics  qpos and qvel (read), ctrl (written)
     """
     time, tick = clock
-    stay, pace = people.rates
+    stay = people.rates[0]
     qpos, qvel, ctrl = physics
     at, field, ways, crowd = people.at, people.field, people.ways, people.crowd
     servos = people.servos
     near = np.zeros(24, dtype=np.int64)
     sense(at, qpos, qvel, ways, crowd)
+    note_ways(tick, people.leaders, crowd)
+    spread_out(field, people.leaders, crowd)
     for i in range(len(servos)):
+        goal = crowd.task[i, columns.GOAL]
         plan(i, time, tick, stay, ways.doors, field, crowd)
+        hand(i, time, stay, goal, people)
     give_turns(ways, field, crowd)
     for i in range(len(servos)):
         if on_chair(i, crowd):
             vx, vy = to_chair(i, crowd)
             steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])
             continue
-        wanted = want(i, pace, ways, field, crowd)
-        count = nearby(i, crowd.task[i, columns.SEAT], crowd.discs, ways.sides, near)
+        wanted = wish(i, time, tick, people)
+        count = nearby(i, crowd, ways.sides, near)
         fade = patience(i, time, crowd)
-        chosen = choose(i, wanted, near[:count], fade, field, crowd)
-        vx, vy = spare_robot(i, chosen, near[:count], crowd.discs)
+        if crowd.state[i, columns.TURN_RATE] < TURN_MOST:
+            vx, vy = pushes(i, wanted, near[:count], crowd)
+        else:
+            vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
+        vx, vy = spare_robot(i, (vx, vy), near[:count], crowd)
         steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])

@@ -11,10 +11,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.scene import Scene
+from scenes.kinds import kind_of
+from scenes.scene import Role, Scene
+from sim.actors import holding
 from sim.actors.config import ACTORS
 from sim.actors.doors import Doors
-from sim.actors.people import columns, crowd, gait, right_of_way, sitting
+from sim.actors.people import columns, crowd, following, gait, right_of_way, sitting
 from sim.actors.people.right_of_way import Addresses, Crowd
 from sim.core.bodies import Bodies
 from sim.core.draws import between, normal, uniform
@@ -75,19 +77,25 @@ class People:
         counters: NDArray[np.uint64],
     ) -> None:
         scene = bodies.scene
-        self.names = [m.name for m in scene.movers if m.kind == "person"]
+        self.names = [m.name for m in scene.movers if m.group == "person"]
         n = len(self.names)
         self._rates = (stay_mean, pace)
         self.feet = np.zeros((n, gait.N_COLUMNS))
         at = _addresses(bodies, doors, self.names)
+        discs, owner, long = _discs(bodies, doors, self.names)
         self.crowd = Crowd(
-            discs=_discs(bodies, doors, self.names),
+            discs=discs,
             yaws=np.zeros(len(at.discs)),
+            owner=owner,
+            long=long,
+            allowed=np.ones((n, max(len(scene.goals), 1)), dtype=np.bool_),
             state=np.zeros((n, columns.N_STATE)),
-            task=np.zeros((n, 3), dtype=np.int64),
+            task=np.full((n, columns.N_TASK), -1, dtype=np.int64),
             draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
         )
-        self.crowd.task[:, columns.SEAT] = -1
+        self.crowd.task[:, [columns.WALKING, columns.GOAL]] = 0
+        self.crowd.state[:, [columns.STAYS, columns.SLOW]] = 1.0
+        self.crowd.state[:, columns.TURN_RATE] = crowd.TURN_MOST
         alive = n > 0 and math.isfinite(stay_mean) and len(scene.goals) > 0
         servos = [model.actuator(f"{p}/vx").id for p in self.names]
         limbs = [[model.body(f"{p}/{limb}").mocapid[0] for limb in _LIMBS] for p in self.names]
@@ -104,7 +112,41 @@ class People:
             feet=self.feet,
             sitting=self.crowd.state[:, columns.SIT],
             hulls=_hulls(model, self.names),
+            leaders=self._give_roles(_planar(bodies, self.names), scene),
+            held=holding.hands(model, bodies, scene, self._cleaners),
+            weights=_weights(model, _planar(bodies, self.names)),
         )
+
+    def _give_roles(self, planar: list[str], scene: Scene) -> following.Leaders:
+        """Write what everybody does into their rows; who is followed, and the lines."""
+        state, task = self.crowd.state, self.crowd.task
+        leaders = list(dict.fromkeys(r.leader for r in scene.roles.values() if r.leader))
+        self._cleaners = [name for name in self.names if _role(scene, name).does == "clean"]
+        goals, lines = list(scene.goals), []
+        for i, name in enumerate(self.names):
+            role = _role(scene, name)
+            state[i, [columns.STAYS, columns.SLOW]] = role.stay, role.slow
+            state[i, [columns.AHEAD, columns.LEFT]] = role.slot
+            if role.goals:
+                self.crowd.allowed[i] = [goal in role.goals for goal in goals]
+            if role.does == "follow":
+                task[i, columns.WALKING] = columns.FOLLOWS
+                task[i, columns.LEADER] = leaders.index(role.leader)
+            elif role.does == "queue":
+                task[i, columns.WALKING], task[i, columns.PLACE] = columns.QUEUES, role.turn
+                if role.turn == 0:
+                    first = len(lines)
+                    lines += [(*place, float(len(role.places))) for place in role.places]
+                task[i, columns.GOAL] = first
+            elif role.does == "clean":
+                task[i, columns.HAND] = len(scene.holds) + self._cleaners.index(name)
+        for hold in scene.holds:
+            if hold.holder in self.names:
+                i = self.names.index(hold.holder)
+                task[i, columns.HELD] = planar.index(hold.held)
+                if not hold.hinged:
+                    state[i, columns.TURN_RATE] = ACTORS.holding.turn_most
+        return following.leaders_of([planar.index(name) for name in leaders], lines)
 
     def start(self, data: mujoco.MjData) -> None:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand."""
@@ -120,7 +162,9 @@ class People:
                 draws, i, numbers.look_least_s, numbers.look_most_s
             )
             n_goals = max(len(self.table.field.times), 1)
-            task[i, columns.GOAL] = int(uniform(draws, i) * n_goals)
+            goal = int(uniform(draws, i) * n_goals)
+            if task[i, columns.WALKING] != columns.QUEUES:
+                task[i, columns.GOAL] = goal
         self.stand(data)
 
     def dress(self) -> None:
@@ -146,8 +190,10 @@ class People:
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""
-        c = self.crowd
-        return {"feet": self.feet, "state": c.state, "task": c.task, "draws": c.draws}
+        c, held = self.crowd, self.table.held
+        own = {"feet": self.feet, "state": c.state, "task": c.task, "draws": c.draws}
+        hands = {"hands": held.at, "hands.pose": held.pose, "hands.bodies": held.bodies}
+        return {**own, **following.arrays(self.table.leaders), **hands}
 
 
 def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:
@@ -167,8 +213,8 @@ def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:
 
 def _planar(bodies: Bodies, people: Sequence[str]) -> list[str]:
     """Names in the order of the disc rows: people first."""
-    kinds = ("person", "door")
-    return [*people, *(m.name for m in bodies.scene.movers if m.kind not in kinds)]
+    groups = ("person", "door")
+    return [*people, *(m.name for m in bodies.scene.movers if m.group not in groups)]
 
 
 def _addresses(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Addresses:
@@ -176,9 +222,21 @@ def _addresses(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Addresses
     return Addresses(discs=np.column_stack([qpos, dof]), doors=doors.addresses, hinges=doors.hinges)
 
 
-def _discs(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Float:
+def _discs(
+    bodies: Bodies, doors: Doors, people: Sequence[str]
+) -> tuple[Float, NDArray[np.int64], Float]:
+    """The discs, the disc row of the mover that each is of, and the ends of what is long."""
     planar = _planar(bodies, people)
-    discs = np.zeros((len(planar) + 3 * len(doors.names), 6))
+    long = [
+        (float(row), sign * kind_of(mover.kind).half_length_m)
+        for mover in bodies.scene.movers
+        if kind_of(mover.kind).half_length_m > 0.0
+        for row in (planar.index(mover.name),)
+        for sign in (-1.0, 1.0)
+    ]
+    ends = np.array(long, dtype=np.float64).reshape(-1, 2)
+    leaves = len(planar) + 3 * len(doors.names)
+    discs = np.zeros((leaves + len(ends), 6))
     discs[: len(planar), columns.KIND] = columns.THING
     discs[: len(people), columns.KIND] = columns.PERSON
     for mover in bodies.scene.movers:
@@ -187,7 +245,20 @@ def _discs(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Float:
         elif mover.group == "chair":
             discs[planar.index(mover.name), columns.KIND] = columns.CHAIR
     discs[: len(planar), columns.R] = bodies.radii(planar)
-    for row in range(len(planar), len(discs)):
+    for row in range(len(planar), leaves):
         discs[row, columns.KIND] = columns.LEAF + (row - len(planar)) // 3
         discs[row, columns.R] = 0.06
-    return discs
+    owner = np.arange(len(discs))
+    owner[leaves:] = ends[:, 0]
+    discs[leaves:, columns.KIND] = columns.THING
+    discs[leaves:, columns.R] = discs[owner[leaves:], columns.R]
+    return discs, owner, ends
+
+
+def _weights(model: mujoco.MjModel, planar: Sequence[str]) -> Float:
+    rows = [(model.body(f"{n}/base").mass[0], model.body(f"{n}/base").inertia[2]) for n in planar]
+    return np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+
+def _role(scene: Scene, name: str) -> Role:
+    return scene.roles.get(name, Role(does="walk"))

@@ -26,20 +26,26 @@ WANTS, IN_DOORWAY, ON_WAY, SWEPT = _R.wants_m, _R.in_doorway_m, _R.on_way, _R.sw
 CLEAR, IN_FRAME, KEPT = ACTORS.doors.clear_m, _R.in_frame_m, _R.kept_m
 PULL, PUSH, BESIDE, BACK = _R.pull_m, _R.push_m, _R.beside_m, _R.back_m
 WAIT_MPS, WAIT_GAIN, LEAF_M = _R.wait_mps, _R.wait_gain, _R.leaf_m
+ASKS = ACTORS.following.asks_m
 PUSH_STOP, QUEUE, HOLD_GAIN, HOLD_MPS = _R.push_stop_m, _R.queue_m, _R.hold_gain, _R.hold_mps
 
 
 class Crowd(NamedTuple):
     """The people and what is around them, in the columns named above.
 
-    discs (k, 6) people first; yaws rad of people and things; state (n, 14);
-    task (n, 3); draws (2 n,) generators:
+    discs (k, 6) people first; yaws rad of people and things; owner (k,) disc row of the mover that
+    each disc is of; long (p, 2) disc row and m along its x axis of the last p discs, which are the
+    ends of what is long; allowed (n, goals) where each one goes; state (n, 22); task (n, 7);
+    draws (2 n,) generators:
     of each one's trips, then of each one's looking about while standing, which happens as often as
     time allows. So the trips of a person are the same, however long each takes.
     """
 
     discs: Float
     yaws: Float
+    owner: Int
+    long: Float
+    allowed: NDArray[np.bool_]
     state: Float
     task: Int
     draws: NDArray[np.uint64]
@@ -105,6 +111,8 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:  # noqa: C901 (
             )
             if distance < CLEAR or swept:  # nobody is hit by a leaf that moves by itself
                 passage[d, columns.INSIDE] = 1.0
+            if crowd.task[i, columns.WALKING] == columns.FOLLOWS and distance < ASKS:
+                asked = True
             if side == 0:
                 continue
             across, along = (

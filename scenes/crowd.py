@@ -1,0 +1,392 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Crowds: people who agree with each other, and what they push, pull and carry, for any scene.
+
+``scenes.build(name, seed, crowd="escorts:6,boards:2")`` puts them on the free floor of the finished
+scene, from a stream of randomness of their own: what else is in the scene stays as it is. What each
+kind of them does is ``Role`` and ``Hold``; ``sim.actors.people`` carries it out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from scenes import look
+from scenes.assembly import Assembly, hull_radius, moved
+from scenes.builder import stand
+from scenes.kinds import kind_of
+from scenes.placement import Floor
+from scenes.recipe import DOORWAY_RADIUS, GOAL_RADIUS, MARGIN
+from scenes.scene import Hold, Mover, Pose, Role, Scene
+from slam.errors import InvalidValueError
+
+_STREAM = 100  # of a scene's seed; those of ``scenes.recipe.Draws`` are 0 to 6
+_TRIES = 400
+_BESIDE = 0.05  # m between a person's hull and that of what is held
+MOST = 80  # of each kind
+QUEUE_M = 0.75  # from one to the next
+GROUP = 4  # people in one
+WAGONS = 2  # of a train
+COAT = "person_coat"  # what accompanies the robot is dressed for a tour in winter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crowd:
+    """How many of each kind.
+
+    escorts   people who accompany the robot, and stop when it stops
+    streams   people who walk to and fro between the far ends of the scene
+    groups    people who walk in groups of four, stop and talk
+    queue     people who stand in line; now and then the first one leaves and joins at the end
+    boards    partitions on castors, each pushed about by somebody
+    beds      hospital beds, each pushed by somebody
+    trains    trains of two trolleys, each pulled by somebody
+    couches   each carried by two people
+    cleaners  people who take chairs from place to place
+    """
+
+    escorts: int = 0
+    streams: int = 0
+    groups: int = 0
+    queue: int = 0
+    boards: int = 0
+    beds: int = 0
+    trains: int = 0
+    couches: int = 0
+    cleaners: int = 0
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST:
+                raise InvalidValueError(
+                    f"crowd: {each.name} must be a whole number in 0..{MOST}, got {value!r}"
+                )
+
+    def __str__(self) -> str:
+        named = [f"{f.name}:{getattr(self, f.name)}" for f in fields(self) if getattr(self, f.name)]
+        return ",".join(named) or "none"
+
+    def __bool__(self) -> bool:
+        return str(self) != "none"
+
+    def part(self, share: float) -> Crowd:
+        """That share of each kind, to the nearest whole number."""
+        counts = {f.name: math.floor(share * getattr(self, f.name) + 0.5) for f in fields(self)}
+        return Crowd(**counts)
+
+
+def crowd_of(text: object) -> Crowd:
+    """``"escorts:6,boards:2"`` or ``"none"``; ``InvalidValueError`` for anything else."""
+    if isinstance(text, Crowd):
+        return text
+    known = [f.name for f in fields(Crowd)]
+    wanted = f'"none" or like "escorts:6,boards:2" with {", ".join(known)}'
+    if not isinstance(text, str):
+        raise InvalidValueError(f"crowd must be {wanted}, got {text!r:.80}")
+    counts: dict[str, int] = {}
+    for word in text.split(",") if text not in ("none", "") else ():
+        name, _, number = word.strip().partition(":")
+        if name not in known or name in counts or not number.isdecimal() or len(number) > 4:
+            raise InvalidValueError(f"crowd must be {wanted}, got {text!r:.80}")
+        counts[name] = int(number)
+    return Crowd(**counts)
+
+
+MIXES = {
+    "apartment": Crowd(escorts=6, couches=1),
+    "arena": Crowd(escorts=14, boards=3),
+    "classroom": Crowd(escorts=10, boards=2, groups=4),
+    "corridor": Crowd(escorts=8, streams=8, beds=1),
+    "gallery": Crowd(escorts=14, groups=12, boards=2),
+    "office": Crowd(escorts=12, streams=4, boards=2, couches=1, cleaners=1),
+    "random-rooms": Crowd(escorts=10, streams=4),
+    "station": Crowd(escorts=14, streams=36, queue=6, trains=2),
+    "warehouse": Crowd(escorts=8, trains=3, streams=6),
+}
+"""The whole crowd of each scene, at motion 1; calibrated by ``scripts.experiments.share_seen``."""
+OTHERS = Crowd(escorts=10)
+"""That of a scene that has no row."""
+
+
+def mix(scene: str, level: float) -> Crowd:
+    """The crowd of a scene at a motion in [0, 1]."""
+    return MIXES.get(scene, OTHERS).part(level)
+
+
+class _Filling:
+    """A scene that is being filled."""
+
+    def __init__(self, scene: Scene, crowd: Crowd) -> None:
+        self.scene, self.crowd = scene, crowd
+        self.rng = np.random.default_rng([scene.seed, _STREAM])
+        self.parts = Assembly()
+        self.movers: list[Mover] = []
+        self.initial: dict[str, Pose] = {}
+        self.roles: dict[str, Role] = {}
+        self.holds: list[Hold] = []
+        self.floor = _free_floor(scene)
+
+    def fits(self, discs: list[tuple[float, float, float]]) -> bool:
+        points = np.array([disc[:2] for disc in discs])
+        gaps = self.floor.clearance(points)
+        return bool((gaps >= np.array([disc[2] for disc in discs]) + MARGIN).all())
+
+    def add(self, kind: str, name: str, pose: Pose) -> None:
+        """Put a mover at a pose and take its floor."""
+        paint = look.dress(self.rng) if kind_of(kind).group == "person" else {}
+
+        def prepare(child: object) -> None:
+            for geom in child.geoms if paint else ():  # type: ignore[attr-defined]
+                geom.material = paint.get(geom.material, geom.material)
+            if kind_of(kind).group == "person":
+                stand(child, pose)  # type: ignore[arg-type]
+
+        self.parts.put(kind, name, (0.0, 0.0, 0.0), prepare)
+        self.movers.append(Mover(name=name, kind=kind, radius=hull_radius(kind)))
+        self.initial[name] = pose
+        for x, y, radius in _discs(kind, pose):
+            self.floor.block(x, y, radius)
+
+    def anywhere(self, kinds: list[tuple[str, Pose]], what: str) -> list[Pose]:
+        """Poses of a rigid set of things, given in the first one's frame, where all have room."""
+        for _ in range(_TRIES):
+            place = self.floor.find(self.rng, hull_radius(kinds[0][0]) + MARGIN)
+            if place is None:
+                break
+            first = (*place, float(self.rng.uniform(-math.pi, math.pi)))
+            poses = [moved(first, local) for _, local in kinds]
+            discs = [
+                d for (kind, _), p in zip(kinds, poses, strict=True) for d in _discs(kind, p)
+            ]
+            if self.fits(discs):
+                return poses
+        raise InvalidValueError(f"crowd: {what} does not fit on the floor of '{self.scene.name}'")
+
+    def put(self, named: list[tuple[str, str, Pose]], what: str) -> None:
+        """Put a rigid set of things (kind, name, pose in the first one's frame) anywhere."""
+        poses = self.anywhere([(kind, local) for kind, _, local in named], what)
+        for (kind, name, _), pose in zip(named, poses, strict=True):
+            self.add(kind, name, pose)
+
+    def finish(self) -> Scene:
+        scene = self.scene
+        spec = scene.spec.copy()
+        self.parts.into(spec)
+        return replace(
+            scene,
+            spec=spec,
+            movers=(*scene.movers[:-1], *self.movers, scene.movers[-1]),
+            initial={**scene.initial, **self.initial},
+            roles=dict(self.roles),
+            holds=tuple(self.holds),
+            options={**scene.options, "crowd": str(self.crowd)},
+        )
+
+
+def with_crowd(scene: Scene, crowd: Crowd) -> Scene:
+    """The scene with a crowd in it; the given one is left as it is.
+
+    Raises ``InvalidValueError`` where it does not fit on the floor.
+    """
+    if not crowd:
+        return scene
+    filling = _Filling(scene, crowd)
+    for each in fields(crowd):
+        if getattr(crowd, each.name):
+            _PUT[each.name](filling, getattr(crowd, each.name))
+    return filling.finish()
+
+
+def slots(n: int) -> Iterator[tuple[float, float]]:
+    """Where ``n`` escorts go, (m ahead, m left) of the robot: before it, beside it, in file.
+
+    The first are in a half ring before it, with a gap to drive into; every fourth goes in file.
+    """
+    ring = [(1.1, a) for a in (0.75, -0.75, 1.25, -1.25, 1.75, -1.75)]
+    ring += [(1.7, a) for a in (0.45, -0.45, 0.85, -0.85, 1.3, -1.3, 1.75, -1.75)]
+    ring += [(2.3, a) for a in (0.35, -0.35, 0.7, -0.7, 1.05, -1.05)]
+    at = behind = 0
+    for k in range(n):
+        if k % 4 == 3 or at == len(ring):
+            yield -0.95 - 0.7 * behind, 0.0
+            behind += 1
+        else:
+            distance, angle = ring[at]
+            yield distance * math.cos(angle), distance * math.sin(angle)
+            at += 1
+
+
+def _escorts(filling: _Filling, n: int) -> None:
+    x, y, yaw = filling.scene.start
+    for k, slot in enumerate(slots(n)):
+        pose = moved((x, y, yaw), (*slot, 0.0))
+        if not filling.fits(_discs(COAT, pose)):
+            pose = _near(filling, x, y)
+        filling.add(COAT, f"escort{k}", pose)
+        filling.roles[f"escort{k}"] = Role(does="follow", leader="robot", slot=slot)
+
+
+def _near(filling: _Filling, x: float, y: float) -> Pose:
+    """A free pose as near to (x, y) as a few hundred tries find."""
+    for k in range(_TRIES):
+        reach = 1.2 + 0.02 * k
+        angle, far = filling.rng.uniform(-math.pi, math.pi), filling.rng.uniform(0.8, reach)
+        pose = (x + far * math.cos(angle), y + far * math.sin(angle), float(angle))
+        if filling.fits(_discs("person", pose)):
+            return pose
+    return filling.anywhere([("person", (0.0, 0.0, 0.0))], "an escort")[0]
+
+
+def _streams(filling: _Filling, n: int) -> None:
+    ends = far_ends(filling.scene)
+    for k in range(n):
+        filling.put([(COAT if k % 2 else "person", f"stream{k}", (0.0, 0.0, 0.0))], "a stream")
+        filling.roles[f"stream{k}"] = Role(does="walk", goals=ends, stay=0.0)
+
+
+def far_ends(scene: Scene) -> tuple[str, ...]:
+    """Goals between which streams of people go.
+
+    Those called ``stream...``; where there are none, the two that are the farthest apart.
+    """
+    named = tuple(name for name in scene.goals if name.startswith("stream"))
+    if len(named) > 1:
+        return named
+    goals = sorted(scene.goals)
+    pairs = [(a, b) for i, a in enumerate(goals) for b in goals[i + 1 :]]
+    if not pairs:
+        return ()
+    return max(pairs, key=lambda pair: math.dist(scene.goals[pair[0]], scene.goals[pair[1]]))
+
+
+def _groups(filling: _Filling, n: int) -> None:
+    places = ((0.0, 0.0), (0.0, 0.75), (-0.75, 0.1), (-0.75, 0.8))
+    for first in range(0, n, GROUP):
+        size = min(GROUP, n - first)
+        named = [(COAT, f"group{first + k}", (*places[k], 0.0)) for k in range(size)]
+        filling.put(named, "a group")
+        filling.roles[f"group{first}"] = Role(does="walk", stay=1.0)
+        for k in range(1, size):
+            name = f"group{first + k}"
+            filling.roles[name] = Role(does="follow", leader=f"group{first}", slot=places[k])
+
+
+def _queue(filling: _Filling, n: int) -> None:
+    named = [("person", f"queue{k}", (-QUEUE_M * k, 0.0, 0.0)) for k in range(n)]
+    filling.put(named, f"a queue of {n}")
+    places = tuple(filling.initial[name][:2] for _, name, _ in named)
+    for k in range(n):
+        filling.roles[f"queue{k}"] = Role(does="queue", places=places, turn=k)
+
+
+def _pushed(kind: str, name: str) -> Callable[[_Filling, int], None]:
+    """Things that somebody pushes before them."""
+
+    def put(filling: _Filling, n: int) -> None:
+        thing = (_reach(kind) + hull_radius("person") + _BESIDE, 0.0, 0.0)
+        for k in range(n):
+            who, what = f"{name}_pusher{k}", f"{name}{k}"
+            filling.put([("person", who, (0.0, 0.0, 0.0)), (kind, what, thing)], f"a {name}")
+            filling.holds.append(Hold(holder=who, held=what, pose=thing))
+            filling.roles[who] = Role(does="walk", goals=_same_room(filling, who), slow=0.6)
+
+    return put
+
+
+def _trains(filling: _Filling, n: int) -> None:
+    gap = 2.0 * _reach("trolley") + 0.1
+    first = (-_reach("trolley") - hull_radius("person") - _BESIDE, 0.0, 0.0)
+    for k in range(n):
+        who = f"train_puller{k}"
+        named = [("person", who, (0.0, 0.0, 0.0))]
+        before, at = who, first
+        for wagon in range(WAGONS):
+            name = f"wagon{WAGONS * k + wagon}"
+            place = (first[0] - gap * wagon, 0.0, 0.0)
+            named.append(("trolley", name, place))
+            filling.holds.append(Hold(holder=before, held=name, pose=at, hinged=True))
+            before, at = name, (-gap, 0.0, 0.0)
+        filling.put(named, "a train")
+        filling.roles[who] = Role(does="walk", goals=_same_room(filling, who), slow=0.75)
+
+
+def _couches(filling: _Filling, n: int) -> None:
+    reach = _reach("couch") + hull_radius("person") + _BESIDE
+    for k in range(n):
+        front, rear, couch = f"carrier{2 * k}", f"carrier{2 * k + 1}", f"couch{k}"
+        named = [
+            ("person", front, (0.0, 0.0, 0.0)),
+            ("couch", couch, (-reach, 0.0, 0.0)),
+            ("person", rear, (-2.0 * reach, 0.0, 0.0)),
+        ]
+        filling.put(named, "a couch")
+        filling.holds.append(Hold(holder=front, held=couch, pose=(-reach, 0.0, 0.0), hinged=True))
+        filling.holds.append(Hold(holder=rear, held=couch, pose=(reach, 0.0, 0.0), hinged=True))
+        filling.roles[front] = Role(does="walk", goals=_same_room(filling, front), slow=0.6)
+        filling.roles[rear] = Role(does="follow", leader=front, slot=(-2.0 * reach, 0.0))
+
+
+def _cleaners(filling: _Filling, n: int) -> None:
+    for k in range(n):
+        filling.put([("person", f"cleaner{k}", (0.0, 0.0, 0.0))], "a cleaner")
+        filling.roles[f"cleaner{k}"] = Role(does="clean", slow=0.8)
+
+
+_PUT: dict[str, Callable[[_Filling, int], None]] = {
+    "escorts": _escorts,
+    "streams": _streams,
+    "groups": _groups,
+    "queue": _queue,
+    "boards": _pushed("board", "board"),
+    "beds": _pushed("hospital_bed", "bed"),
+    "trains": _trains,
+    "couches": _couches,
+    "cleaners": _cleaners,
+}
+
+
+def _same_room(filling: _Filling, name: str) -> tuple[str, ...]:
+    """Goals of the room that a mover is in, where it has two: what is long keeps out of doors."""
+    x, y, _ = filling.initial[name]
+    for xmin, ymin, xmax, ymax in filling.scene.rooms.values():
+        if xmin <= x <= xmax and ymin <= y <= ymax:
+            inside = [
+                goal
+                for goal, (gx, gy) in filling.scene.goals.items()
+                if xmin <= gx <= xmax and ymin <= gy <= ymax
+            ]
+            if len(inside) > 1:
+                return tuple(inside)
+    return ()
+
+
+def _reach(kind: str) -> float:
+    """m from the middle of a thing to the end of its hulls, along its x axis."""
+    return kind_of(kind).half_length_m + hull_radius(kind)
+
+
+def _discs(kind: str, pose: Pose) -> list[tuple[float, float, float]]:
+    """(x, y, radius) m of the hulls of a thing at a pose."""
+    half, radius = kind_of(kind).half_length_m, hull_radius(kind)
+    offsets = (0.0,) if half == 0.0 else (-half, 0.0, half)
+    return [(*moved(pose, (at, 0.0, 0.0))[:2], radius) for at in offsets]
+
+
+def _free_floor(scene: Scene) -> Floor:
+    """The rooms' floor less furniture, doorways, goals and everything that is there already."""
+    floor = Floor(list(scene.rooms.values()), scene.obstacles)
+    for mover in scene.movers:
+        x, y, yaw = scene.initial[mover.name]
+        if mover.group == "door":
+            middle = moved((x, y, yaw), (0.5 * mover.radius, 0.0, 0.0))
+            floor.block(middle[0], middle[1], DOORWAY_RADIUS + 0.5 * mover.radius)
+        else:
+            for cx, cy, radius in _discs(mover.kind, (x, y, yaw)):
+                floor.block(cx, cy, radius + (0.2 if mover.group == "robot" else 0.0))
+    for x, y in scene.goals.values():
+        floor.block(x, y, GOAL_RADIUS)
+    return floor

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hands: what is pushed, pulled or carried is held by a bounded spring and damper.
+
+What the hand does to the thing, the thing does to the hand: who pushes a heavy bed into a wall is
+stopped by it. Forces are generalised forces of planar joints (x, y, yaw), written before each
+substep.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.scene import Scene
+from sim.actors.config import ACTORS
+from sim.core.bodies import Bodies
+from slam._jit import njit
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+_H = ACTORS.holding
+STIFFNESS, DAMPING = _H.stiffness, _H.damping
+FORCE_MAX, TORQUE_MAX, LOST = _H.force_max, _H.torque_max, _H.lost_m
+QA, VA, QB, VB, DROPPED = range(5)  # columns of ``Held.at``
+
+
+class Held(NamedTuple):
+    """h holds.
+
+    at      (h, 5) first qpos and dof of the holder, then of what is held, -1: an empty hand; first
+            dof of what has just been put down, or -1
+    pose    (h, 3) of what is held in the holder's frame: x m, y m, yaw rad
+    hinged  (h,) whether it turns freely about the hand
+    bodies  (h, 2) mass kg and yaw inertia kg m2 of what is held
+    """
+
+    at: Int
+    pose: Float
+    hinged: NDArray[np.bool_]
+    bodies: Float
+
+
+@njit
+def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:
+    """Write the forces of all hands into ``qfrc``."""
+    for k in range(len(held.at)):
+        for axis in range(3 if held.at[k, DROPPED] >= 0 else 0):
+            qfrc[held.at[k, DROPPED] + axis] = 0.0
+        held.at[k, DROPPED] = -1
+        if held.at[k, QB] >= 0:
+            for axis in range(3):
+                qfrc[held.at[k, VA] + axis] = 0.0
+                qfrc[held.at[k, VB] + axis] = 0.0
+    for k in range(len(held.at)):
+        qa, va, qb, vb, _ = held.at[k]
+        if qb < 0:
+            continue
+        c, s = math.cos(qpos[qa + 2]), math.sin(qpos[qa + 2])
+        rx = c * held.pose[k, 0] - s * held.pose[k, 1]
+        ry = s * held.pose[k, 0] + c * held.pose[k, 1]
+        if held.hinged[k]:
+            # The hand is where holder and thing meet, half way; the thing's end of it turns along.
+            ct, st = math.cos(qpos[qb + 2]), math.sin(qpos[qb + 2])
+            arm = 0.5 * held.pose[k, 0]
+            rx, ry = c * arm - s * held.pose[k, 1], s * arm + c * held.pose[k, 1]
+            bx, by = -ct * arm, -st * arm
+        else:
+            bx, by = 0.0, 0.0
+        ex, ey = qpos[qa] + rx - qpos[qb] - bx, qpos[qa + 1] + ry - qpos[qb + 1] - by
+        if ex * ex + ey * ey > LOST * LOST:
+            continue
+        wa, wb = qvel[va + 2], qvel[vb + 2]
+        du = qvel[va] - wa * ry - qvel[vb] + wb * by
+        dv = qvel[va + 1] + wa * rx - qvel[vb + 1] - wb * bx
+        mass, inertia = held.bodies[k]
+        fx = mass * (STIFFNESS * ex + DAMPING * du)
+        fy = mass * (STIFFNESS * ey + DAMPING * dv)
+        size = math.sqrt(fx * fx + fy * fy)
+        over = max(size / FORCE_MAX, 1.0)
+        fx, fy, torque = fx / over, fy / over, 0.0
+        if not held.hinged[k]:
+            turn = qpos[qa + 2] + held.pose[k, 2] - qpos[qb + 2]
+            turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
+            torque = inertia * (STIFFNESS * turn + DAMPING * (wa - wb))
+            torque = min(max(torque, -TORQUE_MAX), TORQUE_MAX)
+        qfrc[vb] += fx
+        qfrc[vb + 1] += fy
+        qfrc[vb + 2] += torque + bx * fy - by * fx
+        qfrc[va] -= fx
+        qfrc[va + 1] -= fy
+        qfrc[va + 2] -= torque + rx * fy - ry * fx
+
+
+def empty() -> Held:
+    """No hands."""
+    return Held(
+        np.zeros((0, 5), dtype=np.int64), np.zeros((0, 3)), np.zeros(0, dtype=np.bool_),
+        np.zeros((0, 2)),
+    )  # fmt: skip
+
+
+def hands(model: mujoco.MjModel, bodies: Bodies, scene: Scene, cleaners: list[str]) -> Held:
+    """The holds of a scene, then the empty hands of those who take chairs along."""
+    n = len(scene.holds) + len(cleaners)
+    at, pose = np.full((n, 5), -1, dtype=np.int64), np.zeros((n, 3))
+    hinged, inertia = np.zeros(n, dtype=np.bool_), np.ones((n, 2))
+    for k, each in enumerate(scene.holds):
+        qpos, dof = bodies.addresses([each.holder, each.held])
+        at[k, :DROPPED] = qpos[0], dof[0], qpos[1], dof[1]
+        pose[k], hinged[k] = each.pose, each.hinged
+        body = model.body(f"{each.held}/base")
+        inertia[k] = body.mass[0], body.inertia[2]
+    for k, name in enumerate(cleaners):
+        qpos, dof = bodies.addresses([name])
+        at[len(scene.holds) + k, :2] = qpos[0], dof[0]
+    return Held(at, pose, hinged, inertia)
