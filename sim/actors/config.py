@@ -159,7 +159,7 @@ class HoldingConfig(Settings):
     turn_most: float = _fixed(0.8, "rad/s", "turn rate of who pushes something long")
     stop_m: float = _fixed(0.12, "m", "before what stands in its way")
     brake: float = _fixed(1.5, "1/s", "speed by the distance left to that")
-    shoves_s: float = _fixed(0.8, "s", "held up by a chair so long: it is pushed along")
+    backwards_mps: float = _fixed(0.3, "m/s", "while turning a long thing round, at most")
 
 
 @dataclass(frozen=True, kw_only=True)

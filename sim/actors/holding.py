@@ -2,7 +2,7 @@
 """Hands: what is pushed, pulled or carried is held by a bounded spring and damper.
 
 What the hand does to the thing, the thing does to the hand: who pushes a heavy bed into a wall is
-stopped by it. Forces are generalised forces of planar joints (x, y, yaw), written before each
+stopped by it. The torque of two hands is taken up by the feet. Forces are generalised forces of planar joints (x, y, yaw), written before each
 substep.
 """
 
@@ -92,7 +92,6 @@ def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:
         qfrc[vb + 2] += torque + bx * fy - by * fx
         qfrc[va] -= fx
         qfrc[va + 1] -= fy
-        qfrc[va + 2] -= torque + rx * fy - ry * fx
 
 
 def empty() -> Held:

@@ -17,7 +17,7 @@ _C = ACTORS.cleaning
 REACH, NEAR, REST_S = _C.hand_m, _C.near_m, _C.rest_s
 GIVES_UP_S = ACTORS.walking.blocked_s
 _H = ACTORS.holding
-STOP_M, BRAKE, SHOVES_S = _H.stop_m, _H.brake, _H.shoves_s
+STOP_M, BRAKE, BACKWARDS = _H.stop_m, _H.brake, _H.backwards_mps
 
 
 @njit
@@ -26,8 +26,7 @@ def pushes(
 ) -> tuple[float, float]:
     """The velocity of someone who pushes a long thing: they turn it to the way, then walk ahead.
 
-    Who or what stands before its far end is waited for, chairs are pushed out of the way once
-    patience wears out.
+    Who or what stands before its far end is waited for, but chairs are pushed along.
     """
     speed = math.sqrt(wanted[0] ** 2 + wanted[1] ** 2)
     if speed < 0.05:
@@ -35,7 +34,9 @@ def pushes(
     crowd.state[i, columns.LOOK] = math.atan2(wanted[1], wanted[0])
     discs, yaw = crowd.discs, crowd.yaws[i]
     c, s = math.cos(yaw), math.sin(yaw)
-    ahead = max((wanted[0] * c + wanted[1] * s) / speed, 0.0)
+    ahead = (wanted[0] * c + wanted[1] * s) / speed
+    if ahead < 0.0:  # backwards while turning round: its far end needs the room
+        return BACKWARDS * ahead * c, BACKWARDS * ahead * s
     go = speed * ahead * ahead
     first = discs[i]
     for part in range(len(discs)):  # the farthest disc of the thing ahead
@@ -47,7 +48,7 @@ def pushes(
     for k in range(len(near)):
         other = discs[near[k]]
         kind = other[columns.KIND]
-        if kind == columns.CHAIR and crowd.state[i, columns.BLOCKED] > SHOVES_S:
+        if kind == columns.CHAIR:  # is pushed along
             continue
         dx, dy = other[columns.X] - first[columns.X], other[columns.Y] - first[columns.Y]
         along, beside = dx * c + dy * s, abs(dy * c - dx * s)

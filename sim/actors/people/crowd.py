@@ -184,7 +184,7 @@ def plan(  # noqa: C901, PLR0913 (kernel)
         task[i, columns.WALKING] = columns.STANDS
         state[i, columns.STAY_UNTIL] += time
         state[i, columns.LOOK_UNTIL] = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
-        if task[i, columns.SEAT] < 0 and task[i, columns.HAND] < 0:
+        if task[i, columns.SEAT] < 0 and task[i, columns.HAND] < 0 and task[i, columns.HELD] < 0:
             may_sit(i, field, crowd)
     elif state[i, columns.BLOCKED] > GIVES_UP or time - state[i, columns.BEST_AT] > NO_PROGRESS:
         new_trip(i, time, stay, field, crowd)

@@ -249,6 +249,9 @@ def _discs(
         discs[row, columns.KIND] = columns.LEAF + (row - len(planar)) // 3
         discs[row, columns.R] = 0.06
     owner = np.arange(len(discs))
+    for hold in bodies.scene.holds:  # a train is one thing to whoever pulls it
+        if hold.holder not in people:
+            owner[planar.index(hold.held)] = owner[planar.index(hold.holder)]
     owner[leaves:] = ends[:, 0]
     discs[leaves:, columns.KIND] = columns.THING
     discs[leaves:, columns.R] = discs[owner[leaves:], columns.R]
