@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from scripts.metrics.judged import Judged
+from scripts.metrics.judged import Judged, world_truth
 from scripts.metrics.table import METRICS
 from sim.actors.robot import DriveConfig
 from sim.driving.drive import TourConfig
@@ -31,7 +31,6 @@ from slam.files import write_text
 from slam.frames import Frame
 from slam.frontend.odometry_sum import thinned
 from slam.replay import Track
-from slam.trajectory import Trajectory
 
 LOST_M = 0.5
 FULL_RATE_HZ = 37.5
@@ -118,9 +117,7 @@ class Score:
 
 def score(blank: Score, frames: list[Frame]) -> Score:
     """Let the SLAM named in ``blank`` see the frames, and fill the rest of it; inf if it fails."""
-    truth = Trajectory(
-        stamps_ns=np.array([f.stamp_ns for f in frames]), poses=np.array([f.truth for f in frames])
-    )
+    truth = world_truth(frames)
     wheels = Track(name="odometry", system=create("odometry"))
     wheels.survive(frames)
     odometry_m = Judged.of(wheels, truth).ate()
