@@ -98,13 +98,8 @@ def damaged(folder: Path, whole: Path, damage: Damage) -> Any:
 
 def seen_by_verify(folder: Path) -> Answer:
     """Whether ``verify`` would say so."""
-    try:
-        found = results.check(folder)
-    except MobiliaError:
-        return "noticed"
-    except Exception as error:  # noqa: BLE001  # that is what is looked for
-        return f"{type(error).__name__}: {error}"
-    return "wrong" if all(finding.ok for finding in found) else "noticed"
+    answer = answer_of(lambda path: all(found.ok for found in results.check(path)), folder, False)
+    return "noticed" if answer == "the same" else answer
 
 
 def answer_of(consumer: Callable[[Path], Outcome], folder: Path, wanted: Outcome) -> Answer:

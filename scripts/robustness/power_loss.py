@@ -201,8 +201,6 @@ def _timeless(name: str, data: bytes | None) -> object:
     """The content of a file without clock readings."""
     if data is None or name.endswith(OF_CLOCKS):
         return None
-    if name.endswith("results.json"):
-        return _without(json.loads(data))
     if name.endswith(".json"):
         return _without(json.loads(data))
     if name.endswith(".csv"):
