@@ -275,9 +275,7 @@ def _compared(*slams: str) -> Callable[[Path], object]:
 def _run(seconds: float, *, film: bool = False) -> Callable[[Path], object]:
     def call(root: Path) -> None:
         settings = {"scene": "arena", "seconds": seconds, "dynamism": 1.0, "seed": 1}
-        outputs = Outputs(
-            folder=root / "run", command="run", settings={}, overwrite=True, film=film
-        )
+        outputs = Outputs(folder=root / "run", command="run", overwrite=True, film=film)
         on_scene(["shunting"], settings, outputs)
 
     return call
