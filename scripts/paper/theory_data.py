@@ -94,6 +94,7 @@ class Scaling:
 
 
 PITCH_M = 20.0
+EVERY_S = 0.2  # between inspirations
 
 
 def scaling(frame: Frame, rooms: Sequence[int], repeats: int = 15) -> Scaling:
@@ -138,7 +139,8 @@ def _place(k: int) -> Float:
 
 def _look(network: Network, seen: Observations, pose: Float) -> tuple[float, float, int]:
     rasterise(network, seen, pose)
-    return network.integrate(seen.view, se2.compose(pose, seen.T_robot_laser), 0.2, write=True)
+    T_map_laser = se2.compose(pose, seen.T_robot_laser)
+    return network.integrate(seen.view, T_map_laser, EVERY_S, write=True)
 
 
 def alive(network: Network) -> int:
@@ -174,7 +176,7 @@ def _free(frame: Frame, pose: Float) -> Float:
     return se2.transform(T, points)
 
 
-def bell(looks: Sequence[int], every_s: float = 0.2) -> tuple[Float, dict[int, Float]]:
+def bell(looks: Sequence[int]) -> tuple[Float, dict[int, Float]]:
     """Cross-sections of the activity after so many inspirations at one place, not on a neuron.
 
     Returns the offsets from that place (m) and the activities along the row of neurons.
@@ -188,7 +190,7 @@ def bell(looks: Sequence[int], every_s: float = 0.2) -> tuple[Float, dict[int, F
     out: dict[int, Float] = {}
     for k in range(1, max(looks) + 1):
         rasterise(network, seen, np.zeros(3))
-        network.integrate(seen.view, np.zeros(3), every_s, write=True)
+        network.integrate(seen.view, np.zeros(3), EVERY_S, write=True)
         if k in looks:
             x, _ = network.window(1.0, 0.0, 3.0, 0.05)
             out[k] = x[0].astype(np.float64)
