@@ -105,14 +105,14 @@ class Score:
     rate: str
     seed: int
     slam: str
-    ate_m: float
-    odometry_m: float
-    aligned_m: float
-    final_m: float
-    heading_rad: float
-    nees: float
-    not_trusted: int
-    ms_p50: float
+    ate_m: float = math.nan
+    odometry_m: float = math.nan
+    aligned_m: float = math.nan
+    final_m: float = math.nan
+    heading_rad: float = math.nan
+    nees: float = math.nan
+    not_trusted: int = 0
+    ms_p50: float = math.nan
 
 
 def score(blank: Score, frames: list[Frame]) -> Score:
@@ -149,11 +149,7 @@ def scores(
     for rate in rates:
         frames = thinned(whole, STRIDES[rate])
         for name in slams:
-            blank = Score(
-                drive=drive, scanner=scanner, rate=rate, seed=seed, slam=name, ate_m=math.nan,
-                odometry_m=math.nan, aligned_m=math.nan, final_m=math.nan, heading_rad=math.nan,
-                nees=math.nan, not_trusted=0, ms_p50=math.nan,
-            )  # fmt: skip
+            blank = Score(drive=drive, scanner=scanner, rate=rate, seed=seed, slam=name)
             yield score(blank, frames)
 
 

@@ -97,11 +97,7 @@ def _repack(episode: Path, folder: Path) -> tuple[Path, Path, Path]:
         connections = {t: old.add_connection(t, k, typestore=ROS1) for t, k in kinds.items()}
         for topic, kind, stamp_ns, data in messages:
             old.write(connections[topic], stamp_ns, bytes(ROS2.cdr_to_ros1(data, kind)))
-    return (
-        folder / "plain" / "plain.mcap",
-        folder / "sqlite" / "sqlite.db3",
-        folder / "ros1.bag",
-    )
+    return (folder / "plain" / "plain.mcap", folder / "sqlite" / "sqlite.db3", folder / "ros1.bag")
 
 
 def _bag(path: Path) -> None:

@@ -112,7 +112,4 @@ def _tell(outputs: Outputs) -> None:
         others.append("map.npz for the SLAM's load()")
     first = escape(str(outputs.folder / there[0]))
     then = f", then {', '.join(there[1:])} beside it" if there[1:] else ""
-    console.print(
-        f"Open [bold]{first}[/bold] first{then}; {', '.join(others)}.",
-        soft_wrap=True,
-    )
+    console.print(f"Open [bold]{first}[/bold] first{then}; {', '.join(others)}.", soft_wrap=True)

@@ -43,8 +43,7 @@ def render(
         str | None, typer.Option(help="SLAM to film; default the run's own, else shunting.")
     ] = None,
     strip_to: Annotated[
-        Path | None,
-        typer.Option("--strip", help="Also a PNG of some moments side by side."),
+        Path | None, typer.Option("--strip", help="Also a PNG of some moments side by side.")
     ] = None,
     at: Annotated[
         str, typer.Option(help="Moments of the strip, s: 3,12.5,40. Default: six, evenly spaced.")
