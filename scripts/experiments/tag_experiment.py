@@ -173,8 +173,6 @@ def table(outcome: Outcome, stand_in: TagCameraConfig) -> str:
     far = outcome.distances > 1.2
     split = [1e3 * float(np.sqrt((outcome.errors[m, :2] ** 2).mean())) for m in (~far, far)]
     rows = (
-        ("", "detected in pictures", "stand-in"),
-        ("---", "---", "---"),
         ("tag seen", f"{outcome.found} of {outcome.tried}",
          f"{outcome.agree[:, 1].sum()} of {outcome.tried}"),
         ("seen by this one only", f"{outcome.agree[1, 0]}", f"{outcome.agree[0, 1]}"),
@@ -187,7 +185,8 @@ def table(outcome: Outcome, stand_in: TagCameraConfig) -> str:
         ("yaw error, rms", f"{math.degrees(rms[2]):.2f}°",
          f"{math.degrees(stand_in.noise_std_rad):.2f}°"),
     )  # fmt: skip
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    head = "| | detected in pictures | stand-in |\n|---|---|---|"
+    return "\n".join([head, *(f"| {' | '.join(row)} |" for row in rows)])
 
 
 def main() -> None:
