@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from slam.frontend.corner_config import CornerConfig
 from slam.landmarks.hypotheses import Gates
@@ -39,6 +39,8 @@ class EkfConfig(Settings):
     The gates are wide: the first pairs carry the whole error of the odometry, and a step beyond the
     gate, one of a thousand at 0.999, would be a step without landmarks.
     """
+
+    presets: ClassVar[tuple[str, ...]] = ("points", "corners", "victoria_park")
 
     association: str = word(
         "ipjc", ("ipjc", "jcbb", "individual"), "incremental posterior joint compatibility, "
@@ -88,6 +90,11 @@ class EkfConfig(Settings):
         return Gates(
             individual=self.individual_gate, joint=self.joint_gate, posterior=self.posterior_gate
         )
+
+    @classmethod
+    def points(cls, **changes: Any) -> EkfConfig:
+        """Point features as a sensor gives them: the defaults."""
+        return cls(**changes)
 
     @classmethod
     def corners(cls, **changes: Any) -> EkfConfig:

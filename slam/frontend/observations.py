@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observations as Gaussians: beams and point features enter through one type.
 
-What they give to neurons is written by ``shunting.map.rasterise``.
+``slam.tracker.rasterise`` writes them onto a map.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import face, join, unveiled
 from slam.frontend.visibility import View, view_of_beams, view_of_features
 
-MOST_SWEPT_M = 50.0  # during one sweep; beyond, the beams of a scan belong to no one place
-MOST_STD_M = 3.0  # of a feature; one known worse says nothing, and fills the map in saying it
+# Guards on what comes in, no settings: an ordinary stream is far from either.
+MOST_SWEPT_M = 50.0  # m driven during one sweep; more is a broken twist (5 m/s for 10 s), by hand
+MOST_STD_M = 3.0  # m, deviation of a feature used; more would fill 10^5 cells of 3 cm, by hand
 
 
 class Grain(Protocol):
@@ -219,7 +220,7 @@ def observe(frame: Frame, twist: Float, grain: Grain) -> Observations:
     Raises ``InvalidValueError`` for a frame with neither.
     """
     if frame.scan is None and frame.features is None:
-        raise InvalidValueError("the shunting SLAM needs a scan or features in every frame")
+        raise InvalidValueError("this SLAM needs a scan or features in every frame")
     if frame.scan is None:
         return from_features(frame.features, grain)  # type: ignore[arg-type]
     beams = from_scan(frame.scan, twist, grain)

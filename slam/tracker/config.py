@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from slam.errors import InvalidValueError
 from slam.frontend.config import FrontendConfig
@@ -51,6 +51,8 @@ class TrackerConfig(Settings):
     on training seeds of office, arena and arena without walls at 4.7 Hz. The groups below are for
     experts: ``changed({"matching.local.points": 90})`` sets one of theirs by its path.
     """
+
+    presets: ClassVar[tuple[str, ...]] = ("robust", "paper")
 
     cell_m: float = number(
         0.03, "m", "edge of a neuron's square. 0.05: twice as fast; 0.10: error three times",
@@ -159,10 +161,8 @@ class TrackerConfig(Settings):
             return given
         if isinstance(given, Mapping):
             return cls().changed(given)
-        if given == "paper":
-            return cls.paper()
-        if given == "robust":
-            return cls.robust()
+        if given in cls.presets:
+            return cls.preset(given)
         raise InvalidValueError(
             f"config must be a {cls.__name__}, 'robust' or 'paper', or numbers by path, "
             f"got {given!r:.80}"
