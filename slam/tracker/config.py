@@ -28,12 +28,12 @@ SEEDS = "training seeds"
 class FeaturesConfig(Settings):
     """Point features in the place of beams: "shunting-features" alone."""
 
-    least_peak: float = number(0.1, "activity", "lower peaks are no landmark", low=1e-6)
-    peak_cells: float = number(0.15, "cells", "deviation of a peak beside its observations' own")
-    enough_pairs: int = number(2, "pairs", "fewer: the whole map is matched", low=1, high=1000)
-    least_m2: float = number(1e-6, "m²", "variance of a feature, at least", low=1e-15)
-    looks_twice: float = number(1.5, "looks", "peaks looked at more often are associated first")
-    steps: int = number(20, "frames", "whose median step is one look", low=1, high=100_000)
+    least_peak: float = number(0.1, "activity", "a peak below it is no landmark", low=1e-6)
+    peak_cells: float = number(0.15, "cells", "added deviation of a peak")
+    enough_pairs: int = number(2, "pairs", "with fewer, the whole map is matched", low=1, high=1000)
+    least_m2: float = number(1e-6, "m²", "least variance", "numerical guard: (1 mm)²", low=1e-15)
+    looks_twice: float = number(1.5, "looks", "peaks with more are associated first")
+    steps: int = number(20, "frames", "frames whose median step is one look", low=1, high=100_000)
     corners: CornerConfig = field(default=CornerConfig())
     gates: Gates = field(default=Gates())
     corner_gates: Gates = field(default=Gates(individual=0.999, joint=0.99, posterior=0.95))
