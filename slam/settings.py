@@ -21,6 +21,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, TypeVar
 
+from slam.checked import is_number
 from slam.errors import InvalidValueError, NotFiniteError, UnknownNameError
 
 BY_HAND = "set by hand, not swept"  # a source as well: nobody has measured what the number does
@@ -205,7 +206,7 @@ def _checked(name: str, value: Any, field: dataclasses.Field[Any], about: About)
             raise InvalidValueError(f"{name} must be {known}, got {value!r}")
         return value
     whole = isinstance(field.default, int)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
+    if not is_number(value) or math.isnan(value):
         raise InvalidValueError(f"{name} must be a number, got {value!r}")
     if not about.low <= value <= about.high:
         raise InvalidValueError(f"{name} must lie in [{about.low}, {about.high}], got {value}")

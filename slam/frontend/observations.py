@@ -7,8 +7,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -231,14 +231,8 @@ def observe(frame: Frame, twist: Float, grain: Grain) -> Observations:
 
 def joined(first: Observations, second: Observations) -> Observations:
     """Both, seen with the view of the first."""
-    return Observations(
-        points_robot=np.concatenate([first.points_robot, second.points_robot]),
-        covariances=np.concatenate([first.covariances, second.covariances]),
-        weights=np.concatenate([first.weights, second.weights]),
-        tangents=np.concatenate([first.tangents, second.tangents]),
-        joined=np.concatenate([first.joined, second.joined]),
-        facings=np.concatenate([first.facings, second.facings]),
-        view=first.view,
-        T_robot_laser=first.T_robot_laser,
-        sensor_sigma_m=first.sensor_sigma_m,
-    )
+    by_point = ("points_robot", "covariances", "weights", "tangents", "joined", "facings")
+    both: dict[str, Any] = {
+        n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in by_point
+    }
+    return replace(first, **both)

@@ -12,7 +12,7 @@ from slam.errors import InvalidValueError
 from slam.frames import Float, Odometry
 
 MOST_STEP_M = 1000.0  # between two frames: farther, the stream is broken or of another run
-MOST_POSE = 1e9  # m and rad from the origin: there a double still tells 0.1 micrometres
+MOST_POSE = 1e9  # m and rad from the origin: there a double still resolves 0.1 micrometres
 MOST_STD = 1e4  # m and rad, of an increment; with more, rounding would eat what is known beside
 HUGE = 1.0  # m^2 or rad^2: from there on,
 MOST_CORRELATION = 1.0 - 1e-6  # exact correlations would leave nothing of what is known beside
