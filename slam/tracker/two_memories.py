@@ -2,7 +2,7 @@
 """A map of two memories: a short-term mean that leaks, and a running mean of the same input.
 
 With lateral weights it is the network of Eq. (8), and the short-term mean is its activity; without
-them it also holds what the few key frames of a loop saw, for every tracker.
+them it holds what the few key frames of a loop of the occupancy grid saw.
 """
 
 from __future__ import annotations
