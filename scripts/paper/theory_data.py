@@ -17,8 +17,7 @@ from slam.frames import Features, Float, Frame
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.energy import energy
-from slam.shunting.map.network import Network
-from slam.shunting.map.update import lateral_mu
+from slam.shunting.map.network import Network, lateral_mu
 from slam.shunting.slam import ShuntingSlam
 from slam.tracker.cells import SIDE
 from slam.tracker.matching.matcher import Matcher

@@ -105,6 +105,8 @@ def _of_scanner() -> list[Row]:
 
 def _trees(what: str) -> tuple[Settings, Settings]:
     """That tree and its default."""
+    import difflib
+
     from slam.errors import UnknownNameError
 
     if what == "actors":
@@ -115,9 +117,13 @@ def _trees(what: str) -> tuple[Settings, Settings]:
 
     found = config_of(what)
     if found is None:
-        known = [name for name in names() if config_of(name) is not None]
+        known = [*(name for name in names() if config_of(name) is not None), *ROOMS]
+        near = (
+            [] if what in names() else difflib.get_close_matches(what.partition("{")[0], known, 1)
+        )
+        hint = f" Did you mean '{near[0]}'?" if near else ""
         raise UnknownNameError(
-            f"'{what}' has no numbers to set. These have: {', '.join([*known, *ROOMS])}"
+            f"'{what}' has no numbers to set.{hint} These have: {', '.join(known)}"
         )
     return found
 

@@ -68,6 +68,8 @@ def test_the_table_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     ("what", "group", "match"),
     [
         ("kiss-icp", "", r"'kiss-icp' has no numbers to set. These have: ekf, .*dynamism, lms221"),
+        ("shuntin", "", r"no numbers to set. Did you mean 'shunting'"),
+        ("actor{a=1}", "", r"no numbers to set. Did you mean 'actors'"),
         ("shunting", "matchin.local", r"Did you mean 'matching.local'"),
         ("shunting{rewrad=7}", "", r"Did you mean 'reward'"),
     ],
