@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.sensors.lidar import columns as col
 from sim.sensors.lidar.caster import Hits
 from sim.sensors.lidar.effects import error_function, needed_table
 from sim.sensors.lidar.scanner import Scanner
@@ -119,8 +120,9 @@ class SignalModel:
             self._steps, self._bands, self._errors, (ranges, whose),
         )  # fmt: skip
         return ScanResult(
-            ranges=ranges, true_ranges=places[1], geoms=whose[0], bodies=whose[1],
-            cosines=places[2], mixed=marks[0], ghost=marks[1],
+            ranges=ranges, true_ranges=places[col.MIDDLE], cosines=places[col.COSINE],
+            geoms=whose[col.GEOM_ID], bodies=whose[col.BODY_ID],
+            mixed=marks[col.MIXED], ghost=marks[col.GHOST],
         )  # fmt: skip
 
 

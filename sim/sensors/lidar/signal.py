@@ -19,6 +19,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.sensors.lidar import columns as col
 from slam._jit import njit
 
 Float = NDArray[np.float64]
@@ -187,10 +188,10 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
             place, ray, mixed = detect(
                 distances[:rays], energies, surfaces, order[:rays], needed, chance, mixes
             )
-        places[0, i], places[1, i], marks[0, i] = place, distances[0], mixed
-        places[2, i] = cosines[ray] if ray >= 0 else math.nan
+        places[col.PLACE, i], places[col.MIDDLE, i] = place, distances[0]
+        places[col.COSINE, i] = cosines[ray] if ray >= 0 else math.nan
         seen[i] = surfaces[ray] if ray >= 0 else -1
-        marks[1, i] = ray == k_rays
+        marks[col.MIXED, i], marks[col.GHOST, i] = mixed, ray == k_rays
 
 
 @njit
@@ -199,9 +200,9 @@ def measure(hits: tuple[Float, Int, Float], out: tuple[Float, Int, Bool]) -> Non
     ranges, found, cos_of = hits
     places, seen, marks = out
     for i in range(ranges.shape[1]):
-        places[0, i] = places[1, i] = ranges[0, i, 0]
-        places[2, i], seen[i] = cos_of[0, i, 0], found[0, i, 0]
-        marks[0, i] = marks[1, i] = False
+        places[col.PLACE, i] = places[col.MIDDLE, i] = ranges[0, i, 0]
+        places[col.COSINE, i], seen[i] = cos_of[0, i, 0], found[0, i, 0]
+        marks[col.MIXED, i] = marks[col.GHOST, i] = False
 
 
 @njit
@@ -229,13 +230,13 @@ def send(  # noqa: C901, PLR0913 (kernel)
     """Counter, corrections, rounding: the values sent and whose they are.
 
     received      (3, n) and (n,) of ``receive``
-    reflectivity  (candidates + 1,); ``owner`` (2, candidates + 1) geom, body; -1 for no hit
+    reflectivity  (candidates + 1,); ``owner`` (2, candidates + 1); -1 for no hit
     draws         standard normal; 0..1 against the share of lost values; (n,) where needed
     error         of ``error_function``; (0,) for none
     steps         m: of the counter and of the code, 0 for continuous; least and largest range
-    bands         (k, 3) of the noise: up to m, deviation m, deviation per m; (0, 3) for none
+    bands         of the noise; (0, 3) for none
     errors        share of lost values; what no return becomes, NaN or inf
-    out           (n,) ranges m; (2, n) geom, body
+    out           (n,) ranges m; (2, n) whose
     """
     places, seen = received
     ranges, whose = out
@@ -243,8 +244,8 @@ def send(  # noqa: C901, PLR0913 (kernel)
     normal, lost = draws
     rate, none = errors
     for i in range(ranges.size):
-        place, j = places[0, i], seen[i]
-        whose[0, i], whose[1, i] = owner[0, j], owner[1, j]
+        place, j = places[col.PLACE, i], seen[i]
+        whose[col.GEOM_ID, i], whose[col.BODY_ID, i] = owner[col.GEOM_ID, j], owner[col.BODY_ID, j]
         if rate > 0.0 and lost[i] < rate:
             ranges[i] = math.nan
             continue
@@ -257,9 +258,9 @@ def send(  # noqa: C901, PLR0913 (kernel)
         value = place
         if len(bands) > 0:
             band = 0
-            while band < len(bands) - 1 and place > bands[band, 0]:
+            while band < len(bands) - 1 and place > bands[band, col.UP_TO]:
                 band += 1
-            noise = bands[band, 1] + bands[band, 2] * place
+            noise = bands[band, col.SIGMA] + bands[band, col.SIGMA_PER_M] * place
             value = max(place + noise * normal[i], 0.0)
         if counter > 0.0:
             value = math.floor(value / counter + 0.5) * counter
