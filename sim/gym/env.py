@@ -12,7 +12,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from scenes.scan_plane import SCAN_HEIGHT
-from sim.core.checks import instance, number, one_of, whole_numbers
+from sim.core.checks import instance, number, one_of, switch, whole_numbers
 from sim.core.seeds import Seeds
 from sim.gym.actions import clipped
 from sim.gym.options import checked_seed, episode
@@ -170,11 +170,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         number("time_limit_s", time_limit_s)
         if not time_limit_s > 0.0:
             raise InvalidValueError(f"time_limit_s must be > 0, got {time_limit_s}")
-        for name, value in (("terminate_on_collision", terminate_on_collision), ("labels", labels)):
-            if not isinstance(value, (bool, np.bool_)):
-                raise InvalidValueError(f"{name} must be True or False, got {value!r}")
-        for name, word in (("scene", scene), ("odometry", odometry)):
-            instance(name, word, str)
+        switch("terminate_on_collision", terminate_on_collision)
+        switch("labels", labels)
+        instance("scene", scene, str)
+        instance("odometry", odometry, str)
         width, height = whole_numbers("render_size", render_size, "(width, height) in px", MAX_PX)
         self.render_mode = render_mode
         self.time_limit_s = time_limit_s

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from sim.core.checks import whole
 from sim.core.versions import check_world
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
@@ -43,10 +44,7 @@ class Plan:
     twins: bool = False
 
     def __post_init__(self) -> None:
-        if isinstance(self.episodes, bool) or not 1 <= self.episodes <= MAX_EPISODES:
-            raise InvalidValueError(
-                f"Plan.episodes must be 1 to {MAX_EPISODES}, got {self.episodes}"
-            )
+        whole("Plan.episodes", self.episodes, 1, MAX_EPISODES)
         if not self.dynamisms or len(set(self.dynamisms)) != len(self.dynamisms):
             raise InvalidValueError(
                 f"Plan.dynamisms must be different numbers, got {self.dynamisms}"

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from sim.core.checks import number, one_of
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.core.versions import WORLD, world_of
@@ -69,18 +70,13 @@ class Recipe:
             raise InvalidValueError(f"Recipe.scene must be a name, got {self.scene!r}")
         Seeds(self.seed)
         Dynamism.at(self.dynamism)
-        if isinstance(self.seconds, bool) or not isinstance(self.seconds, (int, float)):
-            raise InvalidValueError(f"Recipe.seconds must be a number, got {self.seconds!r}")
+        number("Recipe.seconds", self.seconds)
         if not 0.0 < self.seconds <= MAX_SECONDS:
             raise InvalidValueError(
                 f"Recipe.seconds must be > 0 and at most {MAX_SECONDS:g}, got {self.seconds}"
             )
-        for name, known in (("odometry", PRESETS), ("twin", ("", *TWINS))):
-            value = getattr(self, name)
-            if not isinstance(value, str) or value not in known:
-                raise InvalidValueError(
-                    f"Recipe.{name} must be one of {', '.join(map(repr, known))}, got {value!r}"
-                )
+        one_of("Recipe.odometry", self.odometry, tuple(PRESETS))
+        one_of("Recipe.twin", self.twin, ("", *TWINS))
         if not isinstance(self.options, Mapping):
             raise InvalidValueError(f"Recipe.options must be a mapping, got {self.options!r}")
         taken = sorted(_NOT_OPTIONS.intersection(self.options))
