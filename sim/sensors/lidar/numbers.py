@@ -14,7 +14,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from sim.sensors.lidar.registry import model_of, names, scanner_of
-from sim.sensors.lidar.scanner import Scanner
+from sim.sensors.lidar.scanner import Scanner, Spot
 from sim.sensors.lidar.sheet import NOT_STATED, Stated, sheet_of
 from slam.settings import About, Row
 
@@ -22,7 +22,7 @@ UNITS = {"deg": "deg", "m": "m", "s": "s", "hz": "Hz", "aperture": "m", "diverge
 # Field of ``Scanner`` -> which row of a data sheet states it.
 STATED_AS = {
     "first_deg": "field_of_view_deg", "clockwise": "direction", "noise": "noise_m",
-    "systematic": "systematic_m", "error_codes": "no_return",
+    "systematic": "systematic_m", "error_codes": "no_return", "spot": "spot_width_m",
 }  # fmt: skip
 SETTING = "a setting: NAME=VALUE in brackets"
 _FIELD = re.compile(r"(\w+(?:, \w+)*) {2,}(\S.*)")
@@ -107,6 +107,7 @@ def _source(sheet: tuple[Stated, ...], path: str, value: Any) -> str:
     first, _, rest = path.partition(".")
     stated = [row for row in sheet if row.what == STATED_AS.get(first, first) and row.source]
     if not stated:
-        return NOT_STATED if value in (0.0, None, False, "0 values") else "inferred"
+        default = getattr(Spot if first == "spot" else Scanner, rest or first, None)
+        return NOT_STATED if value in (default, "0 values", "1 values") else "inferred"
     k = int(rest.partition(".")[0]) if rest[:1].isdigit() else 0
     return stated[min(k, len(stated) - 1)].source

@@ -91,7 +91,8 @@ class SignalModel:
             or scanner.glass
             or scanner.bounce
         )
-        self._switches = (bool(scanner.needed), scanner.incidence, scanner.mixed_pixels)
+        pulse = scanner.pulse_m if scanner.mixed_pixels else 0.0
+        self._switches = (bool(scanner.needed), scanner.incidence, pulse)
         self._steps = (
             scanner.counter_m, scanner.unit_m, scanner.range_min_m, scanner.range_max_m,
         )  # fmt: skip
@@ -107,7 +108,7 @@ class SignalModel:
         if self._ruler:
             measure(hits, (places, seen, marks))
         else:
-            chances = self.streams[1].random((n,)) if self._switches[2] else self._nothing
+            chances = self.streams[1].random((n,)) if self._switches[2] > 0.0 else self._nothing
             receive(
                 hits, mirrored, self._surface, self._weights, self._switches, self._needed,
                 chances, (places, seen, marks),

@@ -34,21 +34,31 @@ class Spot:
     """The disc that a beam lights; by default an ideal beam, one ray in the middle.
 
     aperture    radius at the window, m
-    divergence  half angle, rad
+    divergence  half angle sideways, rad
+    aspect      half angle upwards over that sideways, at most 1
     offsets     (k, 2) places of the k rays on the unit disc (left, up)
     weights     (k,) their shares of the energy
     """
 
     aperture: float = 0.0
     divergence: float = 0.0
+    aspect: float = 1.0
     offsets: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
     weights: tuple[float, ...] = (1.0,)
+
+    def __post_init__(self) -> None:
+        check_within(self, dict.fromkeys(("aperture", "divergence", "aspect"), (0.0, 1.0)))
+
+    def size_at(self, range_m: float) -> tuple[float, float]:
+        """Width and height of the disc, m."""
+        wide = self.divergence * range_m
+        return 2.0 * (self.aperture + wide), 2.0 * (self.aperture + self.aspect * wide)
 
     def rays(self) -> Float:
         """(k, 6) in the columns of ``sim.sensors.lidar.columns``."""
         out = np.empty((len(self.offsets), col.N_RAY))
         for k, (u, v) in enumerate(self.offsets):
-            left, up = self.divergence * u, self.divergence * v
+            left, up = self.divergence * u, self.divergence * self.aspect * v
             length = math.sqrt(1.0 + left * left + up * up)
             out[k, [col.U, col.V, col.RISE]] = u, v, up
             out[k, [col.FORWARD, col.LEFT, col.UP]] = 1.0 / length, left / length, up / length
@@ -67,10 +77,12 @@ _DISC = (
 )
 
 
-def disc(*, aperture: float, divergence: float) -> Spot:
-    """A spot of seven rays: radius m at the window, half angle rad."""
+def disc(*, aperture: float, divergence: float, aspect: float = 1.0) -> Spot:
+    """A spot of seven rays; radius m at the window, half angle rad, and that upwards over it."""
     weights = (0.25, *(0.125,) * 6)
-    return Spot(aperture=aperture, divergence=divergence, offsets=_DISC, weights=weights)
+    return Spot(
+        aperture=aperture, divergence=divergence, aspect=aspect, offsets=_DISC, weights=weights
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,6 +144,7 @@ class Scanner:
     needed         (range m, reflectivity): a full, square target needs that much to return
     incidence      oblique surfaces return less (cosine)
     mixed_pixels   at edges the value may lie between the two surfaces; needs a ``spot``
+    pulse_m        length of a pulse; surfaces further apart than that do not mix
     glass          panes let the beam through, except near their normal
     bounce         panes and polished faces also show what they mirror
     error_codes    no return is an error code, NaN; else inf, free space
@@ -157,6 +170,7 @@ class Scanner:
     needed: tuple[tuple[float, float], ...] = ()
     incidence: bool = False
     mixed_pixels: bool = False
+    pulse_m: float = 1.0
     glass: bool = False
     bounce: bool = False
     error_codes: bool = False
@@ -169,7 +183,8 @@ class Scanner:
             "n_beams": (1, MAX_BEAMS), "rate_hz": RATE_HZ, "turns": (1, MAX_TURNS),
             "first_deg": (-360.0, 360.0), "step_deg": (1e-3, 360.0),
             "range_min_m": (0.0, MAX_RANGE_M), "range_max_m": (0.0, MAX_RANGE_M),
-            "unit_m": (0.0, 1.0), "counter_m": (0.0, 1.0), "dropout_rate": (0.0, 1.0),
+            "unit_m": (0.0, 1.0), "counter_m": (0.0, 1.0), "pulse_m": (0.0, 10.0),
+            "dropout_rate": (0.0, 1.0),
         })  # fmt: skip
         if not self.range_min_m < self.range_max_m:
             raise InvalidValueError(

@@ -4,8 +4,8 @@
 A spot is several rays. Rays at about the same distance make one pulse whose energy is the sum of
 weight, reflectivity and cosine of incidence. The first pulse that carries the energy needed at its
 distance (TD fig. 4-2) is the one that counts (TL p19); if more energy comes back from within the
-pulse length of about 1 m behind it, the value lies anywhere
-between the two (TL p110-111): a mixed pixel. What a pane lets through and what it mirrors share
+length of a pulse behind it, the value lies anywhere between the
+two (TL p110-111): a mixed pixel. What a pane lets through and what it mirrors share
 the energy as Fresnel's two faces of n = 1.5 do (Schlick's approximation; inferred, as is all about
 glass: no source gives numbers for this device). The counter's value is then corrected by the
 unit's own tables and rounded to the code of the range mode (TL p113). TD and TL are the documents
@@ -28,7 +28,6 @@ Bool = NDArray[np.bool_]
 
 NEEDED_STEP = 0.005  # m, of the table of needed reflectivity
 ERROR_STEP = 0.1  # m, of the table of the systematic error
-PULSE_LENGTH = 1.0  # m, TL p110
 SAME_PULSE = 0.1  # m between rays of one pulse; inferred
 SAME_SURFACE = 0.5  # m, the same where both hit one thing: an oblique wall; inferred
 RETURN_COS = math.cos(math.radians(5.0))  # a mirror answers only that near its normal; inferred
@@ -88,7 +87,7 @@ def detect(  # noqa: PLR0913 (kernel)
     order: Int,
     needed: Float,
     chance: float,
-    mixes: bool,
+    pulse: float,
 ) -> tuple[float, int, bool]:
     """(range m, inf for none; strongest ray, -1; mixed) of one beam.
 
@@ -96,6 +95,7 @@ def detect(  # noqa: PLR0913 (kernel)
     order                          (k,) room for their order
     needed                         energy needed against distance, every ``NEEDED_STEP`` m
     chance                         0..1, where between two surfaces a mixed pixel falls
+    pulse                          m between surfaces that mix; 0: none do
     """
     _sort_rays(distances, order, order.size)
     row = 0
@@ -103,9 +103,9 @@ def detect(  # noqa: PLR0913 (kernel)
         row, energy, place, strongest = _next_pulse(distances, energies, surfaces, order, row)
         if energy <= 0.0 or energy < needed[min(int(place / NEEDED_STEP), needed.size - 1)]:
             continue
-        if mixes and row < order.size and distances[order[row]] < math.inf:
+        if pulse > 0.0 and row < order.size and distances[order[row]] < math.inf:
             _, behind, far, _ = _next_pulse(distances, energies, surfaces, order, row)
-            if behind > energy and far - place < PULSE_LENGTH:
+            if behind > energy and far - place < pulse:
                 return place + chance * (far - place), strongest, True
         return place, strongest, False
     return math.inf, -1, False
@@ -127,7 +127,7 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
     mirrored: tuple[Float, Int, Float],
     surface: tuple[Float, Bool],
     weights: Float,
-    switches: tuple[bool, bool, bool],
+    switches: tuple[bool, bool, float],
     needed: Float,
     chances: Float,
     out: tuple[Float, Int, Bool],
@@ -141,12 +141,12 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
     mirrored  (n,) each, likewise, of what panes and polished faces mirror; (0,) for not at all
     surface   (candidates + 1,) each: reflectivity; polished. The last, index -1, is for no hit
     weights   (k,) of the rays
-    switches  reflectivity, incidence, mixed pixels
+    switches  reflectivity, incidence; m of a pulse within which surfaces mix, 0 for not at all
     out       (3, n) distance m, that of the middle ray, |cos|; (n,) candidate; (2, n) mixed, ghost
     """
     ranges, found, cos_of = hits
     reflectivity, polished = surface
-    by_reflectivity, by_incidence, mixes = switches
+    by_reflectivity, by_incidence, pulse = switches
     places, seen, marks = out
     k_rays, bounces, panes = weights.size, mirrored[0].size > 0, ranges.shape[0] > 1
     count = k_rays + (1 if bounces else 0)
@@ -184,9 +184,9 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
             if total > 0.0 and total >= needed[min(int(middle / NEEDED_STEP), needed.size - 1)]:
                 place, ray = middle, strongest
         elif rays > 1 or distances[0] < math.inf:
-            chance = chances[i] if mixes else 0.0  # none are drawn where nothing mixes
+            chance = chances[i] if pulse > 0.0 else 0.0  # none are drawn where nothing mixes
             place, ray, mixed = detect(
-                distances[:rays], energies, surfaces, order[:rays], needed, chance, mixes
+                distances[:rays], energies, surfaces, order[:rays], needed, chance, pulse
             )
         places[col.PLACE, i], places[col.MIDDLE, i] = place, distances[0]
         places[col.COSINE, i] = cosines[ray] if ray >= 0 else math.nan

@@ -27,6 +27,7 @@ TURNS_PER_S = 75
 MIRROR_FROM_DEG = -90.0  # where a turn of the mirror begins, whatever the field of view
 TIMER_UNIT = 0.010  # m, resolution of the time measurement in every range mode (TD p34, TL 10-10)
 
+PULSE_M = 1.0  # m, length of a pulse (TL p110)
 LMS221_SPOT = disc(aperture=0.008, divergence=0.00595)  # 16 mm + 11.9 mrad, TL p114
 
 # Needed reflectivity for a return against range, clean window (TD fig. 4-2, digitised).
@@ -196,6 +197,7 @@ class Lms221Config:
             needed=NEEDED if on.reflectivity else (),
             incidence=on.incidence,
             mixed_pixels=on.mixed_pixels,
+            pulse_m=PULSE_M,
             glass=on.glass,
             bounce=on.bounce,
             error_codes=on.error_codes,
