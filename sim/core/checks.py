@@ -51,7 +51,8 @@ def one_of(name: str, value: Any, known: Sequence[str]) -> None:
 
 def number(name: str, value: Any) -> None:
     """Raise ``InvalidValueError`` unless ``value`` is one finite number."""
-    if isinstance(value, bool) or not isinstance(value, _NUMBER) or not math.isfinite(value):
+    fits = isinstance(value, _NUMBER) and not isinstance(value, bool)
+    if not (fits and -math.inf < value < math.inf):  # whole numbers may be beyond any float
         raise InvalidValueError(f"{name} must be a finite number, got {value!r}")
 
 
