@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from sim.core.checks import switch, whole
 from sim.gym.actions import array_of, of_rooms
-from sim.gym.env import MobiliaEnv, Observation, ResetNeededError
+from sim.gym.env import MobiliaEnv, ResetNeededError
+from sim.gym.observation import Observation
 from sim.gym.options import checked_seed
 from slam.errors import InvalidValueError
 
