@@ -15,6 +15,7 @@ from rich.progress import Progress
 from scripts import interrupt
 from scripts.console import console, note, progress
 from scripts.debugger.question import Question
+from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check, file_name, run_name
 from scripts.scanner_option import Scanner
 from scripts.trust import Trust
@@ -43,6 +44,9 @@ def blame(
     ] = None,
     scene: Annotated[str | None, typer.Option(help="Instead of RUN: a scene to simulate.")] = None,
     dynamism: Annotated[float, typer.Option(help="How much the scene moves, 0 to 1.")] = 0.5,
+    motion: Motion = None,
+    change: Change = None,
+    crowd: CrowdOption = None,
     seed: Annotated[int, typer.Option(help="Of the simulated run, whole number >= 0.")] = 0,
     seconds: Annotated[float, typer.Option(help="Length of the simulated tour, s.")] = 60.0,
     scanner: Scanner = "full",
@@ -97,7 +101,8 @@ def blame(
     if run is not None:
         case, name = case_of(run, slam, every, trust), run_name(run)
     else:
-        world = {"scene": scene, "dynamism": dynamism, "seed": seed}
+        held = Held(motion=motion, change=change, crowd=crowd)
+        world = {"scene": scene, "dynamism": dynamism, **held.given(), "seed": seed}
         settings, name = _world(world, option or [], scanner), f"{scene}-{seed}"
         case = Case(settings=settings, seconds=seconds, slam=slam or "shunting", every=every)
     if at is not None and not 0.0 <= at <= case.seconds:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from scenes.crowd import crowd_of
 from sim.core.checks import number, one_of
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
@@ -35,6 +36,7 @@ RECIPE = "recipe.json"
 SCHEMA = 1
 MAX_BYTES = 1 << 16
 MAX_SECONDS = 86_400.0
+_AXES = ("motion", "change")
 _DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "rosbags")
 
 
@@ -43,9 +45,11 @@ class Recipe:
     """What decides an episode.
 
     scene       registered name or ``module:function``; ``options`` of it, e.g. n_chairs, and
-                ``scan_height_m``, but nothing that ``Simulation`` or ``Recipe`` has a name for
+                ``scan_height_m`` and ``crowd``, but nothing that ``Simulation`` or ``Recipe`` has
+                a name for
     seed        whole number >= 0
     dynamism    number in [0, 1]
+    motion, change  one of its two axes alone, in [0, 1]; None: as dynamism says
     seconds     of driving
     scanner     registered name, and which errors: "utm30lx:noise" (``sim.sensors.lidar.registry``);
                 "full", "noise" and "ideal" are those of the LMS-221
@@ -63,13 +67,15 @@ class Recipe:
     range_mode: str = "80m"
     odometry: str = "pioneer3dx"
     twin: str = ""
+    motion: float | None = None
+    change: float | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not isinstance(self.scene, str) or not self.scene:
             raise InvalidValueError(f"Recipe.scene must be a name, got {self.scene!r}")
         Seeds(self.seed)
-        Dynamism.at(self.dynamism)
+        Dynamism.of(Dynamism.at(self.dynamism), motion=self.motion, change=self.change)
         number("Recipe.seconds", self.seconds)
         if not 0.0 < self.seconds <= MAX_SECONDS:
             raise InvalidValueError(
@@ -86,6 +92,8 @@ class Recipe:
                 f"Recipe.options are of the scene: {taken[0]!r} is none, it would override the "
                 f"recipe's own, got {self.options[taken[0]]!r}"
             )
+        if "crowd" in self.options:
+            crowd_of(self.options["crowd"])
         self.laser()
 
     def laser(self) -> ScannerConfig:
@@ -105,6 +113,7 @@ class Recipe:
             "laser": self.laser(),
             "odometry": self.odometry,
             "labels": True,
+            **{name: getattr(self, name) for name in _AXES if getattr(self, name) is not None},
             **self.options,
         }
 
@@ -114,15 +123,25 @@ class Recipe:
 
     @property
     def name(self) -> str:
-        """Of the episode's folder: ``office-d0.50-s0001``, with the twin's name at the end."""
+        """Of the episode's folder: ``office-d0.5-m0.2-c0-s0001``; at the end the twin's name.
+
+        ``-m`` is motion and ``-c`` change, where they are given.
+        """
         scene = re.sub(r"[^A-Za-z0-9_.]+", "-", self.scene).strip("-.")
         twin = f"-{self.twin}" if self.twin else ""
-        return f"{scene}-d{self.dynamism:.4g}-s{self.seed:04d}{twin}"
+        levels = [(axis[0], getattr(self, axis)) for axis in ("dynamism", *_AXES)]
+        level = "".join(f"-{letter}{at:.4g}" for letter, at in levels if at is not None)
+        return f"{scene}{level}-s{self.seed:04d}{twin}"
+
+    def words(self) -> dict[str, Any]:
+        """As it is written; an axis that is not given has no word."""
+        words = asdict(self)
+        return {k: v for k, v in words.items() if k not in _AXES or v is not None}
 
     @property
     def sha256(self) -> str:
         """Of everything that decides the episode, whoever makes it."""
-        text = json.dumps({"schema": SCHEMA, **asdict(self)}, sort_keys=True)
+        text = json.dumps({"schema": SCHEMA, **self.words()}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -162,7 +181,7 @@ def write_recipe(path: Path, recipe: Recipe, result: Mapping[str, Any]) -> None:
     text = {
         "schema": SCHEMA,
         "world": WORLD,
-        "recipe": asdict(recipe),
+        "recipe": recipe.words(),
         "recipe_sha256": recipe.sha256,
         "made_with": made_with(),
         "result": dict(result),
