@@ -25,7 +25,7 @@ JOIN_S = 0.5  # rests shorter than that do not end an event
 NEAR_M = 1.5  # a person nearer than that is near the robot, centre to centre
 JUMP_M = 0.5  # the truth leaps by that against odometry between two frames: kidnapped
 CHAIR, DOOR, PERSON, KIDNAP = "chair", "door", "person", "kidnap"
-_KIND = {"door": DOOR, "person": PERSON}  # everything else that moves is pushed like a chair
+_KIND = {"door": DOOR, "person": PERSON}  # by group; all else that moves is pushed like a chair
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +71,7 @@ class EventWatch:
         movers = world.scene.movers
         self._mover_of_body = world.bodies.mover_of_body
         self._movers = [
-            None if m.kind == "robot" else _Mover(_KIND.get(m.kind, CHAIR), m.name, m.radius)
+            None if m.group == "robot" else _Mover(_KIND.get(m.group, CHAIR), m.name, m.radius)
             for m in movers
         ]
         self._people = np.array([m.group == "person" for m in movers], dtype=bool)

@@ -19,6 +19,7 @@ from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check, file_name, run_name
 from scripts.scanner_option import Scanner
 from scripts.trust import Trust
+from scripts.verbs.compare import named
 from slam.errors import InvalidValueError
 from slam.evaluation.divergence import Rule
 from slam.files import write_text
@@ -70,6 +71,12 @@ def blame(
     top: Annotated[
         int, typer.Option(help="Try only this many of the likeliest; 0: all observed.")
     ] = Question.top,
+    who: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Try only these: a mover, a group (escorts, chairs) or a pattern (group[0-3])."
+        ),
+    ] = None,
     repeats: Annotated[
         int, typer.Option(help="Repeats of original and cure with other noise.")
     ] = Question.repeats,
@@ -82,7 +89,8 @@ def blame(
     """Find which mover misled a SLAM, by running the world again without it.
 
     The first divergence of the run is found, world and SLAM are put back to some seconds before,
-    and run on from there with one mover taken out or frozen at a time. Writes blame.png, blame.json
+    and run on from there with one mover (and what it holds) or one group of a crowd taken out or
+    frozen at a time. Writes blame.png, blame.json
     and the recipe.
 
     [bold]mobilia blame out/run-office[/bold]
@@ -93,7 +101,7 @@ def blame(
         raise InvalidValueError("name exactly one of RUN and --scene")
     question = Question(
         rule=Rule(threshold_m=threshold, within_s=within), at_s=at, lead_s=lead,
-        horizon_s=horizon, top=top, repeats=repeats,
+        horizon_s=horizon, top=top, repeats=repeats, who=named(who or []),
     )  # fmt: skip
     check([slam] if slam else [], scene)
     from scripts.debugger.episode import Case, case_of

@@ -35,7 +35,7 @@ from scripts.film.footage import of_simulation, title_of
 from scripts.film.render import pictures_at
 from sim.core.dynamism import Dynamism
 from sim.recording.episode import record
-from sim.recording.recipe import Recipe, made_with
+from sim.recording.recipe import RECIPE, Recipe, made_with, read_recipe
 from sim.recording.sums import read_sums
 from sim.simulation import Simulation, stream
 from slam import create, se2
@@ -155,13 +155,16 @@ def on_intel(name: str, scans: int, **options: Any) -> Golden:
 
 
 def episode() -> Golden:
-    """Every file of a generated episode, but its recipe, which names this machine."""
+    """The messages of a generated episode and its other files, but for its recipe, which names this
+    machine, and what holds the episode's name."""
     with tempfile.TemporaryDirectory() as folder:
         recipe = Recipe(scene="office", seed=5, dynamism=0.5, seconds=1.0, **WORLD_1)
         record(recipe, Path(folder))
         sums = read_sums(Path(folder) / recipe.name)
-    sums.pop("recipe.json")
-    return {"sha256": sums}
+        made = read_recipe(Path(folder) / recipe.name / RECIPE)
+    kept = ("map.pgm", "map.yaml", "relations.txt", "trajectory.tum")
+    messages = {"messages": str(made.result["messages_sha256"])}
+    return {"sha256": {name: sums[name] for name in kept} | messages}
 
 
 def compared() -> Golden:
