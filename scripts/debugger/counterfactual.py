@@ -26,7 +26,6 @@ CURED = 0.5
 LAST_S = 1.0
 REPEATED = 3  # of the cures by several at once
 PAIRED = 4  # the likeliest of which pairs are tried
-MODES = ("out", "frozen")
 VERDICTS = ("none", "weak", "undecided", "culprit", "several", "joint", "not the movers")
 
 Note = Callable[[str, int, int], None]
@@ -231,8 +230,12 @@ def _crowds(found: Inquest) -> list[str]:
 
 def _pairs(found: Inquest) -> list[Change]:
     likeliest = [suspect.name for suspect in found.suspects[:PAIRED]]
+    pairs = itertools.combinations(likeliest, 2)
+    holds = found.tape.holds
     return [
-        Change(**{mode: pair}) for pair in itertools.combinations(likeliest, 2) for mode in MODES
+        change
+        for pair in pairs
+        for change in (Change(out=with_held(holds, pair)), Change(frozen=pair))
     ]
 
 
