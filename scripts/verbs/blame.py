@@ -12,6 +12,7 @@ import typer
 from rich.markup import escape
 from rich.progress import Progress
 
+from scenes import groups
 from scripts import interrupt
 from scripts.console import console, note, progress
 from scripts.debugger.question import Question
@@ -147,8 +148,12 @@ def _carry_out(case: Case, question: Question, folder: Path, overwrite: bool) ->
 
 def _inquest(case: Case, question: Question) -> Inquest:
     from scripts.debugger.counterfactual import hold
-    from scripts.debugger.recording import record
+    from scripts.debugger.recording import record, simulate
 
+    if question.who:  # told before the run
+        movers = simulate(case).world.scene.movers
+        for word in question.who:
+            groups.named(movers, word)
     with progress() as bar:
         tape = record(case, _Bar(bar, "driving").scans)
         _compare(tape)

@@ -15,10 +15,11 @@ from typer.testing import CliRunner
 from scripts.cli import app
 from scripts.debugger.counterfactual import Inquest, Question, Trial, hold
 from scripts.debugger.episode import Case, case_of, options_of
+from scripts.debugger.picture import blame_picture
 from scripts.debugger.recording import Checkpoint, Strip, Tape, record, row_at
-from scripts.debugger.words import headline
+from scripts.debugger.words import as_json, headline
 from sim.twins.absence import Change
-from slam.errors import InvalidValueError, LogFormatError, SlamFailedError
+from slam.errors import InvalidValueError, LogFormatError, SlamFailedError, UnknownNameError
 from slam.evaluation.divergence import Divergence
 
 SKITTISH = """
@@ -51,6 +52,16 @@ class Moody(Skittish):
         pose = estimate.T_map_robot + 1e-6 * next(self.moods)
         return Estimate(stamp_ns=frame.stamp_ns, T_map_robot=pose, covariance=np.eye(3))
 
+class Late(Skittish):
+    '''Not before two seconds.'''
+
+    def update(self, frame):
+        calm = frame.stamp_ns < 2_000_000_000
+        estimate = super().update(frame)
+        self.off = 0.0 if calm else self.off
+        here = se2.between(self.first, frame.odometry.T_odom_robot) + [self.off, 0.0, 0.0]
+        return Estimate(stamp_ns=frame.stamp_ns, T_map_robot=here, covariance=np.eye(3))
+
 class Blind(Skittish):
     '''Off after three seconds, whatever it sees.'''
 
@@ -60,7 +71,10 @@ class Blind(Skittish):
         pose = here + [self.off, 0.0, 0.0]
         return Estimate(stamp_ns=frame.stamp_ns, T_map_robot=pose, covariance=np.eye(3))
 """
-ROOM = {"scene": "arena", "walls": "none", "n_chairs": 3, "odometry": "ideal", "dynamism": 1.0}
+ROOM = {
+    "scene": "arena", "walls": "none", "n_chairs": 3, "odometry": "ideal", "dynamism": 1.0,
+    "change": 0.0, "crowd": "none",
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -105,6 +119,37 @@ def test_two_that_do_it_each_are_joint():
     assert found.verdict == "joint"
     assert found.named[0].change == Change(out=("chair0", "chair1"))
     assert headline(found)[0].startswith("Joint: nobody alone, but chair0 + chair1 out cures it")
+
+
+@pytest.fixture(scope="module")
+def accompanied() -> Tape:
+    room = {"crowd": "escorts:4,boards:1", "n_chairs": 0, "n_people": 0, "dynamism": 0.5}
+    return record(case("Late", 4.0, **room))
+
+
+def test_a_crowd_that_does_it_together_is_named_by_one_word(accompanied, tmp_path: Path):
+    found = hold(accompanied, Question(horizon_s=0.6, repeats=1))
+    assert found.verdict == "joint"
+    best = found.named[0]
+    assert (best.kind, str(best.change)) == ("group", "escorts out")
+    assert best.change.out == tuple(f"escort{k}" for k in range(4))
+    assert headline(found)[0].startswith("Joint: nobody alone, but escorts out cures it")
+    assert not any(t.cured for t in found.trials if t.kind == "single")
+    pusher = [t.change.out for t in found.trials if t.change.out[:1] == ("board_pusher0",)]
+    assert all(names == ("board_pusher0", "board0") for names in pusher)
+    blame_picture(tmp_path / "blame.png", found)
+    assert cv2.imread(str(tmp_path / "blame.png")).std() > 10.0
+    trials = as_json(found)["trials"]
+    assert "escorts" in {trial.get("called") for trial in trials}
+
+
+def test_only_those_that_are_asked_for_are_tried(accompanied):
+    found = hold(accompanied, Question(horizon_s=0.6, repeats=1, who=("boards", "escort[0-3]")))
+    words = {str(t.change) for t in found.trials if t.kind != "all"}
+    assert words == {"boards out", "boards frozen", "escort[0-3] out", "escort[0-3] frozen"}
+    assert headline(found)[0].startswith("Joint: escort[0-3] out cures it")
+    with pytest.raises(UnknownNameError, match="no group is called 'dragons'"):
+        hold(accompanied, Question(horizon_s=0.6, repeats=1, who=("dragons",)))
 
 
 def test_a_slam_that_fails_by_itself_is_not_blamed_on_the_movers():
@@ -202,6 +247,7 @@ def test_the_verb_leaves_picture_table_and_numbers(tmp_path: Path):
     done = mobilia(
         "blame", "--scene", "arena", "--option", "walls=none", "n_chairs=3",
         "--option", "odometry=ideal", "--dynamism", "1", "--seed", "6", "--seconds", "4",
+        "--change", "0", "--crowd", "none",
         "--slam", "skittish_slams:Skittish", "--every", "4", "--horizon", "1", "--repeats", "1",
         "--out", out,
     )  # fmt: skip
