@@ -23,6 +23,7 @@ import numpy as np
 from scripts.metrics.judged import Judged, world_truth
 from scripts.metrics.table import METRICS
 from sim.actors.robot import DriveConfig
+from sim.core.dynamism import Dynamism
 from sim.driving.drive import TourConfig
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation, n_frames, tour
@@ -70,16 +71,19 @@ class Drive:
         return list(tour(simulation, seconds, pace))
 
 
+HALF = Dynamism.world_1(0.5)  # all figures on file are of world 1: no crowd
+
+
 def _open(share: float) -> Drive:
-    settings = {"walls": "none", "moving_share": share, "dynamism": 0.5}
+    settings = {"walls": "none", "moving_share": share, "dynamism": HALF}
     return Drive(scene="arena", settings=settings)
 
 
 DRIVES = {
     "office 0": Drive(scene="office", settings={"dynamism": 0.0}),
-    "office 0.5": Drive(scene="office", settings={"dynamism": 0.5}),
-    "office 1": Drive(scene="office", settings={"dynamism": 1.0}),
-    "arena, all move": Drive(scene="arena", settings={"dynamism": 0.5, "moving_share": 1.0}),
+    "office 0.5": Drive(scene="office", settings={"dynamism": HALF}),
+    "office 1": Drive(scene="office", settings={"dynamism": Dynamism.world_1(1.0)}),
+    "arena, all move": Drive(scene="arena", settings={"dynamism": HALF, "moving_share": 1.0}),
     "no walls, 30 % move": _open(0.3),
     "no walls, 50 % move": _open(0.5),
     "no walls, all move": _open(1.0),

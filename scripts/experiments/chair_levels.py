@@ -19,6 +19,7 @@ from scripts.comparison.maps import Believed, StaticDistance
 from scripts.metrics.judged import world_truth
 from scripts.paper.runs import follow
 from sim.actors.castors import LEVELS
+from sim.core.dynamism import Dynamism
 from sim.simulation import Simulation, tour
 from sim.world.world import World
 from slam import create
@@ -27,7 +28,9 @@ from slam.evaluation import metrics
 
 def steps_per_s(level: str, n: int = 3000) -> float:
     """Physics steps a second of CPU, actors included."""
-    world = World("office", seed=1, dynamism=0.8, n_chairs=50, n_people=10, chairs=level)
+    world = World(
+        "office", seed=1, dynamism=Dynamism.world_1(0.8), n_chairs=50, n_people=10, chairs=level
+    )
     for _ in range(900):
         world.substep()
     began = time.process_time()
@@ -38,7 +41,7 @@ def steps_per_s(level: str, n: int = 3000) -> float:
 
 def run(level: str, seed: int, seconds: float) -> tuple[float, float]:
     """RMS error of the online positions m, mean distance of mapped from true walls m."""
-    simulation = Simulation("office", seed=seed, dynamism=0.8, chairs=level)
+    simulation = Simulation("office", seed=seed, dynamism=Dynamism.world_1(0.8), chairs=level)
     frames = list(tour(simulation, seconds))
     track, truth = follow(create("shunting"), frames, "shunting"), world_truth(frames)
     mapped = track.map()

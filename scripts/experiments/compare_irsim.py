@@ -30,6 +30,7 @@ import gymnasium
 import numpy as np
 
 import sim  # noqa: F401  (registers the environments)
+from sim.core.dynamism import Dynamism
 from sim.sensors.lidar.models.lms221 import Lms221Config
 
 MOVERS, STEPS = 30, 100
@@ -77,7 +78,7 @@ def ours(chairs: int, people: int, share: float) -> float:
     env.reset(
         seed=1,
         options={
-            "n_chairs": chairs, "n_people": people, "dynamism": 1.0,
+            "n_chairs": chairs, "n_people": people, "dynamism": Dynamism.world_1(1.0),
             "moving_share": share, "goal": None,
         },
     )  # fmt: skip

@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.simulation import stream
 from slam import SlamSystem, create, se2
@@ -54,7 +55,8 @@ def recording(seed: int, seconds: float, dynamism: float, *, again: bool) -> lis
     seeds = Seeds(seed)
     if again:
         seeds = Seeds(seed, lidar=other, odometry=other, people=other, driving=other)
-    return list(stream("office", seed=seeds, dynamism=dynamism, seconds=seconds))
+    rates = Dynamism.world_1(dynamism)
+    return list(stream("office", seed=seeds, dynamism=rates, seconds=seconds))
 
 
 def targets(mapped: list[Frame], later: list[Frame], scans: int, count: int) -> Iterator[int]:

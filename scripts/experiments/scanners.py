@@ -21,6 +21,7 @@ from scripts.metrics.judged import world_truth
 from scripts.output import machine
 from scripts.paper.runs import follow
 from scripts.scanner_option import every_of
+from sim.core.dynamism import Dynamism
 from sim.moments import thinned, toured
 from sim.sensors.lidar.registry import names
 from sim.simulation import Simulation
@@ -42,7 +43,8 @@ class Run:
 
 def run(scanner: str, seed: int, seconds: float, scene: str, dynamism: float) -> Run:
     """Shunting over one tour with one scanner."""
-    simulation = Simulation(scene, seed=seed, dynamism=dynamism, laser=scanner)
+    rates = Dynamism.world_1(dynamism)
+    simulation = Simulation(scene, seed=seed, dynamism=rates, laser=scanner)
     moments = thinned(toured(simulation, seconds), every_of(scanner, None, 8))
     frames = [moment.frame for moment in moments]
     track, truth = follow(create("shunting"), frames, "shunting"), world_truth(frames)

@@ -27,6 +27,7 @@ import slam
 from scripts.comparison.plan import scripts_of, sources
 from scripts.jobs import Job, run_jobs
 from scripts.paper.runs import follow, sign_test, truth_of
+from sim.core.dynamism import Dynamism
 from sim.simulation import stream
 from slam import create
 from slam.ekf.slam import PRESETS
@@ -40,9 +41,9 @@ TRAINING = range(20)
 WORLDS: dict[str, tuple[dict[str, Any], ...]] = {
     "points": ({"moving": 0.0}, {"moving": 0.25}, {"moving": 0.5}, {"moving": 0.75}),
     "corners": (
-        {"scene": "arena", "dynamism": 1.0, "walls": "visible"},
-        {"scene": "arena", "dynamism": 1.0, "walls": "none"},
-        {"scene": "office", "dynamism": 0.5},
+        {"scene": "arena", "dynamism": Dynamism.world_1(1.0), "walls": "visible"},
+        {"scene": "arena", "dynamism": Dynamism.world_1(1.0), "walls": "none"},
+        {"scene": "office", "dynamism": Dynamism.world_1(0.5)},
     ),
 }
 VALUES: dict[str, tuple[Any, ...]] = {

@@ -28,6 +28,7 @@ from scripts.experiments.accuracy import FULL_RATE_HZ, SCANNERS
 from scripts.experiments.parts import Part
 from scripts.metrics.judged import SETTLED_S, world_truth
 from scripts.paper.runs import follow
+from sim.core.dynamism import Dynamism
 from sim.simulation import stream
 from slam import create
 from slam.evaluation import metrics
@@ -118,7 +119,7 @@ def cases(scene: str, scanner: str) -> Iterator[Case]:
 
 def recorded(scene: str, scanner: str, seed: int, seconds: float) -> list[Frame]:
     """One drive."""
-    settings: dict[str, Any] = {"dynamism": DYNAMISM, "seconds": seconds}
+    settings: dict[str, Any] = {"dynamism": Dynamism.world_1(DYNAMISM), "seconds": seconds}
     if scene in FEW:
         settings |= {"walls": "none", "moving_share": FEW[scene]}
     name = "arena" if scene in FEW else scene

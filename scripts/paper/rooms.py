@@ -11,6 +11,7 @@ import numpy as np
 
 from scripts.paper.report import Report
 from scripts.paper.runs import Plan, Run, follow, job, map_arrays, pose_numbers, save_run, truth_of
+from sim.core.dynamism import Dynamism
 from sim.simulation import stream
 from slam import create, se2
 from slam.evaluation import metrics
@@ -42,8 +43,9 @@ def run_one(  # noqa: PLR0913 (the arguments of a job)
     seconds: float,
     keep: bool,
 ) -> None:
-    """Simulate a tour and let every SLAM see it; ``keep`` also keeps maps for the figures."""
-    whole = list(stream(scene, seed=seed, dynamism=dynamism, seconds=seconds, **options))
+    """Simulate a tour of world 1 (no crowd, no change out of sight) and let every SLAM see it; ``keep`` also keeps maps for the figures."""
+    rates = Dynamism.world_1(dynamism)
+    whole = list(stream(scene, seed=seed, dynamism=rates, seconds=seconds, **options))
     frames = thinned(whole, STRIDE)
     truth = truth_of(frames)
     numbers: dict[str, Any] = {}

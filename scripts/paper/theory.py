@@ -14,6 +14,7 @@ from scripts.paper.landmarks import PAPER_SHARE
 from scripts.paper.point_runs import SHUNTING
 from scripts.paper.report import Report, new_figure
 from scripts.paper.runs import FIRST_SEED, Plan
+from sim.core.dynamism import Dynamism
 from sim.simulation import stream
 from slam import se2
 from slam.evaluation.points import PointWorld, PointWorldConfig
@@ -34,7 +35,9 @@ def reproduce(plan: Plan) -> None:
     """All figures of the theory, and their numbers."""
     report = Report("theory", plan)
     seconds = 4.0 if plan.quick else 60.0
-    office = thinned(list(stream("office", seed=FIRST_SEED, dynamism=0.5, seconds=seconds)), STRIDE)
+    rates = Dynamism.world_1(0.5)
+    driven = list(stream("office", seed=FIRST_SEED, dynamism=rates, seconds=seconds))
+    office = thinned(driven, STRIDE)
     steps = 60 if plan.quick else 220
     world = PointWorldConfig(moving=PAPER_SHARE, n_steps=steps)
     points = list(PointWorld(world, seed=FIRST_SEED).stream())

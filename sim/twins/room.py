@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.kinds import kind_of
 from sim.moments import Moment
 from sim.sensors.lidar.device import LaserScanner, ScanResult
 from sim.world.labels import BeamLabeller
@@ -59,13 +60,15 @@ def gap(path: Float, pose: Float, length: float) -> float:
 
 
 class _Shapes:
-    """Discs and leaves of the movers of a world, without its robot."""
+    """Discs, leaves and long things among the movers of a world, without its robot."""
 
     def __init__(self, world: World, path: Sequence[Float]) -> None:
         movers, radius = world.scene.movers, world.bodies.radius
-        doors = np.array([m.kind == "door" for m in movers], dtype=np.bool_)
-        self.rows = [k for k, m in enumerate(movers) if m.kind != "robot"]
-        self.length = np.where(doors, radius, 0.0)
+        doors = np.array([m.group == "door" for m in movers], dtype=np.bool_)
+        self.rows = [k for k, m in enumerate(movers) if m.group != "robot"]
+        self._doors = doors
+        self._back = np.array([kind_of(m.kind).half_length_m for m in movers], dtype=np.float64)
+        self.length = np.where(doors, radius, 2.0 * self._back)
         self.radius = np.where(doors, LEAF_M, radius)
         robot = world.bodies.robot
         self._robot = MARGIN_M + (0.0 if robot is None else float(radius[robot]))
@@ -73,7 +76,7 @@ class _Shapes:
 
     def clear(self, row: int, pose: Float) -> bool:
         """Whether the whole path passes mover ``row`` if it stands at ``pose``."""
-        free = gap(self._path, pose, float(self.length[row]))
+        free = gap(self._path, self._end(row, pose), float(self.length[row]))
         return free > self._robot + float(self.radius[row])
 
     def apart(self, row: int, pose: Float, poses: Float) -> bool:
@@ -82,17 +85,25 @@ class _Shapes:
         for other in self.rows:
             reach = float(self.radius[row] + self.radius[other])
             # Two leaves never meet: each has its own doorway.
-            if other == row or (self.length[row] > 0.0 and self.length[other] > 0.0):
+            if other == row or (self._doors[row] and self._doors[other]):
                 continue
-            if gap(points, poses[other], float(self.length[other])) < reach:
+            if gap(points, self._end(other, poses[other]), float(self.length[other])) < reach:
                 return False
         return True
+
+    def _end(self, row: int, pose: Float) -> Float:
+        """Where the middle line of a mover begins: its hinge, its middle, or a long one's end."""
+        if self._back[row] == 0.0:
+            return pose
+        c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
+        back = float(self._back[row])
+        return np.array([pose[0] - back * c, pose[1] - back * s, pose[2]])
 
     def points(self, row: int, pose: Float) -> Float:
         """(k, 3) points of the mover's middle line."""
         length = float(self.length[row])
         steps = np.linspace(0.0, length, 6 if length > 0.0 else 1)
-        out = np.tile(pose, (len(steps), 1))
+        out = np.tile(self._end(row, pose), (len(steps), 1))
         out[:, 0] += steps * math.cos(float(pose[2]))
         out[:, 1] += steps * math.sin(float(pose[2]))
         return out

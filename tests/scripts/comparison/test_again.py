@@ -74,6 +74,8 @@ def test_what_is_no_run_is_told_in_a_line(run, tmp_path):
     (tmp_path / "recipe.json").write_text('{"command": "drive"}')
     with pytest.raises(LogFormatError, match="went its own way"):
         run_of(tmp_path / "runs" / "x.npz")
-    (tmp_path / "recipe.json").write_text('{"command": "compare", "settings": {"slams": 3}}')
+    (tmp_path / "recipe.json").write_text(
+        '{"command": "compare", "world": 2, "settings": {"slams": 3}}'
+    )
     with pytest.raises(LogFormatError, match="no recipe of a comparison: "):
         run_of(tmp_path / "runs" / "x.npz")

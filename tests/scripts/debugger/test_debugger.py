@@ -297,11 +297,12 @@ def test_wrong_words_are_told_by_name(tmp_path: Path, words, says):
         ('{"command": "compare", "settings": {}}', "a comparison of many runs: name one"),
         ('{"command": "run", "settings": {"log": "a.log"}}', "this run was on a log"),
         (
-            '{"command": "run", "settings": {"scene": "arena", "seconds": "long"}}',
+            '{"command": "run", "world": 2, "settings": {"scene": "arena", "seconds": "long"}}',
             "seconds must be a number",
         ),
         (
-            '{"command": "run", "settings": {"scene": "arena", "seconds": 5, "slams": 7}}',
+            '{"command": "run", "world": 2, "settings": {"scene": "arena", "seconds": 5, '
+            '"slams": 7}}',
             "slams must be a list of names, got 7",
         ),
         ('{"recipe": {}}', "no recipe"),

@@ -18,6 +18,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from scenes.kinds import kind_of
 from sim.moments import Moment, toured
 from sim.recording.bag import BagWriter, _accumulate
 from sim.recording.messages import turns_of
@@ -31,6 +32,8 @@ from slam.frames import NS_PER_S, BeamClass, Frame, LaserSpec, Odometry, Scan
 from slam.logs import read_bag
 from slam.maps import read_map
 from slam.trajectory import read_tum
+
+CUBE, CYLINDER = 1, 3  # of visualization_msgs/Marker
 
 
 @pytest.fixture(scope="session")
@@ -172,8 +175,10 @@ def test_objects_stand_where_they_truly_are(decoded, recorded):
             x, y, yaw = moment.poses[marker.id]
             if mover.kind == "door":
                 continue
+            half = kind_of(mover.kind).half_length_m
             assert (marker.pose.position.x, marker.pose.position.y) == (x, y)
-            assert marker.scale.x == pytest.approx(2.0 * mover.radius)
+            assert marker.scale.x == pytest.approx(2.0 * (mover.radius + half))
+            assert marker.type == (CUBE if half > 0.0 else CYLINDER)
             q = marker.pose.orientation
             assert abs(se2.wrap(2.0 * math.atan2(q.z, q.w) - yaw)) < 1e-12
             moved += (marker.color.r > 0.8) and bool(moment.moving[marker.id])

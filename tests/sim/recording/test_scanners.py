@@ -90,7 +90,7 @@ def test_a_recipe_takes_registered_names_only(tmp_path: Path) -> None:
 
 
 def test_twins_of_a_scanner_between_the_steps_have_one_path_odometry_and_timing() -> None:
-    made = Twins("arena", seconds=1.0, seed=3, dynamism=0.5, laser="utm30lx:ideal")
+    made = Twins("arena", seconds=1.0, seed=3, dynamism=0.5, laser="utm30lx:ideal", crowd="none")
     moving, moved, still = (
         [moment.frame for moment in made.moments(name)]
         for name in ("dynamic", "semi_static", "static")

@@ -12,6 +12,7 @@ from sim.actors.holding import QB
 from sim.actors.people import columns
 from sim.simulation import Simulation
 from sim.twins.absence import Change, apply
+from sim.twins.room import _Shapes
 from slam.errors import UnknownNameError
 
 CROWD = "escorts:3,groups:4,boards:1,trains:1,couches:1,cleaners:1"
@@ -85,6 +86,19 @@ def test_whoever_goes_out_takes_along_what_it_holds_and_no_more():
     assert with_held(holds, ["carrier0"]) == ("carrier0", "couch0")
     assert with_held(holds, ["wagon0"]) == ("wagon0", "wagon1")
     assert with_held(holds, ["board0", "escort0"]) == ("board0", "escort0")
+
+
+def test_a_long_thing_of_a_twin_is_in_the_way_along_its_whole_length():
+    simulation = Simulation(**{**ROOM, "crowd": "boards:1", "dynamism": 0.0})
+    world = simulation.world
+    row = world.mover_names.index("board0")
+    x, y, yaw = pose(simulation, "board0").tolist()
+    along, across = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+    past = np.linspace(-1.0, 1.0, 60)[:, None] * across
+    for off, free in ((0.0, False), (-0.7, False), (0.7, False), (2.0, True)):
+        line = np.array([x, y]) + off * along + past
+        shapes = _Shapes(world, [np.column_stack([line, np.zeros(60)])])
+        assert shapes.clear(row, np.array([x, y, yaw])) == free
 
 
 @pytest.mark.parametrize(
