@@ -43,7 +43,10 @@ def run_one(  # noqa: PLR0913 (the arguments of a job)
     seconds: float,
     keep: bool,
 ) -> None:
-    """Simulate a tour of world 1 (no crowd, no change out of sight) and let every SLAM see it; ``keep`` also keeps maps for the figures."""
+    """Simulate a tour and let every SLAM see it; ``keep`` also keeps maps for the figures.
+
+    The room is one of world 1: no crowd, no change out of sight.
+    """
     rates = Dynamism.world_1(dynamism)
     whole = list(stream(scene, seed=seed, dynamism=rates, seconds=seconds, **options))
     frames = thinned(whole, STRIDE)
