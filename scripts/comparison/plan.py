@@ -14,6 +14,7 @@ from typing import Any
 import scenes
 import sim
 import slam
+from scripts import axis as axes
 from scripts.comparison import entry, recording
 from scripts.imports import with_imports
 from scripts.jobs import Job
@@ -48,7 +49,7 @@ class Plan:
     """Every SLAM on every scene at every level with every seed.
 
     slams, scenes  by name or as module:Class, module:function
-    levels    of dynamism, each in [0, 1]
+    levels    of dynamism, each in [0, 1]; with an ``axis`` (``scripts.axis``) of that alone
     seeds     whole numbers >= 0, the same at every level
     seconds   of driving
     every     one scan in so many is kept
@@ -64,6 +65,7 @@ class Plan:
     every: int = 8
     scanner: str = "full"
     scan_limit_s: float = Limits.scan_s
+    axis: str = axes.BOTH
 
     def __post_init__(self) -> None:
         Limits(scan_s=self.scan_limit_s)
@@ -95,7 +97,9 @@ class Plan:
 
     def recipe(self, run: Run) -> Recipe:
         """Of a run's simulation."""
-        return Recipe(**asdict(run), seconds=self.seconds, scanner=self.scanner)
+        own: dict[str, Any] = axes.at(self.axis, run.dynamism, Recipe)
+        scanned: dict[str, Any] = {"seconds": self.seconds, "scanner": self.scanner}
+        return Recipe(scene=run.scene, seed=run.seed, **own, **scanned)
 
     def recordings(self) -> dict[str, Job]:
         """The jobs that simulate, by the names of the runs."""
