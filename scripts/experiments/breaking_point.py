@@ -15,7 +15,8 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +30,10 @@ from scripts import axis as axes
 from scripts.comparison import folder, make
 from scripts.comparison.plan import Plan
 from scripts.comparison.tables import number
-from scripts.experiments.measured import Row, fill_page, table, write_results
+from scripts.experiments.measured import add_options, head, seeds_of, table
 from scripts.figures import save, styled
+from scripts.marks import fill_page
+from scripts.result_files import write
 from sim.core.versions import WORLD
 from slam import se2
 from slam.errors import MobiliaError
@@ -38,18 +41,19 @@ from slam.evaluation.lost import LOST_RULE
 from slam.evaluation.statistics import quantile
 
 OUT = Path("out/breaking_point")
-RESULTS = Path("docs/results/breaking_point.json")
 PICTURE = Path("docs/pictures/breaking_point.png")
 PAGE, MARK = Path("docs/dynamism.md"), "breaking_point"
 SLAMS = ("kiss-icp", "karto", "occupancy", "ekf", "shunting", "oracle(shunting)")
 SCENES = ("arena", "office", "gallery", "station")
 ATE, MOVING = "ate_unaligned_m", "moving_share_of_returns"
-LEAST_CM, MOST_CM = 0.3, 1000.0  # of the picture; a SLAM that failed is at the top
+LEAST_CM, MOST_CM = 0.2, 1000.0  # of the picture; a SLAM that failed is at the top
 CM = 100.0
 _COLORS = ("#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f", "#ce2c3c", "#202020", "#de6e18", "#5f9e3f")
 _MARKERS = "osD^vP*X"
 _TICKS_CM = (0.3, 1, 3, 10, 30, 100, 300, 1000)
 _ASIDE = 0.012
+CHARACTERS_PER_INCH = 15  # of the smallest print of the picture
+Row = dict[str, Any]
 
 
 def claims(compared: folder.Compared, run: Row) -> tuple[float, float]:
@@ -129,7 +133,7 @@ def picture(rows: Sequence[Row], slams: Sequence[str], told: str, path: Path) ->
             own = [row for row in rows if (row["axis"], row["scene"]) == (axis, scene)]
             for k, slam in enumerate(slams):
                 _curve(grid[i][j], [row for row in own if row["slam"] == slam], k, len(slams))
-            _finish(grid[i][j], axis, scene)
+            _finish(grid[i][j], axis, scene, sorted({row["level"] for row in own}))
         grid[i][0].set_ylabel("position error (ATE) in cm,\nunaligned, median")
     handles = [
         Line2D([], [], color=_COLORS[k % len(_COLORS)], marker=_MARKERS[k % len(_MARKERS)], ms=4.5,
@@ -138,7 +142,8 @@ def picture(rows: Sequence[Row], slams: Sequence[str], told: str, path: Path) ->
     ]  # fmt: skip
     handles.append(Line2D([], [], color="0.4", marker="x", ls="", ms=5, label="a lost run"))
     figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
-    figure.supxlabel(told, fontsize=8)
+    wide = int(CHARACTERS_PER_INCH * figure.get_figwidth())
+    figure.supxlabel(textwrap.fill(told, wide), fontsize=8)
     path.parent.mkdir(parents=True, exist_ok=True)
     save(figure, path)
 
@@ -166,11 +171,12 @@ def _shown(error_m: float) -> float:
     return min(max(CM * error_m, LEAST_CM), MOST_CM)
 
 
-def _finish(ax: Axes, axis: str, scene: str) -> None:
+def _finish(ax: Axes, axis: str, scene: str, levels: Sequence[float]) -> None:
     name = "dynamism" if axis == axes.BOTH else axis
     ax.set(
         title=scene, yscale="log", xlabel=f"{name}, 0 to 1", ylim=(0.8 * LEAST_CM, 1.3 * MOST_CM)
     )
+    ax.set_xticks(levels)
     ax.yaxis.set_major_locator(FixedLocator(_TICKS_CM))
     ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
     ax.yaxis.set_minor_locator(NullLocator())
@@ -182,7 +188,7 @@ def plan_of(axis: str, wanted: argparse.Namespace) -> Plan:
         slams=tuple(wanted.slams),
         scenes=tuple(wanted.scenes),
         levels=tuple(wanted.levels),
-        seeds=tuple(range(wanted.first_seed, wanted.first_seed + wanted.seeds)),
+        seeds=tuple(seeds_of(wanted)),
         seconds=wanted.seconds,
         every=wanted.every,
         scanner=wanted.scanner,
@@ -205,43 +211,49 @@ EXPLAINED = (
 )
 
 
+def cells(rows: Sequence[Row]) -> dict[str, Row]:
+    """By "axis scene slam": numbers, level by level."""
+    numbers = ("lost", "ate_median_m", "ate_worst_m", "claimed_m", "error_m", MOVING)
+    out: dict[str, Row] = {}
+    for row in rows:
+        key = f"{row['axis']} {row['scene']} {row['slam']}"
+        cell = out.setdefault(key, {number: [] for number in numbers})
+        for name in numbers:
+            cell[name].append(row[name])
+    return out
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--slams", nargs="+", default=list(SLAMS))
     parser.add_argument("--scenes", nargs="+", default=list(SCENES))
     parser.add_argument("--axis", nargs="+", choices=axes.AXES, default=["motion", "change"])
     parser.add_argument("--levels", nargs="+", type=float, default=[0.0, 0.25, 0.5, 0.75, 1.0])
-    parser.add_argument("--seeds", type=int, default=10, help="how many")
-    parser.add_argument("--first-seed", type=int, default=500, help="nobody tuned on these")
-    parser.add_argument("--seconds", type=float, default=60.0, help="of each run, simulated")
     parser.add_argument("--every", type=int, default=8, help="use one scan in so many")
     parser.add_argument("--scanner", default="noise")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, default=OUT, help="folder of the comparisons")
-    parser.add_argument("--results", type=Path, default=RESULTS)
     parser.add_argument("--picture", type=Path, default=PICTURE)
-    parser.add_argument("--page", type=Path, default=PAGE)
-    parser.add_argument("--no-page", action="store_true", help="leave the page as it is")
+    add_options(parser, "breaking_point.json", PAGE)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make what is missing, print the table, write results, picture and page."""
     wanted = _parser().parse_args(arguments)
-    asked = ("axis", "scenes", "slams", "levels", "seeds", "first_seed", "seconds", "every")
-    settings: Mapping[str, Any] = {key: getattr(wanted, key) for key in (*asked, "scanner")}
+    asked = ("axis", "scenes", "slams", "levels", "every", "scanner")
     rows: list[Row] = []
     try:
+        first = head(wanted, MARK, arguments, *asked)
         plans = {axis: plan_of(axis, wanted) for axis in wanted.axis}  # all, before any is made
         for axis, plan in plans.items():
             make.carry_out(plan, wanted.out / axis, jobs=wanted.jobs)
             rows += rows_of(axis, folder.read(wanted.out / axis))
         text = markdown(rows, wanted.slams, f"{EXPLAINED}{told_of(wanted)}.")
-        write_results(wanted.results, {**settings, "lost_rule": LOST_RULE}, rows)
+        write(wanted.results, {**first, "lost_rule": LOST_RULE}, {"broken": cells(rows)})
         picture(rows, wanted.slams, told_of(wanted), wanted.picture)
         if not wanted.no_page:
             fill_page(wanted.page, MARK, text)
-    except MobiliaError as error:
+    except (MobiliaError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
     print(text)

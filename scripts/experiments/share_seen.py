@@ -28,7 +28,9 @@ from numpy.typing import NDArray
 import scenes
 from scripts import axis as axes
 from scripts import workers
-from scripts.experiments.measured import Row, fill_page, table, write_results
+from scripts.experiments.measured import add_options, head, seeds_of, table
+from scripts.marks import fill_page
+from scripts.result_files import write
 from sim.core.versions import WORLD
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation, n_frames
@@ -36,13 +38,13 @@ from sim.world.world import World
 from slam.errors import MobiliaError
 from slam.frames import NS_PER_S, BeamClass, Float, Frame
 
-RESULTS = Path("docs/results/share_seen.json")
 PAGE, MARK = Path("docs/dynamism.md"), "share_seen"
 SCANNER = "scanner(fov_deg=180,beams=181,rate_hz=5,sigma_m=0.01)"
 MOVED_M = 0.1  # farther from where it was seen last, a thing stands elsewhere
 LEAST_BEAMS = 2  # that meet a thing, for it to be in view
 WARM_SCANS = 5  # before the processor's time counts: code is being loaded
 PERCENT = 100.0
+Row = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,49 +184,57 @@ def _percent(share: float) -> str:
     return "-" if np.isnan(share) else f"{PERCENT * share:.1f}"
 
 
+def cells(rows: Sequence[Row]) -> dict[str, Row]:
+    """By "scene level": numbers of the runs, seed by seed."""
+    numbers = (
+        "moving", "moving_p90", "movable", "movable_p90", "resightings", "elsewhere", "blocked",
+        "goals", "driven_m", "real_time_factor",
+    )  # fmt: skip
+    out: dict[str, Row] = {}
+    for row in rows:
+        cell = out.setdefault(f"{row['scene']} {row['level']:g}", {key: [] for key in numbers})
+        for key in numbers:
+            cell[key].append(row[key])
+    return out
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", nargs="+", default=scenes.names())
     parser.add_argument("--levels", nargs="+", type=float, default=[0.0, 0.25, 0.5, 0.75, 1.0])
-    parser.add_argument("--seeds", type=int, default=3, help="how many")
-    parser.add_argument("--first-seed", type=int, default=500, help="nobody tuned on these")
-    parser.add_argument("--seconds", type=float, default=60.0, help="of each run, simulated")
     parser.add_argument("--axis", choices=axes.AXES, default=axes.BOTH)
     parser.add_argument("--scanner", default=SCANNER)
     parser.add_argument("--away", type=float, default=5.0, help="s out of view")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--out", type=Path, default=RESULTS)
-    parser.add_argument("--page", type=Path, default=PAGE)
-    parser.add_argument("--no-page", action="store_true", help="leave the page as it is")
+    add_options(parser, "share_seen.json", PAGE)
+    parser.set_defaults(seeds=3)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print the table, write the results and the page."""
     wanted = _parser().parse_args(arguments)
-    seeds = range(wanted.first_seed, wanted.first_seed + wanted.seeds)
-    cases = [
-        Case(
-            scene=scene, level=level, seed=seed, axis=wanted.axis, seconds=wanted.seconds,
-            scanner=wanted.scanner, away_s=wanted.away,
-        )
-        for scene, level, seed in product(wanted.scenes, wanted.levels, seeds)
-    ]  # fmt: skip
-    order = {(case.scene, case.level, case.seed): k for k, case in enumerate(cases)}
     told = (
         f"World {WORLD}, axis {wanted.axis}, {wanted.seconds:g} s, "
         f"{wanted.seeds} seeds from {wanted.first_seed}, "
         f"`{wanted.scanner}`, out of view for {wanted.away:g} s or more."
     )
+    cases = [
+        Case(
+            scene=scene, level=level, seed=seed, axis=wanted.axis, seconds=wanted.seconds,
+            scanner=wanted.scanner, away_s=wanted.away,
+        )
+        for scene, level, seed in product(wanted.scenes, wanted.levels, seeds_of(wanted))
+    ]  # fmt: skip
+    order = {(case.scene, case.level, case.seed): k for k, case in enumerate(cases)}
     try:
+        first = head(wanted, MARK, arguments, "axis", "scanner", "away", "levels", "scenes")
         rows = list(workers.each(measure, cases, jobs=wanted.jobs))
         rows.sort(key=lambda row: order[row["scene"], row["level"], row["seed"]])
         text = markdown(rows, told)
-        asked = ("axis", "seconds", "scanner", "away", "levels", "scenes")
-        write_results(wanted.out, {key: getattr(wanted, key) for key in asked}, rows)
+        write(wanted.results, first, {"seen": cells(rows)})
         if not wanted.no_page:
             fill_page(wanted.page, MARK, text)
-    except MobiliaError as error:
+    except (MobiliaError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
     print(text)

@@ -15,10 +15,9 @@ from scripts import axis as axes
 from scripts.comparison import folder
 from scripts.comparison.plan import Plan
 from scripts.experiments import breaking_point, share_seen
-from scripts.experiments.measured import fill_page, table
 from sim.recording.recipe import Recipe
 from slam import system
-from slam.errors import InvalidValueError, OutputError
+from slam.errors import InvalidValueError
 from slam.estimate import Estimate
 from slam.frames import BeamClass, Frame
 from slam.odometry import OdometrySlam
@@ -86,33 +85,36 @@ def test_change_is_counted_when_a_thing_comes_back_into_view():
     assert room.look(count, 20.0, 2, 3) == (3, 2)  # the person does not count
 
 
-def test_what_is_seen_goes_into_the_results_and_the_page(tmp_path: Path, capsys):
+def test_what_is_seen_goes_into_the_results_and_the_page(tmp_path: Path):
     page, out = tmp_path / "page.md", tmp_path / "seen.json"
     page.write_text("Seen:\n\n<!-- share_seen -->\n<!-- /share_seen -->\nend\n")
     words = ["--scenes", "arena", "--levels", "0", "1", "--seeds", "1", "--seconds", "2"]
     words += ["--scanner", "scanner(fov_deg=180,beams=31,rate_hz=5,sigma_m=0.01)"]
-    assert share_seen.main([*words, "--out", str(out), "--page", str(page)]) == 0
-    rows = json.loads(out.read_text())["rows"]
-    assert [row["level"] for row in rows] == [0.0, 1.0]
-    assert rows[0]["moving"] == 0.0 < rows[0]["movable"] < 1.0
-    assert rows[1]["moving_p90"] >= rows[1]["moving"] > 0.0
-    assert all(row["driven_m"] > 0.1 and row["elsewhere"] is None for row in rows)
+    assert share_seen.main([*words, "--results", str(out), "--page", str(page)]) == 0
+    data = json.loads(out.read_text())
+    assert data["seeds"] == [500]
+    assert data["commit"] is None
+    assert data["command"].startswith("python -m scripts.experiments.share_seen --scenes arena")
+    still, busy = data["seen"]["arena 0"], data["seen"]["arena 1"]
+    assert still["moving"] == [0.0]
+    assert 0.0 < still["movable"][0] < 1.0
+    assert busy["moving_p90"][0] >= busy["moving"][0] > 0.0
+    assert busy["driven_m"][0] > 0.1
+    assert busy["elsewhere"] == [None]
     text = page.read_text()
     assert "| arena | 0 | 0.0 (0.0) |" in text
     assert text.endswith("<!-- /share_seen -->\nend\n")
-    capsys.readouterr()
-    words += ["--out", str(out), "--page", str(tmp_path / "none.md")]
-    assert share_seen.main(words) == 1
-    assert "none.md" in capsys.readouterr().err
 
 
-def test_a_page_without_the_mark_is_left(tmp_path: Path):
+def test_a_page_without_the_mark_is_left_and_nothing_is_run(tmp_path: Path, capsys):
     (page := tmp_path / "page.md").write_text("nothing")
-    with pytest.raises(InvalidValueError, match=r"page\.md must have one <!-- x -->"):
-        fill_page(page, "x", table(("a", "b"), [("1", "2")]))
-    assert page.read_text() == "nothing"
-    with pytest.raises(OutputError, match="none"):
-        fill_page(tmp_path / "none.md", "x", "")
+    words = ["--page", str(page), "--results", str(tmp_path / "r.json")]
+    for script in (share_seen, breaking_point):
+        assert script.main(words) == 1
+        assert "page.md must have one <!-- " in capsys.readouterr().err
+        assert script.main([*words[2:], "--page", str(tmp_path / "none.md")]) == 1
+        assert "none.md" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["page.md"]
 
 
 class Sure(OdometrySlam):
@@ -146,13 +148,16 @@ def test_the_breaking_point_of_a_tiny_plan(tmp_path: Path, capsys, monkeypatch):
     assert "failed (1)" in printed
     assert (tmp_path / "picture.png").stat().st_size > 10_000
     data = json.loads((tmp_path / "results.json").read_text())
-    rows = {(row["level"], row["slam"]): row for row in data["rows"]}
-    assert len(rows) == 6
-    sure, raises = rows[1.0, "sure"], rows[1.0, "raises"]
-    assert sure["claimed_m"] == pytest.approx(math.sqrt(2e-4), rel=1e-5)
+    assert data["levels"] == [0.0, 1.0]
+    cells = data["broken"]
+    assert set(cells) == {f"both arena {slam}" for slam in ("sure", "raises", "oracle(odometry)")}
+    sure, raises = cells["both arena sure"], cells["both arena raises"]
+    assert sure["claimed_m"] == pytest.approx([math.sqrt(2e-4)] * 2, rel=1e-5)
     assert sure["error_m"] == pytest.approx(sure["ate_median_m"], rel=1e-5)
-    assert sure["lost"] == 0
-    assert (raises["lost"], raises["ate_median_m"], raises["claimed_m"]) == (1, "inf", None)
+    assert sure["lost"] == [0, 0]
+    assert raises["lost"] == [1, 1]
+    assert raises["ate_median_m"] == ["inf", "inf"]
+    assert raises["claimed_m"] == [None, None]
     kept = {p: p.stat().st_mtime_ns for p in (tmp_path / "out").glob("both/*/arena*-*.npz")}
     assert len(kept) == 8
     assert breaking_point.main(words) == 0
@@ -162,5 +167,6 @@ def test_the_breaking_point_of_a_tiny_plan(tmp_path: Path, capsys, monkeypatch):
 
 def test_what_cannot_be_planned_is_one_line(tmp_path: Path, capsys):
     words = ["--scenes", "arenna", "--axis", "both", "--no-page", "--out", str(tmp_path)]
+    words += ["--results", str(tmp_path / "r.json")]
     assert breaking_point.main(words) == 1
     assert "Did you mean 'arena'" in capsys.readouterr().err
