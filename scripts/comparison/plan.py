@@ -14,6 +14,7 @@ from typing import Any
 import scenes
 import sim
 import slam
+from scripts import axis as axes
 from scripts.checked import whole
 from scripts.comparison import entry, recording
 from scripts.imports import with_imports
@@ -24,7 +25,7 @@ from sim.simulation import n_frames
 from slam.errors import InvalidValueError
 from slam.guests import Limits
 from slam.names import join_folders, loaded
-from slam.variants import PIPE
+from slam.variants import PIPE, inside
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
@@ -49,7 +50,7 @@ class Plan:
     """Every SLAM on every scene at every level with every seed.
 
     slams, scenes  by name or as module:Class, module:function
-    levels    of dynamism, each in [0, 1]
+    levels    of dynamism, each in [0, 1]; with an ``axis`` (``scripts.axis``) of that alone
     seeds     whole numbers >= 0, the same at every level
     seconds   of driving
     every     one scan in so many is kept
@@ -65,6 +66,7 @@ class Plan:
     every: int = 8
     scanner: str = "full"
     scan_limit_s: float = Limits.scan_s
+    axis: str = axes.BOTH
 
     def __post_init__(self) -> None:
         Limits(scan_s=self.scan_limit_s)
@@ -95,7 +97,9 @@ class Plan:
 
     def recipe(self, run: Run) -> Recipe:
         """Of a run's simulation."""
-        return Recipe(**asdict(run), seconds=self.seconds, scanner=self.scanner)
+        own: dict[str, Any] = axes.at(self.axis, run.dynamism, Recipe)
+        scanned: dict[str, Any] = {"seconds": self.seconds, "scanner": self.scanner}
+        return Recipe(scene=run.scene, seed=run.seed, **own, **scanned)
 
     def recordings(self) -> dict[str, Job]:
         """The jobs that simulate, by the names of the runs."""
@@ -146,6 +150,7 @@ def scripts_of(file: str, module: str) -> tuple[Path, ...]:
 def source_of(slam: str) -> tuple[Path, ...]:
     """The file of a SLAM's own module, or those that a command names, and what Python files among
     them import from beside them: with any of it changed, its runs are made again."""
+    slam = inside(slam)
     kind, _, command = slam.partition(":")
     if not command:
         return ()
