@@ -80,13 +80,15 @@ def free_floor(builder: Builder) -> Floor:
     for goal in plan.find("goal"):
         floor.block(goal.pose[0], goal.pose[1], GOAL_RADIUS)
     for mover in builder.movers:
-        if mover.kind != "door":
+        if mover.group != "door":
             floor.block(*builder.initial[mover.name][:2], mover.radius)
     return floor
 
 
 def hang_doors(builder: Builder, rng: np.random.Generator, doors: str = "open") -> None:
     """A door at each ``door:ROOM:left|right`` mark, whose closer brings it to a seeded angle.
+
+    Sliding doors, at marks of their own, rest closed.
 
     doors  "open" (held open), "ajar", "closed", or "mixed": each door one of the three
     """
@@ -97,6 +99,15 @@ def hang_doors(builder: Builder, rng: np.random.Generator, doors: str = "open") 
         builder.add_door(
             f"door{index}", mark.pose, clockwise=mark.words[2] == "right", angle=round(angle, 3)
         )
+    hang_sliding_doors(builder)
+
+
+def hang_sliding_doors(builder: Builder) -> None:
+    """A closed one at each ``sliding:...`` and ``lift:...`` mark, numbered on after the others."""
+    for first, kind in (("sliding", "door_sliding"), ("lift", "door_lift")):
+        for mark in builder.plan.find(first):
+            name = f"door{len(builder.door_angles)}"
+            builder.add_sliding_door(kind, name, mark.pose, left=mark.words[2] == "left")
 
 
 def seat_chairs(

@@ -87,7 +87,7 @@ class TestTheModel:
         scene.place(model, data)
         mujoco.mj_kinematics(model, data)
         for mover in scene.movers:
-            if mover.kind == "door":
+            if mover.group == "door":
                 continue
             x, y, yaw = scene.initial[mover.name]
             body = data.body(f"{mover.name}/base")
@@ -126,7 +126,7 @@ class TestLayouts:
     @pytest.mark.parametrize("seed", SEEDS)
     def test_nothing_overlaps_at_the_start(self, name, seed):
         scene = built(name, seed)
-        discs = [(*scene.initial[m.name][:2], m.radius) for m in scene.movers if m.kind != "door"]
+        discs = [(*scene.initial[m.name][:2], m.radius) for m in scene.movers if m.group != "door"]
         for (x, y, r), (u, v, s) in combinations(discs, 2):
             assert math.hypot(x - u, y - v) > r + s
         places = np.array([disc[:2] for disc in discs])

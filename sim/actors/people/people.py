@@ -152,15 +152,16 @@ class People:
 
 def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:
     m = len(doors.names)
-    table = np.zeros((m, 8))
+    table = np.zeros((m, columns.N_DOOR))
     table[:, [columns.CX, columns.CY]] = doors.middles
     table[:, [columns.EX, columns.EY]] = doors.along
-    sign = doors.hinges[:, 3]
+    sign = np.where(doors.hinges[:, 4] != 0.0, 1.0, doors.hinges[:, 3])
     table[:, columns.NX], table[:, columns.NY] = (
         -sign * doors.along[:, 1],
         sign * doors.along[:, 0],
     )
     table[:, columns.WIDTH] = doors.widths
+    table[:, columns.SLIDES] = doors.hinges[:, 4]
     sides = np.zeros((n_people, m), dtype=np.int64)
     return right_of_way.Doors(doors=table, passage=doors.passage, sides=sides)
 
@@ -168,7 +169,7 @@ def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:
 def _planar(bodies: Bodies, people: Sequence[str]) -> list[str]:
     """Names in the order of the disc rows: people first."""
     kinds = ("person", "door")
-    return [*people, *(m.name for m in bodies.scene.movers if m.kind not in kinds)]
+    return [*people, *(m.name for m in bodies.scene.movers if m.group not in kinds)]
 
 
 def _addresses(bodies: Bodies, doors: Doors, people: Sequence[str]) -> Addresses:
