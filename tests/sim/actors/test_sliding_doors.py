@@ -19,6 +19,8 @@ from sim.actors.people import columns
 from sim.core.dynamism import Dynamism
 from sim.driving.pilot import Pilot
 from sim.recording.objects import ObjectsMessage
+from sim.simulation import Simulation
+from sim.twins.absence import Change, apply
 from sim.view.mapview import MapView
 from sim.world.world import World
 from slam.errors import InvalidValueError
@@ -205,6 +207,21 @@ class TestLift:
         for _ in zip(walk(first, 6.0), walk(second, 6.0), strict=True):
             np.testing.assert_array_equal(first.data.qpos, second.data.qpos)
         assert first.save_state() == second.save_state()
+
+
+def test_one_seed_is_one_future(folder):
+    worlds = [World(room(folder, n_people=3), seed=6, dynamism=1.0) for _ in range(2)]
+    for world in worlds:
+        list(walk(world, 15.0))
+    assert worlds[0].save_state() == worlds[1].save_state()
+    assert worlds[0].data.joint("door0/slide").qpos[0] != 0.0
+
+
+def test_taken_out_it_stands_wide_open(folder):
+    simulation = Simulation(room(folder), seed=1, dynamism=0.0)
+    apply(simulation, Change(out=("door0",)))
+    list(walk(simulation.world, 2.0))
+    assert opening(simulation.world) == pytest.approx(1.36)
 
 
 def test_a_mark_of_a_sliding_door_needs_its_side(tmp_path):
