@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 
+import mujoco
 import numpy as np
 
 from scenes import look
@@ -139,11 +140,11 @@ class _Filling:
         """Put a mover at a pose and take its floor."""
         paint = look.dress(self.rng) if kind_of(kind).group == "person" else {}
 
-        def prepare(child: object) -> None:
-            for geom in child.geoms if paint else ():  # type: ignore[attr-defined]
+        def prepare(child: mujoco.MjSpec) -> None:
+            for geom in child.geoms if paint else ():
                 geom.material = paint.get(geom.material, geom.material)
             if kind_of(kind).group == "person":
-                stand(child, pose)  # type: ignore[arg-type]
+                stand(child, pose)
 
         self.parts.put(kind, name, (0.0, 0.0, 0.0), prepare)
         self.movers.append(Mover(name=name, kind=kind, radius=hull_radius(kind)))

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.kinds import is_door
 from sim.moments import Moment
 from sim.world.world import World
 from slam import se2
@@ -25,7 +26,13 @@ JOIN_S = 0.5  # rests shorter than that do not end an event
 NEAR_M = 1.5  # a person nearer than that is near the robot, centre to centre
 JUMP_M = 0.5  # the truth leaps by that against odometry between two frames: kidnapped
 CHAIR, DOOR, PERSON, KIDNAP = "chair", "door", "person", "kidnap"
-_KIND = {"door": DOOR, "person": PERSON}  # everything else that moves is pushed like a chair
+
+
+def _kind_of(kind: str) -> str:
+    """Of the events of a mover; what is neither a door nor a person is pushed like a chair."""
+    if is_door(kind):
+        return DOOR
+    return PERSON if kind == "person" else CHAIR
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +78,7 @@ class EventWatch:
         movers = world.scene.movers
         self._mover_of_body = world.bodies.mover_of_body
         self._movers = [
-            None if m.kind == "robot" else _Mover(_KIND.get(m.kind, CHAIR), m.name, m.radius)
+            None if m.kind == "robot" else _Mover(_kind_of(m.kind), m.name, m.radius)
             for m in movers
         ]
         self._people = np.array([m.group == "person" for m in movers], dtype=bool)
@@ -143,7 +150,8 @@ def _shift(mover: _Mover, pose: Float) -> float:
     assert mover.rest is not None
     x, y, yaw = mover.rest
     if mover.kind == DOOR:
-        return abs(se2.wrap(float(pose[2]) - yaw)) * mover.radius
+        turned = abs(se2.wrap(float(pose[2]) - yaw)) * mover.radius
+        return max(turned, math.hypot(float(pose[0]) - x, float(pose[1]) - y))
     return math.hypot(float(pose[0]) - x, float(pose[1]) - y)
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from scenes.kinds import is_door
 from scripts.comparison.recording import Recording
 from scripts.comparison.sight import Sight, clearance
 from slam import se2
@@ -82,7 +83,9 @@ class Places:
         believes     whether the latest map holds such points; None before the first map
         """
         self._drive, self._near_static, self._believes = drive, near_static, believes
-        self._rows = [k for k, kind in enumerate(drive.kinds) if kind not in ("door", "robot")]
+        self._rows = [
+            k for k, kind in enumerate(drive.kinds) if kind != "robot" and not is_door(kind)
+        ]
         self.standing = {row: Place(drive.poses[0, row], 0, new=False) for row in self._rows}
         self.left: list[OldPlace] = []
 

@@ -40,7 +40,7 @@ class Report:
         self.not_finite += int(not np.isfinite(world.data.qpos).all())
         self.fastest = max(self.fastest, float(np.abs(world.data.qvel).max()))
         for mover, pose in zip(world.scene.movers, poses, strict=True):
-            if mover.kind != "door" and _escaped(simulation, pose):
+            if mover.group != "door" and _escaped(simulation, pose):
                 self.escapes[mover.name] = self.escapes.get(mover.name, 0) + 1
         self.memory_mb.append(reading_kb("VmRSS") * 1024.0 / 1e6)
 

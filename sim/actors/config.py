@@ -34,6 +34,15 @@ class DoorConfig(Settings):
     held_s: float = _fixed(0.5, "s", "it is kept open after someone asked")
     event_least_s: float = _fixed(3.0, "s", "an event lasts, at least")
     event_most_s: float = _fixed(9.0, "s", "an event lasts, at most")
+    slide_max: float = _fixed(0.7, "m/s", "a sliding door opens at this pace, at most")
+    slide_opened: float = _fixed(0.96, "share", "of its way: where it stands open")
+    slide_shut_m: float = _fixed(0.02, "m", "less open, a sliding door is shut")
+    slide_stopped_m: float = _fixed(0.10, "m", "more open than this and still: it met something")
+    slide_still_mps: float = _fixed(0.02, "m/s", "slower, its leaf is still")
+    slide_starts_s: float = _fixed(0.5, "s", "its leaf has to get going")
+    slide_held_s: float = _fixed(1.0, "s", "it is kept open after the last who asked")
+    lift_s: float = _fixed(3.5, "s", "from a call to the cabin's arrival")
+    lift_held_s: float = _fixed(3.0, "s", "a lift stands open at least")
 
 
 @dataclass(frozen=True, kw_only=True)

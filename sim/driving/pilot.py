@@ -40,10 +40,12 @@ class Pilot:
         self.world = world
         scene = world.scene
         config = config or TourConfig()
-        self._doors = np.array([m.kind == "door" for m in scene.movers], dtype=np.bool_)
-        self._closed = world.bodies.hinges([m.name for m in scene.movers if m.kind == "door"])[:, 2]
+        self._doors = np.array([m.group == "door" for m in scene.movers], dtype=np.bool_)
+        self._closed = world.bodies.hinges([m.name for m in scene.movers if m.group == "door"])[
+            :, 2
+        ]
         number = {"door": DOOR, "robot": ROBOT}
-        self._kinds = np.array([number.get(m.kind, BODY) for m in scene.movers], dtype=np.int64)
+        self._kinds = np.array([number.get(m.group, BODY) for m in scene.movers], dtype=np.int64)
         self._radii = np.array([m.radius for m in scene.movers], dtype=np.float64)
         halves = [kind_of(m.kind).half_length_m for m in scene.movers]
         self._halves = np.array(halves, dtype=np.float64)

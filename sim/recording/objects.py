@@ -47,7 +47,7 @@ class ObjectsMessage:
         marks, n = Marks(), len(shown)
         poses, colors = marks(7 * n).reshape(n, 7), marks(4 * n, np.float32).reshape(n, 4)
         self._heights = np.array([kind_of(mover.kind).height_m for mover in shown])
-        self._reach = np.array([0.5 * m.radius if m.kind == "door" else 0.0 for m in shown])
+        self._reach = np.array([0.5 * m.radius if m.group == "door" else 0.0 for m in shown])
         markers = [
             _marker(mover, row, pose, color)
             for mover, row, pose, color in zip(shown, self._rows, poses, colors, strict=True)
@@ -71,7 +71,7 @@ class ObjectsMessage:
 def _marker(mover: Mover, row: int, pose: Float, color: NDArray[np.float32]) -> object:
     x, y, z, qx, qy, qz, qw = pose.tolist()
     r, g, b, a = color.tolist()
-    door, height = mover.kind == "door", kind_of(mover.kind).height_m
+    door, height = mover.group == "door", kind_of(mover.kind).height_m
     wide, deep = (mover.radius, LEAF_M) if door else (2.0 * mover.radius, 2.0 * mover.radius)
     none = np.zeros(0, dtype=np.uint8)
     return message(

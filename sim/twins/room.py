@@ -63,7 +63,7 @@ class _Shapes:
 
     def __init__(self, world: World, path: Sequence[Float]) -> None:
         movers, radius = world.scene.movers, world.bodies.radius
-        doors = np.array([m.kind == "door" for m in movers], dtype=np.bool_)
+        doors = np.array([m.group == "door" for m in movers], dtype=np.bool_)
         self.rows = [k for k, m in enumerate(movers) if m.kind != "robot"]
         self.length = np.where(doors, radius, 0.0)
         self.radius = np.where(doors, LEAF_M, radius)

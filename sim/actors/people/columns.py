@@ -26,9 +26,10 @@ STANDS, WALKS, TO_SEAT, SEATED, FOLLOWS, QUEUES, TO_CHAIR = range(7)  # values o
 X, Y, R, U, V, KIND = range(6)
 PERSON, THING, ROBOT, CHAIR, LEAF = 0.0, 1.0, 2.0, 3.0, 10.0  # LEAF + d: of the leaf of door d
 
-# A door, (m, 8) float64: centre, normal to the side it swings to, along the leaf when closed,
-# width, angle.
-CX, CY, NX, NY, EX, EY, WIDTH, ANGLE = range(8)
+# A door, (m, 9) float64: centre, normal to the side it swings to, along the leaf when closed,
+# width, angle (of one that slides: rad that open a hinge as far), whether it slides (not 0).
+CX, CY, NX, NY, EX, EY, WIDTH, ANGLE, SLIDES = range(9)
+N_DOOR = 9
 
 # Its passage, (m, 3): whose turn (side +1, -1, 0 none), asked for, someone in it.
 TURN, ASKED, INSIDE = range(3)

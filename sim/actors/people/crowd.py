@@ -236,12 +236,22 @@ def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) ->
             crowd.yaws[row] = qpos[q + 2]
     for d in range(at.doors.shape[0]):
         q, v = at.doors[d]
-        x, y, closed, sign = at.hinges[d]
+        x, y, closed, sign, slides = at.hinges[d]
         ways.doors[d, columns.ANGLE] = qpos[q]
+        if slides != 0.0:
+            ways.doors[d, columns.ANGLE] = 0.5 * math.pi * qpos[q] / ways.doors[d, columns.WIDTH]
         c, s = math.cos(closed + sign * qpos[q]), math.sin(closed + sign * qpos[q])
         for part in range(3):
             row = k + 3 * d + part
             length = (0.35 + 0.3 * part) * ways.doors[d, columns.WIDTH]
+            if slides != 0.0:
+                along = length + slides * qpos[q]
+                discs[row, columns.X], discs[row, columns.Y] = x + along * c, y + along * s
+                discs[row, columns.U], discs[row, columns.V] = (
+                    slides * qvel[v] * c,
+                    slides * qvel[v] * s,
+                )
+                continue
             discs[row, columns.X], discs[row, columns.Y] = x + length * c, y + length * s
             discs[row, columns.U] = -length * s * sign * qvel[v]
             discs[row, columns.V] = length * c * sign * qvel[v]

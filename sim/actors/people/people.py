@@ -122,7 +122,8 @@ class People:
         state, task = self.crowd.state, self.crowd.task
         leaders = list(dict.fromkeys(r.leader for r in scene.roles.values() if r.leader))
         self._cleaners = [name for name in self.names if _role(scene, name).does == "clean"]
-        goals, lines = list(scene.goals), []
+        goals = list(scene.goals)
+        lines: list[tuple[float, float, float]] = []
         for i, name in enumerate(self.names):
             role = _role(scene, name)
             state[i, [columns.STAYS, columns.SLOW]] = role.stay, role.slow
@@ -198,15 +199,16 @@ class People:
 
 def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:
     m = len(doors.names)
-    table = np.zeros((m, 8))
+    table = np.zeros((m, columns.N_DOOR))
     table[:, [columns.CX, columns.CY]] = doors.middles
     table[:, [columns.EX, columns.EY]] = doors.along
-    sign = doors.hinges[:, 3]
+    sign = np.where(doors.hinges[:, 4] != 0.0, 1.0, doors.hinges[:, 3])
     table[:, columns.NX], table[:, columns.NY] = (
         -sign * doors.along[:, 1],
         sign * doors.along[:, 0],
     )
     table[:, columns.WIDTH] = doors.widths
+    table[:, columns.SLIDES] = doors.hinges[:, 4]
     sides = np.zeros((n_people, m), dtype=np.int64)
     return right_of_way.Doors(doors=table, passage=doors.passage, sides=sides)
 
