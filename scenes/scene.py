@@ -63,6 +63,8 @@ class Scene:
                  count
     start        the robot's pose at reset, equal to ``initial["robot"]``
     scan_height_m  of the robot's scanner above the floor; ``scenes.at_scan_height`` changes it
+    places       (kind, pose) of the plan's seats and spots, whether taken or not, and ("opening",
+                 pose) of each doorway without a door
     """
 
     name: str
@@ -78,6 +80,7 @@ class Scene:
     start: Pose
     options: Mapping[str, object] = field(default_factory=dict)
     scan_height_m: float = SCAN_HEIGHT
+    places: tuple[tuple[str, Pose], ...] = ()
 
     @cached_property
     def static_map(self) -> Raster:

@@ -20,17 +20,19 @@ from sim.actors.castors import checked_level, stand_on_castors
 from sim.actors.chairs import pushers, tables
 from sim.actors.doors import Doors
 from sim.actors.people.people import People
+from sim.actors.rearranging import Rearrangement, Rearranging
 from sim.actors.robot import Drive, DriveConfig
 from sim.core import state
 from sim.core.bodies import Bodies
-from sim.core.checks import instance
+from sim.core.checks import instance, number
 from sim.core.contacts import Contact, RobotContacts
 from sim.core.dynamism import Dynamism
 from sim.core.engine import engine
 from sim.core.seeds import Seeds
-from sim.world import substeps
+from sim.world import sessions, substeps
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from slam.errors import InvalidValueError
+from slam.frames import LaserSpec
 
 __all__ = ["SUBSTEPS_PER_S", "SUBSTEPS_PER_TICK", "World"]
 
@@ -45,6 +47,10 @@ class World:
     seed      whole number or ``Seeds``
     dynamism  number in [0, 1] (see ``sim.core.dynamism``), or the rates themselves
     moving_share  in [0, 1]: keep that share of chairs and loads on the move, instead of shoves
+    change    in [0, 1]: of the things out of sight, the share that is found elsewhere when the
+              robot sees them again (``sim.actors.rearranging``)
+    session   number of a session of the same building (``sim.world.sessions``): then ``change`` is
+              the share of what stands elsewhere than in the session before
     drive     limits of the robot
     start     (x m, y m, heading rad) of the robot instead of the scene's
     chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.castors``)
@@ -61,6 +67,8 @@ class World:
         seed: int | Seeds = 0,
         dynamism: float | Dynamism = 0.5,
         moving_share: float | None = None,
+        change: float = 0.0,
+        session: int | None = None,
         drive: DriveConfig | None = None,
         start: Sequence[float] | None = None,
         chairs: str = "planar",
@@ -68,6 +76,10 @@ class World:
     ) -> None:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
         self.rates = Dynamism.of(dynamism, moving_share)
+        if session is not None:
+            self.rates = sessions.slowed(self.rates, sessions.time_of(session).motion)
+            scene, self.seeds = sessions.opened(scene, self.seeds, change, session, options)
+            options, change = {}, 0.0
         built = self._built(scene, options)
         self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
         self.model: mujoco.MjModel = self.scene.compile()
@@ -96,6 +108,7 @@ class World:
             counters=self._counters("people"),
         )
         self._people_rows = self.bodies.rows(self.people.names)
+        self._rearranging = self._rearranger(change)
         self.scene.place(self.model, self.data)
         if start is not None:
             self.bodies.place_robot(self.data, start)
@@ -137,6 +150,38 @@ class World:
             self.people.table, self._doors.leaves, shoved, rolled, self._pinned
         )
         return substeps.plain((self._clock, engine(self.model, data), robot, physics, actors))
+
+    def _rearranger(self, change: float) -> Rearranging | None:
+        number("change", change)
+        if not 0.0 <= change <= 1.0:
+            raise InvalidValueError(f"change must lie in [0, 1], got {change!r}")
+        if change == 0.0 or self.bodies.robot is None:
+            return None
+        counters = self._counters("change")
+        return Rearranging(self.model, self.scene, self.bodies, share=change, counters=counters)
+
+    @property
+    def change(self) -> float:
+        """The share of what is out of sight that is put elsewhere."""
+        return 0.0 if self._rearranging is None else self._rearranging.share
+
+    def rearrange(self, spec: LaserSpec) -> list[Rearrangement]:
+        """Between two scans, at given moments: change what that scanner cannot see now."""
+        if self._rearranging is None or not self._rearranging.due(self.time_ns * 1e-9):
+            return []
+        poses, busy = self.mover_poses(), np.zeros(len(self.mover_names), dtype=np.bool_)
+        busy[self.people.seats_taken(self.bodies)] = True
+        busy |= self.bodies.any_at(self._pinned.at)
+        done = self._rearranging.rearrange(self.time_ns * 1e-9, spec, poses, busy)
+        rows = sorted({self.mover_names.index(event.name) for event in done})
+        if rows:
+            self.bodies.put(self.data, rows, poses[rows])
+        return done
+
+    def saw(self, hit: NDArray[np.int32]) -> None:
+        """Take in which bodies a scan has hit: ``rearrange`` changes only what was seen."""
+        if self._rearranging is not None:
+            self._rearranging.saw(hit)
 
     def pin(self, pinned: substeps.Pinned) -> None:
         """Hold things at a place from now on, and bring all poses up to date."""
@@ -236,6 +281,8 @@ class World:
         arrays: dict[str, NDArray[Any]] = {"drive": self._drive.state}
         parts = {kind: shoves.arrays() for kind, shoves in self._shoves.items()}
         parts |= {"doors": self._doors.arrays(), "people": self.people.arrays()}
+        if self._rearranging is not None:
+            parts["change"] = self._rearranging.arrays()
         for owner, own in parts.items():
             arrays |= {f"{owner}.{name}": a for name, a in own.items()}
         return arrays

@@ -23,7 +23,8 @@ SPEC = LaserSpec(n_beams=2, angle_min=0.0, angle_increment=0.1)
 def watch() -> EventWatch:
     movers = [SimpleNamespace(name=n, kind=k, radius=r) for n, k, r in MOVERS]
     bodies = SimpleNamespace(mover_of_body=np.array([-1, 0, 1, 2, 3]))
-    world: Any = SimpleNamespace(scene=SimpleNamespace(movers=movers), bodies=bodies)
+    scene = SimpleNamespace(movers=movers, bounds=(0.0, 0.0, 9.0, 9.0))
+    world: Any = SimpleNamespace(scene=scene, bodies=bodies, change=0.0)
     return EventWatch(world)
 
 

@@ -135,6 +135,12 @@ class People:
             physics, mocap = (data.qpos, data.qvel), (data.mocap_pos, data.mocap_quat)
             gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.sitting, mocap)
 
+    def seats_taken(self, bodies: Bodies) -> NDArray[np.int64]:
+        """Rows of the movers that somebody sits on, or goes to sit on."""
+        seats = self.crowd.task[:, columns.SEAT]
+        names = _planar(bodies, self.names)
+        return bodies.rows([names[k] for k in seats[seats >= 0].tolist()])
+
     def swinging(self) -> NDArray[np.bool_]:
         """(n,) True for those with a foot in the air."""
         return self.feet[:, gait.SWING] >= 0.0
