@@ -29,7 +29,7 @@ AT_WALL_M = 0.35  # m from a hull to the furniture or wall that it stands at, at
 ROW_M = 0.08  # m between two hulls in a row
 DOORWAY_M, GOAL_M, START_M = 0.65, 0.45, 0.7  # m kept clear, as in ``scenes.recipe``
 WAY_M = 0.36  # m kept clear either side of a way: the robot's hull and 0.1 m
-WIDE_RAD = 1.25  # rad, a leaf that counts as open
+SWING_RAD = (0.6, 0.9, 1.25, 1.5, 1.75)  # rad, where the leaf of a door may rest
 LEAF_M = 0.025  # m, half thickness of a leaf
 TIGHT_M = 0.6  # m, ways keep that far from walls where they can
 SEAT_BACK = ((0.0, 0.0), (0.12, 0.35), (0.25, -0.4))  # m a chair is pulled out, rad it is turned
@@ -71,7 +71,7 @@ def fits(x: float, y: float, radius: float, own: int, discs: Float, boxes: Float
 class Places:
     """Where each kind of thing may stand in one scene.
 
-    boxes    (n, 5) walls, furniture, and doors' leaves wide open
+    boxes    (n, 5) walls, furniture, and doors' leaves wherever they may rest
     kept     (k, 3) discs x, y, radius m that stay clear
     way      (w, 2) points of the ways between start and goals, m
     """
@@ -79,7 +79,7 @@ class Places:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         doors = [(scene.initial[m.name], m.radius) for m in scene.movers if m.kind == "door"]
-        self.boxes: Float = np.vstack([scene.obstacles.reshape(-1, 5), open_leaves(scene)])
+        self.boxes: Float = np.vstack([scene.obstacles.reshape(-1, 5), resting_leaves(scene)])
         self.kept = _kept(scene, doors)
         xmin, ymin, xmax, ymax = (float(b) for b in scene.bounds)
         goals = np.array([scene.start[:2], *scene.goals.values()], dtype=np.float64)
@@ -192,18 +192,23 @@ def places_of(scene: Scene) -> Places:
     return _by_content(_Key(scene))
 
 
-def open_leaves(scene: Scene) -> Float:
-    """(n, 5) the leaves of all doors as boxes, wide open to either side."""
+def resting_leaves(scene: Scene) -> Float:
+    """(n, 5) the leaves of all doors as boxes, at each angle at which they may rest."""
     rows = []
     for mover in scene.movers:
         if mover.kind != "door":
             continue
         x, y, yaw = scene.initial[mover.name]
-        half = 0.5 * mover.radius
-        for turn in (WIDE_RAD, -WIDE_RAD):
-            a = yaw + turn
+        half, sign = 0.5 * mover.radius, opens_to(scene, mover.name)
+        for turn in SWING_RAD:
+            a = yaw + sign * turn
             rows.append((x + half * math.cos(a), y + half * math.sin(a), half, LEAF_M, a))
     return np.array(rows, dtype=np.float64).reshape(-1, 5)
+
+
+def opens_to(scene: Scene, door: str) -> float:
+    """1 for a door that opens counter-clockwise, -1 for one that opens clockwise."""
+    return math.copysign(1.0, float(scene.spec.joint(f"{door}/hinge").axis[2]))
 
 
 def _kept(scene: Scene, doors: Sequence[tuple[Pose, float]]) -> Float:

@@ -215,6 +215,10 @@ def check_dataset(path: Path) -> list[Finding]:
             sorted({name.partition("/")[0] for name in listed} - {PLAN, *FILES})
         )
         files = (PLAN, *(name for name in FILES if name in listed))
+    for name in files:
+        if name != PLAN and not os.path.lexists(path / name):
+            why = f"{path / name} is missing: 'mobilia generate' as before writes it anew"
+            found.append(Fault(kind="incomplete", name=name, why=why))
     episodes = [check_hashes(path / name, recipe) for name, recipe in planned.items()]
     if listed:
         found += _against(path, listed, files, episodes)

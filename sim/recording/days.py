@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenes import build
+from scenes.arrangement import opens_to
 from scenes.scene import Pose, Scene
 from sim.core.seeds import Seeds
 from sim.recording.recipe import Recipe
@@ -97,8 +98,7 @@ def _poses(scene: Scene, arrangement: Arrangement) -> dict[str, Pose | None]:
     poses = dict(arrangement.poses)
     for name, angle in arrangement.angles.items():
         x, y, closed = scene.initial[name]
-        sign = math.copysign(1.0, float(scene.spec.joint(f"{name}/hinge").axis[2]))
-        poses[name] = (x, y, math.remainder(closed + sign * angle, math.tau))
+        poses[name] = (x, y, math.remainder(closed + opens_to(scene, name) * angle, math.tau))
     return poses
 
 

@@ -86,7 +86,7 @@ DAY = (
 
 def time_of(session: int) -> TimeOfDay:
     """The time of day of a session: they go round."""
-    return DAY[session % len(DAY)]
+    return DAY[checked(session) % len(DAY)]
 
 
 @dataclass(frozen=True, kw_only=True)
