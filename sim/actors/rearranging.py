@@ -151,6 +151,11 @@ class Rearranging:
         """The live arrays that are the state."""
         return {"marks": self.marks, "moment": self.moment}
 
+    def seen(self) -> NDArray[np.bool_]:
+        """(n,) whether each mover was seen since it was last drawn."""
+        since: NDArray[np.bool_] = self.marks[:, SEEN] == 1
+        return since
+
     def due(self, time_s: float) -> bool:
         """Whether a new moment has come; call it before each scan."""
         now = int(time_s / PERIOD_S)

@@ -24,6 +24,7 @@ _D = ACTORS.driver
 SIGHT_M, AJAR, REPLAN_S, DECIDE_S = _D.sight_m, _D.ajar_rad, _D.replan_s, _D.decide_s
 LEAF_DISCS, LEAF_M = _D.leaf_discs, _D.leaf_m
 BODY, DOOR, ROBOT = 0, 1, 2
+LEAP_MPS = 10.0  # m/s; what is faster was put there by hand (``sim.actors.rearranging``)
 
 
 class Pilot:
@@ -138,6 +139,8 @@ def _surroundings(  # noqa: PLR0913 (kernel)
                 radius = LEAF_M
             else:
                 vx, vy = (x - before[k, 0]) / dt, (y - before[k, 1]) / dt
+                if vx * vx + vy * vy > LEAP_MPS * LEAP_MPS:
+                    vx, vy = 0.0, 0.0
             dx, dy = x - here[0], y - here[1]
             if dx * dx + dy * dy < sight * sight:
                 discs[count, 0], discs[count, 1], discs[count, 2] = x, y, radius
