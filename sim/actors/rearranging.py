@@ -37,7 +37,7 @@ ELSEWHERE_M = 0.5  # m, a thing moved by less does not stand elsewhere
 REMOVED, SWAPPED = 0.12, 0.12  # of the things rearranged: taken out, exchanged where two are drawn
 BACK = 0.5  # of what is out, brought in at a moment
 SORTS = (0.45, 0.2, 0.35)  # of the places tried: seats and spots, rows, floor at a wall
-TRIES = 60
+TRIES, EACH = 80, 20  # places tried, and of one sort in a row
 UNMOVED = ("person", "door", "robot")  # groups that are not rearranged
 _STRIDE = np.uint64(0xA24BAED4963EE407)  # sets the moments of one thing apart
 SEEN, OUT, PARKED = range(3)  # columns of the marks
@@ -90,10 +90,12 @@ def find_place(  # noqa: PLR0913 (kernel)
     around  discs of all movers and boxes
     """
     own, x, y, radius = thing
-    for _ in range(TRIES):
-        luck, sort = uniform(draws, 0), 0
-        while sort < 2 and luck >= sorts[sort]:
-            luck, sort = luck - sorts[sort], sort + 1
+    sort = 0
+    for attempt in range(TRIES):
+        if attempt % EACH == 0 or sort == IN_ROW:  # a row was looked along to its end
+            luck, sort = uniform(draws, 0), 0
+            while sort < 2 and luck >= sorts[sort]:
+                luck, sort = luck - sorts[sort], sort + 1
         first, n = places.first[sort], places.first[sort + 1] - places.first[sort]
         pick = start if sort == IN_ROW else uniform(draws, 0)
         # In a row the next free place is taken, elsewhere another one is drawn.
