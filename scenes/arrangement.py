@@ -91,11 +91,11 @@ class Places:
     def of(self, mover: Mover) -> Candidates:
         """Places for a thing."""
         if mover.kind not in self._known:
-            parts = [
-                self._marked(mover),
-                self._rows(mover.radius),
-                self._at_walls(mover.radius),
-            ]
+            long = mover.group not in ("chair", "bin")
+            rows, walls = self._rows(mover.radius), self._at_walls(mover.radius, long=long)
+            if long:  # its long side to the wall
+                rows[:, 2] += 0.5 * math.pi
+            parts = [self._marked(mover), rows, walls]
             first = np.cumsum([0, *map(len, parts)]).astype(np.int64)
             self._known[mover.kind] = Candidates(np.vstack(parts), first)
         return self._known[mover.kind]
@@ -144,8 +144,8 @@ class Places:
         gap = gap_to_boxes(np.ascontiguousarray(rows[:, :2]), self.boxes)
         return np.ascontiguousarray(rows[gap < radius + 0.15])
 
-    def _at_walls(self, radius: float) -> Float:
-        """Free floor near furniture or a wall, facing away from the room's middle."""
+    def _at_walls(self, radius: float, *, long: bool) -> Float:
+        """Free floor near furniture or a wall; what is ``long`` stands along it."""
         points = self._floor
         if not len(points):
             return np.zeros((0, 3))
@@ -153,7 +153,20 @@ class Places:
         near = points[(gap >= radius + MARGIN_M) & (gap < radius + AT_WALL_M)]
         # every heading alike often: by the golden angle
         yaw = np.remainder(np.arange(len(near)) * 2.399963229728653, math.tau) - math.pi
+        if long:
+            east, north = (self._slope(near, axis) for axis in (0, 1))
+            yaw = np.array([math.atan2(e, -n) for e, n in zip(east, north, strict=True)])
         return self._clear(np.column_stack([near, yaw]), radius, ways=True)
+
+    def _slope(self, points: Float, axis: int) -> list[float]:
+        """How fast the gap to what stands still grows along x or y."""
+        step = np.eye(2)[axis] * 0.5 * CELL_M
+        ahead, behind = (
+            gap_to_boxes(points + step, self.boxes),
+            gap_to_boxes(points - step, self.boxes),
+        )
+        slopes: list[float] = (ahead - behind).tolist()
+        return slopes
 
     def _nodes(self) -> Float:
         """(n, 2) nodes of the floor of all rooms, m."""
