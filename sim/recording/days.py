@@ -110,7 +110,8 @@ def differences(known: Sequence[Thing]) -> Iterator[Difference]:
     for first in sorted(sessions):
         for second in sorted(s for s in sessions if s > first):
             for name, thing in sessions[first].items():
-                before, after = thing.pose, sessions[second][name].pose
+                later = sessions[second].get(name)
+                before, after = thing.pose, None if later is None else later.pose
                 if before is None and after is None:
                     continue
                 yield Difference(

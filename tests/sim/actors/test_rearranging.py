@@ -145,10 +145,14 @@ def test_what_is_taken_out_is_met_by_nothing_and_comes_back(monkeypatch):
     simulation = made("arena", 2, 1.0)
     world, words = simulation.world, []
     for _ in carried(simulation, 25, 2):
+        before = world.mover_poses()
         labels = simulation.observe().labels
         assert labels is not None
         words += [event.change for event in simulation.rearranged]
         poses, hit = world.mover_poses(), world.bodies.mover_of_body[labels.body]
+        for event in simulation.rearranged:
+            before[world.mover_names.index(event.name)] = event.after
+        assert np.array_equal(before[:-1], poses[:-1])  # all else rests, but the robot
         seen = set(hit[labels.body >= 0].tolist())
         out = {k for k in range(len(poses)) if is_out(poses[k], world.scene.bounds)}
         assert not seen & out
