@@ -18,7 +18,7 @@ from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
 from sim.recording.verify import Finding, check_hashes, finding, listed_in
 from sim.twins.twins import TWINS
-from sim.world.sessions import MOST_SESSIONS
+from sim.world.times_of_day import MOST_SESSIONS
 from slam import locks
 from slam.bounded import check_file
 from slam.errors import InvalidValueError, LogFormatError, OutputError

@@ -23,7 +23,8 @@ from scenes.arrangement import opens_to
 from scenes.scene import Pose, Scene
 from sim.core.seeds import Seeds
 from sim.recording.recipe import Recipe
-from sim.world.sessions import Arrangement, Days, time_of
+from sim.world.sessions import Arrangement, Days
+from sim.world.times_of_day import time_of
 from slam.bounded import check_file
 from slam.errors import LogFormatError
 from slam.files import write_text

@@ -25,7 +25,7 @@ from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from sim.sensors.odometry.config import PRESETS
 from sim.simulation import Simulation
 from sim.twins.twins import TWINS
-from sim.world.sessions import checked
+from sim.world.times_of_day import checked
 from sim.world.world import World
 from slam.bounded import check_file
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError

@@ -31,6 +31,7 @@ from sim.core.engine import engine
 from sim.core.seeds import Seeds
 from sim.world import sessions, substeps
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
+from sim.world.times_of_day import time_of
 from slam.errors import InvalidValueError
 from slam.frames import LaserSpec
 
@@ -77,7 +78,7 @@ class World:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
         self.rates = Dynamism.of(dynamism, moving_share)
         if session is not None:
-            self.rates = sessions.slowed(self.rates, sessions.time_of(session).motion)
+            self.rates = sessions.slowed(self.rates, time_of(session).motion)
             scene, self.seeds = sessions.opened(scene, self.seeds, change, session, options)
             options, change = {}, 0.0
         built = self._built(scene, options)

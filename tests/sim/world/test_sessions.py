@@ -13,7 +13,8 @@ from scenes import build
 from sim.actors.rearranging import is_movable, is_out
 from sim.core.seeds import Seeds
 from sim.simulation import Simulation
-from sim.world.sessions import DAY, MOST_SESSIONS, Days, seeds_of, time_of
+from sim.world.sessions import Days, seeds_of
+from sim.world.times_of_day import DAY, MOST_SESSIONS, time_of
 from sim.world.world import World
 from slam.errors import InvalidValueError
 
