@@ -29,7 +29,7 @@ from scripts.verbs.reproduce import reproduce
 from scripts.verbs.run import run
 from scripts.verbs.sensor_card import sensor_card
 from scripts.verbs.verify import verify
-from slam.errors import MobiliaError
+from slam.errors import MissingPathError, MobiliaError
 from slam.names import load, look_in
 
 _log = logging.getLogger(__name__)
@@ -96,7 +96,7 @@ def main(warning: str | None = None) -> None:
     except MobiliaError as error:
         fail(str(error))
         _log.info("where it came from:", exc_info=error)  # with --verbose
-        sys.exit(1)
+        sys.exit(2 if isinstance(error, MissingPathError) else 1)
     except interrupt.InterruptedBySignal:
         fail("interrupted: nothing half-written is left behind")
         sys.exit(130)

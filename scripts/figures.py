@@ -87,13 +87,18 @@ def trajectories(
     save(figure, path)
 
 
-def draw_raster(ax: Axes, raster: Raster) -> None:
-    """A raster as grey values under a plot (axis-aligned origins only, as all of ours are)."""
+def _extent(raster: Raster) -> tuple[float, float, float, float]:
+    """xmin, xmax, ymin, ymax m (axis-aligned origins only, as all of ours are)."""
     height, width = raster.values.shape
-    x, y, _ = raster.T_map_origin
-    extent = (x, x + width * raster.resolution_m, y, y + height * raster.resolution_m)
-    ax.imshow(np.nan_to_num(raster.values), origin="lower", extent=extent, cmap="Greys",
-              vmin=0.0, vmax=1.0, interpolation="antialiased")  # fmt: skip
+    x, y, _ = raster.T_map_origin.tolist()
+    return x, x + width * raster.resolution_m, y, y + height * raster.resolution_m
+
+
+def draw_raster(ax: Axes, raster: Raster, **look: Any) -> None:
+    """A raster as grey values under a plot."""
+    look = {"vmax": 1.0, "interpolation": "antialiased", **look}
+    ax.imshow(np.nan_to_num(raster.values), origin="lower", extent=_extent(raster), cmap="Greys",
+              vmin=0.0, **look)  # fmt: skip
 
 
 @styled()
@@ -135,49 +140,46 @@ def in_first_frame(truth: Trajectory) -> Trajectory:
     )
 
 
-@styled()
-def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float) -> None:
-    """The map in the paper's style (Fig. 13): activities coloured, last scan blue, path black."""
+@contextmanager
+def _over_map(path: Path, raster: Raster, track: Trajectory, title: str) -> Iterator[Axes]:
+    """Axes to draw the map on, of its shape; the trajectory comes over it, then it is saved."""
     height, width = raster.values.shape
     figure, axes = _axes(min(11.0, max(5.0, 5.5 * width / height + 2.0)), 6.5)
     ax: Axes = axes[0]
     ax.grid(visible=False)
-    x, y, _ = raster.T_map_origin
-    extent = (x, x + width * raster.resolution_m, y, y + height * raster.resolution_m)
-    faint = np.where(raster.values > 0.02, raster.values, np.nan)
-    colors = mpl.colormaps["YlOrRd"].with_extremes(bad="#fafaf8")
-    image = ax.imshow(faint, origin="lower", extent=extent, cmap=colors, vmin=0.0, vmax=1.0,
-                      interpolation="nearest")  # fmt: skip
-    ax.plot(points_map[:, 0], points_map[:, 1], ".", color="#1f61be", ms=1.5, label="last scan")
+    yield ax
     ax.plot(track.poses[:, 0], track.poses[:, 1], "k-", lw=0.9, label="trajectory")
-    ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title="Activities of the map")
-    figure.colorbar(image, ax=ax, shrink=0.6, label="activity")
+    ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title=title)
     ax.legend(loc="upper left", frameon=False)
     save(figure, path)
+
+
+def _coloured(ax: Axes, raster: Raster, values: Float, cmap: Any, label: str, pad: float) -> None:
+    """What is no NaN in colours, with their bar."""
+    image = ax.imshow(values, origin="lower", extent=_extent(raster), cmap=cmap, vmin=0.0,
+                      vmax=1.0, interpolation="nearest")  # fmt: skip
+    ax.figure.colorbar(image, ax=ax, shrink=0.6, pad=pad, label=label)
+
+
+@styled()
+def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float) -> None:
+    """The map in the paper's style (Fig. 13): activities coloured, last scan blue, path black."""
+    faint = np.where(raster.values > 0.02, raster.values, np.nan)
+    colors = mpl.colormaps["YlOrRd"].with_extremes(bad="#fafaf8")
+    with _over_map(path, raster, track, "Activities of the map") as ax:
+        _coloured(ax, raster, faint, colors, "activity", 0.05)
+        ax.plot(points_map[:, 0], points_map[:, 1], ".", color="#1f61be", ms=1.5, label="last scan")
 
 
 @styled()
 def changes_picture(path: Path, raster: Raster, changes: Changes, track: Trajectory) -> None:
     """Recent changes over the present map: appeared green, gone red, the rest grey."""
-    height, width = raster.values.shape
-    figure, axes = _axes(min(11.0, max(5.0, 5.5 * width / height + 2.0)), 6.5)
-    ax: Axes = axes[0]
-    ax.grid(visible=False)
-    ax.set_facecolor("#fafaf8")
-    x, y, _ = raster.T_map_origin
-    extent = (x, x + width * raster.resolution_m, y, y + height * raster.resolution_m)
-    ax.imshow(np.nan_to_num(raster.values), origin="lower", extent=extent, cmap="Greys", vmin=0.0,
-              vmax=2.0, interpolation="nearest")  # fmt: skip
-    for layer, cmap, label in (
-        (changes.gone, "Reds", "gone: in long-term memory, seen empty"),
-        (changes.appeared, "Greens", "new: not (yet) in long-term memory"),
-    ):
-        thick = maximum_filter(np.nan_to_num(layer.values), size=3)  # a chair's leg is two cells
-        clear = np.where(thick > CHANGED, thick, np.nan)
-        image = ax.imshow(clear, origin="lower", extent=extent, cmap=cmap, vmin=0.0, vmax=1.0,
-                          interpolation="nearest")  # fmt: skip
-        figure.colorbar(image, ax=ax, shrink=0.6, pad=0.02, label=label)
-    ax.plot(track.poses[:, 0], track.poses[:, 1], "k-", lw=0.9, label="trajectory")
-    ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title="Recent changes of the map")
-    ax.legend(loc="upper left", frameon=False)
-    save(figure, path)
+    with _over_map(path, raster, track, "Recent changes of the map") as ax:
+        ax.set_facecolor("#fafaf8")
+        draw_raster(ax, raster, vmax=2.0, interpolation="nearest")
+        for layer, cmap, label in (
+            (changes.gone, "Reds", "gone: in long-term memory, seen empty"),
+            (changes.appeared, "Greens", "new: not (yet) in long-term memory"),
+        ):
+            thick = maximum_filter(np.nan_to_num(layer.values), size=3)  # a chair's leg: two cells
+            _coloured(ax, raster, np.where(thick > CHANGED, thick, np.nan), cmap, label, 0.02)

@@ -9,8 +9,10 @@ all of the line for HTML.
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 from slam.errors import InvalidValueError
+from slam.files import write_text
 
 _BEGIN = re.compile(r"<!-- ([\w.-]+) -->")
 
@@ -34,6 +36,11 @@ def filled(text: str, name: str, told: str, page: object) -> str:
     if "\n" in told:
         raise InvalidValueError(f"{page}: {begin} must stand on a line of its own for {told!r}")
     return f"{before}{told}{after}"
+
+
+def fill_page(page: Path, name: str, told: str) -> None:
+    """Write ``told`` at the place ``name`` of a page that is there, the rest as it is."""
+    write_text(page, filled(page.read_text(encoding="utf-8"), name, told, page))
 
 
 def without(text: str) -> str:

@@ -10,6 +10,7 @@ from scenes import registry
 from slam import system
 
 RUNS = "runs"  # of a comparison: the folder of its runs
+DATASET = "dataset.json"  # the plan that ``generate`` writes (``sim.recording.dataset``)
 # Endings of logs, which are no part of their names.
 LOGS = (".gz", ".xz", ".log", ".clf", ".txt", ".mat", ".bag", ".mcap", ".db3", ".npz")
 
@@ -34,11 +35,13 @@ def is_run(path: Path) -> bool:
 def run_name(path: Path) -> str:
     """What outputs about the run, episode or log at ``path`` are called.
 
-    A folder's name is whole (``office-d0.5-s0001``); a file's is without the endings of logs.
+    A folder's name is whole, after that of its dataset (``data-office-d0.5-s0001``); a file's is
+    without the endings of logs.
     """
     path = path.resolve()
     if path.is_dir():
-        return path.name
+        of_dataset = (path.parent / DATASET).exists()
+        return f"{path.parent.name}-{path.name}" if of_dataset else path.name
     while path.suffix.lower() in LOGS:
         path = path.with_suffix("")
     return path.name

@@ -50,11 +50,7 @@ MAX_RECIPE_BYTES = 1 << 20
 
 @contextmanager
 def whole_folder(
-    path: Path,
-    *,
-    overwrite: bool,
-    command: str = "",
-    settings: Mapping[str, Any] | None = None,
+    path: Path, *, overwrite: bool, command: str = "", settings: Mapping[str, Any] | None = None
 ) -> Iterator[Path]:
     """Yield a temporary folder beside ``path``; it takes the name ``path`` when the block succeeds.
 

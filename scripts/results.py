@@ -17,7 +17,7 @@ from sim.recording.dataset import PLAN, check_dataset
 from sim.recording.sums import SUMS, Fault, check_vouched, faults
 from sim.recording.verify import METADATA, Finding, check_hashes, finding, listed_in
 from slam.bounded import check_file
-from slam.errors import LogFormatError
+from slam.errors import LogFormatError, MissingPathError
 from slam.maps import has_sums, read_map
 from slam.tracker import map_file as memory
 
@@ -35,11 +35,12 @@ _ALWAYS = {
 def check(path: Path) -> list[Finding]:
     """One finding for each result at ``path``: for a dataset itself and for each of its episodes.
 
-    Raises ``LogFormatError`` when nothing is there that a verb of ours leaves.
+    Raises ``MissingPathError`` when nothing is there, ``LogFormatError`` when nothing that a verb
+    of ours leaves.
     """
     try:
         if not path.exists():
-            raise LogFormatError(path, "no such file or folder")
+            raise MissingPathError(path, "no such file or folder")
         if not path.is_dir():
             return [_check_file(path)]
         way = _way(path)

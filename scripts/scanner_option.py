@@ -14,7 +14,7 @@ Scanner = Annotated[
     typer.Option(
         help="Which scanner, and which of its errors: utm30lx, tim561:noise, "
         "'scanner(fov_deg=270,beams=541,rate_hz=20,sigma_m=0.01)'; full, noise (statistical only) "
-        "and ideal are the LMS-221's.",
+        "and ideal are the LMS-221's."
     ),
 ]
 

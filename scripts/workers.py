@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 import joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
+from scripts.checked import whole
 from slam import locks
 from slam.errors import InvalidValueError, MissingDependencyError, MobiliaError, OutputError
 from slam.files import write_text
@@ -98,8 +99,7 @@ def each(
 
 def check_jobs(jobs: int) -> None:
     """``InvalidValueError`` for a number of processes that cannot be."""
-    if isinstance(jobs, bool) or not 1 <= jobs <= MAX_JOBS:
-        raise InvalidValueError(f"--jobs must be 1 to {MAX_JOBS}, got {jobs}")
+    whole("--jobs", jobs, 1, MAX_JOBS)
 
 
 def _guarded(

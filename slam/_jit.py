@@ -18,6 +18,7 @@ import logging
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
 
 # isort: off
@@ -89,10 +90,18 @@ def _watch_callees(dispatcher: Any, function: Any) -> None:
 
 
 def _constants(function: Any) -> set[str]:
-    """The module constants that a kernel names, with their values."""
-    found = ((name, function.__globals__.get(name)) for name in function.__code__.co_names)
-    module = function.__module__
-    return {f"{module}.{k} = {v!r}" for k, v in found if isinstance(v, int | float | str | tuple)}
+    """The constants that a kernel names, with their values: its module's, and ``columns.SPEED``."""
+    names, own = function.__code__.co_names, function.__globals__
+    spaces = {function.__module__: own}
+    for value in map(own.get, names):
+        if isinstance(value, ModuleType):
+            spaces[value.__name__] = vars(value)
+    return {
+        f"{module}.{name} = {space[name]!r}"
+        for module, space in spaces.items()
+        for name in names
+        if isinstance(space.get(name), int | float | str | tuple)
+    }
 
 
 def _save(index: Any, key: Any, data: Any) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,16 @@ from slam.errors import InvalidValueError, NotFiniteError
 
 Float = NDArray[np.float64]
 MOST_NS = 2**63 - 1  # of a stamp, either way; Unix times reach it in the year 2262
+
+
+def is_number(value: object, kinds: tuple[type, ...] = (int, float)) -> TypeGuard[float]:
+    """Whether a value is a number of one of these types; True and False are none."""
+    return isinstance(value, kinds) and not isinstance(value, bool)
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Whether a value is a whole number, of Python or NumPy; True and False are none."""
+    return is_number(value, (int, np.integer))
 
 
 def frozen(
@@ -110,7 +120,7 @@ def covariance(owner: str, name: str, value: ArrayLike) -> Float:
 
 def stamp(owner: str, value: object) -> int:
     """A whole number of nanoseconds that 64 bits hold; ``InvalidValueError`` for anything else."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+    if not is_whole(value):
         raise InvalidValueError(
             f"{owner}.stamp_ns must be an integer number of nanoseconds, got {value!r}"
         )

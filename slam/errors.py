@@ -47,6 +47,10 @@ class LogFormatError(MobiliaError):
         return type(self), (str(self.path), self.message, self.line)
 
 
+class MissingPathError(LogFormatError):
+    """A file or folder that was named is not there; ``verify`` ends with status 2, as for usage."""
+
+
 FAILURES = ("raised", "hung", "nan", "bad")
 
 

@@ -17,7 +17,7 @@ from slam.frames import Float
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Estimate:
-    """Where a SLAM believes the robot is.
+    """Where the robot is, as a SLAM estimates it.
 
     stamp_ns     the frame's stamp
     T_map_robot  (3,) m, m, rad; the map frame is the robot's frame at the first update

@@ -215,7 +215,7 @@ def remove(path: Path) -> None:
 def reason(error: OSError, folder: Path) -> str:
     """In words, why something could not be written in ``folder``.
 
-    A full disk is told as one, whatever a library or a broken pipe made of it.
+    A full disk is reported as one, whatever a library or a broken pipe made of it.
     """
     chain = _chain(error)
     if is_full(error, folder):

@@ -23,6 +23,8 @@ from slam.checked import (
     covariance,
     finite,
     frozen,
+    is_number,
+    is_whole,
     pose,
     possible,
     stamp,
@@ -104,15 +106,14 @@ class LaserSpec(ByContent):
         object.__setattr__(self, "_angles", angles)
 
     def _check_angles(self) -> None:
-        whole = isinstance(self.n_beams, (int, np.integer)) and not isinstance(self.n_beams, bool)
-        if not whole or not 1 <= self.n_beams <= MOST_BEAMS:
+        if not is_whole(self.n_beams) or not 1 <= self.n_beams <= MOST_BEAMS:
             raise InvalidValueError(
                 f"LaserSpec.n_beams must be a whole number >= 1 and <= {MOST_BEAMS}, "
                 f"got {self.n_beams!r}"
             )
         for name in ("angle_min", "angle_increment", "range_min", "range_max", "range_sigma_m"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (float, int, np.number)):
+            if not is_number(value, (float, int, np.number)):
                 raise InvalidValueError(f"LaserSpec.{name} must be a number, got {value!r}")
         if not (math.isfinite(self.angle_min) and math.isfinite(self.angle_increment)):
             raise InvalidValueError("LaserSpec.angle_min and angle_increment must be finite")

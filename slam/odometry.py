@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The null system: believe the wheels. Every other SLAM is measured against it."""
+"""The null system: odometry alone. Every other SLAM is measured against it."""
 
 from __future__ import annotations
 

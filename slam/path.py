@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The path a SLAM has told so far: stamps and poses of its frames, which come in order."""
+"""The path a SLAM has reported so far: stamps and poses of its frames, which come in order."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class PosePath:
         return np.array(self._poses, dtype=np.float64).reshape(-1, 3)
 
     def trajectory(self, poses: Float | None = None) -> Trajectory:
-        """The poses as they were told, or others (n, 3) for the same stamps."""
+        """The poses as they were reported, or others (n, 3) for the same stamps."""
         return Trajectory(
             stamps_ns=np.array(self._stamps, dtype=np.int64),
             poses=self.poses() if poses is None else poses,

@@ -113,7 +113,7 @@ class Track:
     durations_s: list[float] = field(default_factory=list)
 
     def online(self) -> Trajectory:
-        """The poses as they were believed at the time."""
+        """The poses as they were reported at the time."""
         return Trajectory(
             stamps_ns=np.array([e.stamp_ns for e in self.estimates], dtype=np.int64),
             poses=np.array([e.T_map_robot for e in self.estimates]).reshape(-1, 3),

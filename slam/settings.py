@@ -19,8 +19,9 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
+from slam.checked import is_number
 from slam.errors import InvalidValueError, NotFiniteError, UnknownNameError
 
 BY_HAND = "set by hand, not swept"  # a source as well: nobody has measured what the number does
@@ -88,6 +89,8 @@ class Settings:
     Raises ``InvalidValueError`` that names group, field, value and what was expected.
     """
 
+    presets: ClassVar[tuple[str, ...]] = ()  # names of class methods, each of which makes a tree
+
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
@@ -110,9 +113,13 @@ class Settings:
     def changed(self, changes: Mapping[str, Any]) -> Self:
         """The same tree with the numbers at some paths replaced.
 
+        "preset" is no path: where the tree has presets, that one is taken first, then changed.
         Raises ``UnknownNameError`` with the nearest path, ``InvalidValueError`` for a value that
         cannot be or a number that is fixed.
         """
+        if self.presets and "preset" in changes:
+            rest = {path: value for path, value in changes.items() if path != "preset"}
+            return self.preset(changes["preset"]).changed(rest)
         known = {row.path: row for row in self.rows()}
         aliases = {row.about.alias: row.path for row in known.values() if row.about.alias}
         nested: dict[str, Any] = {}
@@ -133,6 +140,16 @@ class Settings:
                 raise InvalidValueError(f"{type(self).__name__}: '{path}' is set twice")
             at[name] = value
         return _replaced(self, nested)
+
+    @classmethod
+    def preset(cls, name: Any) -> Self:
+        """The tree of one of the ``presets``; raises ``UnknownNameError`` for any other name."""
+        if name not in cls.presets:
+            raise UnknownNameError(
+                f"{cls.__name__} has no preset {name!r:.40}; it has {', '.join(cls.presets)}"
+            )
+        made: Self = getattr(cls, name)()
+        return made
 
     def differences(self, other: Settings) -> dict[str, Any]:
         """By path: the numbers that are not as in ``other``, a tree of the same shape."""
@@ -189,7 +206,7 @@ def _checked(name: str, value: Any, field: dataclasses.Field[Any], about: About)
             raise InvalidValueError(f"{name} must be {known}, got {value!r}")
         return value
     whole = isinstance(field.default, int)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
+    if not is_number(value) or math.isnan(value):
         raise InvalidValueError(f"{name} must be a number, got {value!r}")
     if not about.low <= value <= about.high:
         raise InvalidValueError(f"{name} must lie in [{about.low}, {about.high}], got {value}")
@@ -207,7 +224,8 @@ def _no_path(owner: str, given: str, known: list[str]) -> str:
     if not near:  # the right name in another group
         last = given.rpartition(".")[2]
         near = [path for path in known if path.rpartition(".")[2] == last][:1]
-    hint = f" Did you mean '{near[0]}'?" if near else ""
+    groups = dict.fromkeys(path.partition(".")[0] for path in known)
+    hint = f" Did you mean '{near[0]}'?" if near else f" It has: {', '.join(groups)}."
     return f"{owner} has no '{given}'.{hint}"
 
 

@@ -245,7 +245,7 @@ def _check_options(name: str, factory: Factory, config: Mapping[str, Any]) -> No
         raise UnknownNameError(f"'{name}' is no class or function")
     try:
         signature = inspect.signature(factory)
-    except ValueError:  # some built-in callables do not tell
+    except ValueError:  # some built-in callables have none
         return
     try:
         signature.bind(**config)

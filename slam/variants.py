@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A SLAM's name with numbers set: ``shunting{matching.reward=7}``.
+"""A SLAM's name with numbers set: ``shunting{matching.reward=7}``, ``ekf{preset=corners}``.
 
 Such a variant may be named wherever a SLAM is: ``create``, ``--slam``, recipes. Values are JSON, or
 words without quotes.
@@ -62,8 +62,12 @@ def with_set(names: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
     """The names with each of the words "[SLAM.]PATH=VALUE" (``--set``) in the SLAM that it is for.
 
     With one SLAM beside "odometry" the prefix may be left out. Raises ``InvalidValueError`` where
-    several SLAMs could be meant, or none of that name runs.
+    several SLAMs could be meant, or none of that name runs, and ``UnknownNameError`` with the
+    nearest path for one that a registered SLAM does not have.
     """
+    from slam.system import config_of
+    from slam.system import names as registered
+
     changes = {name: dict[str, Any]() for name in names}
     able = [name for name in changes if name != "odometry"]
     for word in words:
@@ -72,6 +76,11 @@ def with_set(names: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
         meant = [name for name in able if parsed(name)[0] == first] if rest else []
         if meant:
             path = rest
+        elif rest and first in registered():
+            raise InvalidValueError(
+                f"--set {word}: '{first}' does not run; these run: {', '.join(names)}. "
+                f"Did you mean '--set {word.partition('.')[2]}'?"
+            )
         elif len(able) == 1:
             meant = able
         else:
@@ -83,7 +92,11 @@ def with_set(names: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
             if path in changes[name]:
                 raise InvalidValueError(f"--set: '{path}' is set twice")
             changes[name][path] = value
-    return tuple(_with(name, changes[name]) for name in names)
+    variants = tuple(_with(name, changes[name]) for name in names)
+    for name, variant in zip(names, variants, strict=True):
+        if changes[name] and ":" not in parsed(name)[0]:
+            config_of(variant)
+    return variants
 
 
 def _with(name: str, more: Mapping[str, Any]) -> str:

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 from scripts import workers
+from scripts.benches.world import Row, row
 from sim.moments import toured
 from sim.recording.bag import BagWriter
 from sim.recording.episode import record
@@ -20,7 +20,6 @@ from sim.simulation import Simulation, n_frames
 from slam.logs import read_bag
 
 WARM_S = 2.0
-Row = dict[str, Any]
 
 
 def rows(seconds: float, *, seed: int, dynamism: float) -> Iterator[Row]:
@@ -30,24 +29,20 @@ def rows(seconds: float, *, seed: int, dynamism: float) -> Iterator[Row]:
         folder = Path(scratch)
         bare, labelled, written, bag = _making(recipe, folder)
         frames = n_frames(seconds, 1.0 / 37.5)
-        yield _row("episode, made", seconds / written, "× real time", "≥ 15", "simulate and write")
+        yield row("episode, made", seconds / written, "× real time", "≥ 15", "simulate and write")
         for what, spent in (
             ("simulation", bare), ("labels", labelled - bare), ("writing", written - labelled),
         ):  # fmt: skip
             share = 100.0 * spent / written
-            yield _row(f"episode, share of {what}", share, "%", "", "of processor time")
+            yield row(f"episode, share of {what}", share, "%", "", "of processor time")
         size = sum(file.stat().st_size for file in bag.iterdir())
         raw = 4 * recipe.laser().spec().n_beams
         per_frame = size / (frames + n_frames(WARM_S, 1.0 / 37.5))
-        yield _row("episode, bytes a frame", per_frame, "B", "", f"ranges as float32: {raw} B")
+        yield row("episode, bytes a frame", per_frame, "B", "", f"ranges as float32: {raw} B")
         for what, labels, target in (("", False, "≥ 8000"), (", with labels", True, "")):
             rate = _reading(bag, labels)
-            yield _row(f"bag, read{what}", rate, "frames/s", target, "into Frames")
-        yield _row("two processes", _speed_up(recipe, folder), "×", "≥ 1.8", "against one, wall")
-
-
-def _row(what: str, figure: float, unit: str, target: str, how: str) -> Row:
-    return {"what": what, "figure": float(figure), "unit": unit, "target": target, "how": how}
+            yield row(f"bag, read{what}", rate, "frames/s", target, "into Frames")
+        yield row("two processes", _speed_up(recipe, folder), "×", "≥ 1.8", "against one, wall")
 
 
 def _making(recipe: Recipe, folder: Path) -> tuple[float, float, float, Path]:

@@ -45,9 +45,9 @@ def timed(work: Callable[[], object]) -> float:
     return time.process_time() - start
 
 
-def median(work: Callable[[], object], repeats: int = REPEATS) -> float:
-    """s, of ``repeats`` calls of ``work``."""
-    return float(np.median([timed(work) for _ in range(repeats)]))
+def median(work: Callable[[], object]) -> float:
+    """s, of ``REPEATS`` calls of ``work``."""
+    return float(np.median([timed(work) for _ in range(REPEATS)]))
 
 
 def simulation(seconds: float) -> Iterator[Row]:

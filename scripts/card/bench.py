@@ -30,14 +30,9 @@ _FRAME = """
 """
 
 
-def box(
-    x: float, y: float, half_x: float, half_y: float, material: str = "wall", yaw: float = 0.0
-) -> str:
+def box(x: float, y: float, half_x: float, half_y: float, material: str = "wall") -> str:
     """MJCF of an upright box 2 m high."""
-    return (
-        f'<geom type="box" size="{half_x} {half_y} 1" pos="{x} {y} 1" euler="0 0 {yaw}" '
-        f'material="{material}"/>'
-    )
+    return f'<geom type="box" size="{half_x} {half_y} 1" pos="{x} {y} 1" material="{material}"/>'
 
 
 def post(x: float, y: float, radius: float, material: str = "metal") -> str:
@@ -45,9 +40,9 @@ def post(x: float, y: float, radius: float, material: str = "metal") -> str:
     return f'<geom type="cylinder" size="{radius} .5" pos="{x} {y} .5" material="{material}"/>'
 
 
-def plate(distance: float, half: float = 30.0, material: str = "wall") -> str:
+def plate(distance: float, half: float = 30.0) -> str:
     """A wall square to the beam ahead."""
-    return box(distance + 0.05, 0.0, 0.05, half, material)
+    return box(distance + 0.05, 0.0, 0.05, half)
 
 
 class Bench:

@@ -99,7 +99,7 @@ NOTES = (
 
 
 def card_figure() -> Figure:
-    """Six panels: noise, systematic error, spot, needed reflectivity, timing, edges."""
+    """Six panels: noise, systematic error, spot, needed reflectivity, timing, range."""
     figure = Figure(figsize=(10.0, 5.6), layout="constrained")
     panels = figure.subplots(2, 3).ravel()
     for draw, ax in zip((_noise, _bias, _spot, _needed, _times, _rate), panels, strict=True):
@@ -121,11 +121,11 @@ def _noise(ax: Axes) -> None:
 def _bias(ax: Axes) -> None:
     true, curves = measure.systematic_curves("32m", 40)
     ax.plot(true, 1e3 * curves.T, color=GREY, lw=0.4, alpha=0.6)
-    ax.plot(true, 1e3 * curves[3], color=BLUE, lw=1.4, label="one of 40 units")
+    ax.plot(true, 1e3 * curves[3], color=BLUE, lw=1.4, label="one of 40 units (grey: the others)")
     for bound in (-35.0, 35.0):
         label = "data sheet, TD p34" if bound > 0 else None
         ax.axhline(bound, color=INK, lw=1.0, ls="--", label=label)
-    ax.set(title="systematic error, mm mode", xlabel="range [m]", ylabel="mm", ylim=(-50, 50))
+    ax.set(title="systematic error, mm mode", xlabel="range [m]", ylabel="mm", ylim=(-50, 75))
     ax.legend(fontsize=7, loc="upper right")
 
 

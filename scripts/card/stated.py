@@ -12,7 +12,7 @@ import numpy as np
 from scripts.card.bench import Bench, box, plate
 from scripts.card.rows import Row, table
 from sim.sensors.lidar.registry import describe, names, scanner_of
-from sim.sensors.lidar.scanner import Scanner
+from sim.sensors.lidar.scanner import Scanner, Spot
 from sim.sensors.lidar.sheet import NOT_STATED, QUANTITIES, Stated, sheet_of
 from slam.errors import InvalidValueError
 from slam.frames import Float
@@ -87,6 +87,8 @@ def _measured(model: Scanner, stated: Stated) -> tuple[float | str, str]:
         "noise_m": lambda: _noise(model, at),
         "systematic_m": lambda: _systematic(model, at),
         "unit_m": lambda: _unit(model),
+        "spot_width_m": lambda: _spot_sizes(model, at)[0],
+        "spot_height_m": lambda: _spot_sizes(model, at)[1],
     }[stated.what]()
     suffix, scale = UNIT_OF.get(stated.what.rsplit("_", 1)[-1], ("", 1.0))
     words = f"{float(f'{scale * value:.4g}'):g} {suffix}".strip()
@@ -150,7 +152,7 @@ def _noise(model: Scanner, distance: float) -> float:
 def _systematic(model: Scanner, distance: float) -> float:
     """The worst of ``UNITS`` units that look along a wall, from half to one and a half times as
     far; within the band of that distance."""
-    smooth = replace(model, noise=(), unit_m=0.0)
+    smooth = replace(model, noise=(), unit_m=0.0, spot=Spot(), mixed_pixels=False)
     edges = [0.0, *(band.up_to_m for band in model.systematic)]
     band = max(k for k, edge in enumerate(edges[:-1]) if edge < distance)
     low, high = max(0.5 * distance, edges[band] + 0.1), min(1.5 * distance, edges[band + 1] - 0.1)
@@ -161,6 +163,14 @@ def _systematic(model: Scanner, distance: float) -> float:
         error = np.abs(result.ranges[inside] - result.true_ranges[inside])
         worst = max(worst, float(error.max(initial=0.0)))
     return worst
+
+
+def _spot_sizes(model: Scanner, distance: float) -> tuple[float, float]:
+    """Width and height m of the ellipse with the rays' second moments (as ISO 11146)."""
+    spot = model.spot
+    moments = np.array(spot.weights) @ np.array(spot.offsets) ** 2
+    wide, high = 2.0 * np.sqrt(moments) * spot.size_at(distance)
+    return float(wide), float(high)
 
 
 def _unit(model: Scanner) -> float:

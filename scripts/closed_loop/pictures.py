@@ -40,10 +40,10 @@ def curves(path: Path, levels: Sequence[Row]) -> None:
         columns = ("precision_m", "precision_m_low", "precision_m_high")
         _line(precision, arrived, aside, columns, 1.0, name, look)
     scene = levels[0]["scene"]
-    success.set(ylim=(-3, 103), ylabel="goals reached, %", title=f"{scene}: success")
+    success.set(ylim=(-3, 103), ylabel="goals reached, %", title=f"{scene}: success, 95 % interval")
     precision.set(
         ylim=(0.0, None), ylabel="distance to the goal when believed reached, m",
-        title=f"{scene}: precision (median)",
+        title=f"{scene}: median precision, 95 % interval",
     )  # fmt: skip
     for ax in (success, precision):
         ax.set(xlabel="dynamism", xticks=sorted({row["dynamism"] for row in levels}))

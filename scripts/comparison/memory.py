@@ -22,7 +22,7 @@ class PeakMemory:
     def __init__(self) -> None:
         gc.collect()
         _give_back()
-        self._base_kb = _reading("VmRSS")
+        self._base_kb = reading_kb("VmRSS")
         self._peak_kb = self._base_kb
 
     def begin(self) -> None:
@@ -34,7 +34,7 @@ class PeakMemory:
 
     def end(self) -> None:
         """Note the peak since ``begin``."""
-        self._peak_kb = max(self._peak_kb, _reading("VmHWM"))  # NaN stays: it compares False
+        self._peak_kb = max(self._peak_kb, reading_kb("VmHWM"))  # NaN stays: it compares False
 
     @property
     def growth_mb(self) -> float:
@@ -50,8 +50,8 @@ def _give_back() -> None:
         return
 
 
-def _reading(name: str) -> float:
-    """kB of that line of the status file, NaN without one."""
+def reading_kb(name: str) -> float:
+    """A line of this process's status file, "VmRSS" or "VmHWM", kB; NaN without one."""
     try:
         for line in _STATUS.read_text().splitlines():
             if line.startswith(name + ":"):

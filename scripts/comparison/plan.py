@@ -14,6 +14,7 @@ from typing import Any
 import scenes
 import sim
 import slam
+from scripts.checked import whole
 from scripts.comparison import entry, recording
 from scripts.imports import with_imports
 from scripts.jobs import Job
@@ -71,8 +72,7 @@ class Plan:
             values = getattr(self, name)
             if not values or len(set(values)) != len(values):
                 raise InvalidValueError(f"Plan.{name} must be one or more, each once, got {values}")
-        if isinstance(self.every, bool) or not 1 <= self.every <= 1000:
-            raise InvalidValueError(f"Plan.every must be 1 to 1000, got {self.every}")
+        whole("Plan.every", self.every, 1, 1000)
         if len(self.scenes) * len(self.levels) * len(self.seeds) > MAX_RUNS:
             raise InvalidValueError(f"a comparison has at most {MAX_RUNS} runs")
         for run in self.runs():

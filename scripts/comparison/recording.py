@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scripts.metrics.judged import world_truth
 from sim.moments import Moment, thinned, toured
 from sim.recording.recipe import Recipe
 from sim.simulation import Simulation
@@ -53,10 +54,7 @@ class Recording:
 
     def truth(self) -> Trajectory:
         """True poses in the world."""
-        return Trajectory(
-            stamps_ns=np.array([frame.stamp_ns for frame in self.frames]),
-            poses=np.array([frame.truth for frame in self.frames]),
-        )
+        return world_truth(self.frames)
 
     def share_of_returns(self, kind: BeamClass) -> float:
         """Of all beams that met something, those that met something of that class."""

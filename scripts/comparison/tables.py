@@ -60,7 +60,7 @@ def pairs(rows: Sequence[Row]) -> list[Row]:
     for (scene, dynamism), group in _grouped(rows, ("scene", "dynamism")).items():
         for metric in JUDGED:
             for slam_a, slam_b in combinations(slams, 2):
-                a, b = (_by_seed(group, slam, metric) for slam in (slam_a, slam_b))
+                a, b = (by_seed(group, slam, metric) for slam in (slam_a, slam_b))
                 seeds = sorted(a.keys() & b.keys())
                 if not seeds:
                     continue
@@ -71,7 +71,8 @@ def pairs(rows: Sequence[Row]) -> list[Row]:
     return out
 
 
-def _by_seed(rows: Sequence[Row], slam: str, metric: str) -> dict[int, float]:
+def by_seed(rows: Sequence[Row], slam: str, metric: str) -> dict[int, float]:
+    """The runs of one SLAM that have the number."""
     pairs = ((row["seed"], number(row, metric)) for row in rows if row["slam"] == slam)
     return {seed: value for seed, value in pairs if value is not None}
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from scripts.checked import whole
 from scripts.comparison.again import run_of, why_no_run
 from scripts.comparison.folder import RunFile
 from scripts.names import file_name, is_run
@@ -47,8 +48,7 @@ class Case:
     made: Made | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        if isinstance(self.every, bool) or not isinstance(self.every, int) or self.every < 1:
-            raise InvalidValueError(f"--every must be a whole number >= 1, got {self.every!r}")
+        whole("--every", self.every, 1)
 
     @property
     def title(self) -> str:

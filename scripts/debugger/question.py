@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from scripts.checked import whole
 from slam.errors import InvalidValueError
 from slam.evaluation.divergence import Rule
 
@@ -36,6 +37,4 @@ class Question:
                 option = name.replace("_s", "")
                 raise InvalidValueError(f"--{option} must be > 0 s and finite, got {value}")
         for name in ("top", "repeats"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-                raise InvalidValueError(f"--{name} must be a whole number >= 0, got {value!r}")
+            whole(f"--{name}", getattr(self, name), 0)

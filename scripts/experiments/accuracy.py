@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from scripts.metrics.judged import Judged
+from scripts.metrics.judged import Judged, world_truth
 from scripts.metrics.table import METRICS
 from sim.actors.robot import DriveConfig
 from sim.driving.drive import TourConfig
@@ -31,7 +31,6 @@ from slam.files import write_text
 from slam.frames import Frame
 from slam.frontend.odometry_sum import thinned
 from slam.replay import Track
-from slam.trajectory import Trajectory
 
 LOST_M = 0.5
 FULL_RATE_HZ = 37.5
@@ -106,21 +105,19 @@ class Score:
     rate: str
     seed: int
     slam: str
-    ate_m: float
-    odometry_m: float
-    aligned_m: float
-    final_m: float
-    heading_rad: float
-    nees: float
-    not_trusted: int
-    ms_p50: float
+    ate_m: float = math.nan
+    odometry_m: float = math.nan
+    aligned_m: float = math.nan
+    final_m: float = math.nan
+    heading_rad: float = math.nan
+    nees: float = math.nan
+    not_trusted: int = 0
+    ms_p50: float = math.nan
 
 
 def score(blank: Score, frames: list[Frame]) -> Score:
     """Let the SLAM named in ``blank`` see the frames, and fill the rest of it; inf if it fails."""
-    truth = Trajectory(
-        stamps_ns=np.array([f.stamp_ns for f in frames]), poses=np.array([f.truth for f in frames])
-    )
+    truth = world_truth(frames)
     wheels = Track(name="odometry", system=create("odometry"))
     wheels.survive(frames)
     odometry_m = Judged.of(wheels, truth).ate()
@@ -152,11 +149,7 @@ def scores(
     for rate in rates:
         frames = thinned(whole, STRIDES[rate])
         for name in slams:
-            blank = Score(
-                drive=drive, scanner=scanner, rate=rate, seed=seed, slam=name, ate_m=math.nan,
-                odometry_m=math.nan, aligned_m=math.nan, final_m=math.nan, heading_rad=math.nan,
-                nees=math.nan, not_trusted=0, ms_p50=math.nan,
-            )  # fmt: skip
+            blank = Score(drive=drive, scanner=scanner, rate=rate, seed=seed, slam=name)
             yield score(blank, frames)
 
 

@@ -4,9 +4,8 @@
 ``python -m scripts.experiments.chair_levels [--seconds 30]``.
 
 The same tours of the office at both levels of chair physics (``sim.actors.castors``): physics
-steps a
-second, and how far the SLAM's path and map are off. Chairs take different ways after the first
-push, so single runs differ; what matters is whether the means do.
+steps a second, and how far the SLAM's path and map are off. Chairs take different paths after the
+first push, so single runs differ; what matters is whether the means do.
 """
 
 from __future__ import annotations
@@ -14,15 +13,16 @@ from __future__ import annotations
 import argparse
 import time
 
-import cv2
 import numpy as np
 
+from scripts.comparison.maps import Believed, StaticDistance
+from scripts.metrics.judged import world_truth
+from scripts.paper.runs import follow
 from sim.actors.castors import LEVELS
 from sim.simulation import Simulation, tour
 from sim.world.world import World
-from slam import create, se2
-from slam.frames import Float
-from slam.system import Raster
+from slam import create
+from slam.evaluation import metrics
 
 
 def steps_per_s(level: str, n: int = 3000) -> float:
@@ -39,31 +39,13 @@ def steps_per_s(level: str, n: int = 3000) -> float:
 def run(level: str, seed: int, seconds: float) -> tuple[float, float]:
     """RMS error of the online positions m, mean distance of mapped from true walls m."""
     simulation = Simulation("office", seed=seed, dynamism=0.8, chairs=level)
-    slam = create("shunting")
-    start: Float | None = None
-    errors = []
-    for frame in tour(simulation, seconds):
-        estimate = slam.update(frame.without_truth())
-        assert frame.truth is not None
-        start = frame.truth if start is None else start
-        errors.append(se2.between(start, frame.truth)[:2] - estimate.T_map_robot[:2])
-    mapped = slam.map()
-    assert start is not None
+    frames = list(tour(simulation, seconds))
+    track, truth = follow(create("shunting"), frames, "shunting"), world_truth(frames)
+    mapped = track.map()
     assert mapped is not None
-    rms = float(np.sqrt((np.array(errors) ** 2).sum(axis=1).mean()))
-    return rms, map_error(mapped, start, simulation.world.scene.static_map)
-
-
-def map_error(mapped: Raster, T_world_map: Float, truth: Raster) -> float:
-    """Mean distance of the cells mapped as occupied from what truly never moves, m."""
-    rows, columns = np.nonzero(np.nan_to_num(mapped.values) > 0.5)
-    local = (np.column_stack([columns, rows]) + 0.5) * mapped.resolution_m
-    points = se2.transform(se2.compose(T_world_map, mapped.T_map_origin), local)
-    free = (truth.values < 0.5).astype(np.uint8)
-    distance = cv2.distanceTransform(free, cv2.DIST_L2, 5) * truth.resolution_m
-    cells = np.floor((points - truth.T_map_origin[:2]) / truth.resolution_m).astype(np.int64)
-    inside = ((cells >= 0) & (cells < [free.shape[1], free.shape[0]])).all(axis=1)
-    return float(distance[cells[inside, 1], cells[inside, 0]].mean())
+    occupied = Believed(mapped, truth.poses[0]).occupied()
+    off_m = StaticDistance(simulation.world.scene.static_map)(occupied)
+    return metrics.ate(track.online(), truth).value, float(off_m[np.isfinite(off_m)].mean())
 
 
 def main() -> None:

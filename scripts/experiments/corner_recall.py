@@ -159,10 +159,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
     parser.add_argument("--seconds", type=float, default=30.0)
     wanted = parser.parse_args(arguments)
-    lasers = {
-        "0.5 degrees": Lms221Config(),
-        "1 degree": Lms221Config(resolution_deg=1.0),
-    }
+    lasers = {"0.5 degrees": Lms221Config(), "1 degree": Lms221Config(resolution_deg=1.0)}
     for scene in wanted.scenes:
         for name, laser in lasers.items():
             print(f"{scene}, LMS-221 at {name}, within {REACH_M:g} m")

@@ -13,10 +13,10 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
+from scripts.comparison.memory import reading_kb
 from sim.actors.rearranging import is_out
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation
@@ -44,7 +44,7 @@ class Report:
             inside = mover.kind != "door" and not is_out(pose, world.scene.bounds)
             if inside and _escaped(simulation, pose):
                 self.escapes[mover.name] = self.escapes.get(mover.name, 0) + 1
-        self.memory_mb.append(resident_mb())
+        self.memory_mb.append(reading_kb("VmRSS") * 1024.0 / 1e6)
 
     @property
     def growth_mb(self) -> float:
@@ -65,12 +65,6 @@ def _escaped(simulation: Simulation, pose: Float) -> bool:
     row = int((y - float(raster.T_map_origin[1])) / raster.resolution_m)
     rows, columns = raster.values.shape
     return 0 <= row < rows and 0 <= column < columns and bool(raster.values[row, column] > 0.5)
-
-
-def resident_mb() -> float:
-    """Memory of this process, MB."""
-    words = Path("/proc/self/statm").read_text(encoding="ascii").split()
-    return int(words[1]) * 4096 / 1e6
 
 
 def main() -> int:

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scripts.checked import whole
 from slam.errors import InvalidValueError
 from slam.frames import Frame, LaserSpec, Scan
 
@@ -30,20 +30,12 @@ class Part:
     range_m: float | None = None
 
     def __post_init__(self) -> None:
-        if isinstance(self.every, bool) or not isinstance(self.every, int):
-            raise InvalidValueError(f"Part.every must be a whole number, got {self.every!r}")
-        limits: tuple[tuple[str, Any, float], ...] = (
-            ("every", self.every, 1),
-            ("fov_deg", self.fov_deg, 1.0),
-            ("range_m", self.range_m, 0.1),
-        )
-        for field, value, least in limits:
-            if value is None:
-                continue
-            number = isinstance(value, (int, float)) and math.isfinite(value)
-            if not number or value < least:
+        whole("Part.every", self.every, 1)
+        for name, value, least in (("fov_deg", self.fov_deg, 1.0), ("range_m", self.range_m, 0.1)):
+            known = isinstance(value, (int, float)) and math.isfinite(value) and value >= least
+            if value is not None and not known:
                 raise InvalidValueError(
-                    f"Part.{field} must be a number of at least {least}, got {value!r}"
+                    f"Part.{name} must be a number of at least {least}, got {value!r}"
                 )
 
     def of(self, frames: list[Frame]) -> list[Frame]:

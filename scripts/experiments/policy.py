@@ -4,12 +4,15 @@
 ``python -m scripts.experiments.policy``.
 """
 
+import argparse
+
 import gymnasium
 import numpy as np
 
 import sim  # noqa: F401  (registers the environments)
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     rooms = gymnasium.make_vec(
         "mobilia/Office-v1", num_envs=8, vectorization_mode="vector_entry_point"
     )

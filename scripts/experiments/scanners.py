@@ -16,16 +16,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scripts.comparison.columns import lost_at
+from scripts.metrics.judged import world_truth
 from scripts.output import machine
+from scripts.paper.runs import follow
 from scripts.scanner_option import every_of
 from sim.moments import thinned, toured
 from sim.sensors.lidar.registry import names
 from sim.simulation import Simulation
-from slam import create, se2
-from slam.evaluation import lost, metrics
-from slam.frames import NS_PER_S
-from slam.replay import Track
-from slam.trajectory import Trajectory
+from slam import create
+from slam.evaluation import metrics
 
 GENERIC = "scanner(fov_deg=240,beams=481,rate_hz=20,sigma_m=0.02)"
 SEEDS = (100, 101, 102)
@@ -43,21 +43,12 @@ class Run:
 def run(scanner: str, seed: int, seconds: float, scene: str, dynamism: float) -> Run:
     """Shunting over one tour with one scanner."""
     simulation = Simulation(scene, seed=seed, dynamism=dynamism, laser=scanner)
-    track = Track(name="shunting", system=create("shunting"))
-    truth = []
-    for moment in thinned(toured(simulation, seconds), every_of(scanner, None, 8)):
-        assert moment.frame.truth is not None
-        truth.append(moment.frame.truth)
-        track.take(moment.frame.without_truth())
-    online = track.online()
-    true = Trajectory(stamps_ns=online.stamps_ns, poses=np.array(truth))
-    placed = np.array([se2.compose(true.poses[0], pose) for pose in online.poses])
-    offset = placed - true.poses
-    far = np.sqrt(offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1])
-    times = (online.stamps_ns - online.stamps_ns[0]) / NS_PER_S
+    moments = thinned(toured(simulation, seconds), every_of(scanner, None, 8))
+    frames = [moment.frame for moment in moments]
+    track, truth = follow(create("shunting"), frames, "shunting"), world_truth(frames)
     return Run(
-        ate_m=metrics.ate(online, true).value,
-        lost=lost.lost_at(times, far, se2.wrap_array(offset[:, 2])) is not None,
+        ate_m=metrics.ate(track.online(), truth).value,
+        lost=lost_at(track.online(), truth) is not None,
         update_ms=1e3 * float(np.median(track.durations_s)),
     )
 

@@ -5,8 +5,8 @@
 
 puts an AprilTag (36h11) on the robot and a camera on the ceiling of the office, renders pictures
 with ``sim.view.camera``, detects the tag with OpenCV, solves for its pose, and sets the errors
-beside
-those that ``sim.sensors.tag_cameras`` draws. Needs OpenGL; writes ``tags.md`` and its picture.
+beside those that ``sim.sensors.tag_cameras`` draws. Needs OpenGL; draws the picture of ``tags.md``
+and fills in its table.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 
 from scenes import registry
 from scripts.figures import save
+from scripts.marks import fill_page
 from sim.sensors.tag_cameras import TagCameraConfig, TagCameras
 from sim.view.camera import Camera
 from sim.world.world import World
 from slam import se2
-from slam.files import write_text
 from slam.frames import Float
 
 DICTIONARY = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
@@ -166,67 +166,31 @@ def figure(outcome: Outcome, stand_in: TagCameraConfig, picture: NDArray[np.uint
     return out
 
 
-def page(outcome: Outcome, stand_in: TagCameraConfig) -> str:
-    """The page as Markdown."""
+def table(outcome: Outcome, stand_in: TagCameraConfig) -> str:
+    """What stands on the page between its marks."""
     rms = np.sqrt((outcome.errors**2).mean(axis=0))
     bias = outcome.errors.mean(axis=0)
     far = outcome.distances > 1.2
     split = [1e3 * float(np.sqrt((outcome.errors[m, :2] ** 2).mean())) for m in (~far, far)]
-    return "\n".join(
-        [
-            "# Ceiling tags",
-            "",
-            "Get the truth as cameras on the ceiling would measure it. By default, the truth is",
-            "the simulator's. `sim.sensors.tag_cameras` is a stand-in for such cameras: it has a",
-            "rate, a latency, noise, and gaps while somebody or something is between tag and",
-            "camera. This command compares the stand-in with rendered pictures:",
-            "",
-            "    python -m scripts.experiments.tag_experiment --out docs",
-            "",
-            f"The robot carries an AprilTag 36h11 of {100 * TAG_M:.0f} cm. A camera of "
-            f"{WIDTH} × {HEIGHT} px hangs at",
-            f"{CEILING_M} m in the `office`. The robot has {outcome.tried} random poses within "
-            "1.6 × 1.2 m of the middle. In",
-            "every other one, somebody stands 0.4 to 0.9 m from it. The detector is OpenCV's.",
-            "",
-            "![Tags](pictures/tags.png)",
-            "",
-            "| | detected in pictures | stand-in |",
-            "|---|---|---|",
-            f"| tag seen | {outcome.found} of {outcome.tried} | "
-            f"{outcome.agree[:, 1].sum()} of {outcome.tried} |",
-            f"| seen by this one only | {outcome.agree[1, 0]} | {outcome.agree[0, 1]} |",
-            f"| x, y error, rms | {1e3 * rms[0]:.1f}, {1e3 * rms[1]:.1f} mm | "
-            f"{1e3 * stand_in.noise_std_m:.0f} mm |",
-            f"| x, y mean error | {1e3 * bias[0]:+.1f}, {1e3 * bias[1]:+.1f} mm | "
-            f"{1e3 * stand_in.bias_std_m:.0f} mm per camera |",
-            f"| position error within / beyond 1.2 m of the middle | {split[0]:.1f} / "
-            f"{split[1]:.1f} mm | the same everywhere |",
-            f"| yaw error, rms | {math.degrees(rms[2]):.2f}° | "
-            f"{math.degrees(stand_in.noise_std_rad):.2f}° |",
-            "",
-            *VERDICT,
-        ]
-    )
-
-
-VERDICT = (
-    "**Is the stand-in honest?** It is too pessimistic where a camera is perfect.",
-    "Rendered pictures have no lens distortion, no blur and no sensor noise, and the pose",
-    "of the camera is known exactly. Only the detector's sub-pixel error remains. A real",
-    "installation adds calibration to about a centimetre. The stand-in's noise and the",
-    "constant error of each camera stand for that. These two numbers are assumed, not",
-    "measured.",
-    "",
-    "Whether a tag is detected is as honest as the table says. The stand-in checks all",
-    "four corners against the geometry of the scene. It can miss something that covers",
-    "only the middle of a tag, or that cuts the white border which the detector needs.",
-    "",
-)
+    rows = (
+        ("tag seen", f"{outcome.found} of {outcome.tried}",
+         f"{outcome.agree[:, 1].sum()} of {outcome.tried}"),
+        ("seen by this one only", f"{outcome.agree[1, 0]}", f"{outcome.agree[0, 1]}"),
+        ("x, y error, rms", f"{1e3 * rms[0]:.1f}, {1e3 * rms[1]:.1f} mm",
+         f"{1e3 * stand_in.noise_std_m:.0f} mm"),
+        ("x, y mean error", f"{1e3 * bias[0]:+.1f}, {1e3 * bias[1]:+.1f} mm",
+         f"{1e3 * stand_in.bias_std_m:.0f} mm per camera"),
+        ("position error within / beyond 1.2 m of the middle",
+         f"{split[0]:.1f} / {split[1]:.1f} mm", "the same everywhere"),
+        ("yaw error, rms", f"{math.degrees(rms[2]):.2f}°",
+         f"{math.degrees(stand_in.noise_std_rad):.2f}°"),
+    )  # fmt: skip
+    head = "| | detected in pictures | stand-in |\n|---|---|---|"
+    return "\n".join([head, *(f"| {' | '.join(row)} |" for row in rows)])
 
 
 def main() -> None:
-    """Write the page and its picture."""
+    """Fill in the page, draw its picture."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=Path("docs"))
     parser.add_argument("--pictures", type=int, default=100)
@@ -235,7 +199,7 @@ def main() -> None:
     stand_in = TagCameraConfig()
     (wanted.out / "pictures").mkdir(parents=True, exist_ok=True)
     save(figure(outcome, stand_in, picture), wanted.out / "pictures" / "tags.png")
-    write_text(wanted.out / "tags.md", page(outcome, stand_in))
+    fill_page(wanted.out / "tags.md", "tags", table(outcome, stand_in))
     print(f"wrote {wanted.out / 'tags.md'}: {outcome.found} of {outcome.tried} found")
 
 

@@ -4,9 +4,8 @@
     python -m scripts.experiments.umbmark --out docs
 
 drives the wheel odometry of ``sim.sensors.odometry.encoders`` round a 4 m square five times each
-way for several
-robots, estimates each robot's Eb and Ed from the mean end errors by the method's own formulas, and
-writes ``odometry.md`` and its picture.
+way for several robots, and estimates each robot's Eb and Ed from the mean end errors by the
+method's own formulas. Draws the picture of ``odometry.md`` and fills in its tables.
 """
 
 from __future__ import annotations
@@ -21,8 +20,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from scripts.figures import save
+from scripts.marks import fill_page
 from sim.sensors.odometry.encoders import OdometryConfig, WheelOdometry
-from slam.files import write_text
 from slam.frames import Float
 
 SIDE, TRACK = 4.0, 0.33  # m
@@ -117,10 +116,9 @@ def figure(units: Sequence[Unit]) -> Figure:
     return out
 
 
-def page(units: Sequence[Unit]) -> str:
-    """The page as Markdown."""
+def tables(units: Sequence[Unit]) -> str:
+    """What stands on the page between its marks."""
     lines = [
-        *HEAD,
         "| robot | Eb true | Eb by UMBmark | Ed true | Ed by UMBmark | farther centre |",
         "|---|---|---|---|---|---|",
     ]
@@ -131,8 +129,10 @@ def page(units: Sequence[Unit]) -> str:
             f"| {k + 1} | {track:.4f} | {eb:.4f} | {ratio:.4f} | {ed:.4f} | "
             f"{1e3 * unit.worst:.0f} mm |"
         )
-    lines += ["", "Median over 30 robots of each preset, five squares each way:", ""]
     lines += [
+        "",
+        f"Median over {ROBOTS} robots of each preset, five squares each way:",
+        "",
         "| preset | farther centre (systematic) | spread of one way's ends (random) |",
         "|---|---|---|",
     ]
@@ -141,59 +141,11 @@ def page(units: Sequence[Unit]) -> str:
         worst = float(np.median([u.worst for u in many]))
         spread = float(np.median([u.ends.std(axis=1).mean() for u in many]))
         lines.append(f"| `{name}` | {1e3 * worst:.0f} mm | {1e3 * spread:.0f} mm |")
-    return "\n".join([*lines, "", *TAIL])
-
-
-HEAD = (
-    "# Wheel odometry",
-    "",
-    "See which errors the simulated wheels make, and how far to trust their covariance.",
-    "This command makes the page:",
-    "",
-    "    python -m scripts.experiments.umbmark --out docs",
-    "",
-    "Errors are of two kinds, which behave differently:",
-    "",
-    "- *Systematic* errors are drawn once per run: Ed (right over left wheel diameter),",
-    "  Eb (true over nominal track) and Es (true over reported distance).",
-    "- *Random* errors have a variance that grows with metres and radians.",
-    "",
-    "Presets and their sources are in `sim/sensors/odometry/config.py`.",
-    "",
-    "## UMBmark",
-    "",
-    "Robots of the preset `pioneer3dx` drive a 4 m square five times each way. The figure",
-    "shows the quartiles of 30 robots. Dots are true minus reported ends, and crosses are",
-    "their means. The size of a cloud is the random part. The means show the systematic",
-    "part: a wrong track shifts both directions alike, and unequal wheels shift them in",
-    "opposite directions. From the two means, the formulas of Borenstein and Feng give Eb",
-    "and Ed, as well as five runs can. Es appears in neither.",
-    "",
-    "![UMBmark](pictures/umbmark.png)",
-    "",
-)
-TAIL = (
-    "The size of the systematic part of `pioneer3dx` is inferred (design note, fidelity",
-    "2.4), because the published UMBmark figures could not be read.",
-    "`probabilistic_robotics` has no systematic part. Its centres differ from zero only",
-    "by the mean of five random runs.",
-    "",
-    "## Covariance",
-    "",
-    "Each frame carries the covariance of its motion increment over the ensemble of runs.",
-    "The mean of the normalised squared error (NEES) over 100 runs lies within its bounds",
-    "for both noisy presets, at increments of 27 ms and of 0.53 s",
-    "(`tests/sim/sensors/test_odometry.py`).",
-    "",
-    "Between increments the systematic part is fully correlated. Independent covariances",
-    "cannot express that. If you chain increments over many metres, add",
-    "`WheelOdometry.systematic_std`.",
-    "",
-)
+    return "\n".join(lines)
 
 
 def main() -> None:
-    """Write the page and its picture."""
+    """Fill in the page, draw its picture."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=Path("docs"))
     out = parser.parse_args().out
@@ -201,7 +153,7 @@ def main() -> None:
     robots = sorted((measure_unit("pioneer3dx", k) for k in range(ROBOTS)), key=lambda u: u.worst)
     units = [robots[round(ROBOTS * part)] for part in (0.25, 0.5, 0.75)]
     save(figure(units), out / "pictures" / "umbmark.png")
-    write_text(out / "odometry.md", page(units))
+    fill_page(out / "odometry.md", "umbmark", tables(units))
     print(f"wrote {out / 'odometry.md'}")
 
 

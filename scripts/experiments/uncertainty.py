@@ -26,14 +26,13 @@ from matplotlib.figure import Figure
 
 from scripts.experiments.accuracy import FULL_RATE_HZ, SCANNERS
 from scripts.experiments.parts import Part
-from scripts.metrics.judged import SETTLED_S
+from scripts.metrics.judged import SETTLED_S, world_truth
+from scripts.paper.runs import follow
 from sim.simulation import stream
 from slam import create
 from slam.evaluation import metrics
 from slam.frames import Float, Frame
 from slam.frontend.odometry_sum import thinned
-from slam.replay import Track
-from slam.trajectory import Trajectory
 
 SCENES = ("arena", "office")
 DYNAMISM = 0.5
@@ -91,12 +90,7 @@ def run(name: str, frames: list[Frame], case: Case) -> Run:
         ]
     if case.part is not WHOLE:
         frames = case.part.of(frames)
-    track = Track(name=name, system=create(name))
-    for frame in frames:
-        track.take(frame.without_truth())
-    truth = Trajectory(
-        stamps_ns=np.array([f.stamp_ns for f in frames]), poses=np.array([f.truth for f in frames])
-    )
+    track, truth = follow(create(name), frames, name), world_truth(frames)
     online = track.online()
     nees = metrics.nees(online, track.covariances(), truth).values
     nis = [e.diagnostics.get("nis") for e in track.estimates]

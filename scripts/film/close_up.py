@@ -37,9 +37,7 @@ class CloseUp:
         self._radius = _grown(self._radius, reach)
         x, y = T_view_robot[:2].tolist()
         view = View.fitting(
-            (x - self._radius, y - self._radius, x + self._radius, y + self._radius),
-            width,
-            height,
+            (x - self._radius, y - self._radius, x + self._radius, y + self._radius), width, height
         )
         picture: Picture = np.full((height, width, 3), 255, np.uint8)
         self._grid(picture, view)

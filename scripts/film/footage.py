@@ -28,14 +28,8 @@ if TYPE_CHECKING:
     from sim.moments import Moment
     from sim.simulation import Simulation
 
-SIMULATED = (
-    "scene",
-    "seconds",
-    "seed",
-    "dynamism",
-    "scan_height_m",
-    "laser",
-)  # of a run's settings
+# Of a run's settings.
+SIMULATED = ("scene", "seconds", "seed", "dynamism", "scan_height_m", "laser")
 
 
 @dataclass(eq=False, kw_only=True)
@@ -127,35 +121,30 @@ def open_run(path: Path, *, view: str | None = "follow", trust: bool = False) ->
 
 def of_scene(settings: Mapping[str, Any], *, view: str | None = "follow") -> Footage:
     """A simulated tour: scene, seconds, and what ``Simulation`` takes."""
-    from sim.moments import toured
     from sim.simulation import Simulation
 
     seconds = settings["seconds"]
     simulation = Simulation(**{k: v for k, v in settings.items() if k != "seconds"}, labels=True)
-    return of_simulation(
-        simulation,
-        lambda: toured(simulation, seconds),
-        seconds=seconds,
-        title=title_of(settings),
-        view=view,
-    )
+    return of_simulation(simulation, seconds=seconds, title=title_of(settings), view=view)
 
 
 def of_simulation(
     simulation: Simulation,
-    moments: Callable[[], Iterator[Moment]],
+    moments: Callable[[], Iterator[Moment]] | None = None,
     *,
     seconds: float,
     title: str,
     view: str | None = "follow",
     every: int = 1,
 ) -> Footage:
-    """A simulation at hand and the moments that it goes through, one in ``every`` of them shown."""
+    """A simulation at hand and the moments that it goes through, a tour unless said otherwise; one
+    in ``every`` of them is shown."""
     from scripts.film.live_view import LiveStage
-    from sim.moments import thinned
+    from sim.moments import thinned, toured
     from sim.simulation import n_frames
 
-    shown = moments if every == 1 else lambda: thinned(moments(), every)
+    whole = moments or (lambda: toured(simulation, seconds))
+    shown = whole if every == 1 else lambda: thinned(whole(), every)
     stage = LiveStage(simulation, shown, view=view)
     stream = Stream(
         metadata=simulation.metadata(),
@@ -176,7 +165,6 @@ def of_simulation(
 
 def of_episode(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
     """An episode of a dataset, made again from its recipe."""
-    from sim.moments import toured
     from sim.recording.recipe import read_recipe
     from sim.simulation import Simulation
     from sim.twins.twins import Twins
@@ -187,38 +175,30 @@ def of_episode(path: Path, *, view: str | None = "follow", trust: bool = False) 
     settings = {"scene": recipe.scene, "dynamism": recipe.dynamism, "seed": recipe.seed}
     if not recipe.twin:
         simulation = Simulation(**recipe.simulation())
-        moments = lambda: toured(simulation, recipe.seconds)  # noqa: E731
-    else:  # the room of a twin is another one than its drive's: no 3D view of it
-        twins = Twins(**recipe.simulation(), seconds=recipe.seconds)
-        simulation, settings["twin"] = twins.simulation, recipe.twin
-        moments = lambda: twins.moments(recipe.twin)  # noqa: E731
+        title = title_of(settings)
+        return of_simulation(simulation, seconds=recipe.seconds, title=title, view=view)
+    twins = Twins(**recipe.simulation(), seconds=recipe.seconds)
     footage = of_simulation(
-        simulation,
-        moments,
+        twins.simulation,
+        lambda: twins.moments(recipe.twin),
         seconds=recipe.seconds,
-        title=title_of(settings),
-        view=None if recipe.twin else view,
+        title=title_of({**settings, "twin": recipe.twin}),
+        view=None,  # the room of a twin is another one than its drive's
     )
-    if recipe.twin and view is not None:
+    if view is not None:
         footage.no_camera = "this episode is one of three twins, whose rooms only the plan shows"
     return footage
 
 
 def of_compared(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
     """A run of a comparison, made again with the scans that its SLAMs got."""
-    from sim.moments import toured
     from sim.simulation import Simulation
 
     again = run_of(path)
     recipe = replace(again.recipe, scene=admitted(again.recipe.scene, "scene", trust))
-    simulation = Simulation(**recipe.simulation())
+    simulation, title = Simulation(**recipe.simulation()), title_of(asdict(recipe))
     footage = of_simulation(
-        simulation,
-        lambda: toured(simulation, recipe.seconds),
-        seconds=recipe.seconds,
-        title=title_of(asdict(recipe)),
-        view=view,
-        every=again.every,
+        simulation, seconds=recipe.seconds, title=title, view=view, every=again.every
     )
     footage.slam = next((name for name in again.slams if name != "odometry"), "")
     return footage

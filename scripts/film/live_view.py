@@ -19,17 +19,16 @@ from sim.view.pictures import CameraPicture
 from slam import se2
 from slam.frames import Frame
 
-VIEWS = ("follow", "top", "persp")
-
 
 class LiveStage:
-    """Shows a simulation while its moments pass; a context manager, as the camera wants closing.
+    """Shows a simulation while its moments pass; to be closed, for the camera.
 
     moments  a fresh run of moments each time it is called; ``simulation`` is the world they are of
-    view     of the 3D camera, one of ``VIEWS``; None for no 3D view
+    view     of the 3D camera, follow, top or persp; None for no 3D view
     """
 
     lanes: Sequence[str]
+    labelled = True
 
     def __init__(
         self,
@@ -37,12 +36,10 @@ class LiveStage:
         moments: Callable[[], Iterator[Moment]],
         *,
         view: str | None = "follow",
-        labelled: bool = True,
     ) -> None:
         self._simulation, self._moments, self._angle = simulation, moments, view
         self._watch = EventWatch(simulation.world)
         self.lanes = self._watch.kinds
-        self.labelled = labelled
         self._camera: CameraPicture | None = None
         self._map: MapView | None = None
         self._moment: Moment | None = None
@@ -115,9 +112,3 @@ class LiveStage:
         if self._camera is not None:
             self._camera.close()
             self._camera = None
-
-    def __enter__(self) -> LiveStage:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

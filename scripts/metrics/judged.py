@@ -12,12 +12,20 @@ import numpy as np
 
 from slam.errors import InvalidValueError
 from slam.evaluation import metrics
-from slam.frames import NS_PER_S, Float
+from slam.frames import NS_PER_S, Float, Frame
 from slam.replay import Track
 from slam.system import Estimate
 from slam.trajectory import Trajectory
 
 SETTLED_S = 5.0  # NEES counts after this: before, the covariance is that of the known first pose
+
+
+def world_truth(frames: Sequence[Frame]) -> Trajectory:
+    """The true poses of frames that have them, in the world."""
+    return Trajectory(
+        stamps_ns=np.array([frame.stamp_ns for frame in frames]),
+        poses=np.array([frame.truth for frame in frames]),
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

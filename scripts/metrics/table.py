@@ -165,7 +165,7 @@ _ALL = (
 METRICS = {metric.key: metric for metric in _ALL}
 
 COLUMNS = tuple(m.key for m in _ALL if m.column)
-DRIVES = tuple(m.key for m in _ALL if m.section == "drive")
+DRIVES = tuple(m.key for m in _ALL if m.section == "drive" and m.compute is None)
 JUDGED = tuple(m.key for better in ("less", "more") for m in _ALL if m.better == better)
 SHARES = tuple(m.key for m in _ALL if m.summary == "share")
 MEDIANS = (

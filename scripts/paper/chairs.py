@@ -14,10 +14,7 @@ from scripts.paper.room_pages import RULE, fig_rmse, score_table, seconds_of, ve
 from scripts.paper.rooms import run_all
 from scripts.paper.runs import Plan, Run
 
-VARIANTS: dict[str, dict[str, Any]] = {
-    "walls": {"walls": "visible"},
-    "no-walls": {"walls": "none"},
-}
+VARIANTS: dict[str, dict[str, Any]] = {"walls": {"walls": "visible"}, "no-walls": {"walls": "none"}}
 TITLES = {"walls": "walls visible", "no-walls": "walls out of range"}
 DYNAMISM = 1.0  # each chair is shoved once in 7 s on average
 LIMITS = {"x": (0.05, 0.01), "y": (0.05, 0.01), "θ": (0.03, 0.01)}

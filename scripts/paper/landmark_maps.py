@@ -35,14 +35,7 @@ def fig8(run: Run) -> Any:
         titles = ("EKF, IPJC and lifecycle", "shunting on features", "EKF", "shunting")
         ax.set(title=f"({'abcd'[k]}) {titles[k]}{', one point' if k >= 2 else ''}")
     for ax in axes[:2]:
-        ax.plot(
-            *_typical(a),
-            "o",
-            ms=14,
-            mfc="none",
-            mec="#ce2c3c",
-            label="shown in (c), (d)",
-        )
+        ax.plot(*_typical(a), "o", ms=14, mfc="none", mec="#ce2c3c", label="shown in (c), (d)")
     figure.colorbar(image, ax=list(axes), shrink=0.5, aspect=40, label="activity")
     legend_below(figure, axes)
     return figure

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scripts.paper.census import landmarks_of
-from scripts.paper.runs import save_run
+from scripts.paper.runs import map_arrays, save_run
 from slam import create
 from slam.errors import InvalidValueError
 from slam.frames import Frame
@@ -77,16 +77,7 @@ def run_one(path: Path, *, name: str, data: str, scans: int) -> None:
     }
     if final is not None:
         arrays["final"] = final.poses
-    landmarks = track.landmarks()
-    if landmarks is not None:
-        arrays["ellipses"] = landmarks.ellipses()
-    raster = track.map()
-    if raster is not None:
-        arrays |= {
-            "activities": np.nan_to_num(raster.values).astype(np.float16),
-            "origin": raster.T_map_origin,
-            "cell": raster.resolution_m,
-        }
+    arrays |= map_arrays(track)
     lost = sum(not e.converged for e in track.estimates)
     ms = float(np.median(track.durations_s)) * 1e3
     save_run(path, {"sizes": sizes, "not converged": lost, "ms": ms}, arrays)

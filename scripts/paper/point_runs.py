@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from scripts.paper.census import Census, landmarks_of
-from scripts.paper.runs import follow, pose_numbers, save_run, truth_of
+from scripts.paper.runs import follow, map_arrays, pose_numbers, save_run, truth_of
 from slam import create, se2
 from slam.ekf.config import EkfConfig
 from slam.ekf.slam import EkfSlam
@@ -84,7 +84,7 @@ def run_one(path: Path, *, moving: float, seed: int, steps: int, keep: bool) -> 
     arrays["errors known associations"] = metrics.pose_errors(known, truth).errors
     arrays["seconds"] = (truth.stamps_ns - truth.stamps_ns[0]) * 1e-9
     if keep:
-        arrays |= _maps(ekf, ours)
+        arrays |= map_arrays(ekf) | map_arrays(ours)
     save_run(path, numbers, arrays)
 
 
@@ -103,15 +103,3 @@ def _counted(system: Any, frames: Sequence[Frame], true_points: Float) -> tuple[
         if k % EVERY == 0 or k == len(frames) - 1:
             census.take(*landmarks_of(system))
     return track, census
-
-
-def _maps(ekf: Track, ours: Track) -> dict[str, Any]:
-    raster, landmarks = ours.map(), ekf.landmarks()
-    assert raster is not None
-    assert landmarks is not None
-    return {
-        "ellipses": landmarks.ellipses(),
-        "activities": np.nan_to_num(raster.values).astype(np.float16),
-        "origin": raster.T_map_origin,
-        "cell": raster.resolution_m,
-    }

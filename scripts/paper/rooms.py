@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from scripts.paper.report import Report
-from scripts.paper.runs import Plan, Run, job, pose_numbers, save_run, truth_of
+from scripts.paper.runs import Plan, Run, follow, job, map_arrays, pose_numbers, save_run, truth_of
 from sim.simulation import stream
 from slam import create, se2
 from slam.evaluation import metrics
 from slam.frames import Float, Frame
 from slam.frontend.odometry_sum import thinned
-from slam.replay import Track
 
 STRIDE = 5  # 37.5 Hz thinned to 7.5 Hz
 SECONDS = 60.0
@@ -53,9 +52,7 @@ def run_one(  # noqa: PLR0913 (the arguments of a job)
         "seconds": (truth.stamps_ns - truth.stamps_ns[0]) * 1e-9,
     }
     for name, (kind, settings) in SYSTEMS.items():
-        track = Track(name=name, system=create(kind, **settings))
-        for frame in frames:
-            track.take(frame.without_truth())
+        track = follow(create(kind, **settings), frames, name)
         scored = pose_numbers(track.online(), truth)
         lost = not track.estimates[-1].converged
         scored["failed"] = bool(
@@ -66,24 +63,10 @@ def run_one(  # noqa: PLR0913 (the arguments of a job)
         arrays[f"errors {name}"] = metrics.pose_errors(track.online(), truth).errors
         arrays[f"poses {name}"] = track.online().poses
         if keep:
-            arrays |= _map_of(track, name)
+            arrays |= map_arrays(track, f" {name}")
     if keep:
         arrays["raw"] = raw_points(frames, arrays["poses shunting"])
     save_run(path, numbers, arrays)
-
-
-def _map_of(track: Track, name: str) -> dict[str, Any]:
-    landmarks = track.landmarks()
-    if landmarks is not None:
-        return {f"ellipses {name}": landmarks.ellipses()}
-    raster = track.map()
-    if raster is None:
-        return {}
-    return {
-        f"activities {name}": np.nan_to_num(raster.values).astype(np.float16),
-        f"origin {name}": raster.T_map_origin,
-        f"cell {name}": raster.resolution_m,
-    }
 
 
 def raw_points(frames: Sequence[Frame], poses: Float) -> Float:

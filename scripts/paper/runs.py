@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scripts.jobs import Job
-from scripts.metrics.judged import Judged
+from scripts.metrics.judged import Judged, world_truth
 from scripts.metrics.table import METRICS
 from scripts.paper.depends import depends_on
 from slam import se2
 from slam.archives import read_arrays
 from slam.errors import InvalidValueError, LogFormatError
+from slam.evaluation.statistics import paired
 from slam.frames import Float, Frame
 from slam.replay import Track
 from slam.system import SlamSystem
@@ -117,12 +118,10 @@ def timed(path: Path, *, call: str, **arguments: Any) -> None:
 
 def truth_of(frames: Sequence[Frame]) -> Trajectory:
     """The true poses, in the frame of the first."""
-    poses = np.array([frame.truth for frame in frames])
-    first = se2.inverse(poses[0])
-    return Trajectory(
-        stamps_ns=np.array([frame.stamp_ns for frame in frames]),
-        poses=np.array([se2.compose(first, pose) for pose in poses]),
-    )
+    world = world_truth(frames)
+    first = se2.inverse(world.poses[0])
+    poses = np.array([se2.compose(first, pose) for pose in world.poses])
+    return Trajectory(stamps_ns=world.stamps_ns, poses=poses)
 
 
 def follow(system: SlamSystem, frames: Iterable[Frame], name: str) -> Track:
@@ -131,6 +130,20 @@ def follow(system: SlamSystem, frames: Iterable[Frame], name: str) -> Track:
     for frame in frames:
         track.take(frame.without_truth())
     return track
+
+
+def map_arrays(track: Track, suffix: str = "") -> dict[str, Any]:
+    """What figures draw of its map: ``ellipses`` of landmarks; ``activities``, ``origin``, ``cell``
+    of a raster."""
+    landmarks, raster = track.landmarks(), track.map()
+    out: dict[str, Any] = {}
+    if landmarks is not None:
+        out["ellipses" + suffix] = landmarks.ellipses()
+    if raster is not None:
+        out["activities" + suffix] = np.nan_to_num(raster.values).astype(np.float16)
+        out["origin" + suffix] = raster.T_map_origin
+        out["cell" + suffix] = raster.resolution_m
+    return out
 
 
 def pose_numbers(estimate: Trajectory, truth: Trajectory) -> dict[str, Any]:
@@ -201,11 +214,6 @@ class SignTest:
 
 def sign_test(first: Sequence[float], second: Sequence[float]) -> SignTest:
     """Paired by seed; ties count for neither, no number (NaN) loses against any."""
-    pairs = [
-        (math.inf if math.isnan(a) else a, math.inf if math.isnan(b) else b)
-        for a, b in zip(first, second, strict=True)
-    ]
-    wins, losses = sum(a < b for a, b in pairs), sum(b < a for a, b in pairs)
-    n, k = wins + losses, max(wins, losses)
-    tail = sum(math.comb(n, i) for i in range(k, n + 1)) / 2.0**n
-    return SignTest(wins=wins, losses=losses, p=min(1.0, 2.0 * tail) if n else 1.0)
+    a, b = ([math.inf if math.isnan(v) else v for v in values] for values in (first, second))
+    row = paired(a, b, less_is_better=True)
+    return SignTest(wins=row["wins"], losses=row["losses"], p=row["p_sign"])

@@ -17,8 +17,7 @@ from slam.frames import Features, Float, Frame
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.energy import energy
-from slam.shunting.map.network import Network
-from slam.shunting.map.update import lateral_mu
+from slam.shunting.map.network import Network, lateral_mu
 from slam.shunting.slam import ShuntingSlam
 from slam.tracker.cells import SIDE
 from slam.tracker.matching.matcher import Matcher
@@ -94,6 +93,7 @@ class Scaling:
 
 
 PITCH_M = 20.0
+EVERY_S = 0.2  # between inspirations
 
 
 def scaling(frame: Frame, rooms: Sequence[int], repeats: int = 15) -> Scaling:
@@ -104,7 +104,6 @@ def scaling(frame: Frame, rooms: Sequence[int], repeats: int = 15) -> Scaling:
     matcher, out = Matcher(config), Scaling()
     network, made = Network(config), 0
     for count in rooms:
-        side = math.isqrt(count - 1) + 1
         for k in range(made, count):  # nearest first, so that the first one is the origin
             _look(network, seen, _place(k))
         made = count
@@ -121,7 +120,6 @@ def scaling(frame: Frame, rooms: Sequence[int], repeats: int = 15) -> Scaling:
         out.visited.append(visited)
         out.update_ms.append(1e3 * float(np.median(update)))
         out.match_ms.append(1e3 * float(np.median(match)))
-        assert side * side >= count
     return out
 
 
@@ -140,7 +138,8 @@ def _place(k: int) -> Float:
 
 def _look(network: Network, seen: Observations, pose: Float) -> tuple[float, float, int]:
     rasterise(network, seen, pose)
-    return network.integrate(seen.view, se2.compose(pose, seen.T_robot_laser), 0.2, write=True)
+    T_map_laser = se2.compose(pose, seen.T_robot_laser)
+    return network.integrate(seen.view, T_map_laser, EVERY_S, write=True)
 
 
 def alive(network: Network) -> int:
@@ -176,7 +175,7 @@ def _free(frame: Frame, pose: Float) -> Float:
     return se2.transform(T, points)
 
 
-def bell(looks: Sequence[int], every_s: float = 0.2) -> tuple[Float, dict[int, Float]]:
+def bell(looks: Sequence[int]) -> tuple[Float, dict[int, Float]]:
     """Cross-sections of the activity after so many inspirations at one place, not on a neuron.
 
     Returns the offsets from that place (m) and the activities along the row of neurons.
@@ -190,7 +189,7 @@ def bell(looks: Sequence[int], every_s: float = 0.2) -> tuple[Float, dict[int, F
     out: dict[int, Float] = {}
     for k in range(1, max(looks) + 1):
         rasterise(network, seen, np.zeros(3))
-        network.integrate(seen.view, np.zeros(3), every_s, write=True)
+        network.integrate(seen.view, np.zeros(3), EVERY_S, write=True)
         if k in looks:
             x, _ = network.window(1.0, 0.0, 3.0, 0.05)
             out[k] = x[0].astype(np.float64)

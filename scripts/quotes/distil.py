@@ -16,7 +16,7 @@ from typing import Any
 
 from scripts.comparison.folder import Compared, Row, read
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
-from scripts.comparison.tables import number
+from scripts.comparison.tables import by_seed
 from scripts.experiments.dynamism_curve import Curve
 from scripts.metrics.table import METRICS
 from scripts.quotes.results import RESULTS, SCHEMA, commit, write
@@ -90,7 +90,7 @@ def _paired(compared: Compared) -> dict[str, dict[str, Any]]:
     for scene in settings["scenes"]:
         for rival in settings["slams"]:
             for metric in QUOTED if rival != OURS else ():
-                ours, theirs = (_table(compared, scene, slam, metric) for slam in (OURS, rival))
+                ours, theirs = (_by_level(compared, scene, slam, metric) for slam in (OURS, rival))
                 levels = [_differences(a, b) for a, b in zip(ours, theirs, strict=True)]
                 if not any(levels):
                     continue
@@ -105,18 +105,17 @@ def _paired(compared: Compared) -> dict[str, dict[str, Any]]:
     return {"paired": by_level, "over_levels": over}
 
 
-def _table(compared: Compared, scene: str, slam: str, metric: str) -> list[dict[float, float]]:
-    """By level, by seed: what there is a number of."""
-    found: dict[float, dict[float, float]] = {}
+def _by_level(compared: Compared, scene: str, slam: str, metric: str) -> list[dict[int, float]]:
+    """For each level, by seed: what there is a number of."""
+    at: dict[float, list[Row]] = {}
     for row in compared.runs:
-        if (row["scene"], row["slam"]) == (scene, slam):
-            value = number(row, metric)
-            if value is not None:
-                found.setdefault(row["dynamism"], {})[row["seed"]] = value
-    return [found.get(level, {}) for level in compared.recipe["settings"]["levels"]]
+        if row["scene"] == scene:
+            at.setdefault(row["dynamism"], []).append(row)
+    levels = compared.recipe["settings"]["levels"]
+    return [by_seed(at.get(level, []), slam, metric) for level in levels]
 
 
-def _differences(a: dict[float, float], b: dict[float, float]) -> dict[float, float]:
+def _differences(a: dict[int, float], b: dict[int, float]) -> dict[int, float]:
     """By seed; two infinite numbers are a tie."""
     return {
         seed: 0.0 if a[seed] == b[seed] else a[seed] - b[seed]

@@ -9,7 +9,7 @@ from typing import Any
 
 from scripts.metrics.table import METRICS
 from scripts.quotes.results import Comparison, Interval, load
-from scripts.quotes.words import interval, made, shown, table, verdict, verdicts
+from scripts.quotes.words import VERDICTS, interval, made, shown, table, verdict, verdicts
 from scripts.report.words import listed
 
 ATE, ALIGNED, LOST = "ate_unaligned_m", "ate_se2_m", "lost"
@@ -71,17 +71,13 @@ def errors(of: Comparison) -> str:
         rows = [["returns from what moves, %", *shares, rho, ""]]
         for slam in of.slams:
             places = 0 if slam == NULL else 1
-            cells = [_in_cm(level, places) for level in of.levels(scene, slam, ATE)]
+            cells = [interval(level, ATE, places) for level in of.levels(scene, slam, ATE)]
             gone = sum(_lost(of, scene, slam))
             runs = len(of.dynamisms) * len(of.data["seeds"])
             rho = shown(of.rank_correlation(scene, slam, ATE), 1)
             rows.append([f"`{slam}`", *cells, rho, f"{gone} of {runs}"])
         tables.append(table([scene, *head, "rank correlation", "runs lost"], rows))
     return "\n\n".join(tables)
-
-
-def _in_cm(of: Interval | None, places: int) -> str:
-    return interval(of, ATE, places)
 
 
 def _lost(of: Comparison, scene: str, slam: str) -> list[int]:
@@ -135,7 +131,7 @@ def listing(of: Comparison) -> str:
         for rival in _rivals(of):
             said = verdicts(of.pairs(scene, rival, ATE), of.dynamisms, ATE)
             over = of.over_levels(scene, rival, ATE)
-            word = {1: "better", -1: "**beaten**", 0: "no clear difference"}[verdict(over, ATE)]
+            word = VERDICTS[verdict(over, ATE)]
             lines.append(
                 f"- {scene}, against `{rival}`: {said}; over all levels {word}, nearer on "
                 f"{over.wins} of {over.wins + over.ties + over.losses} seeds."
@@ -165,20 +161,16 @@ def maps(of: Comparison) -> str:
     rows = []
     for scene in of.scenes:
         for metric, (name, places) in MAPS.items():
-            if not _medians_or_none(of, scene, metric):
+            if f"{scene} {OURS} {metric}" not in of.data["levels"]:
                 continue
             factor = METRICS[metric].factor
             over = of.over_levels(scene, GRID, metric)
-            word = {1: "better", -1: "**beaten**", 0: "no clear difference"}[verdict(over, metric)]
+            word = VERDICTS[verdict(over, metric)]
             spans = [
                 _span(_medians(of, scene, slam, metric), factor, places) for slam in (OURS, GRID)
             ]
             rows.append([f"{scene}: {name}", *spans, interval(over, metric, places), word])
     return table(head, rows)
-
-
-def _medians_or_none(of: Comparison, scene: str, metric: str) -> bool:
-    return f"{scene} {OURS} {metric}" in of.data["levels"]
 
 
 def comparing_made(of: Comparison) -> str:

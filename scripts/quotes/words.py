@@ -12,9 +12,11 @@ from scripts.metrics.table import METRICS
 from scripts.quotes.results import Interval, Pair
 from scripts.report.words import levels_text
 
+VERDICTS = {1: "better", -1: "**beaten**", 0: "no clear difference"}
 
-def shown(value: float, places: int, *, sign: bool = False) -> str:
-    """``2.3``, ``−0.7``, ``+0.1``; ∞ for what never ends, – for no number."""
+
+def shown(value: float, places: int) -> str:
+    """``2.3``, ``−0.7``; ∞ for what never ends, – for no number."""
     if math.isnan(value):
         return "–"
     if math.isinf(value):
@@ -22,17 +24,15 @@ def shown(value: float, places: int, *, sign: bool = False) -> str:
     digits = f"{abs(value):.{places}f}"
     if float(digits) == 0.0:
         return digits
-    return ("−" if value < 0.0 else "+" if sign else "") + digits
+    return ("−" if value < 0.0 else "") + digits
 
 
-def interval(of: Interval | None, metric: str, places: int, *, sign: bool = False) -> str:
+def interval(of: Interval | None, metric: str, places: int) -> str:
     """``1.8 [1.5, 2.0]`` in the metric's handy unit; – where there is none."""
     if of is None:
         return "–"
     factor = METRICS[metric].factor
-    value, low, high = (
-        shown(factor * number, places, sign=sign) for number in (of.value, of.low, of.high)
-    )
+    value, low, high = (shown(factor * n, places) for n in (of.value, of.low, of.high))
     return f"{value} [{low}, {high}]"
 
 
@@ -47,7 +47,7 @@ def verdict(pair: Pair | None, metric: str) -> int:
 def verdicts(pairs: Sequence[Pair | None], levels: Sequence[float], metric: str) -> str:
     """In words: at which levels shunting is better, at which it is beaten, at which neither."""
     said = []
-    for side, words in ((1, "better"), (-1, "**beaten**"), (0, "no clear difference")):
+    for side, words in VERDICTS.items():
         at = [
             level
             for level, pair in zip(levels, pairs, strict=True)

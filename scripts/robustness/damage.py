@@ -19,7 +19,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -98,13 +98,8 @@ def damaged(folder: Path, whole: Path, damage: Damage) -> Any:
 
 def seen_by_verify(folder: Path) -> Answer:
     """Whether ``verify`` would say so."""
-    try:
-        found = results.check(folder)
-    except MobiliaError:
-        return "noticed"
-    except Exception as error:  # noqa: BLE001  # that is what is looked for
-        return f"{type(error).__name__}: {error}"
-    return "wrong" if all(finding.ok for finding in found) else "noticed"
+    answer = answer_of(lambda path: all(found.ok for found in results.check(path)), folder, False)
+    return "noticed" if answer == "the same" else answer
 
 
 def answer_of(consumer: Callable[[Path], Outcome], folder: Path, wanted: Outcome) -> Answer:
@@ -121,13 +116,8 @@ def answer_of(consumer: Callable[[Path], Outcome], folder: Path, wanted: Outcome
 class Tally:
     """Answers by who was asked, the sample and the kind of damage; what was wrong, in words."""
 
-    counts: Counter[tuple[str, str, str, Answer]]
-    wrong: list[str]
-
-    @classmethod
-    def new(cls) -> Tally:
-        """Nothing yet."""
-        return cls(Counter(), [])
+    counts: Counter[tuple[str, str, str, Answer]] = field(default_factory=Counter)
+    wrong: list[str] = field(default_factory=list)
 
     def note(self, who: str, sample: str, damage: Damage, answer: Answer) -> None:
         """One case."""
@@ -196,7 +186,7 @@ def main() -> None:
     parser.add_argument("--consumers", type=int, default=24, help="For each reader of a result.")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", nargs="*", default=list(SAMPLES), choices=list(SAMPLES))
-    wanted, started, tally = parser.parse_args(), time.perf_counter(), Tally.new()
+    wanted, started, tally = parser.parse_args(), time.perf_counter(), Tally()
     with tempfile.TemporaryDirectory(prefix="mobilia-damage-") as scratch:
         console.quiet = True
         made = {name: SAMPLES[name](Path(scratch) / name) for name in wanted.only}

@@ -27,18 +27,18 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from types import FrameType
 
 import numpy as np
+from joblib.externals.loky import ProcessPoolExecutor
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 from rich.table import Table
 from rosbags.rosbag1 import Writer as WriterOfRos1
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from scripts.console import console
+from scripts.robustness import fuzz_calls
 from scripts.robustness.fuzz_calls import GROUPS, Tally
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
@@ -97,11 +97,7 @@ def _repack(episode: Path, folder: Path) -> tuple[Path, Path, Path]:
         connections = {t: old.add_connection(t, k, typestore=ROS1) for t, k in kinds.items()}
         for topic, kind, stamp_ns, data in messages:
             old.write(connections[topic], stamp_ns, bytes(ROS2.cdr_to_ros1(data, kind)))
-    return (
-        folder / "plain" / "plain.mcap",
-        folder / "sqlite" / "sqlite.db3",
-        folder / "ros1.bag",
-    )
+    return (folder / "plain" / "plain.mcap", folder / "sqlite" / "sqlite.db3", folder / "ros1.bag")
 
 
 def _bag(path: Path) -> None:
@@ -177,50 +173,37 @@ def attack(sample: Sample, folder: Path, rng: np.random.Generator) -> tuple[str,
     return "read", ""
 
 
-def _child(wire: Connection, seed: int) -> None:
-    """Run the cases that are asked for, until the end."""
-    from scripts.robustness import fuzz_calls
-
+def _limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, resource.RLIM_INFINITY))
-    while True:
-        group, number = wire.recv()
-        wire.send(fuzz_calls.run(group, number, seed))
 
 
 class _Runner:
-    """A child that runs cases; one that hangs or dies is replaced."""
+    """A worker that runs cases; one that hangs or dies is replaced."""
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
-        self._process: SpawnProcess | None = None
+        self._pool: ProcessPoolExecutor | None = None
 
     def run(self, group: str, number: int) -> Tally:
-        """One case; a finding where the child hangs or ends."""
-        if self._process is None:
-            context = get_context("spawn")
-            self._wire, theirs = context.Pipe()
-            self._process = context.Process(target=_child, args=(theirs, self._seed), daemon=True)
-            self._process.start()
-            theirs.close()
+        """One case; a finding where the worker hangs or ends."""
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(1, initializer=_limit_memory)
+        case = self._pool.submit(fuzz_calls.run, group, number, self._seed)
         try:
-            self._wire.send((group, number))
-            if self._wire.poll(CASE_S):
-                tally: Tally = self._wire.recv()
-                return tally
+            tally: Tally = case.result(CASE_S)
+            return tally
+        except TimeoutError:
             found = f"no end within {CASE_S} s"
-        except (EOFError, OSError):
-            self._process.join(1.0)
-            found = f"the process ended ({self._process.exitcode})"
+        except TerminatedWorkerError as error:
+            found = f"the process ended: {' '.join(str(error).split())}"[:300]
         self.close()
         return Tally(findings=[found])
 
     def close(self) -> None:
-        """End the child."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.join()
-            self._wire.close()
-            self._process = None
+        """End the worker."""
+        if self._pool is not None:
+            self._pool.shutdown(kill_workers=True)
+            self._pool = None
 
 
 def call(cases: int, seed: int) -> int:
@@ -260,7 +243,7 @@ def main(arguments: list[str] | None = None) -> int:
     wanted = parser.parse_args(arguments)
     if wanted.cases is not None:
         return 1 if call(wanted.cases, wanted.seed) else 0
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, resource.RLIM_INFINITY))
+    _limit_memory()
     outcomes: Counter[tuple[str, str]] = Counter()
     findings = 0
     with tempfile.TemporaryDirectory() as scratch:

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from scripts.console import console
+from scripts.robustness.disk_log import tree
 from sim.recording.verify import check_hashes
 
 LIMIT_S = 2.0  # promised from the kill to the end of the last process
@@ -64,16 +65,7 @@ class Command:
         """Running, as the leader of a process group."""
         with (out.parent / f"{self.name}.log").open("ab") as log:
             return subprocess.Popen(
-                [
-                    sys.executable,
-                    "-m",
-                    "scripts",
-                    self.name,
-                    *self.words,
-                    *SHORT,
-                    "--out",
-                    str(out),
-                ],
+                [sys.executable, "-m", "scripts", self.name, *self.words, *SHORT, "--out", out],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
@@ -131,11 +123,8 @@ def files(out: Path) -> dict[str, Path]:
 
 
 def same_bytes(one: Path, other: Path) -> bool:
-    """The same files with the same bytes."""
-    here, there = files(one), files(other)
-    return here.keys() == there.keys() and all(
-        file.read_bytes() == there[name].read_bytes() for name, file in here.items()
-    )
+    """The same files and folders with the same bytes."""
+    return tree(one) == tree(other)
 
 
 def same_numbers(one: Path, other: Path) -> bool:
@@ -226,14 +215,8 @@ def carry_out(commands: list[Command], kills: int, seed: int, folder: Path) -> N
 def table(commands: list[Command]) -> Table:
     """Kills, the longest life after one, what was wrong."""
     shown = Table(title="killed at random moments", title_justify="left")
-    for heading in (
-        "command",
-        "killed",
-        "kills",
-        "last end, median",
-        "longest",
-        f"over {LIMIT_S:g} s",
-    ):
+    headings = ("command", "killed", "kills", "last end, median", "longest")
+    for heading in (*headings, f"over {LIMIT_S:g} s"):
         shown.add_column(heading, justify="right")
     for command in commands:
         for whom, ends in command.ends_s.items():

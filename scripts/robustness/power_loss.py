@@ -201,8 +201,6 @@ def _timeless(name: str, data: bytes | None) -> object:
     """The content of a file without clock readings."""
     if data is None or name.endswith(OF_CLOCKS):
         return None
-    if name.endswith("results.json"):
-        return _without(json.loads(data))
     if name.endswith(".json"):
         return _without(json.loads(data))
     if name.endswith(".csv"):
@@ -277,9 +275,7 @@ def _compared(*slams: str) -> Callable[[Path], object]:
 def _run(seconds: float, *, film: bool = False) -> Callable[[Path], object]:
     def call(root: Path) -> None:
         settings = {"scene": "arena", "seconds": seconds, "dynamism": 1.0, "seed": 1}
-        outputs = Outputs(
-            folder=root / "run", command="run", settings={}, overwrite=True, film=film
-        )
+        outputs = Outputs(folder=root / "run", command="run", overwrite=True, film=film)
         on_scene(["shunting"], settings, outputs)
 
     return call

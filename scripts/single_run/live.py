@@ -12,6 +12,14 @@ from scripts.film.footage import of_scene
 from scripts.single_run.session import Outputs, run_session
 
 
+def tour(
+    scene: str, seconds: float, dynamism: float, seed: int, scan_height_m: float, scanner: str
+) -> dict[str, Any]:
+    """The settings of a tour, as ``on_scene`` takes them."""
+    world = {"scene": scene, "dynamism": dynamism, "seed": seed}
+    return {**world, "seconds": seconds, "scan_height_m": scan_height_m, "laser": scanner}
+
+
 def on_scene(names: list[str], settings: Mapping[str, Any], outputs: Outputs) -> dict[str, Any]:
     """Run SLAMs on a tour of a scene.
 

@@ -7,7 +7,7 @@ import json
 import time
 from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,7 @@ class Outputs:
 
     folder: Path
     command: str
-    settings: Mapping[str, Any]
+    settings: Mapping[str, Any] = field(default_factory=dict)
     overwrite: bool = False
     film: bool = True
     film_fps: float = FPS
@@ -112,7 +112,4 @@ def _tell(outputs: Outputs) -> None:
         others.append("map.npz for the SLAM's load()")
     first = escape(str(outputs.folder / there[0]))
     then = f", then {', '.join(there[1:])} beside it" if there[1:] else ""
-    console.print(
-        f"Open [bold]{first}[/bold] first{then}; {', '.join(others)}.",
-        soft_wrap=True,
-    )
+    console.print(f"Open [bold]{first}[/bold] first{then}; {', '.join(others)}.", soft_wrap=True)

@@ -92,24 +92,36 @@ def blame(
         horizon_s=horizon, top=top, repeats=repeats,
     )  # fmt: skip
     check([slam] if slam else [], scene)
-    from scripts.debugger.episode import Case, case_of, options_of
-    from scripts.debugger.picture import blame_picture
-    from scripts.debugger.words import as_json
-    from scripts.output import whole_folder, write_recipe
-    from sim.sensors.lidar.registry import scanner_of
+    from scripts.debugger.episode import Case, case_of
 
     if run is not None:
-        case = case_of(run, slam, every, trust)
+        case, name = case_of(run, slam, every, trust), run_name(run)
     else:
-        laser = scanner_of(scanner)
-        settings = {"scene": scene, "dynamism": dynamism, "seed": seed, **options_of(option or [])}
-        if scanner != "full":
-            settings["laser"] = laser
+        world = {"scene": scene, "dynamism": dynamism, "seed": seed}
+        settings, name = _world(world, option or [], scanner), f"{scene}-{seed}"
         case = Case(settings=settings, seconds=seconds, slam=slam or "shunting", every=every)
     if at is not None and not 0.0 <= at <= case.seconds:
         raise InvalidValueError(f"--at must lie in 0..{case.seconds:g} s, got {at:g}")
-    name = run_name(run) if run is not None else f"{scene}-{seed}"
     folder = out or Path("out") / f"blame-{file_name(name)}-{file_name(case.slam)}"
+    _tell(_carry_out(case, question, folder, overwrite), folder)
+
+
+def _world(world: dict[str, Any], options: list[str], scanner: str) -> dict[str, Any]:
+    """Settings of the simulation: scene, dynamism and seed, and what the options say."""
+    from scripts.debugger.episode import options_of
+    from sim.sensors.lidar.registry import scanner_of
+
+    laser = scanner_of(scanner)
+    settings = {**world, **options_of(options)}
+    return settings if scanner == "full" else settings | {"laser": laser}
+
+
+def _carry_out(case: Case, question: Question, folder: Path, overwrite: bool) -> Inquest:
+    """Find who is to blame and write the folder."""
+    from scripts.debugger.picture import blame_picture
+    from scripts.debugger.words import as_json
+    from scripts.output import whole_folder, write_recipe
+
     recipe = _recipe(case, question)
     with whole_folder(folder, overwrite=overwrite, command="blame", settings=recipe) as part:
         found = _inquest(case, question)
@@ -117,7 +129,7 @@ def blame(
         text = json.dumps(as_json(found), indent=1, allow_nan=False)
         write_text(part / "blame.json", text + "\n")
         write_recipe(part, "blame", recipe)
-    _tell(found, folder)
+    return found
 
 
 def _inquest(case: Case, question: Question) -> Inquest:

@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from scripts.checked import whole
 from scripts.console import console
 from scripts.names import check
 from scripts.scanner_option import Scanner, every_of
@@ -59,8 +60,7 @@ def compare(
     [bold]mobilia compare --slam shunting ekf odometry --scene arena --dynamism 0:1:0.5 --seeds 3
     --out out/compare[/bold]
     """
-    if isinstance(seeds, bool) or not 1 <= seeds <= 10_000:
-        raise InvalidValueError(f"--seeds must be 1 to 10000, got {seeds}")
+    whole("--seeds", seeds, 1, 10_000)
     slams, rooms = with_set(named(slam), set_ or []), named(scene or ["arena", "office"])
     check(slams, *rooms)
     from scripts import workers

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mobilia config``: every number of a SLAM, of the actors or of the scanner."""
+"""``mobilia config``: every number of a SLAM, of the actors or of a scanner."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from itertools import groupby
@@ -15,14 +14,16 @@ if TYPE_CHECKING:
     from slam.settings import Row, Settings
 
 BY_DEVICE = "TD: technical description 8008970/06-2003, TL: telegram listing 8007954"
-ROOMS = ("actors", "dynamism", "lms221")  # what belongs to no SLAM
+ROOMS = ("actors", "dynamism")  # what belongs to no SLAM
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of dynamism that are printed
 
 
 def config(
     what: Annotated[
         str,
-        typer.Argument(help="A SLAM (or a variant, SLAM{PATH=VALUE}), actors, dynamism or lms221."),
+        typer.Argument(
+            help="A SLAM (or a variant, SLAM{PATH=VALUE}), actors, dynamism or a scanner."
+        ),
     ],
     group: Annotated[
         str, typer.Argument(help="Only the numbers whose path begins so: matching.local.")
@@ -40,8 +41,12 @@ def config(
     if what == "dynamism":
         _print_dynamism(as_json)
         return
-    tree, default = (None, None) if what == "lms221" else _trees(what)
-    rows = _chosen(_of_scanner() if tree is None else list(tree.rows()), group)
+    from sim.sensors.lidar import numbers
+
+    tree, default = (None, None) if numbers.is_scanner(what) else _trees(what)
+    rows = _chosen(
+        numbers.numbers_of(what, BY_DEVICE) if tree is None else list(tree.rows()), group
+    )
     if as_json:
         digest = {} if tree is None else {"sha256": tree.sha256()}
         words = {**digest, "numbers": [_plain(row) for row in rows]}
@@ -82,29 +87,10 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _of_scanner() -> list[Row]:
-    """The options of the scanner and its effects, in the words of their docstrings."""
-    from sim.sensors.lidar.models.lms221 import Lms221Config
-    from slam.settings import About, Row
-
-    found, units = [], {"deg": "deg", "m": "m"}
-    of_device = Lms221Config()
-    for prefix, group in (("", of_device), ("effects.", of_device.effects)):
-        lines = [line.strip() for line in (type(group).__doc__ or "").splitlines()]
-        words = {line.partition(" ")[0]: line.partition(" ")[2].strip() for line in lines}
-        for field in dataclasses.fields(group):
-            if field.name == "effects":
-                continue
-            about = About(
-                unit=units.get(field.name.rpartition("_")[2], "word"),
-                meaning=words.get(field.name, ""), source=BY_DEVICE, fixed=False,
-            )  # fmt: skip
-            found.append(Row(prefix + field.name, getattr(group, field.name), about))
-    return found
-
-
 def _trees(what: str) -> tuple[Settings, Settings]:
     """That tree and its default."""
+    import difflib
+
     from slam.errors import UnknownNameError
 
     if what == "actors":
@@ -115,9 +101,16 @@ def _trees(what: str) -> tuple[Settings, Settings]:
 
     found = config_of(what)
     if found is None:
+        from sim.sensors.lidar import registry
+
         known = [name for name in names() if config_of(name) is not None]
+        known += [*ROOMS, *registry.names()]
+        near = (
+            [] if what in names() else difflib.get_close_matches(what.partition("{")[0], known, 1)
+        )
+        hint = f" Did you mean '{near[0]}'?" if near else ""
         raise UnknownNameError(
-            f"'{what}' has no numbers to set. These have: {', '.join([*known, *ROOMS])}"
+            f"'{what}' has no numbers to set.{hint} These have: {', '.join(known)}"
         )
     return found
 
@@ -145,10 +138,10 @@ def _plain(row: Row) -> dict[str, Any]:
         "path": row.path, "value": row.value, "unit": about.unit, "meaning": about.meaning,
         "source": about.source, "fixed": about.fixed,
     }  # fmt: skip
-    if about.fixed or about.source == BY_DEVICE:
-        return words
-    if about.options:
+    if about.options and not about.fixed:
         return words | {"options": list(about.options)}
+    if about.fixed or math.isinf(about.low):  # a scanner's: its config checks itself
+        return words
     return words | {"low": about.low, "high": about.high}
 
 
@@ -178,8 +171,6 @@ def _print(rows: list[Row], changed: dict[str, Any]) -> None:
             table.add_row(f"  {escape(name)}", value, escape(unit), said)
     console.print(table)
     fixed = " All are fixed: compiled into kernels." if all_fixed else ""
-    console.print(
-        f"{len(rows)} numbers.{fixed} Without a source in brackets: "
-        f"{rows[0].about.source if rows[0].about.source == BY_DEVICE else BY_HAND}.",
-        highlight=False,
-    )
+    unsaid = {row.about.source for row in rows} & {BY_HAND, BY_DEVICE}
+    others = f" Without a source in brackets: {'; '.join(sorted(unsaid))}." if unsaid else ""
+    console.print(f"{len(rows)} numbers.{fixed}{others}", highlight=False)

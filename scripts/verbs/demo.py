@@ -39,25 +39,9 @@ def demo(
     drift as far as it does in half of all runs; try others.
     """
     check(["shunting"], scene)
-    from scripts.single_run.live import on_scene
+    from scripts.single_run.live import on_scene, tour
     from scripts.single_run.session import Outputs
 
-    on_scene(
-        ["shunting"],
-        {
-            "scene": scene,
-            "seconds": seconds,
-            "dynamism": dynamism,
-            "seed": seed,
-            "scan_height_m": scan_height,
-            "laser": scanner,
-        },
-        Outputs(
-            folder=out,
-            command="demo",
-            settings={},
-            overwrite=overwrite,
-            film=film,
-            film_fps=FILM_FPS,
-        ),
-    )
+    outputs = Outputs(folder=out, command="demo", overwrite=overwrite, film=film, film_fps=FILM_FPS)
+    settings = tour(scene, seconds, dynamism, seed, scan_height, scanner)
+    on_scene(["shunting"], settings, outputs)

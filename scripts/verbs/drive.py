@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from scripts.checked import whole
 from scripts.console import console
 from scripts.names import check
 from scripts.scanner_option import Scanner, every_of
@@ -91,8 +92,7 @@ def _seeds(words: tuple[str, ...]) -> tuple[int, ...]:
             f"--seeds must be a number, several, or first:end, got {' '.join(words)!r}"
         ) from None
     if len(numbers) == 1:
-        if not 1 <= numbers[0] <= 10_000:
-            raise InvalidValueError(f"--seeds must be 1 to 10000, got {numbers[0]}")
+        whole("--seeds", numbers[0], 1, 10_000)
         return tuple(range(100, 100 + numbers[0]))
     return numbers
 

@@ -17,9 +17,7 @@ def listing() -> None:
     from sim.core.versions import WORLD
     from sim.sensors.lidar import registry as scanners
 
-    table = Table(show_header=True, title_justify="left")
-    for heading in ("what", "name", "about"):
-        table.add_column(heading)
+    table = Table("what", "name", "about")
     for name in registry.names():
         table.add_row("scene", name, registry.describe(name))
     for name in scanners.names():

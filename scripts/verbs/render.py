@@ -43,8 +43,7 @@ def render(
         str | None, typer.Option(help="SLAM to film; default the run's own, else shunting.")
     ] = None,
     strip_to: Annotated[
-        Path | None,
-        typer.Option("--strip", help="Also a PNG of some moments side by side."),
+        Path | None, typer.Option("--strip", help="Also a PNG of some moments side by side.")
     ] = None,
     at: Annotated[
         str, typer.Option(help="Moments of the strip, s: 3,12.5,40. Default: six, evenly spaced.")
@@ -79,21 +78,16 @@ def render(
         raise InvalidValueError(f"--view must be one of {', '.join(VIEWS)}, got '{view}'")
     if out is None and strip_to is None and rerun is None:
         out = Path("out") / f"{run_name(run)}.mp4"
-    _check_suffixes(out, strip_to, rerun)
     if at and strip_to is None:
         raise InvalidValueError("--at names the moments of --strip, which is missing")
     moments = _moments(at)
     check([slam] if slam else [])
-    from scripts.film.encode import require_ffmpeg, size_of
+    _check_outputs(out, strip_to, rerun)
+    from scripts.film.encode import size_of
     from scripts.film.footage import open_run
-    from scripts.film.rerun_log import RerunLog
     from scripts.film.strips import evenly
 
     pixels = size_of(size)
-    if out is not None:
-        require_ffmpeg()
-    if rerun is not None:
-        RerunLog.require()
     seen = view if out is not None and not no_3d else None
     with open_run(run, view=seen, trust=trust) as footage:
         if moments and moments[-1] > footage.duration_s:
@@ -171,8 +165,11 @@ def _pace(
     )
 
 
-def _check_suffixes(out: Path | None, strip_to: Path | None, rerun: Path | None) -> None:
-    """Writers choose formats by the suffix, and so do those who open the file."""
+def _check_outputs(out: Path | None, strip_to: Path | None, rerun: Path | None) -> None:
+    """Writers choose formats by the suffix, as do those who open the file; what they need is there.
+
+    Raises ``InvalidValueError`` for another suffix, ``MissingDependencyError`` without a writer.
+    """
     for option, path, suffix in (
         ("--out", out, ".mp4"),
         ("--strip", strip_to, ".png"),
@@ -180,6 +177,13 @@ def _check_suffixes(out: Path | None, strip_to: Path | None, rerun: Path | None)
     ):
         if path is not None and path.suffix.lower() != suffix:
             raise InvalidValueError(f"{option} must be a file that ends in {suffix}, got '{path}'")
+    from scripts.film.encode import require_ffmpeg
+    from scripts.film.rerun_log import RerunLog
+
+    if out is not None:
+        require_ffmpeg()
+    if rerun is not None:
+        RerunLog.require()
 
 
 def _moments(words: str) -> list[float]:

@@ -65,26 +65,13 @@ def run(
     if log is not None:
         on_log(slam, log, out or Path("out") / f"run-{run_name(log)}", overwrite, film)
     elif scene is not None:
-        from scripts.single_run.live import on_scene
+        from scripts.single_run.live import on_scene, tour
         from scripts.single_run.session import Outputs
 
+        folder = out or Path("out") / f"run-{scene.replace(':', '-')}"
+        settings = tour(scene, seconds, dynamism, seed, scan_height, scanner)
         on_scene(
-            slam,
-            settings={
-                "scene": scene,
-                "seconds": seconds,
-                "dynamism": dynamism,
-                "seed": seed,
-                "scan_height_m": scan_height,
-                "laser": scanner,
-            },
-            outputs=Outputs(
-                folder=out or Path("out") / f"run-{scene.replace(':', '-')}",
-                command="run",
-                settings={},
-                overwrite=overwrite,
-                film=film,
-            ),
+            slam, settings, Outputs(folder=folder, command="run", overwrite=overwrite, film=film)
         )
 
 

@@ -35,9 +35,9 @@ def sensor_card(
 
     own = scanner == DEFAULT
     rows = sensor_rows.rows() if own else stated.rows_of(scanner)
-    table = Table(title=escape(f"{describe(scanner)} (simulated)"), title_justify="left")
-    for heading in ("", "what", "data sheet", "measured", "source"):
-        table.add_column(heading)
+    headings = ("", "what", "data sheet", "measured", "source")
+    title = escape(f"{describe(scanner)} (simulated)")
+    table = Table(*headings, title=title, title_justify="left")
     for row in rows:
         mark = "[green]✓[/green]" if row.kept else "[red]✗[/red]"
         table.add_row(mark, row.what, row.datasheet, row.measured, row.source)

@@ -39,8 +39,9 @@ def verify(
 
     Exit status: 0 all well. 1 damaged: a file is not what it was, or an episode comes out otherwise
     on the very CPU and versions that made it (on others it may: that is said, and is no failure).
-    3 incomplete: a file or an episode is missing. 4 foreign: something is there that no SHA256SUMS
-    lists. 5 same messages, other bytes: a bag was packed anew. The first that holds counts.
+    2 there is nothing at that path. 3 incomplete: a file or an episode is missing. 4 foreign:
+    something is there that no SHA256SUMS lists. 5 same messages, other bytes: a bag was packed
+    anew. The first that holds counts.
     """
     if regenerate_ < 0 or seed < 0:
         raise InvalidValueError("--regenerate and --seed must be >= 0")

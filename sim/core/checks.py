@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
 from typing import Any
@@ -51,7 +51,8 @@ def one_of(name: str, value: Any, known: Sequence[str]) -> None:
 
 def number(name: str, value: Any) -> None:
     """Raise ``InvalidValueError`` unless ``value`` is one finite number."""
-    if isinstance(value, bool) or not isinstance(value, _NUMBER) or not math.isfinite(value):
+    fits = isinstance(value, _NUMBER) and not isinstance(value, bool)
+    if not (fits and -math.inf < value < math.inf):  # whole numbers may be beyond any float
         raise InvalidValueError(f"{name} must be a finite number, got {value!r}")
 
 
@@ -88,3 +89,31 @@ def check_not_negative(config: Any) -> None:
             raise InvalidValueError(
                 f"{type(config).__name__}.{item.name} must be finite and >= 0, got {value}"
             )
+
+
+def check_within(config: Any, limits: Mapping[str, tuple[float, float]]) -> None:
+    """``InvalidValueError`` for a field of that dataclass below its least or above its most."""
+    for name, (least, most) in limits.items():
+        value = getattr(config, name)
+        if not least <= value <= most:
+            raise InvalidValueError(
+                f"{type(config).__name__}.{name} must be in {least:g}..{most:g}, got {value!r}"
+            )
+
+
+def whole(name: str, value: Any, least: int, most: int) -> None:
+    """``InvalidValueError`` unless ``value`` is one whole number from ``least`` to ``most``."""
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, (int, np.integer))
+        or (not least <= value <= most)
+    ):
+        raise InvalidValueError(
+            f"{name} must be a whole number from {least} to {most}, got {value!r:.200}"
+        )
+
+
+def switch(name: str, value: Any) -> None:
+    """``InvalidValueError`` unless ``value`` is True or False, NumPy's too."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InvalidValueError(f"{name} must be True or False, got {value!r}")

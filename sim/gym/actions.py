@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -18,22 +17,19 @@ def clipped(action: Any) -> tuple[float, float]:
     Raises ``InvalidValueError`` for what is not two numbers (words, objects and switches are none),
     and for NaN and infinities alike.
     """
-    array = array_of(action)
-    if array.shape != (2,) or array.dtype.kind not in "fiu":
-        raise InvalidValueError(f"an action is two finite numbers in [-1, 1], got {action!r:.200}")
-    v, omega = (float(part) for part in array.tolist())
-    if not (math.isfinite(v) and math.isfinite(omega)):
-        raise InvalidValueError(f"an action is two finite numbers in [-1, 1], got {action!r:.200}")
+    v, omega = map(float, _finite(action, (2,), "an action is two").tolist())
     return min(max(v, -1.0), 1.0), min(max(omega, -1.0), 1.0)
 
 
 def of_rooms(actions: Any, n: int) -> NDArray[Any]:
     """(n, 2) finite numbers, one action for each of ``n`` rooms; else ``InvalidValueError``."""
-    array = array_of(actions)
-    if array.shape != (n, 2) or array.dtype.kind not in "fiu" or not np.isfinite(array).all():
-        raise InvalidValueError(
-            f"actions are ({n}, 2) finite numbers in [-1, 1], got {actions!r:.200}"
-        )
+    return _finite(actions, (n, 2), f"actions are ({n}, 2)")
+
+
+def _finite(value: Any, shape: tuple[int, ...], words: str) -> NDArray[Any]:
+    array = array_of(value)
+    if array.shape != shape or array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+        raise InvalidValueError(f"{words} finite numbers in [-1, 1], got {value!r:.200}")
     return array
 
 

@@ -12,53 +12,23 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from scenes.scan_plane import SCAN_HEIGHT
-from sim.core.checks import instance, number, one_of, whole_numbers
+from sim.core.checks import instance, number, one_of, switch, whole_numbers
 from sim.core.seeds import Seeds
 from sim.gym.actions import clipped
+from sim.gym.observation import Observation, observed, space_of
 from sim.gym.options import checked_seed, episode
 from sim.gym.pose_source import PoseSource
 from sim.sensors.lidar.device import ScanResult
 from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from sim.simulation import Simulation
-from slam._jit import njit
 from slam.errors import InvalidValueError, MobiliaError
 from slam.frames import LaserSpec
 from slam.system import SlamSystem
 
 V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
 GOAL_RADIUS_M = 0.4
-_MAX_TICKS = 2**40
 VIEWS = ("top", "follow", "persp")  # as in ``sim.view.pictures``, which needs OpenGL to import
 MAX_PX = 8192  # edge of a picture
-
-Observation = dict[str, Any]  # arrays by name; Gymnasium types Dict spaces so
-
-
-def _observation_space(spec: LaserSpec, *, believing: bool) -> spaces.Dict:
-    n = spec.n_beams
-    believed = PoseSource.space() if believing else {}
-    return spaces.Dict(
-        {
-            "ranges": spaces.Box(0.0, np.float32(spec.range_max), (n,), np.float32),
-            "valid": spaces.Box(0, 1, (n,), np.uint8),
-            "encoders": spaces.Box(-_MAX_TICKS, _MAX_TICKS, (2,), np.int64),
-            "time": spaces.Box(0.0, 1e9, (), np.float64),
-            **believed,
-        }
-    )
-
-
-@njit
-def _told(
-    ranges: NDArray[np.float32], least: float, most: float
-) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """Finite ranges, and which are measurements, as ``Scan.valid``."""
-    out, valid = np.empty(ranges.size, np.float32), np.empty(ranges.size, np.uint8)
-    for i in range(ranges.size):
-        fits = least <= ranges[i] <= most
-        valid[i] = fits
-        out[i] = ranges[i] if fits else most
-    return out, valid
 
 
 class ResetNeededError(MobiliaError, gymnasium.error.ResetNeeded):
@@ -170,11 +140,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         number("time_limit_s", time_limit_s)
         if not time_limit_s > 0.0:
             raise InvalidValueError(f"time_limit_s must be > 0, got {time_limit_s}")
-        for name, value in (("terminate_on_collision", terminate_on_collision), ("labels", labels)):
-            if not isinstance(value, (bool, np.bool_)):
-                raise InvalidValueError(f"{name} must be True or False, got {value!r}")
-        for name, word in (("scene", scene), ("odometry", odometry)):
-            instance(name, word, str)
+        switch("terminate_on_collision", terminate_on_collision)
+        switch("labels", labels)
+        instance("scene", scene, str)
+        instance("odometry", odometry, str)
         width, height = whole_numbers("render_size", render_size, "(width, height) in px", MAX_PX)
         self.render_mode = render_mode
         self.time_limit_s = time_limit_s
@@ -198,7 +167,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _set_space(self, spec: LaserSpec) -> None:
         self._n_beams = spec.n_beams
-        self.observation_space = _observation_space(spec, believing=self._pose_source is not None)
+        self.observation_space = space_of(spec, believing=self._pose_source is not None)
 
     @property
     def simulation(self) -> Simulation:
@@ -258,7 +227,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """What the robot knows by the scan that was just taken."""
         simulation = self.simulation
         spec = simulation.spec
-        ranges, valid = _told(scan.ranges, spec.range_min, spec.range_max)
+        ranges, valid = observed(scan.ranges, spec.range_min, spec.range_max)
         observation = {
             "ranges": ranges,
             "valid": valid,

@@ -20,12 +20,15 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from sim.core.checks import switch, whole
 from sim.gym.actions import array_of, of_rooms
-from sim.gym.env import MobiliaEnv, Observation, ResetNeededError
+from sim.gym.env import MobiliaEnv, ResetNeededError
+from sim.gym.observation import Observation
 from sim.gym.options import checked_seed
 from slam.errors import InvalidValueError
 
 MOST_ENVS = 4096  # each holds a physics model of its own
+MOST_THREADS = 1024
 Outcome = tuple[float, bool, bool]
 
 
@@ -63,16 +66,9 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         frames: bool = False,
         **settings: Any,
     ) -> None:
-        for name, value, most in (
-            ("num_envs", num_envs, MOST_ENVS),
-            ("n_threads", n_threads, 1024),
-        ):
-            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-                raise InvalidValueError(
-                    f"{name} must be a whole number >= 1 and <= {most}, got {value!r}"
-                )
-        if not isinstance(frames, (bool, np.bool_)):
-            raise InvalidValueError(f"frames must be True or False, got {frames!r}")
+        whole("num_envs", num_envs, 1, MOST_ENVS)
+        whole("n_threads", n_threads, 1, MOST_THREADS)
+        switch("frames", frames)
         source = settings.get("pose_source")
         if num_envs > 1 and source is not None and not isinstance(source, str):
             raise InvalidValueError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sim.core.checks import check_types
+from sim.core.checks import check_types, check_within, one_of
 from slam.errors import InvalidValueError
 
 PLANS = ("layout", "map")
@@ -36,12 +36,8 @@ class LoopConfig:
 
     def __post_init__(self) -> None:
         check_types(self)
-        if self.plan_on not in PLANS:
-            raise InvalidValueError(
-                f"LoopConfig.plan_on must be one of {', '.join(PLANS)}, got {self.plan_on!r}"
-            )
-        if not 1 <= self.scans <= 100:
-            raise InvalidValueError(f"LoopConfig.scans must lie in 1..100, got {self.scans}")
+        one_of("LoopConfig.plan_on", self.plan_on, PLANS)
+        check_within(self, {"scans": (1, 100)})
         limits = {
             "arrive_m": 10.0, "tolerance_m": 10.0, "patience_s": 1e4, "limit_s": 1e4,
             "replan_s": 1e4, "near_m": 10.0,

@@ -11,7 +11,6 @@ from collections import defaultdict
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal
 
 import numpy as np
@@ -32,7 +31,7 @@ from sim.recording import messages as ros
 from sim.recording.label_cloud import LabelsMessage
 from sim.recording.objects import ObjectsMessage
 from sim.recording.template import STORE
-from sim.recording.topics import MoreTopics
+from sim.recording.topics import OURS, MoreTopics
 from slam import se2
 from slam._jit import njit
 from slam.errors import InvalidValueError
@@ -202,21 +201,9 @@ class BagWriter:
 
     def __enter__(self) -> BagWriter:
         self._writer.open()
-        scan, wheels = ros.ScanMessage.KIND, self._wheels
-        topics = {
-            "/tf_static": ros.TransformMessage.KIND,
-            "/tf": wheels.tf.KIND,
-            "/odom": wheels.odometry.KIND,
-            "/odom_increment": wheels.increment.KIND,
-            "/ground_truth/pose": ros.TruthMessage.KIND,
-            "/ground_truth/objects": ObjectsMessage.KIND if self._objects else "",
-            "/ground_truth/labels": LabelsMessage.KIND if self._labels else "",
-            "/scan": scan,
-            "/scan_turn": scan,
-            **self._more.kinds,
-        }
-        for topic, kind in topics.items():
-            if kind:
+        made = {"/ground_truth/objects": self._objects, "/ground_truth/labels": self._labels}
+        for topic, kind in {**OURS, **self._more.kinds}.items():
+            if made.get(topic, True):
                 latched = [_LATCHED] if topic == "/tf_static" else []
                 self._connections[topic] = self._writer.add_connection(
                     topic, kind, typestore=STORE, offered_qos_profiles=latched
@@ -225,10 +212,7 @@ class BagWriter:
         return self
 
     def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: Any
     ) -> None:
         if error is None:
             self._chunks.flush()

@@ -6,12 +6,12 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from sim.core.checks import whole
 from sim.core.versions import check_world
 from sim.recording.days import FILES, write_days
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
@@ -19,8 +19,7 @@ from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
 from sim.recording.verify import Finding, check_hashes, finding, listed_in
 from sim.twins.twins import TWINS
 from sim.world.times_of_day import MOST_SESSIONS
-from slam import locks
-from slam.bounded import check_file
+from slam import bounded, locks
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import PART, is_part, make_folder, reason, write_text
 
@@ -48,10 +47,7 @@ class Plan:
     sessions: int = 0
 
     def __post_init__(self) -> None:
-        if isinstance(self.episodes, bool) or not 1 <= self.episodes <= MAX_EPISODES:
-            raise InvalidValueError(
-                f"Plan.episodes must be 1 to {MAX_EPISODES}, got {self.episodes}"
-            )
+        whole("Plan.episodes", self.episodes, 1, MAX_EPISODES)
         if not self.dynamisms or len(set(self.dynamisms)) != len(self.dynamisms):
             raise InvalidValueError(
                 f"Plan.dynamisms must be different numbers, got {self.dynamisms}"
@@ -65,11 +61,7 @@ class Plan:
             raise InvalidValueError("Plan.dynamisms are too close: two episodes have one name")
 
     def _check_sessions(self) -> None:
-        most = 0 <= self.sessions <= MOST_SESSIONS
-        if isinstance(self.sessions, bool) or not isinstance(self.sessions, int) or not most:
-            raise InvalidValueError(
-                f"Plan.sessions must be 0 to {MOST_SESSIONS}, got {self.sessions!r}"
-            )
+        whole("Plan.sessions", self.sessions, 0, MOST_SESSIONS)
         alone = self.episodes == 1 and len(self.dynamisms) == 1 and not self.twins
         if self.sessions and not alone:
             raise InvalidValueError(
@@ -175,24 +167,16 @@ def read_plan(path: Path) -> Plan:
     Raises ``LogFormatError`` for one that is missing or anything else.
     """
     file = path / PLAN
+    text = bounded.text_of(file, MAX_BYTES)
     try:
-        if not stat.S_ISREG(file.stat().st_mode):
-            raise LogFormatError(file, "cannot be read: not a file")
-        with file.open("rb") as opened:
-            raw = opened.read(MAX_BYTES + 1)
-        if len(raw) > MAX_BYTES:
-            raise LogFormatError(file, f"more than {MAX_BYTES} bytes: no plan")
-        data = json.loads(raw.decode("utf-8"))
+        data = json.loads(text)
         if not isinstance(data, dict) or data.pop("schema", None) != SCHEMA:
             raise LogFormatError(file, f"no plan of schema {SCHEMA}")
         levels, recipe = tuple(data.pop("dynamisms")), Recipe(**data.pop("recipe"))
         plan = Plan(recipe=recipe, dynamisms=levels, **data)
-        whole = plan.text().encode() == raw
-    except OSError as error:
-        raise LogFormatError(file, f"cannot be read: {error.strerror or error}") from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise LogFormatError(file, f"no plan of a dataset: {error}") from error
-    if not whole:
+    if plan.text() != text:
         raise LogFormatError(file, "damaged: not as it was written")
     return plan
 
@@ -289,7 +273,7 @@ def _claim(path: Path, plan: Plan) -> None:
     """Leave the plan in an empty folder; refuse one that has another."""
     file = path / PLAN
     if file.exists():
-        check_file(file)
+        bounded.check_file(file)
         if file.read_text(encoding="utf-8", errors="replace") != plan.text():
             raise OutputError(f"{file} is of another dataset: choose another --out")
         return

@@ -25,7 +25,7 @@ from sim.core.seeds import Seeds
 from sim.recording.recipe import Recipe
 from sim.world.sessions import Arrangement, Days
 from sim.world.times_of_day import time_of
-from slam.bounded import check_file
+from slam.bounded import text_of
 from slam.errors import LogFormatError
 from slam.files import write_text
 from slam.maps import write_map
@@ -180,17 +180,10 @@ def read_things(folder: Path) -> list[Thing]:
 
 
 def _rows(file: Path, columns: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
-    check_file(file)
     try:
-        with file.open("rb") as opened:
-            raw = opened.read(MAX_BYTES + 1)
-        lines = list(csv.reader(io.StringIO(raw.decode("utf-8"))))
-    except OSError as error:
-        raise LogFormatError(file, f"cannot be read: {error.strerror or error}") from error
-    except (UnicodeDecodeError, csv.Error) as error:
+        lines = list(csv.reader(io.StringIO(text_of(file, MAX_BYTES))))
+    except csv.Error as error:
         raise LogFormatError(file, f"no table: {error}") from error
-    if len(raw) > MAX_BYTES:
-        raise LogFormatError(file, f"more than {MAX_BYTES} bytes: no table of sessions")
     if not lines or lines[0] != list(columns):
         raise LogFormatError(file, f"expected the columns {', '.join(columns)}")
     for number, row in enumerate(lines[1:], 2):

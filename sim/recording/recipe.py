@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.core.checks import number
+from sim.core.checks import number, one_of
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.core.versions import WORLD, world_of
@@ -27,7 +27,7 @@ from sim.simulation import Simulation
 from sim.twins.twins import TWINS
 from sim.world.times_of_day import checked
 from sim.world.world import World
-from slam.bounded import check_file
+from slam.bounded import text_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.files import write_text
 from slam.names import NameFromFile
@@ -77,18 +77,14 @@ class Recipe:
             raise InvalidValueError(f"Recipe.scene must be a name, got {self.scene!r}")
         Seeds(self.seed)
         Dynamism.at(self.dynamism)
-        if isinstance(self.seconds, bool) or not isinstance(self.seconds, (int, float)):
-            raise InvalidValueError(f"Recipe.seconds must be a number, got {self.seconds!r}")
+        number("Recipe.seconds", self.seconds)
         if not 0.0 < self.seconds <= MAX_SECONDS:
             raise InvalidValueError(
                 f"Recipe.seconds must be > 0 and at most {MAX_SECONDS:g}, got {self.seconds}"
             )
-        for name, known in (("odometry", PRESETS), ("twin", ("", *TWINS))):
-            value = getattr(self, name)
-            if not isinstance(value, str) or value not in known:
-                raise InvalidValueError(
-                    f"Recipe.{name} must be one of {', '.join(map(repr, known))}, got {value!r}"
-                )
+        one_of("Recipe.odometry", self.odometry, tuple(PRESETS))
+        if self.twin != "":
+            one_of("Recipe.twin", self.twin, TWINS)
         self._check_change()
         if not isinstance(self.options, Mapping):
             raise InvalidValueError(f"Recipe.options must be a mapping, got {self.options!r}")
@@ -236,21 +232,15 @@ class Made:
         return "; ".join(changes)
 
 
-def read_recipe(path: Path) -> Made:  # noqa: C901 (one check a field)
+def read_recipe(path: Path) -> Made:
     """Inverse of ``write_recipe``; ``LogFormatError`` that names the file for anything else.
 
     The scene's name is one from a file: no code runs by it (``slam.names``). The recipe may be of
     another version of the world: ``sim.core.versions.check_world`` before it is simulated.
     """
-    check_file(path)
+    text = text_of(path, MAX_BYTES)
     try:
-        with path.open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
-        if len(raw) > MAX_BYTES:
-            raise LogFormatError(path, f"more than {MAX_BYTES} bytes: no recipe")
-        data = json.loads(raw.decode("utf-8"), parse_constant=_refuse)
-    except OSError as error:
-        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
+        data = json.loads(text, parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
         raise LogFormatError(path, f"no recipe: {error}") from error
     wanted = ("schema", "recipe", "recipe_sha256", "made_with", "result")

@@ -18,8 +18,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 from typing import Literal, NoReturn
 
-from slam import locks
-from slam.bounded import check_file
+from slam import bounded, locks
 from slam.errors import LogFormatError
 from slam.files import write_text
 
@@ -42,7 +41,7 @@ class Fault:
 
 def sha256(path: Path) -> str:
     """Of a file, read in pieces; ``LogFormatError`` when it cannot be read."""
-    check_file(path)
+    bounded.check_file(path)
     digest = hashlib.sha256()
     try:
         with path.open("rb") as file:
@@ -91,19 +90,8 @@ def read_sums(folder: Path) -> dict[str, str]:
 
 
 def _read(path: Path) -> dict[str, str]:
-    try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise LogFormatError(path, "cannot be read: not a file")
-        with path.open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
-        lines = raw.decode("utf-8").split("\n")
-    except OSError as error:
-        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise LogFormatError(path, "not a list of hashes") from error
-    if len(raw) > MAX_BYTES:
-        raise LogFormatError(path, f"more than {MAX_BYTES} bytes: no list of hashes")
-    sums: dict[str, str] = {}
+    text = bounded.text_of(path, MAX_BYTES)
+    lines, sums = text.split("\n"), dict[str, str]()
     for number, line in enumerate(lines[:-1] if lines[-1] == "" else lines, 1):
         found = _LINE.fullmatch(line)
         if found is None or not _is_inside(found[2]):
@@ -111,7 +99,7 @@ def _read(path: Path) -> dict[str, str]:
         sums[found[2]] = found[1]
     if not sums:
         raise LogFormatError(path, "lists no file")
-    if raw != text_of(sums).encode():
+    if text != text_of(sums):
         raise LogFormatError(path, "damaged: not as it was written (order, repetition, last line)")
     return sums
 

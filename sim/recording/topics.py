@@ -7,16 +7,26 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from sim.moments import Moment
+from sim.recording import messages as ros
+from sim.recording.label_cloud import LabelsMessage
+from sim.recording.objects import ObjectsMessage
 from sim.recording.template import STORE
 from slam.errors import InvalidValueError, UnknownNameError
 
 Maker = Callable[[Moment], Any]
 F = TypeVar("F", bound=Maker)
 _topics: dict[str, tuple[str, Maker]] = {}
-OURS = frozenset(
-    ("/tf_static", "/tf", "/odom", "/odom_increment", "/ground_truth/pose", "/ground_truth/objects",
-     "/ground_truth/labels", "/scan", "/scan_turn")
-)  # fmt: skip
+OURS = {  # by name their types, in the order of a bag's connections
+    "/tf_static": ros.TransformMessage.KIND,
+    "/tf": ros.TransformMessage.KIND,
+    "/odom": ros.OdometryMessage.KIND,
+    "/odom_increment": ros.IncrementMessage.KIND,
+    "/ground_truth/pose": ros.TruthMessage.KIND,
+    "/ground_truth/objects": ObjectsMessage.KIND,
+    "/ground_truth/labels": LabelsMessage.KIND,
+    "/scan": ros.ScanMessage.KIND,
+    "/scan_turn": ros.ScanMessage.KIND,
+}
 
 
 def topic(name: str, kind: str) -> Callable[[F], F]:
@@ -29,7 +39,7 @@ def topic(name: str, kind: str) -> Callable[[F], F]:
     name that is taken or does not begin with '/', ``UnknownNameError`` for an unknown type.
     """
     if not name.startswith("/") or name in OURS or name in _topics:
-        taken = ", ".join(sorted(OURS | set(_topics)))
+        taken = ", ".join(sorted({*OURS, *_topics}))
         raise InvalidValueError(
             f"a topic needs a new name that begins with '/', got {name!r}. Taken: {taken}"
         )

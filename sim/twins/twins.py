@@ -19,7 +19,7 @@ the same to the bit in all three, as are the numbers drawn for the beams' noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -111,7 +111,7 @@ class Twins:
     def _dynamic(self) -> Iterator[Moment]:
         moments = self._tour(self._again())
         for moment, odometry in zip(moments, self._odometry, strict=True):
-            yield replace(moment, frame=_with(moment.frame, odometry))
+            yield replace(moment, frame=replace(moment.frame, odometry=odometry))
 
 
 def twins(scene: str = "office", **settings: Any) -> dict[str, Stream]:
@@ -180,25 +180,6 @@ def _odometry(simulation: Simulation, drive: Drive) -> list[Odometry]:
     return readings
 
 
-def _with(frame: Frame, odometry: Odometry) -> Frame:
-    return Frame(
-        stamp_ns=frame.stamp_ns,
-        odometry=odometry,
-        scan=frame.scan,
-        truth=frame.truth,
-        labels=frame.labels,
-    )
-
-
 def _stream(metadata: StreamMetadata, name: str, frames: list[Frame]) -> Stream:
-    extra: Mapping[str, Any] = {**metadata.extra, "twin": name}
-    labelled = StreamMetadata(
-        source=metadata.source,
-        scene=metadata.scene,
-        seed=metadata.seed,
-        laser=metadata.laser,
-        robot=metadata.robot,
-        truth=metadata.truth,
-        extra=extra,
-    )
+    labelled = replace(metadata, extra={**metadata.extra, "twin": name})
     return Stream(metadata=labelled, frames=lambda: iter(frames), length=len(frames))

@@ -12,7 +12,6 @@ that made it.
 from __future__ import annotations
 
 import importlib
-from types import TracebackType
 from typing import Any, Self
 
 import cv2
@@ -126,12 +125,7 @@ class Camera:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

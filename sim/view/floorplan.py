@@ -38,7 +38,7 @@ WALL = (66, 73, 88)
 PALE = 0.42  # share of white in the colour of furniture
 MARGIN_M = 0.3
 BAR_PX = 140  # longest scale bar
-SHIFT = 4
+SHIFT = 4  # fractional bits of pixel coordinates given to OpenCV
 PAD = 8  # px around what is written
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 
@@ -70,7 +70,7 @@ class FloorPlan:
         shadow = np.zeros((height, width), dtype=np.uint8)
         shapes = sorted(_shapes(model, data), key=lambda shape: shape[0])
         for top, outline, colour in shapes:
-            pixels = self._fixed(outline)
+            pixels = fixed(self.to_pixels(outline))
             if top < 0.02:
                 cv2.fillPoly(picture, [pixels], colour, cv2.LINE_AA, SHIFT)
             else:
@@ -79,7 +79,7 @@ class FloorPlan:
         for top, outline, colour in shapes:
             if top < 0.02:
                 continue
-            pixels = self._fixed(outline)
+            pixels = fixed(self.to_pixels(outline))
             cv2.fillPoly(picture, [pixels], colour, cv2.LINE_AA, SHIFT)
             if colour != WALL:
                 rim = tuple(round(0.72 * c) for c in colour)
@@ -107,8 +107,10 @@ class FloorPlan:
             cv2.line(picture, start, end, icons.INK, 2, cv2.LINE_AA)
         write(picture, label, x + bar + PAD, y)
 
-    def _fixed(self, outline: Float) -> NDArray[np.int32]:
-        return np.round(self.to_pixels(outline) * (1 << SHIFT)).astype(np.int32)
+
+def fixed(pixels: Float) -> NDArray[np.int32]:
+    """Pixel coordinates as OpenCV's fixed point."""
+    return np.round(pixels * (1 << SHIFT)).astype(np.int32)
 
 
 def text_width(words: str, height: int) -> int:
@@ -158,11 +160,9 @@ def _corners(model: mujoco.MjModel, geom: int) -> Float:
         c = 0.0
     elif kind == GEOM.mjGEOM_SPHERE:
         b = c = a
-    elif kind == GEOM.mjGEOM_CAPSULE:
-        ring = [(a * math.cos(t), a * math.sin(t)) for t in np.linspace(0, math.tau, 16)]
-        return np.array([(x, y, z) for x, y in ring for z in (-b, b)])
-    elif kind == GEOM.mjGEOM_CYLINDER:
-        ring = [(a * math.cos(t), a * math.sin(t)) for t in np.linspace(0, math.tau, 32)]
+    elif kind in (GEOM.mjGEOM_CAPSULE, GEOM.mjGEOM_CYLINDER):
+        turns = np.linspace(0, math.tau, 16 if kind == GEOM.mjGEOM_CAPSULE else 32)
+        ring = [(a * math.cos(t), a * math.sin(t)) for t in turns]
         return np.array([(x, y, z) for x, y in ring for z in (-b, b)])
     if kind in (GEOM.mjGEOM_SPHERE, GEOM.mjGEOM_ELLIPSOID):
         tilts, turns = np.linspace(0, math.pi, 9), np.linspace(0, math.tau, 16)

@@ -21,13 +21,12 @@ from numpy.typing import ArrayLike, NDArray
 from scenes.kinds import kind_of
 from scenes.scene import Scene
 from sim.view import icons
-from sim.view.floorplan import PAD, FloorPlan, panel, text_width, write
+from sim.view.floorplan import PAD, SHIFT, FloorPlan, fixed, panel, text_width, write
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-SHIFT = 4  # fractional bits of pixel coordinates given to OpenCV
 SCAN_FILL = (255, 190, 120)
 LABEL_FILL = (96, 168, 255)  # under hits that have colours of their own
 SCAN_SHARE = 0.34
@@ -109,7 +108,7 @@ class MapView:
         places = owners[strokes.of_point, :2]
         turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=1) + places
         drawn = np.isfinite(owners).all(axis=1)
-        pixels = _fixed(self.plan.to_pixels(np.nan_to_num(turned)))
+        pixels = fixed(self.plan.to_pixels(np.nan_to_num(turned)))
         for index in np.flatnonzero(drawn).tolist():
             shape = strokes.shapes[index]
             lines = [pixels[start:end] for start, end in strokes.spans[index]]
@@ -136,7 +135,7 @@ class MapView:
         if not window.size:
             return
         tinted = window.copy()
-        cv2.fillPoly(tinted, [_fixed(outline - low)], fill, cv2.LINE_AA, SHIFT)
+        cv2.fillPoly(tinted, [fixed(outline - low)], fill, cv2.LINE_AA, SHIFT)
         cv2.addWeighted(tinted, SCAN_SHARE, window, 1.0 - SCAN_SHARE, 0.0, dst=window)
 
     def _draw_hits(
@@ -144,7 +143,7 @@ class MapView:
     ) -> None:
         hits = np.asarray(points, dtype=np.float64)
         known = np.isfinite(hits).all(axis=1)
-        places = _fixed(self.plan.to_pixels(hits[known])).tolist()
+        places = fixed(self.plan.to_pixels(hits[known])).tolist()
         drawn = [SCAN_HIT] * len(places) if colours is None else colours[known].tolist()
         least = 1.1 if colours is None else 1.7  # a colour wants more than a pixel
         radius = round(max(least, 0.022 * self.plan.scale) * (1 << SHIFT))
@@ -155,7 +154,7 @@ class MapView:
         if len(path) < 2:
             return
         step = max(1, len(path) // MAX_TRAIL_POINTS)
-        line = _fixed(self.plan.to_pixels(np.vstack([path[:-1:step], path[-1:]])))
+        line = fixed(self.plan.to_pixels(np.vstack([path[:-1:step], path[-1:]])))
         width = max(1, round(0.035 * self.plan.scale))
         cv2.polylines(picture, [line], False, colour, width, cv2.LINE_AA, SHIFT)
 
@@ -173,11 +172,6 @@ class MapView:
             wide = text_width(caption, height)
             panel(picture, width - wide - 4 * PAD, height - step - PAD, wide + 4 * PAD, step + PAD)
             write(picture, caption, width - wide - 2 * PAD, height - (step + PAD) // 2)
-
-
-def _fixed(points: Float) -> NDArray[np.int32]:
-    """Pixel coordinates as OpenCV's fixed point."""
-    return np.round(points * (1 << SHIFT)).astype(np.int32)
 
 
 def _trail_colour(name: str) -> icons.Colour:

@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from slam.errors import InvalidValueError
+from sim.core.checks import whole
 
 MOST_SESSIONS = 50
 OPEN, AJAR, SHUT = (1.25, 1.75), (0.3, 0.9), (0.0, 0.0)  # rad, as in ``scenes.recipe``
@@ -66,9 +64,5 @@ def time_of(session: int) -> TimeOfDay:
 
 def checked(session: Any) -> int:
     """A number of a session; ``InvalidValueError`` for anything else."""
-    whole = isinstance(session, (int, np.integer)) and not isinstance(session, bool)
-    if not whole or not 0 <= session < MOST_SESSIONS:
-        raise InvalidValueError(
-            f"session must be a whole number from 0 to {MOST_SESSIONS - 1}, got {session!r}"
-        )
+    whole("session", session, 0, MOST_SESSIONS - 1)
     return int(session)

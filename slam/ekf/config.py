@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from slam.frontend.corner_config import CornerConfig
 from slam.landmarks.hypotheses import Gates
 from slam.settings import Settings, number, word
 
-SEEDS = "training seeds 0-19 (docs/paper/method.md)"
+SEEDS = "training seeds 0-19, tune_ekf (docs/paper/method.md)"
+SENSOR = "as PointWorldConfig, the world of section 4.2"
 MOST_GATE = 1.0 - 1e-12
 
 
@@ -19,17 +20,27 @@ class LifecycleConfig(Settings):
     """When an object is a landmark, and when it is none any more."""
 
     chance: float = number(
-        0.05, "prob", "that something else is seen where it was", low=1e-6, high=0.15
+        0.05, "prob", "of something else where a landmark was", low=1e-6, high=0.15
     )
     within: float = number(0.95, "share", "of range and field of view: surely in view")
-    beyond: float = number(1.1, "share", "of the same: surely not in view", low=1.0)
-    behind_m: float = number(
-        0.15, "m", "a beam that ends this much before or after the landmark decides"
+    beyond: float = number(1.1, "share", "of range and field of view: surely not in view", low=1.0)
+    behind_m: float = number(0.15, "m", "a beam that ends so far off a landmark decides")
+    lost_after: int = number(10, "frames", "in a row without an expected match: lost", low=1)
+    singular_m2: float = number(
+        1e-12,
+        "m²",
+        "least eigenvalue of a measured covariance; below, it is replaced",
+        "numerical guard: (1 µm)²",
+        low=1e-18,
     )
-    lost_after: int = number(10, "frames", "that should match and do not: lost", low=1)
-    singular_m2: float = number(1e-12, "m²", "least eigenvalue of a measured feature", low=1e-18)
-    least_m2: float = number(1e-6, "m²", "taken in its place: 1 mm", low=1e-15)
-    reach_sigmas: float = number(3.0, "σ", "by which the pose may be off, for what is in reach")
+    least_m2: float = number(
+        1e-6,
+        "m²",
+        "variance taken in the place of a singular one",
+        "numerical guard: (1 mm)²",
+        low=1e-15,
+    )
+    reach_sigmas: float = number(3.0, "σ", "deviations of the pose, for what is in reach")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +51,11 @@ class EkfConfig(Settings):
     gate, one of a thousand at 0.999, would be a step without landmarks.
     """
 
+    presets: ClassVar[tuple[str, ...]] = ("points", "corners", "victoria_park")
+
     association: str = word(
-        "ipjc", ("ipjc", "jcbb", "individual"), "incremental posterior joint compatibility, "
-        "joint compatibility branch and bound, or each pair alone",
+        "ipjc", ("ipjc", "jcbb", "individual"), "IPJC, joint compatibility branch and bound, "
+        "or each pair alone",
     )  # fmt: skip
     individual_gate: float = number(
         0.999999, "prob", "of chi-square, a pair alone, 2 dof", SEEDS, low=0.5, high=MOST_GATE
@@ -59,12 +72,17 @@ class EkfConfig(Settings):
         "steps of 0.1 m and 0.03 rad needs", SEEDS, low=1e-3, high=1e3,
     )  # fmt: skip
     range_m: float = number(
-        12.0, "m", "of the sensor of features; beyond, none is used", low=0.1, high=1e4
+        12.0,
+        "m",
+        "range of the sensor of features; farther ones are not used",
+        SENSOR,
+        low=0.1,
+        high=1e4,
     )
-    fov_deg: float = number(180.0, "deg", "its field of view", low=1.0, high=360.0)
-    occluder_m: float = number(
-        0.0, "m", "half width of the things that hide a landmark", high=100.0
+    fov_deg: float = number(
+        180.0, "deg", "field of view of the sensor of features", SENSOR, low=1.0, high=360.0
     )
+    occluder_m: float = number(0.0, "m", "half width of what hides a landmark", high=100.0)
     confirm_looks: int = number(
         2, "looks", "that make an object a landmark; the paper: re-observed once", SEEDS,
         low=1, high=100,
@@ -88,6 +106,11 @@ class EkfConfig(Settings):
         return Gates(
             individual=self.individual_gate, joint=self.joint_gate, posterior=self.posterior_gate
         )
+
+    @classmethod
+    def points(cls, **changes: Any) -> EkfConfig:
+        """Point features as a sensor gives them: the defaults."""
+        return cls(**changes)
 
     @classmethod
     def corners(cls, **changes: Any) -> EkfConfig:

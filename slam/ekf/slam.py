@@ -35,9 +35,7 @@ from slam.trajectory import Trajectory
 
 GROUPS = ("lifecycle", "extractor")  # set by path, not as options
 PRESETS: dict[str, Callable[..., EkfConfig]] = {
-    "points": EkfConfig,
-    "corners": EkfConfig.corners,
-    "victoria_park": EkfConfig.victoria_park,
+    name: getattr(EkfConfig, name) for name in EkfConfig.presets
 }
 
 
@@ -61,8 +59,8 @@ class EkfSlam:
 
     Takes ``frame.features``; where a frame has only a scan, corners are extracted from it. Options
     are those of ``EkfConfig``; ``preset`` is "points" (the default of ``EkfConfig``), "corners" or
-    "victoria_park", and without it the first frame tells the first two apart. ``config`` may be
-    numbers by their path instead, which change that preset.
+    "victoria_park"; without it the first frame decides between the first two. ``config`` may be
+    numbers by their path instead, which change that preset, and name it: ``{"preset": "corners"}``.
     """
 
     config_class: ClassVar[type[EkfConfig]] = EkfConfig
@@ -75,11 +73,11 @@ class EkfSlam:
         corner_config: CornerConfig | None = None,
         **options: Any,
     ) -> None:
-        if preset is not None and preset not in PRESETS:
-            raise InvalidValueError(f"EkfSlam.preset must be of {list(PRESETS)}, got {preset!r}")
         self._changes = dict(config) if isinstance(config, Mapping) else {}
         if isinstance(config, Mapping):
-            config = None
+            preset, config = self._changes.pop("preset", preset), None
+        if preset is not None and preset not in PRESETS:
+            raise InvalidValueError(f"EkfSlam.preset must be of {list(PRESETS)}, got {preset!r}")
         if config is not None and (preset is not None or options):
             raise InvalidValueError("EkfSlam takes a config, or a preset and options, not both")
         known = [name for name in EkfConfig.__dataclass_fields__ if name not in GROUPS]
@@ -87,7 +85,7 @@ class EkfSlam:
         if unknown:
             raise InvalidValueError(f"EkfSlam has no option {unknown[0]!r}; it has {known}")
         self._options = options
-        self._told = config is not None or preset is not None
+        self._is_given = config is not None or preset is not None
         self._corner_config = corner_config
         self._configure(config or PRESETS[preset or "points"](**options))
         self.reset()
@@ -117,9 +115,9 @@ class EkfSlam:
         return self._report(frame, pairs.matched, len(points))
 
     def _begin(self, frame: Frame) -> None:
-        """Refuse a frame out of order; let the first one tell which preset is meant."""
+        """Refuse a frame out of order; the first one decides which preset is meant."""
         self._path.check_order(frame.stamp_ns)
-        if not len(self._path) and not self._told:
+        if not len(self._path) and not self._is_given:
             name = "points" if frame.features is not None else "corners"
             self._configure(PRESETS[name](**self._options))
             self.lifecycle = Lifecycle(self.config)

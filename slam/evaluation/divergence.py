@@ -4,7 +4,7 @@
 The error at a frame is the distance of the estimate from the truth plus ``LEVER_M`` times the
 heading error, in the frame of the first pose, unaligned: one number in m. A **divergence** is a
 rise by ``threshold_m`` within ``within_s`` that is still there over the ``stays_s`` that follow (by
-the median), and that the motion since tells too: who drives on with a heading that has long been
+the median), and that the motion since shows too: who drives on with a heading that has long been
 wrong gets further off, but gathers no error. Slow drift never rises that fast, a glitch does not
 stay, and a correction is a fall.
 """
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
+from slam.checked import is_number
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float
 
@@ -40,7 +41,7 @@ class Rule:
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float):
+            if not is_number(value):
                 raise InvalidValueError(f"Rule.{name} must be a number, got {value!r}")
             if not 0.0 < value < math.inf:
                 raise InvalidValueError(f"Rule.{name} must be > 0 and finite, got {value}")

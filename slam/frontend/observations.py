@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observations as Gaussians: beams and point features enter through one type.
 
-What they give to neurons is written by ``shunting.map.rasterise``.
+``slam.tracker.rasterise`` writes them onto a map.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,9 @@ from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import face, join, unveiled
 from slam.frontend.visibility import View, view_of_beams, view_of_features
 
-MOST_SWEPT_M = 50.0  # during one sweep; beyond, the beams of a scan belong to no one place
-MOST_STD_M = 3.0  # of a feature; one known worse says nothing, and fills the map in saying it
+# Guards on what comes in, no settings: an ordinary stream is far from either.
+MOST_SWEPT_M = 50.0  # m driven during one sweep; more is a broken twist (5 m/s for 10 s), by hand
+MOST_STD_M = 3.0  # m, deviation of a feature used; more would fill 10^5 cells of 3 cm, by hand
 
 
 class Grain(Protocol):
@@ -219,7 +220,7 @@ def observe(frame: Frame, twist: Float, grain: Grain) -> Observations:
     Raises ``InvalidValueError`` for a frame with neither.
     """
     if frame.scan is None and frame.features is None:
-        raise InvalidValueError("the shunting SLAM needs a scan or features in every frame")
+        raise InvalidValueError("this SLAM needs a scan or features in every frame")
     if frame.scan is None:
         return from_features(frame.features, grain)  # type: ignore[arg-type]
     beams = from_scan(frame.scan, twist, grain)
@@ -230,14 +231,8 @@ def observe(frame: Frame, twist: Float, grain: Grain) -> Observations:
 
 def joined(first: Observations, second: Observations) -> Observations:
     """Both, seen with the view of the first."""
-    return Observations(
-        points_robot=np.concatenate([first.points_robot, second.points_robot]),
-        covariances=np.concatenate([first.covariances, second.covariances]),
-        weights=np.concatenate([first.weights, second.weights]),
-        tangents=np.concatenate([first.tangents, second.tangents]),
-        joined=np.concatenate([first.joined, second.joined]),
-        facings=np.concatenate([first.facings, second.facings]),
-        view=first.view,
-        T_robot_laser=first.T_robot_laser,
-        sensor_sigma_m=first.sensor_sigma_m,
-    )
+    by_point = ("points_robot", "covariances", "weights", "tangents", "joined", "facings")
+    both: dict[str, Any] = {
+        n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in by_point
+    }
+    return replace(first, **both)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the odometry adds to the heading by itself, learnt while the map tells the heading.
+"""What the odometry adds to the heading by itself, learnt while the map shows the heading.
 
 Wheels of unequal size turn a robot that drives straight, a wrong track miscounts its turns
-(UMBmark, Borenstein and Feng 1996), both for a whole run. Left in, they are what a robot goes
-astray by as soon as the map tells little; taken out, odometry may be trusted more.
+(UMBmark, Borenstein and Feng 1996), both for a whole run. Left in, they lead a robot
+astray as soon as the map shows little. Without them, odometry is more accurate.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from slam.frontend.config import FRONTEND, BiasConfig
 class HeadingBias:
     """A Kalman filter of three: the heading's error against the map, and the two biases.
 
-    Each match gives it what the data alone say of the heading. It learns nothing where they tell
+    Each match gives it what the data alone say of the heading. It learns nothing where they say
     nothing, so it needs no gate against featureless places.
 
     per_m, per_rad  what the odometry adds, rad for each m driven and each rad turned
@@ -51,10 +51,10 @@ class HeadingBias:
         said, given = variances
         self._move(increment, said, elapsed)
         share, off, information = matched
-        told, config = _of_heading(information, self._config.place_information), self._config
-        kept = told * given / (1.0 + told * given)  # of what the data say, beside the prior
+        found, config = _of_heading(information, self._config.place_information), self._config
+        kept = found * given / (1.0 + found * given)  # of what the data say, beside the prior
         if share >= config.matched and kept >= config.data_share:
-            self._see(se2.wrap(off) / kept, 1.0 / (config.independent * told))
+            self._see(se2.wrap(off) / kept, 1.0 / (config.independent * found))
 
     def _move(self, increment: Float, variance: float, elapsed: float) -> None:
         P, G = self._P, (1.0, float(increment[0]), float(increment[2]))

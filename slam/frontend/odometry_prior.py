@@ -15,9 +15,8 @@ from slam.frontend.config import FRONTEND, PriorConfig
 from slam.frontend.odometry_bias import HeadingBias
 
 IDENTITY = np.eye(3)
-
-
-SINGULAR = 1e-12  # least variance of a matrix that rounding has left singular, m^2 and rad^2
+# Guard against rounding: least variance of a matrix left singular, m^2 and rad^2: (1 um, 1 urad)^2
+SINGULAR = 1e-12
 
 
 def turned(covariance: Float, theta: float) -> Float:

@@ -12,7 +12,7 @@ from slam.errors import InvalidValueError
 from slam.frames import Float, Odometry
 
 MOST_STEP_M = 1000.0  # between two frames: farther, the stream is broken or of another run
-MOST_POSE = 1e9  # m and rad from the origin: there a double still tells 0.1 micrometres
+MOST_POSE = 1e9  # m and rad from the origin: there a double still resolves 0.1 micrometres
 MOST_STD = 1e4  # m and rad, of an increment; with more, rounding would eat what is known beside
 HUGE = 1.0  # m^2 or rad^2: from there on,
 MOST_CORRELATION = 1.0 - 1e-6  # exact correlations would leave nothing of what is known beside
@@ -29,10 +29,10 @@ def known(covariance: Float, most_m: float = MOST_STD, most_rad: float = MOST_ST
     """A copy of an increment's covariance (3, 3) with standard deviations lowered to at most
     these, the correlations kept: beyond, they mean "not known"."""
     out = np.array(covariance, dtype=np.float64)
-    most = zip(np.diag(out).tolist(), (most_m, most_m, most_rad), strict=True)
-    scale = np.array([min(1.0, limit / math.sqrt(v)) if v > 0.0 else 1.0 for v, limit in most])
-    if scale.min() < 1.0:
-        out *= scale[:, None] * scale[None, :]
+    most = zip(out.diagonal().tolist(), (most_m, most_m, most_rad), strict=True)
+    scale = [min(1.0, limit / math.sqrt(v)) if v > 0.0 else 1.0 for v, limit in most]
+    if min(scale) < 1.0:
+        out *= np.outer(scale, scale)
     return out
 
 
@@ -40,11 +40,11 @@ def invertible(covariance: Float) -> Float:
     """``known``, and such that its inverse can be computed: the very numbers, unless a variance is
     ``HUGE``."""
     out = known(covariance)
-    variances = np.diag(out).copy()
-    if variances.max() > HUGE:
+    xx, yy, tt = out.diagonal().tolist()
+    if max(xx, yy, tt) > HUGE:
         out *= MOST_CORRELATION
-        least = LEAST_SHARE * max(variances[0], variances[1])
-        np.fill_diagonal(out, np.maximum(variances, [least, least, 0.0]))
+        least = LEAST_SHARE * max(xx, yy)
+        np.fill_diagonal(out, [max(xx, least), max(yy, least), max(tt, 0.0)])
     return out
 
 

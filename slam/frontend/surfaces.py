@@ -15,7 +15,7 @@ LINE_HITS = FRONTEND.surfaces.line_hits
 FACES, FACES_SEEN = (
     128,
     0x80,
-)  # directions told apart; a facing is FACES_SEEN | direction, 0: unknown
+)  # directions distinguished; a facing is FACES_SEEN | direction, 0: unknown
 AWAY = int(FACES * FRONTEND.surfaces.opposite_deg / 360.0)
 
 

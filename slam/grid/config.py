@@ -15,12 +15,14 @@ OCTOMAP = "Hornung et al. 2013"
 class GridConfig(Settings):
     """The inverse sensor model, log-odds per scan."""
 
-    hit: float = number(0.85, "log-odds", "of a cell where a beam ends: p = 0.7", OCTOMAP)
+    hit: float = number(0.85, "log-odds", "added to a cell in which a beam ends: p = 0.7", OCTOMAP)
     miss: float = number(
-        -0.4, "log-odds", "of a cell that a beam passes: p = 0.4", OCTOMAP, low=-1e6, high=0.0
+        -0.4, "log-odds", "added to a cell that a beam passes: p = 0.4", OCTOMAP, low=-1e6, high=0.0
     )
-    most: float = number(3.5, "log-odds", "either way: p = 0.97", OCTOMAP, low=1e-3)
-    struck: float = number(0.6, "input", "of a cell that holds the end; fainter is beside it")
+    most: float = number(
+        3.5, "log-odds", "largest magnitude of a cell's log-odds: p = 0.97", OCTOMAP, low=1e-3
+    )
+    struck: float = number(0.6, "input", "least input of a cell where a beam ends")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,11 +18,11 @@ from slam._jit import njit
 from slam.frames import Float
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
 from slam.grid.config import OccupancyConfig
-from slam.grid.submap import Submap
 from slam.system import Raster, register
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells, in_reach
 from slam.tracker.tracker import Tracker
+from slam.tracker.two_memories import TwoMemories
 
 
 class Odds(NamedTuple):
@@ -210,8 +210,8 @@ class OccupancySlam(Tracker):
     def _new_map(config: OccupancyConfig) -> Grid:
         return Grid(config)
 
-    def _new_submap(self) -> Submap:
-        return Submap(self.config)
+    def _new_submap(self) -> TwoMemories:
+        return TwoMemories(self.config)
 
     def changes(self) -> None:
         """A grid has but one memory."""

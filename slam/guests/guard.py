@@ -79,7 +79,7 @@ def _told(control: int) -> tuple[list[bytes], dict[bytes, bytes], bytes] | None:
 
 
 def _say(control: int, words: bytes) -> None:
-    with suppress(OSError):  # it has gone: the next look at the socket tells
+    with suppress(OSError):  # it has gone: the next look at the socket shows it
         os.write(control, words)
 
 

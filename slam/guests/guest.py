@@ -51,7 +51,7 @@ class Guest(ABC):
     """A SLAM from outside behind this project's protocol.
 
     It gets each scan's end points, de-skewed by odometry as "shunting" gets them, and odometry's
-    guess of the pose. Guests tell no covariance of their own that means anything, so theirs is
+    guess of the pose. Guests report no covariance of their own that means anything, so theirs is
     zero: no claim. Raises ``InvalidValueError`` for frames without a scan or out of order, and
     ``SlamFailedError`` for a pose that is not finite.
     """
@@ -101,7 +101,7 @@ class Guest(ABC):
 
     @abstractmethod
     def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
-        """T_map_robot (3,) of a scan whose end points are (n, 2), and numbers to tell about it."""
+        """T_map_robot (3,) of a scan whose end points are (n, 2), and numbers to report."""
 
     def map(self) -> Raster | None:
         """None: a guest's map is its own affair."""

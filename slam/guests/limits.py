@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from slam.checked import is_number
 from slam.errors import InvalidValueError
 
 
@@ -24,5 +25,5 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("scan_s", "first_s"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not 0.0 < value < math.inf:
+            if not is_number(value) or not 0.0 < value < math.inf:
                 raise InvalidValueError(f"Limits.{name} must be > 0 s and finite, got {value!r}")

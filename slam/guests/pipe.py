@@ -101,7 +101,7 @@ class PipeSlam:
         self._forget()
 
     def update(self, frame: Frame) -> Estimate:
-        """Tell the frame, without truth, and hear the estimate.
+        """Send the frame, without truth, and read the estimate.
 
         Raises ``InvalidValueError`` for a frame that does not come after the last one.
         """
@@ -131,7 +131,7 @@ class PipeSlam:
         return self._path.trajectory()
 
     def processor_s(self) -> float:
-        """Processor time its process has used, s; wall-clock time where no system tells."""
+        """Processor time its process has used, s; wall-clock time where no system says it."""
         spent = self._wire.processor_s()
         return time.monotonic() if spent is None else spent
 

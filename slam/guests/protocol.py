@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.checked import is_number
 from slam.errors import FAILURES, InvalidValueError, NotFiniteError, SlamFailedError
 from slam.estimate import Estimate, Raster
 from slam.frames import Features, Float, Frame, LaserSpec, Odometry, Scan
@@ -78,7 +79,7 @@ def error_message(words: str, outcome: str) -> dict[str, Any]:
 
 
 def failure_of(message: Message) -> SlamFailedError:
-    """The failure that a guest tells of itself; "raised" unless it says otherwise."""
+    """The failure that a guest reports of itself; "raised" unless it says otherwise."""
     words = " ".join(str(message.get("message", "")).split())[:400] or "an error without words"
     outcome = message.get("outcome")
     return SlamFailedError(words, outcome if outcome in FAILURES else "raised")
@@ -231,7 +232,7 @@ def _numbers(message: Message, key: str, length: int | None = None) -> Float:
         raise SlamFailedError(f"answered a {key!r} that is no list: {values!r:.60}", "bad")
     if length is not None and len(values) != length:
         raise SlamFailedError(f"answered {len(values)} numbers as {key!r}, not {length}", "bad")
-    if any(isinstance(v, bool) or not isinstance(v, (int, float, type(None))) for v in values):
+    if any(v is not None and not is_number(v) for v in values):
         raise SlamFailedError(f"answered a {key!r} that holds no numbers: {values!r:.60}", "bad")
     try:
         return np.array(values, dtype=np.float64)
@@ -267,7 +268,7 @@ def map_of(message: Message) -> Raster | None:
     values = _numbers(message, "values", height * width)
     values[values == UNKNOWN] = np.nan
     resolution_m = message.get("resolution_m")
-    if isinstance(resolution_m, bool) or not isinstance(resolution_m, (int, float)):
+    if not is_number(resolution_m):
         raise SlamFailedError(f"answered a map of resolution {resolution_m!r:.40}", "bad")
     try:
         with np.errstate(over="ignore"):  # what is past float32 is outside [0, 1], too

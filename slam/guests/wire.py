@@ -102,7 +102,7 @@ class Wire:
         return answer
 
     def _write(self, unsent: memoryview) -> int:
-        """Bytes written; all of them when nobody reads any more: its output tells why."""
+        """Bytes written; all of them when nobody reads any more: its output says why."""
         try:
             return os.write(self._stdin.fileno(), unsent[:_CHUNK])
         except BlockingIOError:

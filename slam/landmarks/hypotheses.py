@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from slam.settings import Settings, number
 
 MOST_GATE = 1.0 - 1e-15
+TUNED = "training seeds 0-19, tune_ekf (docs/paper/method.md)"
 Ints = NDArray[np.int64]
 
 
@@ -28,14 +29,31 @@ class Gates(Settings):
     """Gates of association, as probabilities of chi-square."""
 
     individual: float = number(
-        0.999999, "prob", "a pair under the prior, 2 dof", low=0.5, high=MOST_GATE
+        0.999999,
+        "prob",
+        "chi-square probability of one pair under the prior, 2 dof",
+        TUNED,
+        low=0.5,
+        high=MOST_GATE,
     )
-    joint: float = number(0.999999, "prob", "k pairs, 2 k dof", low=0.5, high=MOST_GATE)
+    joint: float = number(
+        0.999999,
+        "prob",
+        "chi-square probability of k pairs together, 2 k dof",
+        TUNED,
+        low=0.5,
+        high=MOST_GATE,
+    )
     posterior: float = number(
-        0.99999, "prob", "what one more pair adds, 2 dof; IPJC alone", low=0.5, high=MOST_GATE
+        0.99999,
+        "prob",
+        "chi-square probability of what one more pair adds, 2 dof (IPJC alone)",
+        TUNED,
+        low=0.5,
+        high=MOST_GATE,
     )
     most_nodes: int = number(
-        400, "hypotheses", "looked into (JCBB: thousands); then the best one counts", low=1
+        400, "hypotheses", "examined (JCBB: thousands); then the best counts", low=1
     )
 
     def single(self) -> float:

@@ -13,8 +13,6 @@ from slam import se2
 from slam.checked import possible
 from slam.frames import Float
 
-_ZERO = np.zeros((3, 3))
-
 
 @dataclass(slots=True)
 class Stamped:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One entry for all logs: the format is told by what is in the file."""
+"""One entry for all logs: the format follows from what is in the file."""
 
 from __future__ import annotations
 

@@ -72,6 +72,8 @@ class FeaturedShuntingSlam(ShuntingSlam):
     ) -> None:
         """``options`` replace fields of the preset; ``paper`` has ``PAPER_REWARD`` here."""
         if isinstance(config, (ShuntingConfig, Mapping)):
+            if isinstance(config, Mapping) and "preset" in config:  # its paper has another reward
+                raise InvalidValueError("FeaturedShuntingSlam takes a preset as its config alone")
             if options:
                 raise InvalidValueError("FeaturedShuntingSlam takes a config, or options, not both")
         elif config in PRESETS and set(options) <= set(ShuntingConfig.__dataclass_fields__):

@@ -37,7 +37,7 @@ class ShuntingSlam(Tracker):
 
     def map(self) -> Raster | None:
         """What exists, from either memory; NaN where no neuron lives (never seen, or seen empty:
-        the network does not tell these apart).
+        the network does not distinguish these).
         """
         return export.existence(self.network)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from slam.errors import InvalidValueError
 from slam.frontend.config import FrontendConfig
@@ -28,12 +28,12 @@ SEEDS = "training seeds"
 class FeaturesConfig(Settings):
     """Point features in the place of beams: "shunting-features" alone."""
 
-    least_peak: float = number(0.1, "activity", "lower peaks are no landmark", low=1e-6)
-    peak_cells: float = number(0.15, "cells", "deviation of a peak beside its observations' own")
-    enough_pairs: int = number(2, "pairs", "fewer: the whole map is matched", low=1, high=1000)
-    least_m2: float = number(1e-6, "m²", "variance of a feature, at least", low=1e-15)
-    looks_twice: float = number(1.5, "looks", "peaks looked at more often are associated first")
-    steps: int = number(20, "frames", "whose median step is one look", low=1, high=100_000)
+    least_peak: float = number(0.1, "activity", "a peak below it is no landmark", low=1e-6)
+    peak_cells: float = number(0.15, "cells", "added deviation of a peak")
+    enough_pairs: int = number(2, "pairs", "with fewer, the whole map is matched", low=1, high=1000)
+    least_m2: float = number(1e-6, "m²", "least variance", "numerical guard: (1 mm)²", low=1e-15)
+    looks_twice: float = number(1.5, "looks", "peaks with more are associated first")
+    steps: int = number(20, "frames", "frames whose median step is one look", low=1, high=100_000)
     corners: CornerConfig = field(default=CornerConfig())
     gates: Gates = field(default=Gates())
     corner_gates: Gates = field(default=Gates(individual=0.999, joint=0.99, posterior=0.95))
@@ -51,6 +51,8 @@ class TrackerConfig(Settings):
     on training seeds of office, arena and arena without walls at 4.7 Hz. The groups below are for
     experts: ``changed({"matching.local.points": 90})`` sets one of theirs by its path.
     """
+
+    presets: ClassVar[tuple[str, ...]] = ("robust", "paper")
 
     cell_m: float = number(
         0.03, "m", "edge of a neuron's square. 0.05: twice as fast; 0.10: error three times",
@@ -159,10 +161,8 @@ class TrackerConfig(Settings):
             return given
         if isinstance(given, Mapping):
             return cls().changed(given)
-        if given == "paper":
-            return cls.paper()
-        if given == "robust":
-            return cls.robust()
+        if given in cls.presets:
+            return cls.preset(given)
         raise InvalidValueError(
             f"config must be a {cls.__name__}, 'robust' or 'paper', or numbers by path, "
             f"got {given!r:.80}"

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.archives import read_arrays
-from slam.checked import covariance, pose
+from slam.checked import covariance, is_number, pose
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing
 from slam.frames import Float
@@ -81,8 +81,7 @@ class State:
 
 def _positive(name: str, value: object, kinds: tuple[type, ...]) -> None:
     """Raise ``InvalidValueError`` unless it is a number from 0 to ``MOST_COUNT``."""
-    number = isinstance(value, kinds) and not isinstance(value, bool)
-    if not number or not 0.0 <= value <= MOST_COUNT:  # type: ignore[operator]
+    if not is_number(value, kinds) or not 0.0 <= value <= MOST_COUNT:
         raise InvalidValueError(
             f"State.{name} must be a number in [0, {MOST_COUNT:g}], got {value!r:.40}"
         )

@@ -127,7 +127,7 @@ class Tracker(abc.ABC):
     ) -> tuple[Prediction, Match, str]:
         """The pose by scan matching, or by relocalisation where the robot was lost; the state.
 
-        The prior comes back wider where enough is in view to correct what odometry alone told of
+        The prior comes back wider where enough is in view to correct what odometry alone gave for
         the pose before, and after a slip.
         """
         if float(observations.weights.sum()) >= self._numbers.relocalise.least_weight:
@@ -203,28 +203,28 @@ class Tracker(abc.ABC):
         rasterise(self.cell_map, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
         step = min(prediction.elapsed, self.config.map.longest_look_s)
-        doubt, doubtful = self._quality, False
+        quality, denied = self._quality, False
         enough = self._numbers.relocalise.least_weight
-        if float(observations.weights.sum()) >= enough and doubt.arises(match.matched):
+        if float(observations.weights.sum()) >= enough and quality.arises(match.matched):
             confirmed, contradicted, _ = self.cell_map.integrate(
                 observations.view, T_map_laser, step, write=False
             )
             motion = match.T_map_robot - self._T_map_robot
-            doubtful = doubt.denied(match.matched, confirmed, contradicted, motion)
-        doubt.count(doubtful)
-        if doubtful and doubt.scans <= doubt.config.patience:
+            denied = quality.denied(match.matched, confirmed, contradicted, motion)
+        quality.count(denied)
+        if denied and quality.scans <= quality.config.patience:
             self.cell_map.release()
-            if doubt.scans >= doubt.config.lost_after and doubt.suspicious:
+            if quality.scans >= quality.config.lost_after and quality.suspicious:
                 self._relocalisation = Relocalisation(self.cell_map, self._matcher)
-            return "lost" if doubt.scans > doubt.config.lost_after else "frozen"
+            return "lost" if quality.scans > quality.config.lost_after else "frozen"
         confirmed, contradicted, _ = self.cell_map.integrate(
             observations.view, T_map_laser, step, write=True
         )
         if len(observations.points_robot) == 0:
-            return "lost" if doubtful else "blind"  # odometry alone
-        if not doubtful:
-            doubt.learn(match.matched, confirmed, contradicted, prediction.elapsed)
-        return "lost" if doubtful else "tracking"
+            return "lost" if denied else "blind"  # odometry alone
+        if not denied:
+            quality.learn(match.matched, confirmed, contradicted, prediction.elapsed)
+        return "lost" if denied else "tracking"
 
     def _update_uncertainty(
         self,
@@ -243,7 +243,7 @@ class Tracker(abc.ABC):
     def _add_to_path(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
     ) -> None:
-        """For closing loops: motion as matched, or by odometry where an end of it is in doubt."""
+        """For closing loops: motion as matched, or by odometry where an end of it is uncertain."""
         motion = se2.between(self._T_map_robot, match.T_map_robot)
         covariance = self._pose_covariance.newest_drift
         if state != "tracking" or not self._trusted:

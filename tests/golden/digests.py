@@ -12,6 +12,7 @@ beside it (end poses and the like) are compared everywhere, to ``TOLERANCE``.
 
 from __future__ import annotations
 
+import argparse
 import csv
 import hashlib
 import itertools
@@ -229,11 +230,14 @@ def read() -> dict[str, Any]:
 
 def main() -> int:
     """Print what differs; with ``--write`` record it."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--write", action="store_true", help="record today's results")
+    parser.add_argument("--only", default="", metavar="WORD", help="those whose name holds it")
+    wanted = parser.parse_args()
     before = read() if FILE.exists() else {"results": {}}
     results = dict(before["results"])
-    word = sys.argv[sys.argv.index("--only") + 1] if "--only" in sys.argv else ""
     for name, make in MAKERS.items():
-        if word not in name:
+        if wanted.only not in name:
             continue
         try:
             results[name] = make()
@@ -243,10 +247,10 @@ def main() -> int:
         same = results[name] == before["results"].get(name)
         print(f"{'same   ' if same else 'CHANGED'} {name}", flush=True)
     changed = results != before["results"]
-    if "--write" in sys.argv:
+    if wanted.write:
         text = {"made_with": made_with(), "results": results}
         FILE.write_text(json.dumps(text, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    return int(changed and "--write" not in sys.argv)
+    return int(changed and not wanted.write)
 
 
 if __name__ == "__main__":

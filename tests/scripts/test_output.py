@@ -21,6 +21,7 @@ from scripts.output import (
     write_recipe,
 )
 from scripts.report.closed import driven
+from sim.recording.dataset import PLAN
 from sim.recording.sums import SUMS
 from slam.errors import LogFormatError, OutputError
 from slam.files import write_text
@@ -80,6 +81,14 @@ def test_outputs_keep_the_whole_name_of_an_episode(words, is_folder, name, tmp_p
     if is_folder:
         (tmp_path / words).mkdir()
     assert run_name(tmp_path / words) == name
+
+
+def test_equally_named_episodes_of_two_datasets_have_outputs_of_their_own(tmp_path: Path):
+    for data in ("one", "two"):
+        (tmp_path / data / "office-d0.5-s0001").mkdir(parents=True)
+        (tmp_path / data / PLAN).write_text("{}")
+    names = {run_name(tmp_path / data / "office-d0.5-s0001") for data in ("one", "two")}
+    assert names == {"one-office-d0.5-s0001", "two-office-d0.5-s0001"}
 
 
 def test_somebody_elses_files_are_never_replaced(tmp_path: Path):

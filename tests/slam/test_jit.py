@@ -50,10 +50,14 @@ def test_a_changed_callee_of_another_module_is_compiled_anew(tmp_path, decorator
     assert run(tmp_path, decorator, 2.0) == 3.0
 
 
-def test_a_changed_constant_from_another_module_is_compiled_anew(tmp_path):
+@pytest.mark.parametrize(
+    ("imported", "name"),
+    [("from numbers_of import STEP", "STEP"), ("import numbers_of", "numbers_of.STEP")],
+)
+def test_a_changed_constant_from_another_module_is_compiled_anew(tmp_path, imported, name):
     (tmp_path / "caller.py").write_text(CALLER)
-    callee = "from slam._jit import njit\nfrom numbers_of import STEP\n@njit\n"
-    callee += "def inner(x):\n    return x + STEP\n"
+    callee = f"from slam._jit import njit\n{imported}\n@njit\n"
+    callee += f"def inner(x):\n    return x + {name}\n"
     for step in (1.0, 2.0):
         (tmp_path / "numbers_of.py").write_text(f"STEP = {step}\n")
         assert run(tmp_path, "njit", step, callee) == 1.0 + step

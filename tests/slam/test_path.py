@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The path: in order, kept as it was told."""
+"""The path: in order, kept as it was reported."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from slam.errors import InvalidValueError
 from slam.path import PosePath
 
 
-def test_poses_stay_as_they_were_told():
+def test_poses_stay_as_they_were_reported():
     path, pose = PosePath(), np.array([1.0, 2.0, 0.5])
     path.add(10, pose)
     pose += 1.0
     path.add(20, pose)
-    told = path.trajectory()
-    np.testing.assert_array_equal(told.stamps_ns, [10, 20])
-    np.testing.assert_array_equal(told.poses, [[1.0, 2.0, 0.5], [2.0, 3.0, 1.5]])
+    whole = path.trajectory()
+    np.testing.assert_array_equal(whole.stamps_ns, [10, 20])
+    np.testing.assert_array_equal(whole.poses, [[1.0, 2.0, 0.5], [2.0, 3.0, 1.5]])
     corrected = path.trajectory(np.zeros((2, 3)))
-    np.testing.assert_array_equal(corrected.stamps_ns, told.stamps_ns)
+    np.testing.assert_array_equal(corrected.stamps_ns, whole.stamps_ns)
     np.testing.assert_array_equal(corrected.poses, 0.0)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import slam
+from slam.ekf.config import EkfConfig
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.frames import Frame
 from slam.odometry import OdometrySlam
@@ -82,6 +83,21 @@ def test_what_cannot_be_set_is_said() -> None:
         slam.create("shunting{map.bell_steps=256}")
 
 
+def test_braces_may_name_a_preset() -> None:
+    system = slam.create("shunting{cell_m=0.1,preset=paper}")
+    assert system.config == ShuntingConfig.paper(cell_m=0.1)  # type: ignore[attr-defined]
+    rival = slam.create("ekf{preset=corners,detection=0.7}")
+    rival.update(tour()[0])
+    assert rival.config == EkfConfig.corners(detection=0.7)  # type: ignore[attr-defined]
+    found = slam.config_of("ekf{preset=victoria_park}")
+    assert found is not None
+    assert found[0] == EkfConfig.victoria_park()
+    with pytest.raises(UnknownNameError, match="no preset 'papper'; it has robust, paper"):
+        slam.create("shunting{preset=papper}")
+    with pytest.raises(InvalidValueError, match="a preset as its config alone"):
+        slam.create("shunting-features{preset=paper}")
+
+
 def test_a_slam_of_ones_own_takes_numbers_too() -> None:
     system = slam.create(f"{__name__}:Own{{gain=0.7}}")
     assert system.config.gain == 0.7  # type: ignore[attr-defined]
@@ -100,6 +116,10 @@ def test_set_is_for_the_slam_it_names() -> None:
     assert with_set(two, []) == tuple(two)
     with pytest.raises(InvalidValueError, match="which SLAM"):
         with_set(two, ["reward=7"])
+    with pytest.raises(InvalidValueError, match=r"'ekf' does not run.*Did you mean '--set x=1'"):
+        with_set(["shunting"], ["ekf.x=1"])
+    with pytest.raises(UnknownNameError, match=r"no 'detectoin'. Did you mean 'detection'"):
+        with_set(["ekf"], ["ekf.detectoin=1"])
     with pytest.raises(InvalidValueError, match="expected PATH=VALUE"):
         with_set(["shunting"], ["reward"])
     with pytest.raises(InvalidValueError, match="set twice"):

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.sensors.lidar.fan import BOX, CAPSULE, CYLINDER, ELLIPSOID, PLANE, PRIMITIVES, SPHERE
+from sim.sensors.lidar import columns as col
 from slam._jit import njit
 from slam.errors import InvalidValueError
 
@@ -30,7 +30,7 @@ UNSEEN_GROUPS = (HULL_GROUP, PAINT_GROUP)
 def candidates(
     model: mujoco.MjModel, height: float, reach: float, robot: str | None, panes: Bool
 ) -> tuple[NDArray[np.int64], Float]:
-    """(n,) ids and (n, 8) table, in the columns of ``fan``, of what a scanner can see.
+    """(n,) ids and (n, 8) table of what a scanner can see.
 
     height  m, of the scan plane; ``reach`` m, how far rays may leave it
     robot   name of the scanner's own body; it and its children are not seen
@@ -42,7 +42,7 @@ def candidates(
     mujoco.mj_kinematics(model, data)
     lifts, body, kind = _changes_height(model, data), model.geom_bodyid, model.geom_type
     bound = model.geom_rbound.copy()
-    odd = ~np.isin(kind, PRIMITIVES)
+    odd = ~np.isin(kind, col.PRIMITIVES)
     # A mesh frame sits at its centre of mass; its bounding sphere is about its box's centre.
     bound[odd] += np.abs(model.geom_aabb[odd, :3]).sum(axis=1)
     half, upright = _extents(kind, model.geom_size, bound, data.geom_xmat, lifts[body])
@@ -107,16 +107,16 @@ def _changes_height(model: mujoco.MjModel, data: mujoco.MjData) -> Bool:
 def _half_height(kind: int, size: Float, mat: Float) -> float:
     """Half the vertical extent of a primitive with the given orientation, m."""
     x, y, z = abs(mat[6]), abs(mat[7]), abs(mat[8])  # world z of the geom's own axes
-    if kind == PLANE:
+    if kind == col.PLANE:
         return 0.0 if z > 1.0 - 1e-12 else math.inf
-    if kind == SPHERE:
+    if kind == col.SPHERE:
         return float(size[0])
-    if kind == CAPSULE:
+    if kind == col.CAPSULE:
         return float(size[0] + size[1] * z)
-    if kind == CYLINDER:
+    if kind == col.CYLINDER:
         return float(size[1] * z + size[0] * math.sqrt(max(0.0, 1.0 - z * z)))
     a, b, c = x * size[0], y * size[1], z * size[2]
-    if kind == ELLIPSOID:
+    if kind == col.ELLIPSOID:
         return math.sqrt(a * a + b * b + c * c)
     return float(a + b + c)
 
@@ -129,10 +129,10 @@ def _extents(
     half, upright = bounds.copy(), np.zeros(len(bounds), dtype=np.bool_)
     for i in range(len(bounds)):
         kind = kinds[i]
-        if kind not in (PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX):
+        if kind not in (col.PLANE, col.SPHERE, col.CAPSULE, col.ELLIPSOID, col.CYLINDER, col.BOX):
             continue
         if lifts[i]:
-            half[i] = math.inf if kind == PLANE else bounds[i]
+            half[i] = math.inf if kind == col.PLANE else bounds[i]
             continue
         half[i] = _half_height(kind, sizes[i], mats[i])
         upright[i] = mats[i, 8] > 1.0 - 1e-12

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.sensors.lidar import columns as col
 from sim.sensors.lidar import raycast, windows
 from sim.sensors.lidar.candidates import candidates
 from sim.sensors.lidar.scanner import Spot
@@ -26,8 +27,7 @@ class FanPlan:
 
     beams  (m,) number of each beam
     ends   (fans + 1,) where each fan's rows begin, and the last one's end
-    rows   (m, 5) angle rad in the laser frame, ascending by even steps within a fan, its cosine
-           and sine; slot of the last ``note`` before the beam and part of the way to the next
+    rows   (m, 5) of each beam as planned; angles ascend by even steps within a fan
     """
 
     beams: NDArray[np.int64]
@@ -89,8 +89,8 @@ class Raycaster:
         n = self.ids.size
         self._rays = self.spot.rays()
         self._optics = (height, self.spot.aperture, self.spot.divergence)
-        self.poses = np.zeros((slots, n, 12))
-        self.bounds = np.zeros((n, 6))
+        self.poses = np.zeros((slots, n, col.N_POSE))
+        self.bounds = np.zeros((n, col.N_BOUND))
         self.lasers = np.zeros((slots, 3))
         self._all = np.arange(n)
         self._movable = np.flatnonzero(
@@ -170,10 +170,10 @@ class Raycaster:
         self._plan, m, n = plan, plan.beams.size, 3 * self.ids.size
         shape = (self.layers, m, self.rays_per_beam)
         self.hits = (np.zeros(shape), np.zeros(shape, dtype=np.int64), np.zeros(shape))
-        self.fan = np.zeros((m, 7))
+        self.fan = np.zeros((m, col.N_BEAM))
         self._work = (
-            self.fan, np.zeros((plan.ends.size - 1, 4)), np.zeros(shape[:2]),
-            np.zeros((n, 4)), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64),
+            self.fan, np.zeros((plan.ends.size - 1, col.N_FAN)), np.zeros(shape[:2]),
+            np.zeros((n, col.N_WINDOW)), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64),
         )  # fmt: skip
 
     def mirror(self, polished: NDArray[np.bool_], out: Hits) -> None:

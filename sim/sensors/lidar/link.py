@@ -116,7 +116,7 @@ def over_link(frames: Iterable[Frame], link: SerialLink) -> Iterator[Frame]:
 
 def partial_spec(spec: LaserSpec, config: Lms221Config, turn: int) -> LaserSpec:
     """Geometry of the message of one turn of the mirror; times from the first beam of that turn."""
-    mine = np.flatnonzero(config.beams[1] == turn)
+    mine = np.flatnonzero(config.scanner().turn_of == turn)
     offsets = spec.beam_time_offsets[mine]
     return LaserSpec(
         n_beams=mine.size,
@@ -136,16 +136,17 @@ def partial_scans(scan: Scan, config: Lms221Config) -> list[Scan]:
     One for each turn over 180 degrees; the whole scan for 100 degrees, as the driver does (STW).
     Stamps are those of the earliest beam of each message.
     """
-    if scan.spec.n_beams != config.beams[0].size:
+    scanner = config.scanner()
+    if scan.spec.n_beams != scanner.n_beams:
         raise InvalidValueError(
             f"partial_scans: the scan has {scan.spec.n_beams} beams, "
-            f"expected {config.beams[0].size} as of the config"
+            f"expected {scanner.n_beams} as of the config"
         )
     if config.fov_deg != 180 or config.turns == 1:
         return [scan]
-    turn_of, messages = config.beams[1], []
+    messages = []
     for turn in range(config.turns):
-        mine = np.flatnonzero(turn_of == turn)
+        mine = np.flatnonzero(scanner.turn_of == turn)
         first_ns = round(float(scan.spec.beam_time_offsets[mine[0]]) * NS_PER_S)
         messages.append(
             Scan(

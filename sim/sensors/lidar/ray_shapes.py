@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 
-from sim.sensors.lidar.fan import BOX, CAPSULE, CYLINDER, ELLIPSOID, SPHERE, Vec3
+from sim.sensors.lidar import columns as col
+from sim.sensors.lidar.fan import Vec3
 from slam._jit import njit
 
 MINVAL = 1e-15  # mjMINVAL
-# Position, then matrix by rows.
+# In the columns of a pose.
 Pose = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float
 ]  # fmt: skip
@@ -158,9 +159,9 @@ def _plane(pnt: Vec3, vec: Vec3, size: Vec3) -> float:
 def _to_local(pose: Pose, dif: Vec3) -> Vec3:
     """A world difference in the frame of a geom."""
     return (
-        pose[3] * dif[0] + pose[6] * dif[1] + pose[9] * dif[2],
-        pose[4] * dif[0] + pose[7] * dif[1] + pose[10] * dif[2],
-        pose[5] * dif[0] + pose[8] * dif[1] + pose[11] * dif[2],
+        pose[col.R00] * dif[0] + pose[col.R10] * dif[1] + pose[col.R20] * dif[2],
+        pose[col.R01] * dif[0] + pose[col.R11] * dif[1] + pose[col.R21] * dif[2],
+        pose[col.R02] * dif[0] + pose[col.R12] * dif[1] + pose[col.R22] * dif[2],
     )
 
 
@@ -168,13 +169,13 @@ def _to_local(pose: Pose, dif: Vec3) -> Vec3:
 def _round_cos(kind: int, pnt: Vec3, ray: Vec3, size: Vec3, x: float) -> float:
     """|cos| between a unit ray and the surface of anything but a box or plane, where it hit."""
     n0, n1, n2 = pnt[0] + x * ray[0], pnt[1] + x * ray[1], pnt[2] + x * ray[2]
-    if kind == CAPSULE:
+    if kind == col.CAPSULE:
         n2 -= min(max(n2, -size[1]), size[1])
-    elif kind == CYLINDER:
+    elif kind == col.CYLINDER:
         if abs(abs(n2) - size[1]) < abs(math.sqrt(n0 * n0 + n1 * n1) - size[0]):
             return min(abs(ray[2]), 1.0)
         n2 = 0.0
-    elif kind == ELLIPSOID:
+    elif kind == col.ELLIPSOID:
         n0, n1, n2 = n0 / (size[0] * size[0]), n1 / (size[1] * size[1]), n2 / (size[2] * size[2])
     length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
     if length < MINVAL:
@@ -188,26 +189,26 @@ def meet(kind: int, size: Vec3, pose: Pose, origin: Vec3, vec: Vec3, limit: floa
 
     Numbers, not arrays: to pass arrays costs more than the whole calculation.
     """
-    dif = (origin[0] - pose[0], origin[1] - pose[1], origin[2] - pose[2])
-    if kind == SPHERE:
+    dif = (origin[0] - pose[col.PX], origin[1] - pose[col.PY], origin[2] - pose[col.PZ])
+    if kind == col.SPHERE:
         x = _sphere(dif, vec, size[0] * size[0])
         return x, _round_cos(kind, dif, vec, size, x) if 0.0 <= x <= limit else 0.0
     # MuJoCo tests a bounding sphere first; at a corner it decides, so it is part of the formula.
-    if kind == BOX:
+    if kind == col.BOX:
         if _passes(dif, vec, size[0] * size[0] + size[1] * size[1] + size[2] * size[2]):
             return MISS
         return _box(_to_local(pose, dif), _to_local(pose, vec), size)
-    if kind == CAPSULE:
+    if kind == col.CAPSULE:
         if _passes(dif, vec, (size[0] + size[1]) * (size[0] + size[1])):
             return MISS
-    elif kind == CYLINDER and _passes(dif, vec, size[0] * size[0] + size[1] * size[1]):
+    elif kind == col.CYLINDER and _passes(dif, vec, size[0] * size[0] + size[1] * size[1]):
         return MISS
     pnt, ray = _to_local(pose, dif), _to_local(pose, vec)
-    if kind == CAPSULE:
+    if kind == col.CAPSULE:
         x = _capsule(pnt, ray, size[0], size[1])
-    elif kind == CYLINDER:
+    elif kind == col.CYLINDER:
         x = _cylinder(pnt, ray, size[0], size[1])
-    elif kind == ELLIPSOID:
+    elif kind == col.ELLIPSOID:
         x = _ellipsoid(pnt, ray, size)
     else:
         return _plane(pnt, ray, size), min(abs(ray[2]), 1.0)
@@ -217,11 +218,11 @@ def meet(kind: int, size: Vec3, pose: Pose, origin: Vec3, vec: Vec3, limit: floa
 @njit
 def face_normal(size: Vec3, pose: Pose, at: Vec3) -> Vec3:
     """Axis, in the world, of the face of a box that a point on it is nearest to."""
-    pnt = _to_local(pose, (at[0] - pose[0], at[1] - pose[1], at[2] - pose[2]))
+    pnt = _to_local(pose, (at[0] - pose[col.PX], at[1] - pose[col.PY], at[2] - pose[col.PZ]))
     gap0, gap1 = abs(abs(pnt[0]) - size[0]), abs(abs(pnt[1]) - size[1])
     gap2 = abs(abs(pnt[2]) - size[2])
     if gap0 <= gap1 and gap0 <= gap2:
-        return pose[3], pose[6], pose[9]
+        return pose[col.R00], pose[col.R10], pose[col.R20]
     if gap1 <= gap2:
-        return pose[4], pose[7], pose[10]
-    return pose[5], pose[8], pose[11]
+        return pose[col.R01], pose[col.R11], pose[col.R21]
+    return pose[col.R02], pose[col.R12], pose[col.R22]

@@ -12,46 +12,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.sensors.lidar.fan import (
-    BOX,
-    COS,
-    DISC_HALF,
-    DISC_RADIUS,
-    DISC_X,
-    DISC_Y,
-    DISC_Z,
-    FAR,
-    HIGH,
-    KIND,
-    LAYER,
-    LOW,
-    MOVED,
-    NEAR,
-    ORIGIN_X,
-    ORIGIN_Y,
-    PART,
-    PER_RADIAN,
-    SIN,
-    SIZE_X,
-    SIZE_Y,
-    SIZE_Z,
-    SLACK,
-    SLOT,
-    START,
-    UNEVEN,
-    Float,
-    Int,
-    Vec3,
-    lay_fans,
-    ray_wedge,
-)
+from sim.sensors.lidar import columns as col
+from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3, lay_fans, ray_wedge
 from sim.sensors.lidar.ray_shapes import Pose, face_normal, meet
 from sim.sensors.lidar.windows import enclose, find_windows, nearest_first
 from slam._jit import njit
-
-# Columns of the rays of a spot in the beam's frame: place on the disc (left, up), unit direction
-# (forward, left, up), and the way up per metre forward.
-U, V, FORWARD, LEFT, UP, SLOPE = range(6)
 
 Ray = tuple[Vec3, Vec3]
 AWAY = 1e-6  # m from a mirror at which what it shows begins, so that it does not show itself
@@ -65,6 +30,11 @@ def _pose(poses: Float, slot: int, j: int) -> Pose:
         poses[slot, j, 4], poses[slot, j, 5], poses[slot, j, 6], poses[slot, j, 7],
         poses[slot, j, 8], poses[slot, j, 9], poses[slot, j, 10], poses[slot, j, 11],
     )  # fmt: skip
+
+
+@njit
+def _size(table: Float, j: int) -> Vec3:
+    return table[j, col.SIZE_X], table[j, col.SIZE_Y], table[j, col.SIZE_Z]
 
 
 @njit
@@ -113,31 +83,33 @@ def _cast_windows(  # noqa: PLR0913, PLR0915 (kernel)
     count = rays.shape[0]
     for turn in range(found):
         row = order[turn]
-        j, near, far = owners[row], windows[row, NEAR], windows[row, FAR]
-        kind, layer = int(table[j, KIND]), int(table[j, LAYER])
-        size = (table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z])
-        moves, pose = bounds[j, MOVED] != 0.0, _pose(poses, 0, j)
-        bottom = bounds[j, DISC_Z] - bounds[j, DISC_HALF] - SLACK
-        top = bounds[j, DISC_Z] + bounds[j, DISC_HALF] + SLACK
+        j, near, far = owners[row], windows[row, col.NEAR], windows[row, col.FAR]
+        kind, layer = int(table[j, col.KIND]), int(table[j, col.LAYER])
+        size = _size(table, j)
+        moves, pose = bounds[j, col.MOVED] != 0.0, _pose(poses, 0, j)
+        bottom = bounds[j, col.DISC_Z] - bounds[j, col.DISC_HALF] - SLACK
+        top = bounds[j, col.DISC_Z] + bounds[j, col.DISC_HALF] + SLACK
         for f in range(frames.shape[0]):
-            per_step, base = frames[f, PER_RADIAN], ends[f]
-            lowest = (windows[row, LOW] - frames[f, UNEVEN] - frames[f, START]) * per_step
-            highest = (windows[row, HIGH] + frames[f, UNEVEN] - frames[f, START]) * per_step
+            per_step, base = frames[f, col.PER_RADIAN], ends[f]
+            start, uneven = frames[f, col.START], frames[f, col.UNEVEN]
+            lowest = (windows[row, col.LOW] - uneven - start) * per_step
+            highest = (windows[row, col.HIGH] + uneven - start) * per_step
             margin = slope * per_step
             first = base + max(math.ceil(lowest - margin), 0)
             last = min(base + math.floor(highest + margin), ends[f + 1] - 1)
             for i in range(first, last + 1):
                 if near > farthest[layer, i]:
                     continue
-                c, s, x, y = fan[i, COS], fan[i, SIN], fan[i, ORIGIN_X], fan[i, ORIGIN_Y]
+                c, s = fan[i, col.COS], fan[i, col.SIN]
+                x, y = fan[i, col.ORIGIN_X], fan[i, col.ORIGIN_Y]
                 beam, worst, posed = beams[i], 0.0, not moves
                 for k in range(count):
                     best = ranges[layer, beam, k]
-                    up = aperture * rays[k, V]
+                    up = aperture * rays[k, col.V]
                     if count > 1:
                         # Rays of the spot that pass beside, over or under the geom.
-                        place = i - base + rays[k, LEFT] * per_step
-                        rise = rays[k, SLOPE]
+                        place = i - base + rays[k, col.LEFT] * per_step
+                        rise = rays[k, col.RISE]
                         low, high = height + up + rise * near, height + up + rise * far
                         if (
                             near > best
@@ -149,13 +121,13 @@ def _cast_windows(  # noqa: PLR0913, PLR0915 (kernel)
                             worst = max(worst, best)
                             continue
                     if not posed:
-                        slot = int(fan[i, SLOT])
+                        slot = int(fan[i, col.SLOT])
                         pose = _between(
-                            _pose(poses, slot, j), _pose(poses, slot + 1, j), fan[i, PART]
+                            _pose(poses, slot, j), _pose(poses, slot + 1, j), fan[i, col.PART]
                         )
                         posed = True
-                    lever = (0.0, aperture * rays[k, U], up)
-                    way = (rays[k, FORWARD], rays[k, LEFT], rays[k, UP])
+                    lever = (0.0, aperture * rays[k, col.U], up)
+                    way = (rays[k, col.FORWARD], rays[k, col.LEFT], rays[k, col.UP])
                     origin, vec = _ray(c, s, x, y, height, lever, way)
                     distance, cos = meet(kind, size, pose, origin, vec, best)
                     # Equal distances go to the lower id, as in MuJoCo's loop over ascending ids.
@@ -185,15 +157,15 @@ def sweep(  # noqa: PLR0913 (kernel)
 ) -> None:
     """Cast the beams of one scan.
 
-    table    (n, 8) the candidate geoms; rows ``movable`` of them can move
-    poses    (slots, n, 12) of them at the ``slots`` ends of physics steps; lasers (slots, 3)
-    bounds   (n, 6), as ``enclose`` left them for what cannot move
-    plan     (m, 5) of the beams, fan k in the rows ``ends[k]`` to ``ends[k + 1]``
+    table    the candidate geoms; rows ``movable`` of them can move
+    poses    of them at the ``slots`` ends of physics steps, and of the laser
+    bounds   as ``enclose`` left them for what cannot move
+    plan     of the beams, fan k in the rows ``ends[k]`` to ``ends[k + 1]``
     beams    (m,) the rows of the outputs they go to
-    rays     (k, 6) of a beam
+    rays     of a beam
     optics   height of the scan plane m, aperture radius m, half divergence rad
-    work     room for the fans (m, 7), their frames (fans, 4), reach of the beams (layers, m),
-             windows (3 n, 4), their owners (3 n,) and order (3 n,)
+    work     room for the fans, their frames, reach of the beams (layers, m), windows, their owners
+             (3 n,) and order (3 n,)
     out      (layers, m, k) each: ranges m, inf for a miss; index of the candidate, -1; |cos| of
              the incidence, NaN
     """
@@ -220,18 +192,20 @@ def cast_one(  # noqa: PLR0913 (kernel)
     Panes are not seen.
     """
     best, hit, cosine = math.inf, -1, math.nan
-    slot, part = int(fan[i, SLOT]), fan[i, PART]
+    slot, part = int(fan[i, col.SLOT]), fan[i, col.PART]
     for j in range(table.shape[0]):
-        dx, dy = bounds[j, DISC_X] - origin[0], bounds[j, DISC_Y] - origin[1]
-        reach = bounds[j, DISC_RADIUS] + SLACK
+        dx, dy = bounds[j, col.DISC_X] - origin[0], bounds[j, col.DISC_Y] - origin[1]
+        reach = bounds[j, col.DISC_RADIUS] + SLACK
         along, aside = dx * vec[0] + dy * vec[1], dy * vec[0] - dx * vec[1]
-        if abs(aside) > reach or along < -reach or along - reach > best or table[j, LAYER] > 0.0:
+        if abs(aside) > reach or along < -reach or along - reach > best:
+            continue
+        if table[j, col.LAYER] > 0.0:
             continue
         pose = _pose(poses, slot, j)
-        if bounds[j, MOVED] != 0.0:
+        if bounds[j, col.MOVED] != 0.0:
             pose = _between(pose, _pose(poses, slot + 1, j), part)
-        size = (table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z])
-        x, cos = meet(int(table[j, KIND]), size, pose, origin, vec, best)
+        size = _size(table, j)
+        x, cos = meet(int(table[j, col.KIND]), size, pose, origin, vec, best)
         if 0.0 <= x < best:
             best, hit, cosine = x, j, cos
     return best, hit, cosine
@@ -256,32 +230,24 @@ def reflect(  # noqa: PLR0913 (kernel)
     out       (all beams,) each: length of the way there m, inf for none; candidate; |cos| there
     """
     ranges, found, _ = hits
+    lengths, shown, cosines = out
     for i in range(beams.size):
         beam = beams[i]
-        out[0][beam], out[1][beam], out[2][beam] = math.inf, -1, math.nan
+        lengths[beam], shown[beam], cosines[beam] = math.inf, -1, math.nan
         layer = ranges.shape[0] - 1
         if ranges[layer, beam, 0] >= ranges[0, beam, 0]:
             layer = 0
         j, x = found[layer, beam, 0], ranges[layer, beam, 0]
-        if j < 0 or int(table[j, KIND]) != BOX or (layer == 0 and not polished[j]):
+        if j < 0 or int(table[j, col.KIND]) != col.BOX or (layer == 0 and not polished[j]):
             continue
-        slot = int(fan[i, SLOT])
-        pose = _between(_pose(poses, slot, j), _pose(poses, slot + 1, j), fan[i, PART])
-        size = (table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z])
-        vec = (fan[i, COS], fan[i, SIN], 0.0)
-        at = (fan[i, ORIGIN_X] + x * vec[0], fan[i, ORIGIN_Y] + x * vec[1], height)
+        slot = int(fan[i, col.SLOT])
+        pose = _between(_pose(poses, slot, j), _pose(poses, slot + 1, j), fan[i, col.PART])
+        size = _size(table, j)
+        vec = (fan[i, col.COS], fan[i, col.SIN], 0.0)
+        at = (fan[i, col.ORIGIN_X] + x * vec[0], fan[i, col.ORIGIN_Y] + x * vec[1], height)
         n = face_normal(size, pose, at)
         along = 2.0 * (vec[0] * n[0] + vec[1] * n[1] + vec[2] * n[2])
         vec = (vec[0] - along * n[0], vec[1] - along * n[1], vec[2] - along * n[2])
         at = (at[0] + AWAY * vec[0], at[1] + AWAY * vec[1], at[2] + AWAY * vec[2])
-        further, out[1][beam], out[2][beam] = cast_one(table, poses, bounds, fan, i, at, vec)
-        out[0][beam] = x + AWAY + further
-
-
-@njit
-def arccos(cosines: Float) -> Float:
-    """Elementwise, by libm: NumPy's own changes its last bit with the CPU."""
-    out = np.empty(cosines.size)
-    for i in range(cosines.size):
-        out[i] = math.acos(cosines[i])
-    return out
+        further, shown[beam], cosines[beam] = cast_one(table, poses, bounds, fan, i, at, vec)
+        lengths[beam] = x + AWAY + further

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.sensors.lidar import columns as col
 from sim.sensors.lidar.caster import Hits
 from sim.sensors.lidar.effects import error_function, needed_table
 from sim.sensors.lidar.scanner import Scanner
@@ -90,7 +91,8 @@ class SignalModel:
             or scanner.glass
             or scanner.bounce
         )
-        self._switches = (bool(scanner.needed), scanner.incidence, scanner.mixed_pixels)
+        pulse = scanner.pulse_m if scanner.mixed_pixels else 0.0
+        self._switches = (bool(scanner.needed), scanner.incidence, pulse)
         self._steps = (
             scanner.counter_m, scanner.unit_m, scanner.range_min_m, scanner.range_max_m,
         )  # fmt: skip
@@ -106,7 +108,7 @@ class SignalModel:
         if self._ruler:
             measure(hits, (places, seen, marks))
         else:
-            chances = self.streams[1].random((n,)) if self._switches[2] else self._nothing
+            chances = self.streams[1].random((n,)) if self._switches[2] > 0.0 else self._nothing
             receive(
                 hits, mirrored, self._surface, self._weights, self._switches, self._needed,
                 chances, (places, seen, marks),
@@ -119,8 +121,9 @@ class SignalModel:
             self._steps, self._bands, self._errors, (ranges, whose),
         )  # fmt: skip
         return ScanResult(
-            ranges=ranges, true_ranges=places[1], geoms=whose[0], bodies=whose[1],
-            cosines=places[2], mixed=marks[0], ghost=marks[1],
+            ranges=ranges, true_ranges=places[col.MIDDLE], cosines=places[col.COSINE],
+            geoms=whose[col.GEOM_ID], bodies=whose[col.BODY_ID],
+            mixed=marks[col.MIXED], ghost=marks[col.GHOST],
         )  # fmt: skip
 
 

@@ -15,7 +15,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.core.checks import check_types, instance
+from sim.core.checks import check_types, check_within, instance, one_of
+from sim.sensors.lidar import columns as col
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, LaserSpec
 
@@ -30,24 +31,37 @@ MAX_RANGE_M = 1000.0
 
 @dataclass(frozen=True, kw_only=True)
 class Spot:
-    """The disc a beam lights: ``aperture`` radius m at the window, ``divergence`` half angle rad.
+    """The disc that a beam lights; by default an ideal beam, one ray in the middle.
 
-    ``offsets`` (k, 2): places of the k rays on the unit disc, (left, up); ``weights`` (k,) their
-    shares of the energy. An ideal beam is the default: one ray in the middle.
+    aperture    radius at the window, m
+    divergence  half angle sideways, rad
+    aspect      half angle upwards over that sideways, at most 1
+    offsets     (k, 2) places of the k rays on the unit disc (left, up)
+    weights     (k,) their shares of the energy
     """
 
     aperture: float = 0.0
     divergence: float = 0.0
+    aspect: float = 1.0
     offsets: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
     weights: tuple[float, ...] = (1.0,)
 
+    def __post_init__(self) -> None:
+        check_within(self, dict.fromkeys(("aperture", "divergence", "aspect"), (0.0, 1.0)))
+
+    def size_at(self, range_m: float) -> tuple[float, float]:
+        """Width and height of the disc, m."""
+        wide = self.divergence * range_m
+        return 2.0 * (self.aperture + wide), 2.0 * (self.aperture + self.aspect * wide)
+
     def rays(self) -> Float:
-        """(k, 6): left, up, unit direction (forward, left, up), way up per metre forward."""
-        out = np.empty((len(self.offsets), 6))
+        """(k, 6) in the columns of ``sim.sensors.lidar.columns``."""
+        out = np.empty((len(self.offsets), col.N_RAY))
         for k, (u, v) in enumerate(self.offsets):
-            left, up = self.divergence * u, self.divergence * v
+            left, up = self.divergence * u, self.divergence * self.aspect * v
             length = math.sqrt(1.0 + left * left + up * up)
-            out[k] = u, v, 1.0 / length, left / length, up / length, up
+            out[k, [col.U, col.V, col.RISE]] = u, v, up
+            out[k, [col.FORWARD, col.LEFT, col.UP]] = 1.0 / length, left / length, up / length
         return out
 
 
@@ -63,15 +77,22 @@ _DISC = (
 )
 
 
-def disc(*, aperture: float, divergence: float) -> Spot:
-    """A spot of seven rays: radius m at the window, half angle rad."""
+def disc(*, aperture: float, divergence: float, aspect: float = 1.0) -> Spot:
+    """A spot of seven rays; radius m at the window, half angle rad, and that upwards over it."""
     weights = (0.25, *(0.125,) * 6)
-    return Spot(aperture=aperture, divergence=divergence, offsets=_DISC, weights=weights)
+    return Spot(
+        aperture=aperture, divergence=divergence, aspect=aspect, offsets=_DISC, weights=weights
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Band:
-    """An error up to a range: ``error_m`` + ``share`` of the range; the last one holds beyond."""
+    """An error up to a range; the last band holds beyond.
+
+    up_to_m  range to which the band holds
+    error_m  the error, to which ``share`` of the range is added
+    share    of the range
+    """
 
     up_to_m: float
     error_m: float
@@ -79,13 +100,9 @@ class Band:
 
     def __post_init__(self) -> None:
         check_types(self)
-        if not 0.0 < self.up_to_m <= MAX_RANGE_M:
-            raise InvalidValueError(
-                f"Band.up_to_m must be > 0 and at most {MAX_RANGE_M:g} m, got {self.up_to_m}"
-            )
-        for name in ("error_m", "share"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise InvalidValueError(f"Band.{name} must be in 0..1, got {getattr(self, name)}")
+        check_within(
+            self, {"up_to_m": (1e-3, MAX_RANGE_M), "error_m": (0.0, 1.0), "share": (0.0, 1.0)}
+        )
 
 
 SIGMA_AT_M = 5.0  # where a spec states the one sigma of its ranges: across a room
@@ -105,16 +122,18 @@ class Scanner:
 
     Beams:
     name           in metadata and messages
-    first_deg      direction of beam 0, the rightmost; ``step_deg`` from each beam to the next
+    first_deg      direction of beam 0, the rightmost
+    step_deg       from each beam to the next
     n_beams        number of beams
-    rate_hz        scans per second; a scan is ``turns`` turns of the mirror, evenly one by one
-    turns          beam i is measured in turn i % turns (interlacing)
+    rate_hz        scans per second
+    turns          of the mirror in a scan; beam i is measured in turn i % turns (interlacing)
     clockwise      the mirror turns that way
     turn_from_deg  where the mirror points when a turn begins; None: at the first beam it meets
     beam_times_s   (n_beams,) s after the scan's start, instead of those of an even mirror
 
     Ranges:
-    range_min_m, range_max_m  limits; closer is sent as an error code (NaN), further as inf
+    range_min_m    least range; closer is sent as an error code (NaN)
+    range_max_m    largest range; further is sent as inf
     unit_m         step of the range code; 0: not rounded
 
     Parts, each of which may be left out:
@@ -125,6 +144,7 @@ class Scanner:
     needed         (range m, reflectivity): a full, square target needs that much to return
     incidence      oblique surfaces return less (cosine)
     mixed_pixels   at edges the value may lie between the two surfaces; needs a ``spot``
+    pulse_m        length of a pulse; surfaces further apart than that do not mix
     glass          panes let the beam through, except near their normal
     bounce         panes and polished faces also show what they mirror
     error_codes    no return is an error code, NaN; else inf, free space
@@ -150,6 +170,7 @@ class Scanner:
     needed: tuple[tuple[float, float], ...] = ()
     incidence: bool = False
     mixed_pixels: bool = False
+    pulse_m: float = 1.0
     glass: bool = False
     bounce: bool = False
     error_codes: bool = False
@@ -158,18 +179,13 @@ class Scanner:
     def __post_init__(self) -> None:
         check_types(self)
         instance("Scanner.spot", self.spot, Spot)
-        limits = {
+        check_within(self, {
             "n_beams": (1, MAX_BEAMS), "rate_hz": RATE_HZ, "turns": (1, MAX_TURNS),
             "first_deg": (-360.0, 360.0), "step_deg": (1e-3, 360.0),
             "range_min_m": (0.0, MAX_RANGE_M), "range_max_m": (0.0, MAX_RANGE_M),
-            "unit_m": (0.0, 1.0), "counter_m": (0.0, 1.0), "dropout_rate": (0.0, 1.0),
-        }  # fmt: skip
-        for name, (least, most) in limits.items():
-            value = getattr(self, name)
-            if not least <= value <= most:
-                raise InvalidValueError(
-                    f"Scanner.{name} must be in {least:g}..{most:g}, got {value!r}"
-                )
+            "unit_m": (0.0, 1.0), "counter_m": (0.0, 1.0), "pulse_m": (0.0, 10.0),
+            "dropout_rate": (0.0, 1.0),
+        })  # fmt: skip
         if not self.range_min_m < self.range_max_m:
             raise InvalidValueError(
                 f"Scanner.range_max_m must be > range_min_m, got {self.range_max_m}"
@@ -201,8 +217,7 @@ class Scanner:
         """With the errors named in ``ERRORS``: "full" is the model as it stands."""
         if errors == "full":
             return self
-        if errors not in ERRORS:
-            raise InvalidValueError(f"errors must be one of {', '.join(ERRORS)}, got {errors!r}")
+        one_of("errors", errors, ERRORS)
         bare = replace(
             self, systematic=(), counter_m=0.0, spot=Spot(), needed=(), incidence=False,
             mixed_pixels=False, glass=False, bounce=False, error_codes=False, dropout_rate=0.0,

@@ -27,6 +27,8 @@ QUANTITIES = {
     "too_near": "sent when too near",
     "no_return": "sent without a return",
     "spot": "spot of a beam",
+    "spot_width_m": "width of the spot",
+    "spot_height_m": "height of the spot",
 }
 
 

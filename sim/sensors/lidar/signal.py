@@ -4,8 +4,8 @@
 A spot is several rays. Rays at about the same distance make one pulse whose energy is the sum of
 weight, reflectivity and cosine of incidence. The first pulse that carries the energy needed at its
 distance (TD fig. 4-2) is the one that counts (TL p19); if more energy comes back from within the
-pulse length of about 1 m behind it, the value lies anywhere
-between the two (TL p110-111): a mixed pixel. What a pane lets through and what it mirrors share
+length of a pulse behind it, the value lies anywhere between the
+two (TL p110-111): a mixed pixel. What a pane lets through and what it mirrors share
 the energy as Fresnel's two faces of n = 1.5 do (Schlick's approximation; inferred, as is all about
 glass: no source gives numbers for this device). The counter's value is then corrected by the
 unit's own tables and rounded to the code of the range mode (TL p113). TD and TL are the documents
@@ -19,6 +19,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.sensors.lidar import columns as col
 from slam._jit import njit
 
 Float = NDArray[np.float64]
@@ -27,7 +28,6 @@ Bool = NDArray[np.bool_]
 
 NEEDED_STEP = 0.005  # m, of the table of needed reflectivity
 ERROR_STEP = 0.1  # m, of the table of the systematic error
-PULSE_LENGTH = 1.0  # m, TL p110
 SAME_PULSE = 0.1  # m between rays of one pulse; inferred
 SAME_SURFACE = 0.5  # m, the same where both hit one thing: an oblique wall; inferred
 RETURN_COS = math.cos(math.radians(5.0))  # a mirror answers only that near its normal; inferred
@@ -87,7 +87,7 @@ def detect(  # noqa: PLR0913 (kernel)
     order: Int,
     needed: Float,
     chance: float,
-    mixes: bool,
+    pulse: float,
 ) -> tuple[float, int, bool]:
     """(range m, inf for none; strongest ray, -1; mixed) of one beam.
 
@@ -95,6 +95,7 @@ def detect(  # noqa: PLR0913 (kernel)
     order                          (k,) room for their order
     needed                         energy needed against distance, every ``NEEDED_STEP`` m
     chance                         0..1, where between two surfaces a mixed pixel falls
+    pulse                          m between surfaces that mix; 0: none do
     """
     _sort_rays(distances, order, order.size)
     row = 0
@@ -102,9 +103,9 @@ def detect(  # noqa: PLR0913 (kernel)
         row, energy, place, strongest = _next_pulse(distances, energies, surfaces, order, row)
         if energy <= 0.0 or energy < needed[min(int(place / NEEDED_STEP), needed.size - 1)]:
             continue
-        if mixes and row < order.size and distances[order[row]] < math.inf:
+        if pulse > 0.0 and row < order.size and distances[order[row]] < math.inf:
             _, behind, far, _ = _next_pulse(distances, energies, surfaces, order, row)
-            if behind > energy and far - place < PULSE_LENGTH:
+            if behind > energy and far - place < pulse:
                 return place + chance * (far - place), strongest, True
         return place, strongest, False
     return math.inf, -1, False
@@ -126,7 +127,7 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
     mirrored: tuple[Float, Int, Float],
     surface: tuple[Float, Bool],
     weights: Float,
-    switches: tuple[bool, bool, bool],
+    switches: tuple[bool, bool, float],
     needed: Float,
     chances: Float,
     out: tuple[Float, Int, Bool],
@@ -140,12 +141,12 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
     mirrored  (n,) each, likewise, of what panes and polished faces mirror; (0,) for not at all
     surface   (candidates + 1,) each: reflectivity; polished. The last, index -1, is for no hit
     weights   (k,) of the rays
-    switches  reflectivity, incidence, mixed pixels
+    switches  reflectivity, incidence; m of a pulse within which surfaces mix, 0 for not at all
     out       (3, n) distance m, that of the middle ray, |cos|; (n,) candidate; (2, n) mixed, ghost
     """
     ranges, found, cos_of = hits
     reflectivity, polished = surface
-    by_reflectivity, by_incidence, mixes = switches
+    by_reflectivity, by_incidence, pulse = switches
     places, seen, marks = out
     k_rays, bounces, panes = weights.size, mirrored[0].size > 0, ranges.shape[0] > 1
     count = k_rays + (1 if bounces else 0)
@@ -183,14 +184,14 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
             if total > 0.0 and total >= needed[min(int(middle / NEEDED_STEP), needed.size - 1)]:
                 place, ray = middle, strongest
         elif rays > 1 or distances[0] < math.inf:
-            chance = chances[i] if mixes else 0.0  # none are drawn where nothing mixes
+            chance = chances[i] if pulse > 0.0 else 0.0  # none are drawn where nothing mixes
             place, ray, mixed = detect(
-                distances[:rays], energies, surfaces, order[:rays], needed, chance, mixes
+                distances[:rays], energies, surfaces, order[:rays], needed, chance, pulse
             )
-        places[0, i], places[1, i], marks[0, i] = place, distances[0], mixed
-        places[2, i] = cosines[ray] if ray >= 0 else math.nan
+        places[col.PLACE, i], places[col.MIDDLE, i] = place, distances[0]
+        places[col.COSINE, i] = cosines[ray] if ray >= 0 else math.nan
         seen[i] = surfaces[ray] if ray >= 0 else -1
-        marks[1, i] = ray == k_rays
+        marks[col.MIXED, i], marks[col.GHOST, i] = mixed, ray == k_rays
 
 
 @njit
@@ -199,9 +200,9 @@ def measure(hits: tuple[Float, Int, Float], out: tuple[Float, Int, Bool]) -> Non
     ranges, found, cos_of = hits
     places, seen, marks = out
     for i in range(ranges.shape[1]):
-        places[0, i] = places[1, i] = ranges[0, i, 0]
-        places[2, i], seen[i] = cos_of[0, i, 0], found[0, i, 0]
-        marks[0, i] = marks[1, i] = False
+        places[col.PLACE, i] = places[col.MIDDLE, i] = ranges[0, i, 0]
+        places[col.COSINE, i], seen[i] = cos_of[0, i, 0], found[0, i, 0]
+        marks[col.MIXED, i] = marks[col.GHOST, i] = False
 
 
 @njit
@@ -229,13 +230,13 @@ def send(  # noqa: C901, PLR0913 (kernel)
     """Counter, corrections, rounding: the values sent and whose they are.
 
     received      (3, n) and (n,) of ``receive``
-    reflectivity  (candidates + 1,); ``owner`` (2, candidates + 1) geom, body; -1 for no hit
+    reflectivity  (candidates + 1,); ``owner`` (2, candidates + 1); -1 for no hit
     draws         standard normal; 0..1 against the share of lost values; (n,) where needed
     error         of ``error_function``; (0,) for none
     steps         m: of the counter and of the code, 0 for continuous; least and largest range
-    bands         (k, 3) of the noise: up to m, deviation m, deviation per m; (0, 3) for none
+    bands         of the noise; (0, 3) for none
     errors        share of lost values; what no return becomes, NaN or inf
-    out           (n,) ranges m; (2, n) geom, body
+    out           (n,) ranges m; (2, n) whose
     """
     places, seen = received
     ranges, whose = out
@@ -243,8 +244,8 @@ def send(  # noqa: C901, PLR0913 (kernel)
     normal, lost = draws
     rate, none = errors
     for i in range(ranges.size):
-        place, j = places[0, i], seen[i]
-        whose[0, i], whose[1, i] = owner[0, j], owner[1, j]
+        place, j = places[col.PLACE, i], seen[i]
+        whose[col.GEOM_ID, i], whose[col.BODY_ID, i] = owner[col.GEOM_ID, j], owner[col.BODY_ID, j]
         if rate > 0.0 and lost[i] < rate:
             ranges[i] = math.nan
             continue
@@ -257,9 +258,9 @@ def send(  # noqa: C901, PLR0913 (kernel)
         value = place
         if len(bands) > 0:
             band = 0
-            while band < len(bands) - 1 and place > bands[band, 0]:
+            while band < len(bands) - 1 and place > bands[band, col.UP_TO]:
                 band += 1
-            noise = bands[band, 1] + bands[band, 2] * place
+            noise = bands[band, col.SIGMA] + bands[band, col.SIGMA_PER_M] * place
             value = max(place + noise * normal[i], 0.0)
         if counter > 0.0:
             value = math.floor(value / counter + 0.5) * counter

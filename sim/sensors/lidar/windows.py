@@ -14,37 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.sensors.lidar.fan import (
-    BODY,
-    BOX,
-    CAPSULE,
-    CYLINDER,
-    DISC_HALF,
-    DISC_RADIUS,
-    DISC_X,
-    DISC_Y,
-    DISC_Z,
-    ELLIPSOID,
-    FAR,
-    HALF_HEIGHT,
-    HIGH,
-    KIND,
-    LOW,
-    MOVED,
-    NEAR,
-    ORIGIN_X,
-    ORIGIN_Y,
-    PLANE,
-    SIZE_X,
-    SIZE_Y,
-    SIZE_Z,
-    SLACK,
-    SPHERE,
-    UPRIGHT,
-    Float,
-    Int,
-    Vec3,
-)
+from sim.sensors.lidar import columns as col
+from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3
 from slam._jit import njit
 
 BUCKETS = 64
@@ -56,7 +27,7 @@ class Noted(NamedTuple):
     ids, rows  geoms of the caster, and which of these are noted
     xpos...    ``geom_xpos``, ``geom_xmat``, ``site_xpos``, ``site_xmat`` of the model's data
     site       of the laser, -1 for none
-    poses      (slots, n, 12): position, then matrix by rows; ``lasers`` (slots, 3): x, y, yaw
+    poses      (slots, n, 12); ``lasers`` (slots, 3)
     filled     (1,) number of slots
     """
 
@@ -85,29 +56,30 @@ def note(noted: tuple[Any, ...]) -> None:
         j = rows[row]
         g = ids[j]
         for i in range(3):
-            poses[slot, j, i] = xpos[g, i]
+            poses[slot, j, col.PX + i] = xpos[g, i]
         for i in range(9):
-            poses[slot, j, 3 + i] = xmat[g, i]
+            poses[slot, j, col.R00 + i] = xmat[g, i]
     if site >= 0:
-        lasers[slot, 0], lasers[slot, 1] = site_xpos[site, 0], site_xpos[site, 1]
-        lasers[slot, 2] = math.atan2(site_xmat[site, 3], site_xmat[site, 0])
+        lasers[slot, col.LASER_X] = site_xpos[site, 0]
+        lasers[slot, col.LASER_Y] = site_xpos[site, 1]
+        lasers[slot, col.LASER_YAW] = math.atan2(site_xmat[site, 3], site_xmat[site, 0])
 
 
 @njit
 def _horizontal_bound(table: Float, j: int, poses: Float, slot: int) -> float:
     """Radius of a vertical cylinder about the geom's centre that contains it."""
-    kind = int(table[j, KIND])
-    s0, s1, s2 = table[j, SIZE_X], table[j, SIZE_Y], table[j, SIZE_Z]
-    if kind == SPHERE:
+    kind = int(table[j, col.KIND])
+    s0, s1, s2 = table[j, col.SIZE_X], table[j, col.SIZE_Y], table[j, col.SIZE_Z]
+    if kind == col.SPHERE:
         return float(s0)
-    if kind in (CAPSULE, CYLINDER):
-        lean_x, lean_y = poses[slot, j, 5], poses[slot, j, 8]
+    if kind in (col.CAPSULE, col.CYLINDER):
+        lean_x, lean_y = poses[slot, j, col.R02], poses[slot, j, col.R12]
         return float(s0 + s1 * math.sqrt(lean_x * lean_x + lean_y * lean_y))
-    if kind == ELLIPSOID:
+    if kind == col.ELLIPSOID:
         return float(max(s0, s1, s2))
-    if kind == PLANE:
+    if kind == col.PLANE:
         return math.inf
-    if table[j, UPRIGHT] > 0.0:
+    if table[j, col.UPRIGHT] > 0.0:
         return math.sqrt(s0 * s0 + s1 * s1)
     return math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
 
@@ -118,25 +90,25 @@ def enclose(table: Float, rows: Int, poses: Float, slots: int, bounds: Float) ->
     last, body, moved = slots - 1, -1.0, False
     for row in range(rows.size):
         j = rows[row]
-        if table[j, BODY] != body:  # else it moved as the last one did
-            body, moved = table[j, BODY], False
+        if table[j, col.BODY] != body:  # else it moved as the last one did
+            body, moved = table[j, col.BODY], False
             for s in range(last):
                 # First row and column of a rotation that changes little tell all of it.
-                for i in (0, 1, 2, 3, 4, 6):
+                for i in (col.PX, col.PY, col.PZ, col.R00, col.R01, col.R10):
                     moved = moved or poses[s, j, i] != poses[last, j, i]
-        radius, half = _horizontal_bound(table, j, poses, last), table[j, HALF_HEIGHT]
-        x, y, z = poses[last, j, 0], poses[last, j, 1], poses[last, j, 2]
+        radius, half = _horizontal_bound(table, j, poses, last), table[j, col.HALF_HEIGHT]
+        x, y, z = poses[last, j, col.PX], poses[last, j, col.PY], poses[last, j, col.PZ]
         if moved:
-            x, y = 0.5 * (x + poses[0, j, 0]), 0.5 * (y + poses[0, j, 1])
+            x, y = 0.5 * (x + poses[0, j, col.PX]), 0.5 * (y + poses[0, j, col.PY])
             radius, lift = 0.0, 0.0
             for s in range(slots):
-                dx, dy = poses[s, j, 0] - x, poses[s, j, 1] - y
+                dx, dy = poses[s, j, col.PX] - x, poses[s, j, col.PY] - y
                 reach = _horizontal_bound(table, j, poses, s) + math.sqrt(dx * dx + dy * dy)
-                radius, lift = max(radius, reach), max(lift, abs(poses[s, j, 2] - z))
+                radius, lift = max(radius, reach), max(lift, abs(poses[s, j, col.PZ] - z))
             half += lift
-        bounds[j, DISC_X], bounds[j, DISC_Y], bounds[j, DISC_Z] = x, y, z
-        bounds[j, DISC_RADIUS], bounds[j, DISC_HALF] = radius, half
-        bounds[j, MOVED] = 1.0 if moved else 0.0
+        bounds[j, col.DISC_X], bounds[j, col.DISC_Y], bounds[j, col.DISC_Z] = x, y, z
+        bounds[j, col.DISC_RADIUS], bounds[j, col.DISC_HALF] = radius, half
+        bounds[j, col.MOVED] = 1.0 if moved else 0.0
 
 
 @njit
@@ -169,8 +141,9 @@ def _box_extent(table: Float, poses: Float, j: int, dx: float, dy: float, spread
     Azimuths are in (-pi, 2 pi), high above low; both widened for origins up to ``spread`` away.
     All around when the box may contain such an origin.
     """
-    ux, uy, wx, wy = poses[0, j, 3], poses[0, j, 6], poses[0, j, 4], poses[0, j, 7]
-    half_x, half_y = table[j, SIZE_X], table[j, SIZE_Y]
+    ux, uy = poses[0, j, col.R00], poses[0, j, col.R10]
+    wx, wy = poses[0, j, col.R01], poses[0, j, col.R11]
+    half_x, half_y = table[j, col.SIZE_X], table[j, col.SIZE_Y]
     across = max(abs(dx * ux + dy * uy) - half_x, 0.0)
     along = max(abs(dx * wx + dy * wy) - half_y, 0.0)
     clear = math.sqrt(across * across + along * along)
@@ -201,10 +174,10 @@ def _box_extent(table: Float, poses: Float, j: int, dx: float, dy: float, spread
 def _origins(fan: Float) -> Vec3:
     """(mid x, mid y, largest distance of any beam's origin from there)."""
     last, spread = fan.shape[0] - 1, 0.0
-    mid_x = 0.5 * (fan[0, ORIGIN_X] + fan[last, ORIGIN_X])
-    mid_y = 0.5 * (fan[0, ORIGIN_Y] + fan[last, ORIGIN_Y])
+    mid_x = 0.5 * (fan[0, col.ORIGIN_X] + fan[last, col.ORIGIN_X])
+    mid_y = 0.5 * (fan[0, col.ORIGIN_Y] + fan[last, col.ORIGIN_Y])
     for i in range(last + 1):
-        x, y = fan[i, ORIGIN_X] - mid_x, fan[i, ORIGIN_Y] - mid_y
+        x, y = fan[i, col.ORIGIN_X] - mid_x, fan[i, col.ORIGIN_Y] - mid_y
         spread = max(spread, x * x + y * y)
     return mid_x, mid_y, math.sqrt(spread)
 
@@ -236,17 +209,21 @@ def find_windows(  # noqa: PLR0913 (kernel)
     right_c, right_s = math.cos(first), math.sin(first)
     span = last - first
     for j in range(bounds.shape[0]):
-        dx, dy = bounds[j, DISC_X] - mid_x, bounds[j, DISC_Y] - mid_y
-        reach = bounds[j, DISC_RADIUS] + spread
+        dx, dy = bounds[j, col.DISC_X] - mid_x, bounds[j, col.DISC_Y] - mid_y
+        reach = bounds[j, col.DISC_RADIUS] + spread
         # Outside the wedge of the scan: no trigonometry needed to know it.
         left, right = left_c * dy - left_s * dx > reach, right_s * dx - right_c * dy > reach
         if (left or right) if span < math.pi else (left and right and span < math.tau):
             continue
         distance = math.sqrt(dx * dx + dy * dy)
-        gap = abs(bounds[j, DISC_Z] - height) - bounds[j, DISC_HALF] - aperture
+        gap = abs(bounds[j, col.DISC_Z] - height) - bounds[j, col.DISC_HALF] - aperture
         if gap > slope * (distance + reach) + SLACK:
             continue
-        if table[j, KIND] == BOX and table[j, UPRIGHT] > 0.0 and bounds[j, MOVED] == 0.0:
+        if (
+            table[j, col.KIND] == col.BOX
+            and table[j, col.UPRIGHT] > 0.0
+            and bounds[j, col.MOVED] == 0.0
+        ):
             near, low, high = _box_extent(table, poses, j, dx, dy, spread)
         elif distance <= reach:
             near, low, high = 0.0, -math.pi, math.pi
@@ -258,8 +235,8 @@ def find_windows(  # noqa: PLR0913 (kernel)
         for lap in (-math.tau, 0.0, math.tau):
             if low - slope + lap <= last and high + slope + lap >= first:
                 owners[found] = j
-                windows[found, NEAR], windows[found, FAR] = near, distance + reach
-                windows[found, LOW], windows[found, HIGH] = low + lap, high + lap
+                windows[found, col.NEAR], windows[found, col.FAR] = near, distance + reach
+                windows[found, col.LOW], windows[found, col.HIGH] = low + lap, high + lap
                 found += 1
     return found
 
@@ -270,10 +247,10 @@ def nearest_first(windows: Float, found: int, order: Int) -> None:
     than a sort."""
     starts = np.zeros(BUCKETS + 1, dtype=np.int64)
     for row in range(found):
-        starts[1 + min(int(4.0 * windows[row, NEAR]), BUCKETS - 1)] += 1
+        starts[1 + min(int(4.0 * windows[row, col.NEAR]), BUCKETS - 1)] += 1
     for k in range(BUCKETS):
         starts[k + 1] += starts[k]
     for row in range(found):
-        k = min(int(4.0 * windows[row, NEAR]), BUCKETS - 1)
+        k = min(int(4.0 * windows[row, col.NEAR]), BUCKETS - 1)
         order[starts[k]] = row
         starts[k] += 1

@@ -119,11 +119,7 @@ class WheelOdometry:
 
     def save(self) -> tuple[dict[str, Float], dict[str, Any]]:
         """Everything that decides what comes next: arrays, and the words of the generator."""
-        arrays = {
-            "wheels": self._wheels.copy(),
-            "poses": self._poses.copy(),
-            "spread": self._spread.copy(),
-        }
+        arrays = {name: live.copy() for name, live in self._live().items()}
         return arrays, {"errors": list(self.errors), "random": state.random_words(self._rng)}
 
     def load(self, arrays: Mapping[str, Float], words: Mapping[str, Any]) -> None:
@@ -131,10 +127,11 @@ class WheelOdometry:
         if list(self.errors) != words["errors"]:
             raise InvalidValueError("the state is of a run whose odometry errs otherwise")
         state.restore_random(self._rng, words["random"])
-        for name, live in (
-            ("wheels", self._wheels), ("poses", self._poses), ("spread", self._spread),
-        ):  # fmt: skip
+        for name, live in self._live().items():
             live[...] = arrays[name]
+
+    def _live(self) -> dict[str, Float]:
+        return {"wheels": self._wheels, "poses": self._poses, "spread": self._spread}
 
     def over_scan(self, travel: Float, first: float, last: float, *, contact: bool) -> None:
         """Advance to the first beam of a scan, which closes the motion increment, and to the last.

@@ -6,17 +6,14 @@ Blocks of neurons are born under an observation and die when every neuron in the
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+import math
 
-from slam.frontend.visibility import View
 from slam.shunting.config import ShuntingConfig
-from slam.shunting.map.update import Law, integrate, lateral_mu
-from slam.tracker.cell_map import CellMap
+from slam.tracker.two_memories import TwoMemories
 
 
-class Network(CellMap):
-    """The plane of neurons, and the constants of its update."""
+class Network(TwoMemories):
+    """The plane of neurons, with the lateral weights of its config."""
 
     config: ShuntingConfig
 
@@ -24,29 +21,14 @@ class Network(CellMap):
         super().__init__(config)
         self.mu = lateral_mu(config.lateral_sum, config.lateral_reach_cells)
 
-    def law(self, step: float) -> Law:
-        """Constants of an update whose input acts for ``step`` s (the time since the last scan)."""
-        numbers = self.config.map
-        pace = self.pace(step)
-        return Law(
-            step=step,
-            look=step,
-            pace=pace,
-            oldest=numbers.oldest_paces * pace,
-            decay=self.config.decay_per_s,
-            threshold=self.config.threshold,
-            mu=self.mu,
-            reach=self.config.lateral_reach_cells,
-            trace=self.config.trace_s > 0.0,
-            faded=numbers.faded,
-            unseen=numbers.unseen,
-        )
 
-    def integrate(
-        self, view: View, T_map_laser: NDArray[np.float64], step: float, *, write: bool
-    ) -> tuple[float, float, int]:
-        """Take the present impressions in for ``step`` s; see the kernel of the same name."""
-        result = integrate(self.cells, view, T_map_laser, self.cell, self.law(step), write)
-        if write:
-            self.release()
-        return result
+def lateral_mu(total: float, reach: float) -> float:
+    """mu such that the weights mu / d over 0 < d < reach sum to ``total``."""
+    inverse_distances = 0.0
+    edge = math.ceil(reach)
+    for dj in range(-edge, edge + 1):
+        for di in range(-edge, edge + 1):
+            d = math.sqrt(di * di + dj * dj)
+            if 0.0 < d < reach:
+                inverse_distances += 1.0 / d
+    return total / inverse_distances if inverse_distances else 0.0

@@ -14,60 +14,68 @@ MANY = 100_000
 class ClimbConfig(Settings):
     """Newton's method with Levenberg damping."""
 
-    steps: int = number(20, "steps", "at most", low=1, high=MANY)
-    enough: float = number(3e-3, "score", "expected rise below which a step is the last")
-    damping: float = number(1e-3, "ratio", "at first")
-    damping_falls: float = number(0.2, "ratio", "after a step that rose")
-    damping_grows: float = number(10.0, "ratio", "after one that did not", low=1.0)
-    damping_least: float = number(1e-6, "ratio", "after steps that rose")
-    damping_again: float = number(0.1, "ratio", "at least, after a step that did not rise")
-    damping_most: float = number(1e6, "ratio", "beyond it the climb ends", high=1e12)
-    few: int = number(90, "points", "are enough to approach the optimum", low=1, high=MANY)
-    widest_cells: float = number(3.0, "cells", "blur of an observation in approach, at most")
-    moved_cells: float = number(
-        0.5, "cells", "a prior that moves no observation by more needs no approach"
-    )
+    steps: int = number(20, "steps", "Newton steps of one climb, at most", low=1, high=MANY)
+    enough: float = number(3e-3, "score", "a step whose expected rise is smaller is the last")
+    damping: float = number(1e-3, "ratio", "Levenberg damping of the first step")
+    damping_falls: float = number(0.2, "ratio", "factor after a step that raised the score")
+    damping_grows: float = number(10.0, "ratio", "factor after a step that did not", low=1.0)
+    damping_least: float = number(1e-6, "ratio", "least damping after one that did")
+    damping_again: float = number(0.1, "ratio", "least damping after one that did not")
+    damping_most: float = number(1e6, "ratio", "damping at which the climb ends", high=1e12)
+    few: int = number(90, "points", "most that approach the optimum", low=1, high=MANY)
+    widest_cells: float = number(3.0, "cells", "widest blur of an observation while approaching")
+    moved_cells: float = number(0.5, "cells", "a prior that moves less needs no approach")
     tempered: float = number(
-        0.9, "ratio", "a weight that falls by less is not climbed with again", high=1.0
+        0.9, "ratio", "the climb is repeated where the weight falls below this share", high=1.0
     )
-    least_weight: float = number(1e-6, "reward", "however little matched", low=1e-12)
+    least_weight: float = number(
+        1e-6,
+        "reward",
+        "least weight of the reward, however little is matched",
+        "numerical guard",
+        low=1e-12,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class LocalConfig(Settings):
     """Branch and bound in a window around the prediction."""
 
-    vague_cells: float = number(1.0, "cells", "a wider prior may miss the optimum: search")
-    good_share: float = number(0.85, "share", "of the usual match: below it, search")
-    widest_share: float = number(0.7, "share", "of that: below it, search the widest window")
-    sigmas: float = number(3.0, "σ", "half width of the window, in deviations of the prior")
-    least_m: float = number(0.1, "m", "half width of the window, at least")
-    least_rad: float = number(0.05, "rad", "the same in heading")
+    vague_cells: float = number(1.0, "cells", "deviation of the prediction: above, a search runs")
+    good_share: float = number(0.85, "share", "of the usual match: below, a search runs")
+    widest_share: float = number(0.7, "share", "of good_share: below, the widest window")
+    sigmas: float = number(3.0, "σ", "half width of the window, in deviations of prior")
+    least_m: float = number(0.1, "m", "least half width of the window")
+    least_rad: float = number(0.05, "rad", "least half width of the window")
     reach_m: float = number(0.6, "m", "half width of the widest window", low=1e-3, high=20.0)
-    turn_rad: float = number(0.5, "rad", "the same in heading", low=1e-3, high=3.2)
-    points: int = number(180, "points", "more add cost, not certainty", low=1, high=MANY)
+    turn_rad: float = number(0.5, "rad", "half width of the widest window", low=1e-3, high=3.2)
+    points: int = number(
+        180,
+        "points",
+        "points used in a search, at most: more add cost, not certainty",
+        low=1,
+        high=MANY,
+    )
     heading_cells: float = number(
         1.5, "cells", "a far point moves so far between two headings", low=1e-3
     )
-    finest_rad: float = number(0.003, "rad", "between two headings, at least", low=1e-4)
-    coarsest_rad: float = number(0.03, "rad", "between two headings, at most", low=1e-4)
+    finest_rad: float = number(0.003, "rad", "least step of heading", low=1e-4)
+    coarsest_rad: float = number(0.03, "rad", "largest step of heading", low=1e-4)
 
 
 @dataclass(frozen=True, kw_only=True)
 class GlobalConfig(Settings):
     """Branch and bound over the whole map, for relocalisation."""
 
-    pitch_m: float = number(0.12, "m", "neurons are pooled up to this edge", low=1e-3)
-    beside: float = number(
-        0.7, "share", "worth of a place beside structure: poses are tried every pitch", high=1.0
-    )
-    far_m: float = number(20.0, "m", "returns beyond turn too fast with the heading", low=0.1)
-    points: int = number(120, "points", "are enough", low=1, high=MANY)
-    apart_m: float = number(1.0, "m", "between two answers, or")
-    apart_rad: float = number(0.5, "rad", "between two answers: one of the two")
-    worth: float = number(0.6, "share", "answers worse than this of the best are dropped", high=1.0)
-    finest_rad: float = number(0.01, "rad", "between two headings, at least", low=1e-3)
-    coarsest_rad: float = number(0.1, "rad", "between two headings, at most", low=1e-3, high=0.5)
+    pitch_m: float = number(0.12, "m", "edge up to which cells are pooled for the search", low=1e-3)
+    beside: float = number(0.7, "share", "worth of a place one pitch beside structure", high=1.0)
+    far_m: float = number(20.0, "m", "returns beyond move too far with the heading", low=0.1)
+    points: int = number(120, "points", "points used in a search, at most", low=1, high=MANY)
+    apart_m: float = number(1.0, "m", "answers differ by this, or by apart_rad")
+    apart_rad: float = number(0.5, "rad", "answers differ by this, or by apart_m")
+    worth: float = number(0.6, "share", "of the best score: worse answers are dropped", high=1.0)
+    finest_rad: float = number(0.01, "rad", "least step of heading", low=1e-3)
+    coarsest_rad: float = number(0.1, "rad", "largest step of heading", low=1e-3, high=0.5)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,10 +84,20 @@ class MatchingConfig(Settings):
 
     matched_overlap: float = number(0.15, "overlap", "an observation with less is not matched")
     log_floor: float = number(
-        0.1, "overlap", "added before the logarithm is taken, preset paper", low=1e-6
+        0.1,
+        "overlap",
+        "added to the overlap before its logarithm is taken (preset paper)",
+        low=1e-6,
     )
-    tail: float = number(3.3, "σ", "where the Gaussian of an observation ends", low=1.0, high=6.0)
-    tail_cells: float = number(3.0, "cells", "and not nearer than this", low=1.0, high=16.0)
+    tail: float = number(
+        3.3,
+        "σ",
+        "distance at which the Gaussian of an observation ends",
+        "exp(-3.3² / 2) = 0.4 % of its peak",
+        low=1.0,
+        high=6.0,
+    )
+    tail_cells: float = number(3.0, "cells", "least distance at which it ends", low=1.0, high=16.0)
     climb: ClimbConfig = field(default=ClimbConfig())
     local: LocalConfig = field(default=LocalConfig())
     whole: GlobalConfig = field(default=GlobalConfig())

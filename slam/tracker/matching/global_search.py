@@ -2,7 +2,7 @@
 """Search of the whole map for places that look like what is in view, by branch and bound.
 
 On a lattice of about 0.12 m, over every heading. Several answers, well apart: rooms look alike, and
-one scan seldom tells which it is.
+one scan seldom shows which it is.
 """
 
 from __future__ import annotations

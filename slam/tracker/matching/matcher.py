@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -189,12 +189,4 @@ class Matcher:
             window, self.config.reward,
         )  # fmt: skip
         match = self.climb(cell_map, observations, start, prediction, precision)
-        return Match(
-            T_map_robot=match.T_map_robot,
-            information=match.information,
-            matched=match.matched,
-            score=match.score,
-            tau=match.tau,
-            searched=True,
-            evaluations=evaluations,
-        )
+        return replace(match, searched=True, evaluations=evaluations)

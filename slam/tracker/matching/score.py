@@ -59,10 +59,20 @@ class Seen(NamedTuple):
     facings: NDArray[np.uint8]
 
 
+class Field(NamedTuple):
+    """The arrays of ``Cells`` that overlaps need: all twelve would be copied at every call."""
+
+    directory: NDArray[np.int32]
+    corner: NDArray[np.int64]
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    facing: NDArray[np.uint8]
+
+
 @inner
 def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
-    cells: Cells,
-    reward: Reward,
+    field: Field,
+    reach: tuple[float, float, float],
     u: float,
     v: float,
     cov: tuple[float, float, float],
@@ -76,13 +86,14 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
     of a surface that faces away from the observed one (``faced``) do not count.
     ``out``: f, df/du, df/dv, -d2f/du2, -d2f/dudv, -d2f/dv2.
     """
+    short_term, tail, tail_cells = reach
     a, b, d = cov
     det = a * d - b * b
     if det <= 0.0:  # rounding has left nothing across
         b, det = 0.0, a * d
     pa, pb, pd = d / det, -b / det, a / det
-    wide = max(reward.tail_cells, reward.tail / math.sqrt(pa))
-    high = max(reward.tail_cells, reward.tail * math.sqrt(d))
+    wide = max(tail_cells, tail / math.sqrt(pa))
+    high = max(tail_cells, tail * math.sqrt(d))
     lean = b / d  # each row's Gaussian is centred at u + lean * dv, with precision pa,
     j0, j1 = math.ceil(v - high), math.floor(v + high)
     weight = math.exp(-0.5 * (j0 - v) * (j0 - v) / d)  # and weighs exp(-dv^2 / 2 d);
@@ -90,7 +101,7 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
     slowing = falling if a == d else math.exp(-1.0 / d)  # by recurrence: no exp in the loops
     i0, i1, t, first, second = 0, 0, 0.0, 0.0, 0.0
     m0 = mu = mv = muu = muv = mvv = 0.0
-    rows, columns = cells.directory.shape
+    rows, columns = field.directory.shape
     for j in range(j0, j1 + 1):
         dv = j - v
         shift = lean * dv
@@ -98,20 +109,20 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
             i0, i1 = math.ceil(u + shift - wide), math.floor(u + shift + wide)
             t = i0 - u - shift
             first, second = math.exp(-0.5 * pa * t * t), math.exp(-pa * (t + 0.5))
-        row = (j >> SHIFT) - cells.corner[1]
+        row = (j >> SHIFT) - field.corner[1]
         if 0 <= row < rows:
             s0 = s1 = s2 = 0.0
             offset, kernel, ratio = t, first, second
             column_before, slot = -1, -1
             for i in range(i0, i1 + 1):
-                column = (i >> SHIFT) - cells.corner[0]
+                column = (i >> SHIFT) - field.corner[0]
                 if column != column_before:
                     column_before = column
-                    slot = cells.directory[row, column] if 0 <= column < columns else -1
+                    slot = field.directory[row, column] if 0 <= column < columns else -1
                 if slot >= 0:
-                    x, y = cells.x[slot, j & MASK, i & MASK], cells.y[slot, j & MASK, i & MASK]
-                    value = kernel * (y + (1.0 - y) * reward.short_term * x)
-                    if opposite(faced, cells.facing[slot, j & MASK, i & MASK]):
+                    x, y = field.x[slot, j & MASK, i & MASK], field.y[slot, j & MASK, i & MASK]
+                    value = kernel * (y + (1.0 - y) * short_term * x)
+                    if opposite(faced, field.facing[slot, j & MASK, i & MASK]):
                         value = 0.0
                     s0 += value
                     value *= offset
@@ -162,6 +173,8 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     score, matched = 0.0, 0.0
     out = np.empty(6)
     scale = 1.0 / reward.cell
+    field = Field(cells.directory, cells.corner, cells.x, cells.y, cells.facing)
+    reach = reward.short_term, reward.tail, reward.tail_cells
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(len(seen.points)):
         rx = c * seen.points[k, 0] - s * seen.points[k, 1]
@@ -173,7 +186,7 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
             (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale * scale,
         )
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
-        _overlap(cells, reward, u, v, cov, turned_face(seen.facings[k], pose[2]), out)
+        _overlap(field, reach, u, v, cov, turned_face(seen.facings[k], pose[2]), out)
         f = out[0]
         if f > reward.matched_overlap:
             matched += seen.weights[k]

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the robot is where the SLAM believes: tracking quality, relocalisation, loops."""
+"""Whether the estimate can be trusted: tracking quality, relocalisation, loops."""

@@ -14,56 +14,58 @@ MANY = 100_000
 class QualityConfig(Settings):
     """When a match is denied, and when the robot counts as lost."""
 
-    remembered: int = number(50, "frames", "that say what is usual", low=1, high=MANY)
-    lost_after: int = number(3, "frames", "denied in a row: then lost", low=1, high=MANY)
+    remembered: int = number(
+        50, "frames", "whose median match and support are usual", low=1, high=MANY
+    )
+    lost_after: int = number(3, "frames", "denied in a row: the robot is lost", low=1, high=MANY)
     patience: int = number(
-        30, "frames", "denied in a row: then the map is written anew", low=1, high=MANY
+        30, "frames", "denied in a row: the map is written again", low=1, high=MANY
     )
-    give_up_s: float = number(60.0, "s", "of searching: then the map goes on from odometry")
+    give_up_s: float = number(60.0, "s", "of relocalising; then go on from odometry")
     worth_searching: float = number(
-        0.6, "share", "usual support from which on a lost robot searches its map", high=1.0
+        0.6, "share", "least usual support of a map to search in", high=1.0
     )
-    grown_s: float = number(10.0, "s", "of tracking until the map counts as grown")
-    grown_scans: int = number(10, "frames", "the same; both must hold", low=0, high=MANY)
-    known: float = number(0.5, "share", "of that time: from then on the map may be frozen")
-    suspicious: float = number(0.70, "share", "of the usual match: below it the map is asked")
-    denied: float = number(0.30, "share", "of the map in view contradicted: the frame is denied")
-    still_denied: float = number(0.20, "share", "the same, while the frame before was denied")
-    sudden: float = number(0.3, "share", "of the usual match at once, within a small step: carried")
-    sudden_m: float = number(0.5, "m", "that step, at most")
-    sudden_rad: float = number(0.5, "rad", "that step's turn, at most")
+    grown_s: float = number(10.0, "s", "of tracking: a grown map, with grown_scans")
+    grown_scans: int = number(10, "frames", "tracked: a grown map, with grown_s", low=0, high=MANY)
+    known: float = number(0.5, "share", "of grown_s: then the map may be frozen")
+    suspicious: float = number(0.70, "share", "of the usual match: below, the map is checked")
+    denied: float = number(0.30, "share", "of the map in view contradicted: denied")
+    still_denied: float = number(0.20, "share", "the same, if the frame before was denied")
+    sudden: float = number(0.3, "share", "of the usual match, after a small step: carried")
+    sudden_m: float = number(0.5, "m", "largest such step")
+    sudden_rad: float = number(0.5, "rad", "largest turn of such a step")
 
 
 @dataclass(frozen=True, kw_only=True)
 class RelocaliseConfig(Settings):
     """Hypotheses of a lost robot, and a robot that was pushed."""
 
-    most: int = number(6, "hypotheses", "from one search of the map", low=1, high=1000)
+    most: int = number(6, "hypotheses", "most from one search of the map", low=1, high=1000)
     again_s: float = number(1.0, "s", "between two searches of the map")
-    coarse_m: float = number(0.1, "m", "standard deviation of what that search finds", low=1e-6)
-    coarse_deg: float = number(1.5, "deg", "the same of the heading", low=1e-6)
-    enough: float = number(0.8, "share", "of the usual support: accepted")
-    enough_later: float = number(0.65, "share", "the same, of a hypothesis followed for long")
-    later: float = number(3.0, "ratio", "of the least evidence: then it was followed for long")
-    hopeless: float = number(0.6, "share", "of the usual, or of the best one's, support: dropped")
-    alias: float = number(0.9, "share", "of the best one's support: a rival, so wait")
-    scans: int = number(5, "frames", "least evidence, and one of the three below", low=1, high=MANY)
-    on_m: float = number(0.3, "m", "driven", low=1e-6)
-    on_rad: float = number(0.35, "rad", "turned", low=1e-6)
-    on_s: float = number(1.0, "s", "of time", low=1e-6)
-    same_m: float = number(0.3, "m", "nearer hypotheses are one")
-    same_rad: float = number(0.2, "rad", "and turned by less")
+    coarse_m: float = number(0.1, "m", "deviation of a position that it finds", low=1e-6)
+    coarse_deg: float = number(1.5, "deg", "deviation of a heading that it finds", low=1e-6)
+    enough: float = number(0.8, "share", "of the usual support: accepts a hypothesis")
+    enough_later: float = number(0.65, "share", "the same, for one followed for long (later)")
+    later: float = number(3.0, "ratio", "of the least evidence: then followed for long")
+    hopeless: float = number(0.6, "share", "of the usual, or the best, support: less is dropped")
+    alias: float = number(0.9, "share", "of the best support: another is a rival, wait")
+    scans: int = number(5, "frames", "least, with one of on_m, on_rad, on_s", low=1, high=MANY)
+    on_m: float = number(0.3, "m", "least distance driven with a hypothesis", low=1e-6)
+    on_rad: float = number(0.35, "rad", "least turn made with a hypothesis", low=1e-6)
+    on_s: float = number(1.0, "s", "least time passed with a hypothesis", low=1e-6)
+    same_m: float = number(0.3, "m", "hypotheses nearer than this are one")
+    same_rad: float = number(0.2, "rad", "and turned by less than this")
     least_weight: float = number(
         40.0, "weight",
         "in view from which on a frame can deny the map or identify a place: 4 m of surface",
     )  # fmt: skip
     slipped_m: float = number(0.2, "m", "deviation of a motion that odometry missed", low=1e-6)
-    slipped_rad: float = number(0.2, "rad", "the same of the heading", low=1e-6)
-    pushed_mps: float = number(2.0, "m/s", "speed of that motion, at most")
-    pushed_radps: float = number(3.5, "rad/s", "its turn rate, at most")
-    farthest_m: float = number(0.6, "m", "that is searched", high=20.0)
-    farthest_rad: float = number(0.5, "rad", "the same in heading", high=3.2)
-    sure: float = number(0.9, "share", "of the usual support at the place found")
+    slipped_rad: float = number(0.2, "rad", "the same of its turn", low=1e-6)
+    pushed_mps: float = number(2.0, "m/s", "largest speed of a motion that odometry missed")
+    pushed_radps: float = number(3.5, "rad/s", "largest turn rate of a motion that odometry missed")
+    farthest_m: float = number(0.6, "m", "farthest that such a motion is searched", high=20.0)
+    farthest_rad: float = number(0.5, "rad", "farthest turn that is searched", high=3.2)
+    sure: float = number(0.9, "share", "of the usual support at the place then found")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,31 +80,35 @@ class TrackingConfig(Settings):
 class LoopsConfig(Settings):
     """Key frames, submaps and loops of long runs."""
 
-    key_m: float = number(1.0, "m", "between key frames, or", low=1e-3)
-    key_rad: float = number(0.6, "rad", "between key frames", low=1e-3)
-    long_m: float = number(100.0, "m", "way from which on loops are looked for")
-    after_m: float = number(15.0, "m", "way between the ends of a loop")
-    gate_m: float = number(1.5, "m", "a loop may be this far off,")
-    gate_share: float = number(0.02, "m/m", "and so much more by the way,")
-    widest_m: float = number(6.0, "m", "and this far at most")
-    gate_rad: float = number(0.5, "rad", "and turned by this")
-    near_m: float = number(1.0, "m", "beyond the gate at which a submap is still tried")
-    most: int = number(4, "places", "looked at for one loop", low=1, high=1000)
-    again_m: float = number(3.0, "m", "second look: how far off a passage may be")
-    passages: int = number(3, "passages", "second look: at most", low=1, high=1000)
-    recent: int = number(6, "key frames", "that a step is measured against", low=1, high=1000)
-    slack_m: float = number(0.05, "m", "by which a step may be better than online", low=1e-6)
-    slack_rad: float = number(0.01, "rad", "the same of the heading", low=1e-6)
+    key_m: float = number(1.0, "m", "between key frames, or key_rad", low=1e-3)
+    key_rad: float = number(0.6, "rad", "between key frames, or key_m", low=1e-3)
+    long_m: float = number(100.0, "m", "driven before loops are searched")
+    after_m: float = number(15.0, "m", "least way between the ends of a loop")
+    gate_m: float = number(1.5, "m", "position error at which loops are searched")
+    gate_share: float = number(0.02, "m/m", "growth of gate_m with the distance driven")
+    widest_m: float = number(6.0, "m", "largest gate_m with that growth")
+    gate_rad: float = number(0.5, "rad", "heading error at which loops are searched")
+    near_m: float = number(1.0, "m", "a submap this far beyond the gate is tried")
+    most: int = number(4, "places", "most that are examined for one loop", low=1, high=1000)
+    again_m: float = number(3.0, "m", "second pass: farthest passage that is tied")
+    passages: int = number(
+        3, "passages", "second pass: most passages tied to a key frame", low=1, high=1000
+    )
+    recent: int = number(
+        6, "key frames", "before it that a step is matched against", low=1, high=1000
+    )
+    slack_m: float = number(0.05, "m", "added deviation of an online step", low=1e-6)
+    slack_rad: float = number(0.01, "rad", "added deviation of an online step", low=1e-6)
     submap: int = number(4, "key frames", "on either side of a submap's middle", low=1, high=1000)
-    every: int = number(4, "key frames", "between two middles", low=1, high=1000)
-    look_s: float = number(1.0, "s", "a key frame acts on its submap", low=1e-3)
-    good_step: float = number(0.5, "share", "matched: a step is taken from the match")
-    good_match: float = number(0.6, "share", "matched: a loop")
-    good_support: float = number(0.5, "share", "support: a loop")
-    alias: float = number(0.9, "share", "of the best one's support: a rival, so no loop")
-    chain_m: float = number(0.02, "m", "deviation of a step beside its match's", low=1e-6)
-    chain_rad: float = number(0.0015, "rad", "the same of the heading", low=1e-6)
-    loop_m: float = number(0.03, "m", "deviation of a loop beside its match's", low=1e-6)
-    loop_rad: float = number(0.003, "rad", "the same of the heading", low=1e-6)
-    loose: float = number(1.0, "m², rad²", "prior variance of a loop's match", low=1e-6)
-    information_share: float = number(0.3, "share", "of a match's information that is believed")
+    every: int = number(4, "key frames", "between the middles of two submaps", low=1, high=1000)
+    look_s: float = number(1.0, "s", "a key frame acts so long on its submap", low=1e-3)
+    good_step: float = number(0.5, "share", "least matched share to take a step's match")
+    good_match: float = number(0.6, "share", "least matched share of a loop")
+    good_support: float = number(0.5, "share", "least support of a loop")
+    alias: float = number(0.9, "share", "of the best support: another is a rival, no loop")
+    chain_m: float = number(0.02, "m", "added deviation of a step's match", low=1e-6)
+    chain_rad: float = number(0.0015, "rad", "added deviation of a step's match", low=1e-6)
+    loop_m: float = number(0.03, "m", "added deviation of a loop", low=1e-6)
+    loop_rad: float = number(0.003, "rad", "added deviation of a loop", low=1e-6)
+    loose: float = number(1.0, "1/m², 1/rad²", "prior information of a loop's match", low=1e-6)
+    information_share: float = number(0.3, "share", "of a match's information, used in the graph")

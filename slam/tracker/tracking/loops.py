@@ -3,7 +3,7 @@
 
 The online map is left as it is. What comes out is the corrected trajectory, made when it is asked
 for. Each key frame is matched to the few before it: matched to the whole map, as it was online, a
-step would hide the drift that a loop is to tell. Then it is matched to the little map of the
+step would hide the drift that a loop is to correct. Then it is matched to the little map of the
 nearest earlier stretch of the way; and when all are in place, to those of every other passage.
 """
 
@@ -146,7 +146,7 @@ class Loops:
             self._optimise()
 
     def _stepped(self, j: int) -> Edge:
-        """The step to key frame ``j``, matched to the few before it; as online where in doubt."""
+        """The step to key frame ``j``, matched to the few before it; as online where it is poor."""
         key = self.keys[j]
         step, covariance = key.step, key.covariance
         cell_map = self._map_of(range(max(0, j - self._numbers.recent), j), j - 1)

@@ -20,10 +20,10 @@ from slam.tracker.tracking.config import QualityConfig
 class TrackingQuality:
     """What frames so far were like, and whether the next one fits.
 
-    freeze_below  share of the usual match, see ``TrackerConfig``; 0: never in doubt
+    freeze_below  share of the usual match, see ``TrackerConfig``; 0: never denied
     matches       latest matched fractions; ``supports`` the same times the share of map confirmed
     tracked_s     s of tracking on this map, in ``tracked`` scans
-    scans         doubtful frames in a row
+    scans         frames denied in a row
     """
 
     def __init__(self, freeze_below: float, config: QualityConfig) -> None:
@@ -56,7 +56,7 @@ class TrackingQuality:
 
     @property
     def suspicious(self) -> bool:
-        """Only a map that for long explained what is seen can tell where the robot is."""
+        """Only a map that for long explained what is seen can show where the robot is."""
         return self.freeze_below > 0.0 and self.is_worth_searching()
 
     def arises(self, matched: float) -> bool:
@@ -82,9 +82,9 @@ class TrackingQuality:
         near = math.hypot(x, y) < config.sudden_m and abs(se2.wrap(turn)) < config.sudden_rad
         return doubtful or (suspicious and share < config.sudden and near)
 
-    def count(self, doubtful: bool) -> None:
-        """Another frame in doubt, or one that is not."""
-        self.scans = self.scans + 1 if doubtful else 0
+    def count(self, denied: bool) -> None:
+        """Another frame that is denied, or one that is not."""
+        self.scans = self.scans + 1 if denied else 0
 
     def learn(self, matched: float, confirmed: float, contradicted: float, elapsed: float) -> None:
         """From a frame that was tracked, ``elapsed`` s after the one before."""

@@ -112,7 +112,7 @@ class Relocalisation:
     def _accepted(self, usual: float, predicted: Float) -> Match | None:
         """The match of the best hypothesis, if it is good and no other is.
 
-        Where dead reckoning leads is believed before places that only look as good: a room may be
+        The place of dead reckoning goes before places that only look as good: a room may be
         symmetric, and to be carried through it is rare.
         """
         if not self.hypotheses:
@@ -125,8 +125,8 @@ class Relocalisation:
         elif len(rivals) > 1:
             return None
         enough = config.enough_later if best.tried(config, config.later) else config.enough
-        told = best.tried(config) and best.seen >= config.least_weight
-        return best.match if told and best.support >= enough * usual else None
+        enough_seen = best.tried(config) and best.seen >= config.least_weight
+        return best.match if enough_seen and best.support >= enough * usual else None
 
     def _carried(
         self, old: Hypothesis, observations: Observations, prediction: Prediction
@@ -161,7 +161,7 @@ class Relocalisation:
 def support(cell_map: CellMap, observations: Observations, match: Match) -> float:
     """Matched share of the observations times the share of the trace in view that they confirm.
 
-    The second factor is what tells a corridor from the room beside it: there the beams pass where
+    The second factor distinguishes a corridor from the room beside it: there the beams pass where
     walls are known to be.
     """
     rasterise(cell_map, observations, match.T_map_robot)
@@ -184,7 +184,7 @@ def slipped(
     """The place around the prediction that explains a frame about as well as ``usual``.
 
     A robot that is shoved, or whose wheels slip, moves far beyond what its odometry says; under
-    that prior the right place is out of reach. None where too little is in view to tell.
+    that prior the right place is out of reach. None where too little is in view to decide.
     """
     config = matcher.config.tracking.relocalise
     if float(observations.weights.sum()) < config.least_weight:

@@ -15,55 +15,67 @@ class PoseConfig(Settings):
     """The errors of the map, of surfaces and of odometry in the pose covariance."""
 
     lattice_cells: float = number(
-        0.055, "cells", "surfaces are off by, without any shared residual, 1 σ", SEEDS
+        0.055, "cells", "deviation by which the lattice displaces surfaces", SEEDS
     )
-    shared_times: float = number(2.6, "ratio", "pose error over the shared residual", SEEDS)
-    new_times: float = number(0.25, "ratio", "share of it that stays in a map all new", SEEDS)
+    shared_times: float = number(
+        2.6, "ratio", "deviation of the pose over that of the shared residual", SEEDS
+    )
+    new_times: float = number(0.25, "ratio", "pose error that stays in a map all new", SEEDS)
     turn_times: float = number(
-        0.7, "ratio", "share of it that turns: surfaces do not all err the same way", SEEDS
+        0.7, "ratio", "heading error if surfaces err alike, times this", SEEDS
     )
-    shared_s: float = number(20.0, "s", "over which shared residuals are averaged", SEEDS, low=1e-3)
-    view_s: float = number(1.0, "s", "over which directions of surfaces are", SEEDS, low=1e-3)
-    at_first: float = number(200.0, "pairs", "that the usual residual counts as", SEEDS)
-    usual_m: float = number(0.002, "m", "residual of the scanner, usually", SEEDS, low=1e-9)
-    room_weight: float = number(
-        75.0, "weight", "of surfaces in view for which these hold: a room; 0.1 m a beam", SEEDS
+    shared_s: float = number(20.0, "s", "memory of shared residuals", SEEDS, low=1e-3)
+    view_s: float = number(1.0, "s", "memory of directions of surfaces", SEEDS, low=1e-3)
+    at_first: float = number(200.0, "pairs", "what usual_m counts as at the start", SEEDS)
+    usual_m: float = number(0.002, "m", "usual shared residual of a scanner", SEEDS, low=1e-9)
+    room_weight: float = number(75.0, "weight", "surfaces of a whole room, 0.1 m each", SEEDS)
+    least_share: float = number(
+        0.005, "share", "least share of room_weight in view", SEEDS, low=1e-6
     )
-    least_share: float = number(0.005, "share", "of it that is reckoned with", SEEDS, low=1e-6)
     written: float = number(
-        2.4, "ratio", "error of odometry that the map keeps, over the share newly written", SEEDS
+        2.4, "ratio", "error of odometry kept by the map, over its new share", SEEDS
     )
-    forgotten: float = number(1e-6, "weight", "a sum that faded to less holds nothing", low=1e-15)
-    correlated_s: float = number(1.0, "s", "the shared error of a scan stays the same", SEEDS)
-    noisy: float = number(
-        2.0, "ratio", "of the noise of beams: less information along an axis is none", SEEDS
+    forgotten: float = number(
+        1e-6,
+        "weight",
+        "a sum of weights that faded to less counts as nothing",
+        "numerical guard",
+        low=1e-15,
     )
+    correlated_s: float = number(1.0, "s", "a scan's shared error stays the same so long", SEEDS)
+    noisy: float = number(2.0, "ratio", "of what beam noise feigns: less is unobservable", SEEDS)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ResidualConfig(Settings):
     """Pairs of points that measure what surfaces share."""
 
-    apart_cells: float = number(3.5, "cells", "between the two of a pair, across the beams", SEEDS)
-    longest_cells: float = number(35.0, "cells", "between the two, at most", SEEDS)
-    samples: int = number(16, "points", "looked at in one frame", low=1, high=100_000)
-    faint_overlap: float = number(0.15, "overlap", "a point with less is off the map")
-    bent: float = number(0.2, "share", "of a chord by which a surface may leave it")
+    apart_cells: float = number(
+        3.5, "cells", "between the points of a pair, across the beams", SEEDS
+    )
+    longest_cells: float = number(35.0, "cells", "between the points of a pair, at most", SEEDS)
+    samples: int = number(
+        16, "points", "compared with the map in one frame, about", low=1, high=100_000
+    )
+    faint_overlap: float = number(0.15, "overlap", "least overlap of a point that is compared")
+    bent: float = number(0.2, "share", "of a pair's chord: the surface may leave it so far")
 
 
 @dataclass(frozen=True, kw_only=True)
 class OdometryNoiseConfig(Settings):
     """How the stated or assumed covariance of odometry is scaled to explain its corrections."""
 
-    stated: float = number(2.0, "ratio", "of a stated variance at first: they are optimistic")
-    assumed: float = number(1.0, "ratio", "of an assumed variance at first")
-    least_stated: float = number(0.25, "ratio", "of a stated variance", low=1e-6)
-    least_assumed: float = number(0.01, "ratio", "of an assumed variance", low=1e-6)
-    most: float = number(100.0, "ratio", "of either", low=1e-3)
-    at_first: float = number(20.0, "frames", "that the first ratio counts as", low=1e-3)
-    memory: float = number(100.0, "frames", "that are averaged, or", low=1e-3)
-    memory_s: float = number(20.0, "s", "that are, if longer")
-    wild: float = number(16.0, "ratio", "a squared innovation over its expectation, at most")
+    stated: float = number(2.0, "ratio", "first factor on a stated variance: logs are optimistic")
+    assumed: float = number(1.0, "ratio", "first factor on an assumed variance")
+    least_stated: float = number(0.25, "ratio", "least factor on a stated variance", low=1e-6)
+    least_assumed: float = number(0.01, "ratio", "least factor on an assumed variance", low=1e-6)
+    most: float = number(100.0, "ratio", "largest factor on either variance", low=1e-3)
+    at_first: float = number(20.0, "frames", "frames that the first factor counts as", low=1e-3)
+    memory: float = number(
+        100.0, "frames", "innovations are averaged over these, or memory_s", low=1e-3
+    )
+    memory_s: float = number(20.0, "s", "innovations are averaged over it, or memory")
+    wild: float = number(16.0, "ratio", "most of a squared innovation over its expectation", "4 σ")
 
 
 @dataclass(frozen=True, kw_only=True)

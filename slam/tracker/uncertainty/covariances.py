@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-
-LEAST = 1e-12  # no variance of a singular matrix is taken for less
+from slam.frontend.odometry_prior import SINGULAR
 
 
 @inner
@@ -25,7 +24,7 @@ def _inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
     det = a * aa + b * ab + c * ac
     if det <= 0.0:
-        aa, bb, cc = 1.0 / max(a, LEAST), 1.0 / max(d, LEAST), 1.0 / max(f, LEAST)
+        aa, bb, cc = 1.0 / max(a, SINGULAR), 1.0 / max(d, SINGULAR), 1.0 / max(f, SINGULAR)
         ab = ac = bc = 0.0
         det = 1.0
     out[0, 0], out[0, 1], out[0, 2] = aa / det, ab / det, ac / det

@@ -31,7 +31,7 @@ class OdometryNoise:
     """Predicts, and learns from what became of it.
 
     scales  (2,) of the variances of translation and rotation
-    nis     of the latest frame; None where its match is not believed
+    nis     of the latest frame; None where its match is not used
     bias    what odometry adds to the heading by itself; taken out of it. None: not learnt
     """
 
@@ -92,7 +92,7 @@ class OdometryNoise:
         return predict(T_map_before, before, now, scales, self.bias, self._prior)
 
     def learn(self, prediction: Prediction, match: Match, sensor_sigma_m: float) -> None:
-        """Compare the increment with a match that is believed, by ranges of that sigma."""
+        """Compare the increment with a match that is used, by ranges of that sigma."""
         off = match.T_map_robot - prediction.T_map_robot
         off[2] = se2.wrap(float(off[2]))
         data = match.tau * match.information
@@ -126,5 +126,5 @@ class OdometryNoise:
             self.scales[k] = min(max(scale, self._least), config.most)
 
     def skip(self) -> None:
-        """The match of this frame is not believed."""
+        """The match of this frame is not used."""
         self.nis = None

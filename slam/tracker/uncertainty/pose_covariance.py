@@ -73,10 +73,10 @@ class PoseCovariance:
         self.covariance = covariance.copy()
 
     def odometry_part(self, motion: Float) -> Float:
-        """Covariance (3, 3), after ``motion`` in the map, of what odometry alone has told lately.
+        """Covariance (3, 3), after ``motion`` in the map, of odometry's own part of late.
 
-        By so much the robot may be off the map in view; the map's own error is not in it. Nor is
-        what adds up along a corridor: there a match given leave to correct it would follow noise.
+        The robot may be off the map in view by this; the map's own error is not in it. Nor is
+        what adds up along a corridor: a match that may correct it there would follow noise.
         """
         x, y = 0.0, 0.0
         if self.along_rad is not None:
@@ -90,7 +90,7 @@ class PoseCovariance:
     ) -> None:
         """Take the motion from ``T_map_before`` and the match at its end in.
 
-        Without ``evidence`` the match was not believed: odometry alone moved the robot.
+        Without ``evidence`` the match was not used: odometry alone moved the robot.
         """
         config, data = self._config, np.zeros((3, 3))
         strength, new = 0.0, 0.0

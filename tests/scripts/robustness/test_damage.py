@@ -59,14 +59,14 @@ def status(path: Path) -> int:
 
 
 def test_every_damage_of_a_dataset_is_noticed(dataset):
-    tally = Tally.new()
+    tally = Tally()
     try_verify(tally, "dataset", dataset, 60, seed=1)
     assert (tally.wrong, tally.counts.total()) == ([], 60)
 
 
 @pytest.mark.parametrize("name", ["map", "raster", "drive"])
 def test_every_damage_of_other_results_is_noticed(name, tmp_path):
-    tally = Tally.new()
+    tally = Tally()
     folder = SAMPLES[name](tmp_path / name)
     try_verify(tally, name, folder, 21, seed=2)
     try_consumers(tally, name, folder, 3, seed=3)
@@ -74,7 +74,7 @@ def test_every_damage_of_other_results_is_noticed(name, tmp_path):
 
 
 def test_every_damage_of_a_comparison_is_noticed_or_made_good(comparison):
-    tally = Tally.new()
+    tally = Tally()
     try_verify(tally, "comparison", comparison, 24, seed=4)
     try_consumers(tally, "comparison", comparison, 3, seed=5)
     assert tally.wrong == []

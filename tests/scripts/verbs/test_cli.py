@@ -150,6 +150,15 @@ def test_a_wrong_word_is_one_line_and_a_status(tmp_path: Path, called, words, sa
     assert list(tmp_path.iterdir()) == []
 
 
+def test_verify_tells_a_wrong_path_from_a_damaged_result(tmp_path: Path, called):
+    (tmp_path / "recipe.json").write_text("{")
+    (tmp_path / "SHA256SUMS").write_text(f"{'0' * 64}  recipe.json\n")
+    assert called("verify", tmp_path).returncode == 1
+    missing = called("verify", tmp_path / "none")
+    assert missing.returncode == 2
+    assert "none: no such file or folder" in missing.stderr
+
+
 def test_a_damaged_log_is_named_and_nothing_is_written(tmp_path: Path, called):
     (tmp_path / "torn.log").write_text("FLASER 3 1.0 1.0 1.0 0 0 0 0 0 0 1.0 host 1.0\nFLASER 3 1.")
     (tmp_path / "noise.log").write_bytes(bytes(range(256)) * 20)

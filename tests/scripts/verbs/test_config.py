@@ -16,6 +16,7 @@ from scripts.output import read_recipe_words, write_recipe
 from scripts.verbs.compare import named
 from scripts.verbs.config import config
 from sim.actors.config import ACTORS
+from sim.sensors.lidar import registry
 from slam import config_of
 from slam.errors import UnknownNameError
 from slam.variants import with_set
@@ -37,7 +38,11 @@ def test_every_number_of_a_tree_is_printed(capsys: pytest.CaptureFixture[str]) -
     assert all(n["path"].startswith("matching.local.") for n in local)
 
 
-@pytest.mark.parametrize("what", ["actors", "lms221", "ekf", "occupancy"])
+SCANNERS = ["lms221", "rplidar_a1", "scanner", "tim561", "utm30lx"]
+SET = "scanner(fov_deg=200, beams=401, rate_hz=20, sigma_m=0.02)"
+
+
+@pytest.mark.parametrize("what", ["actors", "ekf", "occupancy", "utm30lx:noise", SET, *SCANNERS])
 def test_other_trees_say_unit_meaning_and_source(
     capsys: pytest.CaptureFixture[str], what: str
 ) -> None:
@@ -45,6 +50,22 @@ def test_other_trees_say_unit_meaning_and_source(
         assert row["unit"], row
         assert row["meaning"], row
         assert row["source"], row
+
+
+def test_a_scanner_says_what_is_simulated_and_where_its_data_sheet_states_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert registry.names() == SCANNERS
+    found = {row["path"]: row for row in numbers(capsys, "utm30lx")}
+    assert (found["rate_hz"]["value"], found["rate_hz"]["unit"]) == (40.0, "Hz")
+    assert found["rate_hz"]["source"] == "SPEC: scan speed"
+    assert [found[f"noise.{k}.error_m"]["value"] for k in (0, 1)] == [0.010, 0.030]
+    assert found["systematic.1.error_m"]["source"] == "EW: accuracy"
+    given = {row["path"]: row["value"] for row in numbers(capsys, SET)}
+    assert (given["n_beams"], given["rate_hz"], given["noise.0.error_m"]) == (401, 20, 0.02)
+    assert given["step_deg"] == 0.5
+    needed = [r["path"] for r in numbers(capsys, "scanner") if r["value"] == "needed"]
+    assert needed == ["fov_deg", "beams", "rate_hz", "sigma_m"]
 
 
 def test_actors_are_what_a_seed_means_so_none_can_be_set() -> None:
@@ -67,7 +88,13 @@ def test_the_table_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("what", "group", "match"),
     [
-        ("kiss-icp", "", r"'kiss-icp' has no numbers to set. These have: ekf, .*dynamism, lms221"),
+        (
+            "kiss-icp",
+            "",
+            r"'kiss-icp' has no numbers to set. These have: ekf, .*lms221, rplidar_a1",
+        ),
+        ("shuntin", "", r"no numbers to set. Did you mean 'shunting'"),
+        ("actor{a=1}", "", r"no numbers to set. Did you mean 'actors'"),
         ("shunting", "matchin.local", r"Did you mean 'matching.local'"),
         ("shunting{rewrad=7}", "", r"Did you mean 'reward'"),
     ],

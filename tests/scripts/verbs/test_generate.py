@@ -255,14 +255,15 @@ def test_a_full_and_a_read_only_disk_are_named(small_disk):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"episodes": 0}, "episodes must be 1"),
+        ({"episodes": 0}, "episodes must be a whole number from 1"),
         ({"jobs": 0}, "--jobs must be 1"),
         ({"dynamism_sweep": "0:1:0"}, "step > 0"),
         ({"dynamism_sweep": "0:1"}, "start:stop:step"),
         ({"dynamism_sweep": "0:2:0.5"}, "stop <= 1"),
         ({"dynamism_sweep": "0:1:1e-9"}, "at most"),
         ({"seed": -1}, "seed must be a whole number >= 0"),
-        ({"seconds": float("nan")}, "seconds must be > 0"),
+        ({"seconds": float("nan")}, "seconds must be a finite number"),
+        ({"seconds": 0.0}, "seconds must be > 0"),
         ({"dynamism": 1.5}, "dynamism must lie in"),
     ],
 )

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +13,7 @@ from sim.actors.robot import DriveConfig
 from sim.core.dynamism import Dynamism
 from sim.driving.drive import TourConfig
 from sim.gym.env import MobiliaEnv
+from sim.recording.recipe import Recipe
 from sim.sensors.lidar.models.lms221 import Lms221Config, RangeEffects
 from sim.sensors.odometry.config import OdometryConfig
 from sim.sensors.tag_cameras import TagCameraConfig
@@ -70,3 +72,9 @@ def test_times_states_and_actions_are_checked() -> None:
     for action in ("go", (0.1, 0.2, 0.3), None):
         with pytest.raises(InvalidValueError, match="an action is two finite numbers"):
             env.step(action)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seconds", [math.nan, math.inf, True, "9", 10**400, 0.0])
+def test_seconds_of_a_recipe_are_a_number_that_can_be(seconds: Any) -> None:
+    with pytest.raises(InvalidValueError, match=r"Recipe\.seconds must be"):
+        Recipe(scene="arena", seed=0, dynamism=0.5, seconds=seconds)

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from sim.core.checks import number, whole
 from sim.sensors.lidar.registry import register
-from sim.sensors.lidar.scanner import Band, Scanner
+from sim.sensors.lidar.scanner import MAX_BEAMS, Band, Scanner
 from slam.errors import InvalidValueError
 
 
@@ -21,16 +22,22 @@ def scanner(  # noqa: PLR0913 (settings of a model)
 ) -> Scanner:
     """Any scanner: its field of view, beams, rate and noise, as its arguments say.
 
+    fov_deg      field of view, more than 0 and at most 360
+    beams        number of beams, at least 2
+    rate_hz      scans per second
+    sigma_m      statistical error, one sigma; 0: none
+    range_min_m  least range
+    range_max_m  largest range
+    unit_m       step of the range code; 0: not rounded
+
     A mirror turns evenly, counter-clockwise, once a scan. At 360 degrees the first and the last
     beam are a step apart, else they are the two ends of the field of view.
 
     Raises ``InvalidValueError`` that names the setting, its value and what was expected.
     """
-    if isinstance(beams, bool) or not isinstance(beams, int) or not beams >= 2:
-        raise InvalidValueError(f"scanner: beams must be a whole number >= 2, got {beams!r}")
-    for name, value in (("fov_deg", fov_deg), ("sigma_m", sigma_m)):
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InvalidValueError(f"scanner: {name} must be a number, got {value!r}")
+    whole("scanner: beams", beams, 2, MAX_BEAMS)
+    number("scanner: fov_deg", fov_deg)
+    number("scanner: sigma_m", sigma_m)
     if not 0.0 < fov_deg <= 360.0:
         raise InvalidValueError(f"scanner: fov_deg must be > 0 and at most 360, got {fov_deg}")
     step_deg = fov_deg / (beams if fov_deg == 360.0 else beams - 1)

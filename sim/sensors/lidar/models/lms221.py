@@ -17,21 +17,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 
-import numpy as np
-from numpy.typing import NDArray
-
-from sim.core.checks import check_types, instance
+from sim.core.checks import check_types, check_within, instance, one_of
 from sim.sensors.lidar.registry import register
 from sim.sensors.lidar.scanner import ERRORS, Band, Scanner, Spot, disc
 from slam.errors import InvalidValueError
-from slam.frames import LaserSpec
-
-Float = NDArray[np.float64]
+from slam.frames import Float, LaserSpec
 
 TURNS_PER_S = 75
 MIRROR_FROM_DEG = -90.0  # where a turn of the mirror begins, whatever the field of view
 TIMER_UNIT = 0.010  # m, resolution of the time measurement in every range mode (TD p34, TL 10-10)
 
+PULSE_M = 1.0  # m, length of a pulse (TL p110)
 LMS221_SPOT = disc(aperture=0.008, divergence=0.00595)  # 16 mm + 11.9 mrad, TL p114
 
 # Needed reflectivity for a return against range, clean window (TD fig. 4-2, digitised).
@@ -70,10 +66,7 @@ class RangeEffects:
 
     def __post_init__(self) -> None:
         check_types(self)
-        if not 0.0 <= self.dropout_rate <= 1.0:
-            raise InvalidValueError(
-                f"RangeEffects.dropout_rate must be within 0..1, got {self.dropout_rate}"
-            )
+        check_within(self, {"dropout_rate": (0.0, 1.0)})
 
     @classmethod
     def none(cls) -> RangeEffects:
@@ -134,41 +127,24 @@ class Lms221Config:
             )
         if self.fov_deg not in (100, 180):
             raise InvalidValueError(f"Lms221Config.fov_deg must be 100 or 180, got {self.fov_deg}")
-        if self.range_mode not in RANGE_MODES:
-            raise InvalidValueError(
-                f"Lms221Config.range_mode must be one of {', '.join(RANGE_MODES)}, "
-                f"got {self.range_mode!r}"
-            )
-        if not 0.0 <= self.noise_std_m <= 1.0:
-            raise InvalidValueError(
-                f"Lms221Config.noise_std_m must be within 0..1 m, got {self.noise_std_m}"
-            )
+        one_of("Lms221Config.range_mode", self.range_mode, tuple(RANGE_MODES))
+        check_within(self, {"noise_std_m": (0.0, 1.0)})
 
     @classmethod
     def ideal(
         cls, *, resolution_deg: float = 0.5, fov_deg: int = 180, range_mode: str = "80m"
     ) -> Lms221Config:
         """Geometry and timing of the device, exact ranges; inf where there is nothing."""
-        return cls(
-            resolution_deg=resolution_deg,
-            fov_deg=fov_deg,
-            range_mode=range_mode,
-            noise_std_m=0.0,
-            quantise=False,
-            effects=RangeEffects.none(),
-        )
+        own = cls(resolution_deg=resolution_deg, fov_deg=fov_deg, range_mode=range_mode)
+        return own.only("ideal")
 
     @classmethod
     def noise_only(
         cls, *, resolution_deg: float = 0.5, fov_deg: int = 180, range_mode: str = "80m"
     ) -> Lms221Config:
         """The 10 mm statistical error and the rounding to codes, no other effect."""
-        return cls(
-            resolution_deg=resolution_deg,
-            fov_deg=fov_deg,
-            range_mode=range_mode,
-            effects=RangeEffects.none(),
-        )
+        own = cls(resolution_deg=resolution_deg, fov_deg=fov_deg, range_mode=range_mode)
+        return own.only("noise")
 
     @property
     def turns(self) -> int:
@@ -189,15 +165,6 @@ class Lms221Config:
     def systematic_bound_m(self) -> float:
         """TD p34: 35 mm in millimetre mode, 5 cm in centimetre mode, typical, 1..20 m."""
         return 0.035 if self.mode.unit_m < 0.005 else 0.05
-
-    @property
-    def beams(self) -> tuple[Float, NDArray[np.int64]]:
-        """((n,) degrees of the mirror, (n,) turn) of every beam, counter-clockwise."""
-        first = (180 - self.fov_deg) // 2
-        count = round(self.fov_deg / self.resolution_deg) + 1
-        index = np.arange(count, dtype=np.int64)
-        degrees = np.asarray(first + index * self.resolution_deg, dtype=np.float64)
-        return degrees, index % self.turns
 
     @property
     def stamp_offset_ns(self) -> int:
@@ -230,6 +197,7 @@ class Lms221Config:
             needed=NEEDED if on.reflectivity else (),
             incidence=on.incidence,
             mixed_pixels=on.mixed_pixels,
+            pulse_m=PULSE_M,
             glass=on.glass,
             bounce=on.bounce,
             error_codes=on.error_codes,
@@ -238,9 +206,8 @@ class Lms221Config:
 
     def only(self, errors: str) -> Lms221Config:
         """With the errors named in ``sim.sensors.lidar.scanner.ERRORS``."""
+        one_of("errors", errors, ERRORS)
         bare = replace(self, effects=RangeEffects.none())
-        if errors not in ERRORS:
-            raise InvalidValueError(f"errors must be one of {', '.join(ERRORS)}, got {errors!r}")
         ideal = replace(bare, noise_std_m=0.0, quantise=False)
         return {"full": self, "noise": bare, "ideal": ideal}[errors]
 

@@ -7,7 +7,9 @@ A2; ROS the driver rplidar_ros, which puts heading 0 of the device at the rear o
 Its statistical error is not stated, only a distance resolution: "< 1 % of the distance". The model
 takes the error that follows from that and nothing more: a value that is known to one part in
 hundred is off by 1 % / sqrt(12) of itself, one sigma. Not stated either: a systematic error, the
-spot, reflectivities. Panes and mirrors are simulated, as for every scanner, by their optics.
+spot, reflectivities. So there are no mixed pixels: no size of the spot was found. It measures by
+triangulation besides, where two surfaces under one spot do not mix as echoes do. Panes and mirrors
+are simulated, as for every scanner, by their optics.
 """
 
 from __future__ import annotations

@@ -6,7 +6,9 @@ docs/source/laser.rst); EW that of the UTM-30LX-EW, the same head with Ethernet,
 (gist ricklentz/76db8e35). SCIP is Hokuyo's protocol SCIP 2.0, C-42-03320B.
 
 Not stated there: the spot, reflectivities needed for a return, what is sent at edges. None of these
-is simulated. Panes and mirrors are, as for every scanner, by their optics (inferred).
+is simulated, so there are no mixed pixels either: no published divergence was found (that of the
+UST-20LX is of another head). Panes and mirrors are, as for every scanner, by their optics
+(inferred).
 """
 
 from __future__ import annotations

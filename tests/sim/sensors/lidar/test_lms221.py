@@ -64,7 +64,8 @@ def test_half_degree_beams_come_from_the_second_turn() -> None:
 
 def test_quarter_degree_scans_are_four_turns_of_181_and_three_times_180_beams() -> None:
     config = Lms221Config(resolution_deg=0.25)
-    degrees, turn = config.beams
+    turn = config.scanner().turn_of
+    degrees = 0.25 * np.arange(721)
     assert np.bincount(turn).tolist() == [181, 180, 180, 180]
     for k, start in enumerate((0.0, 0.25, 0.5, 0.75)):
         np.testing.assert_allclose(degrees[turn == k][0], start)

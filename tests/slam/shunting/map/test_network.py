@@ -17,8 +17,7 @@ from slam.frontend.observations import Observations
 from slam.frontend.visibility import View, view_of_beams, view_of_features
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.energy import energy, shunting_terms
-from slam.shunting.map.network import Network
-from slam.shunting.map.update import lateral_mu
+from slam.shunting.map.network import Network, lateral_mu
 from slam.tracker.cells import SIDE
 from slam.tracker.rasterise import rasterise
 

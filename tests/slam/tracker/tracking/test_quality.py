@@ -16,10 +16,10 @@ STEP, JUMP = np.array([0.1, 0.0, 0.05]), np.array([0.0, 0.6, 0.0])
 
 def grown(freeze_below: float = 0.35) -> TrackingQuality:
     """After 12.5 s in which 0.8 of each scan matched and 0.9 of the map in view was confirmed."""
-    doubt = TrackingQuality(freeze_below, QUALITY)
+    quality = TrackingQuality(freeze_below, QUALITY)
     for _ in range(50):
-        doubt.learn(0.8, 9.0, 1.0, 0.25)
-    return doubt
+        quality.learn(0.8, 9.0, 1.0, 0.25)
+    return quality
 
 
 def test_a_young_map_cannot_deny_and_a_grown_one_can():
@@ -40,13 +40,13 @@ def test_only_a_match_far_below_the_usual_raises_the_question():
 
 
 def test_a_third_of_the_map_in_view_denied_raises_doubt_and_a_fifth_keeps_it_up():
-    doubt = grown()
-    assert not doubt.denied(0.5, 75.0, 25.0, STEP)
-    assert doubt.denied(0.5, 69.0, 31.0, STEP)
-    doubt.count(True)
-    assert doubt.denied(0.5, 75.0, 25.0, STEP)
-    doubt.count(False)
-    assert not doubt.denied(0.5, 75.0, 25.0, STEP)
+    quality = grown()
+    assert not quality.denied(0.5, 75.0, 25.0, STEP)
+    assert quality.denied(0.5, 69.0, 31.0, STEP)
+    quality.count(True)
+    assert quality.denied(0.5, 75.0, 25.0, STEP)
+    quality.count(False)
+    assert not quality.denied(0.5, 75.0, 25.0, STEP)
 
 
 def test_next_to_nothing_that_matches_is_a_doubt_unless_the_robot_went_far():
@@ -55,13 +55,13 @@ def test_next_to_nothing_that_matches_is_a_doubt_unless_the_robot_went_far():
 
 
 def test_the_paper_s_map_is_never_in_doubt():
-    doubt = grown(0.0)
-    assert not doubt.arises(0.0)
-    assert not doubt.denied(0.0, 0.0, 1.0, STEP)
+    quality = grown(0.0)
+    assert not quality.arises(0.0)
+    assert not quality.denied(0.0, 0.0, 1.0, STEP)
 
 
 def test_giving_up_lets_the_map_grow_anew():
-    doubt = grown()
-    doubt.give_up()
-    assert doubt.scans == QUALITY.patience
-    assert not doubt.suspicious
+    quality = grown()
+    quality.give_up()
+    assert quality.scans == QUALITY.patience
+    assert not quality.suspicious

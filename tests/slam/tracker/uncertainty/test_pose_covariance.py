@@ -165,7 +165,7 @@ def test_innovations_have_the_nis_of_prior_and_match_together() -> None:
 
 
 def corrected(
-    increments: OdometryNoise, rng: np.random.Generator, given: Float | None, true: Float
+    odometry_noise: OdometryNoise, rng: np.random.Generator, given: Float | None, true: Float
 ) -> float | None:
     """One step of 0.2 m whose odometry errs by ``true`` (3,) standard deviations; its NIS."""
     before = Odometry(stamp_ns=0, T_odom_robot=np.zeros(3))
@@ -174,13 +174,13 @@ def corrected(
         T_odom_robot=np.array([0.2, 0.0, 0.05]),
         increment_covariance=given,
     )
-    prediction = increments.predict(np.zeros(3), before, now)
+    prediction = odometry_noise.predict(np.zeros(3), before, now)
     match = np.diag([1e-3, 1e-3, 5e-4]) ** 2
-    share = increments.noise_share(SIGMA_M)
+    share = odometry_noise.noise_share(SIGMA_M)
     information = np.linalg.inv(match) * share  # what the reward's curvature says
     e = true * rng.normal(size=3) + np.sqrt(np.diag(match)) * rng.normal(size=3)
     gain = np.linalg.solve(information + np.linalg.inv(prediction.prior), information)
-    increments.learn(
+    odometry_noise.learn(
         prediction,
         Match(
             T_map_robot=prediction.T_map_robot + gain @ e,
@@ -191,7 +191,7 @@ def corrected(
         ),
         SIGMA_M,
     )
-    return increments.nis
+    return odometry_noise.nis
 
 
 @pytest.mark.parametrize("stated", [None, 0.3, 1.0, 1.8])
@@ -199,23 +199,23 @@ def test_scales_of_odometry_are_found_whatever_is_stated(stated: float | None) -
     """``stated`` times the true standard deviations, or nothing: the NIS settles near 3."""
     true = np.array([0.01, 0.006, 0.012])
     given = None if stated is None else np.diag((stated * true) ** 2)
-    increments, rng = OdometryNoise.of_beams(CONFIG), np.random.default_rng(6)
-    values = [corrected(increments, rng, given, true) for _ in range(1200)]
+    odometry_noise, rng = OdometryNoise.of_beams(CONFIG), np.random.default_rng(6)
+    values = [corrected(odometry_noise, rng, given, true) for _ in range(1200)]
     settled = np.array([v for v in values[400:] if v is not None])
     assert 0.6 < settled.mean() / 3.0 < 1.6
     if stated == 0.3:
-        assert increments.scales[0] > 4.0
+        assert odometry_noise.scales[0] > 4.0
 
 
 def test_nees_is_right_when_the_errors_are_what_the_belief_was_told() -> None:
-    """A toy: odometry with known Gaussian increments and nothing seen. NEES / 3 is 1."""
+    """A toy: odometry with known Gaussian odometry_noise and nothing seen. NEES / 3 is 1."""
     rng = np.random.default_rng(7)
     values = []
     increment = np.array([0.2, 0.0, 0.1])
     Q = np.diag([0.01**2, 0.005**2, 0.01**2])
     root = np.linalg.cholesky(Q)
     for _ in range(300):
-        belief, estimate, truth = PoseCovariance(CONFIG), np.zeros(3), np.zeros(3)
+        pose_covariance, estimate, truth = PoseCovariance(CONFIG), np.zeros(3), np.zeros(3)
         for _ in range(20):
             c, s = math.cos(estimate[2]), math.sin(estimate[2])
             R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -230,19 +230,19 @@ def test_nees_is_right_when_the_errors_are_what_the_belief_was_told() -> None:
             blind = Match(
                 T_map_robot=predicted, information=np.zeros((3, 3)), matched=0.0, score=0.0, tau=0.0
             )
-            belief.update(estimate, prediction, blind, None)
+            pose_covariance.update(estimate, prediction, blind, None)
             estimate = predicted
             truth = se2.compose(truth, increment + root @ rng.normal(size=3))
         e = estimate - truth
         e[2] = se2.wrap(float(e[2]))
-        values.append(e @ np.linalg.solve(belief.covariance, e))
+        values.append(e @ np.linalg.solve(pose_covariance.covariance, e))
     assert np.mean(values) / 3.0 == pytest.approx(1.0, abs=0.15)
 
 
 def standing(shared_m: float, in_view: float) -> tuple[Float, Float]:
     """Covariances of a robot that stands and sees the same surfaces, after 300 and 600 scans."""
     geometry = np.diag([0.5, 0.5, 4.0])
-    belief = PoseCovariance(ShuntingConfig())
+    pose_covariance = PoseCovariance(ShuntingConfig())
     evidence = Evidence(
         geometry=20.0 * geometry,
         weighed=20.0,
@@ -265,8 +265,8 @@ def standing(shared_m: float, in_view: float) -> tuple[Float, Float]:
     out = []
     for _ in range(2):
         for _ in range(300):
-            belief.update(np.zeros(3), still, match, evidence)
-        out.append(belief.covariance.copy())
+            pose_covariance.update(np.zeros(3), still, match, evidence)
+        out.append(pose_covariance.covariance.copy())
     return out[0], out[1]
 
 
@@ -291,7 +291,7 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
     geometry = np.diag([0.5, 0.5, 4.0])
     left = {}
     for new in (0.0, 0.2):
-        belief = PoseCovariance(ShuntingConfig())
+        pose_covariance = PoseCovariance(ShuntingConfig())
         T = np.zeros(3)
         drive = Prediction(
             T_map_robot=T,
@@ -305,8 +305,8 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
         )
         match = Match(T_map_robot=T, information=1e5 * geometry, matched=1.0, score=0.0, tau=5.0)
         for _ in range(100):
-            belief.update(T, drive, nothing, None)
-        blind = belief.covariance[0, 0]
+            pose_covariance.update(T, drive, nothing, None)
+        blind = pose_covariance.covariance[0, 0]
         evidence = Evidence(
             geometry=20.0 * geometry,
             weighed=20.0,
@@ -316,9 +316,9 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
             feigned=0.0,
             new=20.0 * new,
         )
-        belief.update(T, drive, match, evidence)
-        left[new] = belief.covariance[0, 0] / blind
-        assert np.linalg.eigvalsh(belief.covariance)[0] > 0.0
+        pose_covariance.update(T, drive, match, evidence)
+        left[new] = pose_covariance.covariance[0, 0] / blind
+        assert np.linalg.eigvalsh(pose_covariance.covariance)[0] > 0.0
     assert left[0.0] < 0.05
     assert left[0.2] == pytest.approx(2.4 * 0.2, abs=0.05)
 
@@ -326,7 +326,7 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
 @pytest.mark.parametrize("blind_s", [700.0, 16000.0])
 def test_long_blindness_leaves_a_covariance_that_can_be(blind_s: float) -> None:
     """Faded sums come to stand at the smallest numbers there are; they must count as nothing."""
-    belief, T = PoseCovariance(CONFIG), np.zeros(3)
+    pose_covariance, T = PoseCovariance(CONFIG), np.zeros(3)
     nothing = Evidence(
         geometry=np.zeros((3, 3)),
         weighed=0.0,
@@ -345,8 +345,8 @@ def test_long_blindness_leaves_a_covariance_that_can_be(blind_s: float) -> None:
     )
     match = Match(T_map_robot=T, information=1e4 * np.eye(3), matched=1.0, score=0.0, tau=1.0)
     seen = dataclasses.replace(nothing, geometry=np.eye(3), weighed=1.0, in_view=75.0)
-    belief.update(T, still, match, seen)
+    pose_covariance.update(T, still, match, seen)
     for _ in range(round(blind_s / still.elapsed)):
-        belief.update(T, still, match, nothing)
-    assert np.isfinite(belief.covariance).all()
-    assert belief.shared_m2 < 1e-4
+        pose_covariance.update(T, still, match, nothing)
+    assert np.isfinite(pose_covariance.covariance).all()
+    assert pose_covariance.shared_m2 < 1e-4

@@ -8,17 +8,17 @@ import numpy as np
 from slam import se2
 from slam.frontend.observations import from_scan
 from slam.grid.config import OccupancyConfig
-from slam.grid.submap import Submap
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
 from slam.tracker.cell_map import CellMap
 from slam.tracker.rasterise import rasterise
+from slam.tracker.two_memories import TwoMemories
 from tests.world2d import World2D, arena, frames, laser, wander
 
 
 def test_both_means_are_those_of_the_network() -> None:
     stream = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(181), seed=8)[:8]
-    maps: list[CellMap] = [Submap(OccupancyConfig()), Network(ShuntingConfig())]
+    maps: list[CellMap] = [TwoMemories(OccupancyConfig()), Network(ShuntingConfig())]
     for frame in stream:
         assert frame.scan is not None
         assert frame.truth is not None

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a few key frames saw, for the loops of an occupancy grid: means of what hit each cell.
+"""A map of two memories: a short-term mean that leaks, and a running mean of the same input.
 
-Log-odds of the few looks at a key frame's surroundings say little. A short-term mean x that leaks,
-and a running mean y of the same input, hold more of it.
+With lateral weights it is the network of Eq. (8), and the short-term mean is its activity; without
+them it holds what the few key frames of a loop of the occupancy grid saw.
 """
 
 from __future__ import annotations
@@ -13,22 +13,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.frontend.surfaces import opposite
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import FREE_COUNT, SIDE, Cells, in_reach
+from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells, in_reach
 
 
-class Means(NamedTuple):
+class Law(NamedTuple):
     """The constants of one update.
 
-    step, look  s that the present input acts on x, and adds to the age of y
-    pace        s: prior age of y, so that its first looks do not count fully
-    oldest      s: age at which y stops growing stiffer
-    decay       1/s, of x; below ``threshold`` it ends
-    trace       whether y is kept
-    faded       a y below ends where the input is below ``unseen``
+    step        h, s: how long the present input acts on x
+    look        s: what this look adds to a trace's age
+    pace        s: prior age of a trace, so that its first looks do not count fully
+    oldest      s: age at which a trace stops growing stiffer
+    decay       A, 1/s
+    threshold   sigma
+    mu          w = mu / d; 0: no lateral weights
+    reach       r0, cells
+    trace       whether a long-term trace is kept
+    faded       a trace below ends where the input is below ``unseen``
     """
 
     step: float
@@ -37,18 +41,40 @@ class Means(NamedTuple):
     oldest: float
     decay: float
     threshold: float
+    mu: float
+    reach: float
     trace: bool
     faded: float
     unseen: float
 
 
-@njit
-def average(  # noqa: C901, PLR0912, PLR0915 (kernel)
-    cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, law: Means, write: bool
-) -> tuple[float, float, int]:
-    """Take the present impressions into both means of every cell in view.
+@inner
+def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
+    """Sum of w_ij d(x_j) over the neighbours of neuron (i, j), d(x) = max(x - sigma, 0)."""
+    edge = math.ceil(law.reach)
+    rows, columns = cells.directory.shape
+    total = 0.0
+    for b in range(j - edge, j + edge + 1):
+        for a in range(i - edge, i + edge + 1):
+            d = math.sqrt((a - i) * (a - i) + (b - j) * (b - j))
+            row, column = (b >> SHIFT) - cells.corner[1], (a >> SHIFT) - cells.corner[0]
+            if 0.0 < d < law.reach and 0 <= row < rows and 0 <= column < columns:
+                slot = cells.directory[row, column]
+                above = cells.x[slot, b & MASK, a & MASK] - law.threshold if slot >= 0 else 0.0
+                if above > 0.0:
+                    total += law.mu / d * above
+    return total
 
-    Returns confirmed and contradicted y and the cells visited, as ``CellMap.integrate``.
+
+@njit
+def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
+    cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, law: Law, write: bool
+) -> tuple[float, float, int]:
+    """One semi-implicit Gauss-Seidel sweep of Eq. (8) over the neurons in view.
+
+    Returns the long-term trace confirmed by the present scan, that contradicted by it (its sums
+    over neurons) and the number of neurons visited. ``write`` False only looks. Impressions are
+    consumed (their scratch is released) when written.
     """
     confirmed, contradicted, visited = 0.0, 0.0, 0
     ox, oy = T_map_laser[0], T_map_laser[1]
@@ -90,7 +116,10 @@ def average(  # noqa: C901, PLR0912, PLR0915 (kernel)
                     visited += 1
                     if not write:
                         continue
-                    E = float(given)  # implicit in x: stays in [0, 1) for any step
+                    # Eq. (8), implicit in x: stays in [0, 1) for any step
+                    E = float(given)
+                    if law.mu > 0.0:
+                        E += lateral(cells, law, i0 + ii, j0 + jj)
                     x = np.float32((x + law.step * E) / (1.0 + law.step * (law.decay + E)))
                     # Silent is what is small and does not rise: at 37.5 Hz one step is tiny.
                     if x < law.threshold and law.threshold * (law.decay + E) > E:
@@ -115,26 +144,37 @@ def average(  # noqa: C901, PLR0912, PLR0915 (kernel)
     return confirmed, contradicted, visited
 
 
-class Submap(CellMap):
-    """Cells with both means."""
+class TwoMemories(CellMap):
+    """Cells with both means; without lateral weights unless ``mu`` is set.
 
-    def integrate(
-        self, view: View, T_map_laser: NDArray[np.float64], step: float, *, write: bool
-    ) -> tuple[float, float, int]:
-        """As ``CellMap.integrate``."""
-        numbers, pace = self.config.map, self.pace(step)
-        law = Means(
+    mu  scale of the weights w = mu / d of Eq. (8)
+    """
+
+    mu = 0.0
+
+    def law(self, step: float) -> Law:
+        """Constants of an update whose input acts for ``step`` s (the time since the last scan)."""
+        numbers = self.config.map
+        pace = self.pace(step)
+        return Law(
             step=step,
             look=step,
             pace=pace,
             oldest=numbers.oldest_paces * pace,
             decay=self.config.decay_per_s,
             threshold=self.config.threshold,
+            mu=self.mu,
+            reach=self.config.lateral_reach_cells,
             trace=self.config.trace_s > 0.0,
             faded=numbers.faded,
             unseen=numbers.unseen,
         )
-        result = average(self.cells, view, T_map_laser, self.cell, law, write)
+
+    def integrate(
+        self, view: View, T_map_laser: NDArray[np.float64], step: float, *, write: bool
+    ) -> tuple[float, float, int]:
+        """Take the present impressions in for ``step`` s; see the kernel of the same name."""
+        result = integrate(self.cells, view, T_map_laser, self.cell, self.law(step), write)
         if write:
             self.release()
         return result
