@@ -121,9 +121,9 @@ def mix(scene: str, level: float) -> Crowd:
 class _Filling:
     """A scene that is being filled."""
 
-    def __init__(self, scene: Scene, crowd: Crowd) -> None:
+    def __init__(self, scene: Scene, crowd: Crowd, session: int) -> None:
         self.scene, self.crowd = scene, crowd
-        self.rng = np.random.default_rng([scene.seed, _STREAM])
+        self.rng = np.random.default_rng([scene.seed, _STREAM, session])
         self.parts = Assembly()
         self.movers: list[Mover] = []
         self.initial: dict[str, Pose] = {}
@@ -188,14 +188,14 @@ class _Filling:
         )
 
 
-def with_crowd(scene: Scene, crowd: Crowd) -> Scene:
-    """The scene with a crowd in it; the given one is left as it is.
+def with_crowd(scene: Scene, crowd: Crowd, session: int = 0) -> Scene:
+    """The scene with a crowd in it, another one each session; the given scene is left as it is.
 
     Raises ``InvalidValueError`` where it does not fit on the floor.
     """
     if not crowd:
         return scene
-    filling = _Filling(scene, crowd)
+    filling = _Filling(scene, crowd, session)
     for each in fields(crowd):
         if getattr(crowd, each.name):
             _PUT[each.name](filling, getattr(crowd, each.name))

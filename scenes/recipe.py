@@ -189,7 +189,15 @@ def finish(builder: Builder, name: str, seed: int, options: Mapping[str, object]
         obstacles=plan.boxes,
         start=plan.start,
         options=dict(options),
+        places=_places(plan),
     )
+
+
+def _places(plan: Plan) -> tuple[tuple[str, Pose], ...]:
+    """Seats, spots and places of bins by the kind that stands there, and openings."""
+    found = [(mark.words[1], mark.pose) for mark in (*plan.seats, *plan.find("spot"))]
+    found += [("bin", mark.pose) for mark in plan.find("bin")]
+    return (*found, *(("opening", mark.pose) for mark in plan.find("opening")))
 
 
 def _add_chair(builder: Builder, floor: Floor, kind: Kind, pose: Pose, draws: Draws) -> None:

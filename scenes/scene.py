@@ -103,6 +103,8 @@ class Scene:
     scan_height_m  of the robot's scanner above the floor; ``scenes.at_scan_height`` changes it
     roles        what those of a crowd do, by mover name
     holds        who holds what
+    places       (kind, pose) of the plan's seats and spots, whether taken or not, and ("opening",
+                 pose) of each doorway without a door
     """
 
     name: str
@@ -120,6 +122,7 @@ class Scene:
     scan_height_m: float = SCAN_HEIGHT
     roles: Mapping[str, Role] = field(default_factory=dict)
     holds: tuple[Hold, ...] = ()
+    places: tuple[tuple[str, Pose], ...] = ()
 
     @cached_property
     def static_map(self) -> Raster:

@@ -41,6 +41,13 @@ def generate(
         bool,
         typer.Option("--twins", help="Each episode also semi-static and static, with one path."),
     ] = False,
+    change: Annotated[
+        float | None,
+        typer.Option(help="Share of what is out of sight that is found elsewhere later, 0 to 1."),
+    ] = None,
+    sessions: Annotated[
+        int, typer.Option(help="So many sessions of one building instead, --change apart.")
+    ] = 0,
     jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
     cluster: Annotated[
         str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
@@ -60,8 +67,10 @@ def generate(
     from sim.recording.dataset import Plan, writing
     from sim.recording.recipe import Recipe
 
-    first = Recipe(scene=scene, seed=seed, dynamism=levels[0], seconds=seconds, scanner=scanner)
-    plan = Plan(recipe=first, dynamisms=levels, episodes=episodes, twins=twins)
+    first = Recipe(
+        scene=scene, seed=seed, dynamism=levels[0], seconds=seconds, scanner=scanner, change=change
+    )
+    plan = Plan(recipe=first, dynamisms=levels, episodes=episodes, twins=twins, sessions=sessions)
     workers.check_jobs(jobs)
     registry.find(scene)  # a wrong name is told, and a module found, before anything starts
     with writing(out, plan) as dataset:

@@ -127,6 +127,10 @@ class Bodies:
         rows = self.rows(names)
         return self._qpos[rows].astype(np.int64), self._dof[rows].astype(np.int64)
 
+    def any_at(self, qpos: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(n,) whether the first address of each mover is one of these."""
+        return np.isin(self._qpos, qpos)
+
     def hinges(self, names: Sequence[str]) -> Float:
         """(n, 5) of each named door, closed: hinge x, y m, heading of the leaf rad; how its joint
         turns it (1, -1; 0: not) and shifts it along its heading (-1; 0: not).
@@ -183,6 +187,15 @@ class Bodies:
         first = int(self._qpos[row])
         last = first + (1 if self._is_door[row] else 3)
         target[first:last] = source[first:last]
+
+    def put(self, data: mujoco.MjData, rows: Sequence[int], poses: Float) -> None:
+        """Let planar movers stand still at (k, 3) poses; whoever sleeps sleeps on there."""
+        for row, pose in zip(rows, poses, strict=True):
+            first, joint = int(self._qpos[row]), int(self._dof[row])
+            data.qpos[first : first + 3] = pose
+            own = self.model.dof_bodyid == self.model.dof_bodyid[joint]
+            data.qvel[own] = 0.0
+        self.restore_physics(data, self.physics_state(data))
 
     def speeds(self, data: mujoco.MjData) -> Float:
         """(n,) m/s, the greater of the centre's speed and the rim's by turning."""

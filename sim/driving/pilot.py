@@ -26,6 +26,7 @@ SIGHT_M, AJAR, REPLAN_S, DECIDE_S = _D.sight_m, _D.ajar_rad, _D.replan_s, _D.dec
 LEAF_DISCS, LEAF_M = _D.leaf_discs, _D.leaf_m
 BODY, DOOR, ROBOT = 0, 1, 2
 PARTS = 3  # discs of what is long: its middle and its two ends
+LEAP_MPS = 10.0  # m/s; what is faster was put there by hand (``sim.actors.rearranging``)
 
 
 class Pilot:
@@ -158,6 +159,8 @@ def _surroundings(  # noqa: PLR0913 (kernel)
                     bx += reach * math.cos(before[k, 2])
                     by += reach * math.sin(before[k, 2])
                 vx, vy = (x - bx) / dt, (y - by) / dt
+                if vx * vx + vy * vy > LEAP_MPS * LEAP_MPS:
+                    vx, vy = 0.0, 0.0
             dx, dy = x - here[0], y - here[1]
             if dx * dx + dy * dy < sight * sight:
                 discs[count, 0], discs[count, 1], discs[count, 2] = x, y, radius

@@ -25,6 +25,7 @@ from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from sim.sensors.odometry.config import PRESETS
 from sim.simulation import Simulation
 from sim.twins.twins import TWINS
+from sim.world.times_of_day import checked
 from sim.world.world import World
 from slam.bounded import text_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
@@ -52,6 +53,10 @@ class Recipe:
     resolution_deg, range_mode  of the LMS-221 (``Lms221Config``)
     odometry    preset of the wheel encoders
     twin        "", or which one of a drive's three versions (``sim.twins.twins``)
+    change      in [0, 1]: share of what is out of sight that is found elsewhere later
+                (``sim.actors.rearranging``); None: as the simulation has it
+    session     number of a session of the same building (``sim.world.sessions``), ``change`` then
+                being the share that stands elsewhere than in the session before; None: no sessions
     """
 
     scene: str
@@ -63,6 +68,8 @@ class Recipe:
     range_mode: str = "80m"
     odometry: str = "pioneer3dx"
     twin: str = ""
+    change: float | None = None
+    session: int | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -78,6 +85,7 @@ class Recipe:
         one_of("Recipe.odometry", self.odometry, tuple(PRESETS))
         if self.twin != "":
             one_of("Recipe.twin", self.twin, TWINS)
+        self._check_change()
         if not isinstance(self.options, Mapping):
             raise InvalidValueError(f"Recipe.options must be a mapping, got {self.options!r}")
         taken = sorted(_NOT_OPTIONS.intersection(self.options))
@@ -87,6 +95,26 @@ class Recipe:
                 f"recipe's own, got {self.options[taken[0]]!r}"
             )
         self.laser()
+
+    def _check_change(self) -> None:
+        if self.change is not None:
+            number("Recipe.change", self.change)
+            if not 0.0 <= self.change <= 1.0:
+                raise InvalidValueError(f"Recipe.change must lie in [0, 1], got {self.change}")
+        if self.session is not None:
+            checked(self.session)
+            if self.twin:
+                raise InvalidValueError(f"Recipe.session and twin exclude each other: {self.twin}")
+
+    @property
+    def share_changed(self) -> float:
+        """Of the things, from one session to the next: ``change``, else the dynamism."""
+        return float(self.dynamism if self.change is None else self.change)
+
+    @property
+    def rearranges(self) -> bool:
+        """Whether things are put elsewhere during the episode, and written down."""
+        return self.session is None and self.twin in ("", TWINS[0]) and bool(self.change)
 
     def laser(self) -> ScannerConfig:
         """How the scanner is set."""
@@ -98,6 +126,9 @@ class Recipe:
 
     def simulation(self) -> dict[str, Any]:
         """Arguments of ``Simulation``."""
+        more: dict[str, Any] = {} if self.change is None else {"change": self.change}
+        if self.session is not None:
+            more = {"change": self.share_changed, "session": self.session}
         return {
             "scene": self.scene,
             "seed": self.seed,
@@ -105,6 +136,7 @@ class Recipe:
             "laser": self.laser(),
             "odometry": self.odometry,
             "labels": True,
+            **more,
             **self.options,
         }
 
@@ -117,12 +149,18 @@ class Recipe:
         """Of the episode's folder: ``office-d0.50-s0001``, with the twin's name at the end."""
         scene = re.sub(r"[^A-Za-z0-9_.]+", "-", self.scene).strip("-.")
         twin = f"-{self.twin}" if self.twin else ""
-        return f"{scene}-d{self.dynamism:.4g}-s{self.seed:04d}{twin}"
+        session = "" if self.session is None else f"-session{self.session:02d}"
+        return f"{scene}-d{self.dynamism:.4g}-s{self.seed:04d}{session}{twin}"
+
+    def words(self) -> dict[str, Any]:
+        """As JSON has it; what was added since the first recipes is left out where it is None."""
+        later = ("change", "session")
+        return {k: v for k, v in asdict(self).items() if k not in later or v is not None}
 
     @property
     def sha256(self) -> str:
         """Of everything that decides the episode, whoever makes it."""
-        text = json.dumps({"schema": SCHEMA, **asdict(self)}, sort_keys=True)
+        text = json.dumps({"schema": SCHEMA, **self.words()}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -162,7 +200,7 @@ def write_recipe(path: Path, recipe: Recipe, result: Mapping[str, Any]) -> None:
     text = {
         "schema": SCHEMA,
         "world": WORLD,
-        "recipe": asdict(recipe),
+        "recipe": recipe.words(),
         "recipe_sha256": recipe.sha256,
         "made_with": made_with(),
         "result": dict(result),

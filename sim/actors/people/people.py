@@ -180,6 +180,13 @@ class People:
             physics, mocap = (data.qpos, data.qvel), (data.mocap_pos, data.mocap_quat)
             gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.sitting, mocap)
 
+    def in_use(self, bodies: Bodies) -> NDArray[np.int64]:
+        """Rows of the movers that somebody sits on or holds, or goes to for that."""
+        rows = self.crowd.task[:, [columns.SEAT, columns.HELD]].ravel()
+        names = _planar(bodies, self.names)
+        used = [names[k] for k in rows[rows >= 0].tolist()]
+        return bodies.rows([*used, *(hold.held for hold in bodies.scene.holds)])
+
     def swinging(self) -> NDArray[np.bool_]:
         """(n,) True for those with a foot in the air."""
         return self.feet[:, gait.SWING] >= 0.0
