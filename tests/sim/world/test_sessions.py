@@ -72,7 +72,7 @@ def test_times_of_day_say_who_is_there_and_what_moves():
     assert night.people.names == []
     assert night.rates.chair_push_rate == night.rates.door_rate == 0.0
     assert math.isinf(night.rates.stay_mean)
-    meeting = World("office", seed=1, dynamism=0.7, change=0.5, session=2)
+    meeting = World("office", seed=1, dynamism=0.7, change=0.5, session=2, crowd="none")
     assert len(meeting.people.names) == 6
 
 
