@@ -159,9 +159,7 @@ class _Filling:
                 break
             first = (*place, float(self.rng.uniform(-math.pi, math.pi)))
             poses = [moved(first, local) for _, local in kinds]
-            discs = [
-                d for (kind, _), p in zip(kinds, poses, strict=True) for d in _discs(kind, p)
-            ]
+            discs = [d for (kind, _), p in zip(kinds, poses, strict=True) for d in _discs(kind, p)]
             if self.fits(discs):
                 return poses
         raise InvalidValueError(f"crowd: {what} does not fit on the floor of '{self.scene.name}'")

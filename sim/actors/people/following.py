@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sim.actors.config import ACTORS
 from sim.actors.people import columns
 from sim.actors.people.right_of_way import Crowd, Float, Int
-from sim.core.flow import Field, clearance_at
+from sim.core.flow import Field, clearance_at, way_at
 from slam._jit import njit
 
 _F = ACTORS.following
@@ -29,6 +29,9 @@ MARGIN, SIGHT, GAIN = _F.margin_m, _F.sight_m, _F.gain
 FASTEST, THERE, SERVED_S = _F.fastest_mps, _F.there_m, _F.served_s
 NARROW, WAY_M, WAY_HALF, ASIDE = _F.narrow_m, _F.way_m, _F.way_half_m, _F.aside_mps
 TAKEN_M, CROSSING = _F.taken_m, _F.crossing_m2
+NARROW_SIDE, ASKED_S, ROOM_M = _F.narrow_side_m, _F.asked_s, _F.room_m
+ROOM_PUSH_M, ROOM_HALF = _F.room_push_m, _F.room_half_m
+TURN_MOST = ACTORS.walking.turn_most
 HELD_UP_S, NEAR_M, REST_S = _F.held_up_s, _F.near_m, _F.rest_s
 CRUMBS = 160  # remembered of each leader: 40 m
 BEHIND = -0.5  # m; a place farther behind is one on the leader's way
@@ -105,9 +108,15 @@ def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tu
     course, disc = leaders.course[k], crowd.discs[leaders.rows[k]]
     ahead, left = crowd.state[i, columns.AHEAD], crowd.state[i, columns.LEFT]
     far = math.sqrt(ahead * ahead + left * left)
-    if clearance_at(field, disc[columns.X], disc[columns.Y]) < NARROW:  # in file, one after another
-        left = 0.3 * left
-        ahead = ahead if ahead > 0.5 else -far
+    clear = clearance_at(field, disc[columns.X], disc[columns.Y])
+    if clear < NARROW:  # those beside it go in file, those ahead keep between the walls
+        room = max(clear - NARROW_SIDE, 0.1)
+        if ahead <= 0.5:
+            ahead = -far - (0.35 if left < 0.0 else 0.0)
+        elif abs(left) > room:
+            ahead += 0.5 * (abs(left) - room)
+            left = room if left > 0.0 else -room
+        far = math.sqrt(ahead * ahead + left * left)
     if ahead < BEHIND:  # on the way that the leader has come
         back = min(int(-ahead / CRUMB), int(course[COUNT]) - 1)
         at = (int(course[LAST]) - back) % CRUMBS
@@ -133,7 +142,9 @@ def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
             x, y = place_of(i, task[i, columns.LEADER], field, leaders, crowd)
             state[i, columns.SPOT_X], state[i, columns.SPOT_Y] = x, y
     for i in range(len(task)):
-        for j in range(i + 1 if task[i, columns.WALKING] == columns.FOLLOWS else len(task), len(task)):
+        for j in range(
+            i + 1 if task[i, columns.WALKING] == columns.FOLLOWS else len(task), len(task)
+        ):
             if (
                 task[j, columns.WALKING] != columns.FOLLOWS
                 or task[j, columns.LEADER] != task[i, columns.LEADER]
@@ -167,6 +178,33 @@ def make_way(
     side = 1.0 if left >= 0.0 else -1.0
     along = max(wanted[0] * c + wanted[1] * s, 0.3)
     return along * c - side * ASIDE * s, along * s + side * ASIDE * c
+
+
+@njit
+def make_room(
+    i: int, wanted: tuple[float, float], field: Field, crowd: Crowd
+) -> tuple[float, float]:
+    """The velocity of person ``i``, sideways where it stands in the way of one who is held up."""
+    discs, task, state = crowd.discs, crowd.task, crowd.state
+    for j in range(len(task)):
+        if task[j, columns.WALKING] != columns.WALKS or state[j, columns.BLOCKED] < ASKED_S:
+            continue
+        dx, dy = (
+            discs[i, columns.X] - discs[j, columns.X],
+            discs[i, columns.Y] - discs[j, columns.Y],
+        )
+        pushing = state[j, columns.TURN_RATE] < TURN_MOST
+        reach = ROOM_PUSH_M if pushing else ROOM_M
+        if dx * dx + dy * dy > reach * reach:
+            continue
+        c, s = math.cos(crowd.yaws[j]), math.sin(crowd.yaws[j])
+        if not pushing:
+            c, s = way_at(field, task[j, columns.GOAL], discs[j, columns.X], discs[j, columns.Y])
+        ahead, left = c * dx + s * dy, c * dy - s * dx
+        if ahead > 0.0 and abs(left) < ROOM_HALF:
+            side = 1.0 if left >= 0.0 else -1.0
+            return wanted[0] - side * ASIDE * s, wanted[1] + side * ASIDE * c
+    return wanted
 
 
 @njit
@@ -260,7 +298,10 @@ def faces(i: int, leaders: Leaders, crowd: Crowd) -> float:
     if k < 0:
         return float(crowd.state[i, columns.LOOK])
     disc = crowd.discs[leaders.rows[k]]
-    dx, dy = disc[columns.X] - crowd.discs[i, columns.X], disc[columns.Y] - crowd.discs[i, columns.Y]
+    dx, dy = (
+        disc[columns.X] - crowd.discs[i, columns.X],
+        disc[columns.Y] - crowd.discs[i, columns.Y],
+    )
     return math.atan2(dy, dx)
 
 

@@ -94,7 +94,7 @@ class People:
             draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
         )
         self.crowd.task[:, [columns.WALKING, columns.GOAL]] = 0
-        self.crowd.state[:, [columns.STAYS, columns.SLOW]] = 1.0
+        self.crowd.state[:, [columns.STAYS, columns.SLOW, columns.DENSE]] = 1.0
         self.crowd.state[:, columns.TURN_RATE] = crowd.TURN_MOST
         alive = n > 0 and math.isfinite(stay_mean) and len(scene.goals) > 0
         servos = [model.actuator(f"{p}/vx").id for p in self.names]
@@ -126,6 +126,8 @@ class People:
         for i, name in enumerate(self.names):
             role = _role(scene, name)
             state[i, [columns.STAYS, columns.SLOW]] = role.stay, role.slow
+            if name in scene.roles:
+                state[i, columns.DENSE] = ACTORS.steering.dense
             state[i, [columns.AHEAD, columns.LEFT]] = role.slot
             if role.goals:
                 self.crowd.allowed[i] = [goal in role.goals for goal in goals]
