@@ -140,7 +140,7 @@ class FollowingConfig(Settings):
     sight_m: float = _fixed(0.2, "m", "clearance of a line of sight")
     gain: float = _fixed(1.5, "1/s", "speed by the distance left")
     fastest_mps: float = _fixed(1.8, "m/s", "to catch up")
-    narrow_m: float = _fixed(1.25, "m", "clearance of a leader in a doorway or a corridor")
+    narrow_m: float = _fixed(1.15, "m", "clearance of a leader in a doorway or a corridor")
     narrow_side_m: float = _fixed(0.35, "m", "from the wall there")
     asked_s: float = _fixed(0.4, "s", "somebody else is held up so long: one makes room")
     room_m: float = _fixed(1.3, "m", "before somebody who walks")
@@ -181,6 +181,8 @@ class HoldingConfig(Settings):
     close_m: float = _fixed(0.3, "m", "clearance beyond this gains nothing")
     close: float = _fixed(0.5, "s/m", "weight of clearance")
     turning: float = _fixed(0.05, "s²/rad", "weight of turning")
+    hurry: float = _fixed(0.4, "1", "weight of standing by the time held up")
+    hurry_most: float = _fixed(1.2, "s", "of it")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,6 +192,9 @@ class CleaningConfig(Settings):
     hand_m: float = _fixed(6.0, "m", "a chair this near is taken next")
     near_m: float = _fixed(0.12, "m", "between hulls from where it is taken")
     rest_s: float = _fixed(1.5, "s", "between putting one down and taking the next")
+    pace_mps: float = _fixed(0.8, "m/s", "to a chair and with it")
+    there_m: float = _fixed(0.12, "m", "from its place it is put down")
+    trip_s: float = _fixed(25.0, "s", "of a way that is given up then")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -162,7 +162,7 @@ def spare_robot(
 
 
 @njit
-def _spare(  # noqa: PLR0913 (kernel)
+def _spare(
     vx: float, vy: float, disc: Float, robot: Float, spare: float, brake: float
 ) -> tuple[float, float]:
     dx, dy = robot[columns.X] - disc[columns.X], robot[columns.Y] - disc[columns.Y]

@@ -18,7 +18,7 @@ from sim.actors.config import ACTORS
 from sim.actors.holding import Held
 from sim.actors.people import columns
 from sim.actors.people.avoidance import ACCEL, choose, spare_robot
-from sim.actors.people.carrying import may_take, pushes, put_down, to_what_is_taken
+from sim.actors.people.carrying import clean, pushes, to_what_is_taken
 from sim.actors.people.following import (
     Leaders,
     faces,
@@ -348,7 +348,7 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
     elif doing == columns.QUEUES:
         wx, wy = stand_in_line(i, time, people.leaders, crowd)
     else:
-        wx, wy = to_what_is_taken(i, crowd)
+        wx, wy = to_what_is_taken(i, field, people.leaders, crowd)
     if wx * wx + wy * wy > 0.09:
         counts = 0.0 if doing == columns.FOLLOWS and near_place(i, crowd) else tick
         state[i, columns.WALKED_S] += counts  # who is with the leader has nowhere to get on to
@@ -358,23 +358,6 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
             return wx, wy
     state[i, columns.BLOCKED] = max(0.0, state[i, columns.BLOCKED] - 2.0 * tick)
     return wx, wy
-
-
-@njit
-def hand(i: int, time: float, stay: float, goal: int, people: People) -> None:
-    """Who takes chairs along takes one, or puts it down where it has arrived or given up.
-
-    goal  where it was going before this tick
-    """
-    crowd, task = people.crowd, people.crowd.task
-    if task[i, columns.HAND] < 0:
-        return
-    if may_take(i, time, people.field, crowd, people.held, people.at.discs, people.weights):
-        new_trip(i, time, stay, people.field, crowd)
-    elif task[i, columns.HELD] >= 0 and task[i, columns.WALKING] == columns.STANDS:
-        put_down(i, time, crowd, people.held)
-    elif task[i, columns.GOAL] != goal:
-        put_down(i, time, crowd, people.held)
 
 
 @njit
@@ -395,9 +378,8 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
     note_ways(tick, people.leaders, crowd)
     spread_out(field, people.leaders, crowd)
     for i in range(len(servos)):
-        goal = crowd.task[i, columns.GOAL]
         plan(i, time, tick, stay, ways.doors, field, crowd)
-        hand(i, time, stay, goal, people)
+        clean(i, time, field, people.leaders, crowd, people.held, at.discs, people.weights)
     give_turns(ways, field, crowd)
     for i in range(len(servos)):
         if on_chair(i, crowd):
