@@ -35,7 +35,7 @@ class Crowd(NamedTuple):
 
     discs (k, 6) people first; yaws rad of people and things; owner (k,) disc row of the mover that
     each disc is of; long (p, 2) disc row and m along its x axis of the last p discs, which are the
-    ends of what is long; allowed (n, goals) where each one goes; state (n, 22); task (n, 7);
+    ends of what is long; allowed (n, goals) where each one goes; state (n, 24); task (n, 8);
     draws (2 n,) generators:
     of each one's trips, then of each one's looking about while standing, which happens as often as
     time allows. So the trips of a person are the same, however long each takes.
