@@ -53,10 +53,11 @@ def level_table(
     levels: Sequence[float],
     slams: Sequence[str],
     cell: Callable[[float, str], str],
+    axis: str = "dynamism",
 ) -> Table:
-    """A row for each level of dynamism, a column for each SLAM; ``cell`` gives the words."""
+    """A row for each level of an axis, a column for each SLAM; ``cell`` gives the words."""
     table = Table(title=escape(title), title_justify="left", caption=escape(caption))
-    table.add_column("dynamism", justify="right")
+    table.add_column(axis, justify="right")
     for slam in slams:
         table.add_column(escape(slam), justify="right", overflow="fold")
     for level in levels:

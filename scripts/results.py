@@ -94,9 +94,11 @@ def _wanted(folder: Path) -> list[str]:
             slams = recipe["settings"].get("slams", [])
             names += [f"trajectory_{file_name(str(slam))}.tum" for slam in slams]
         if command == "compare":
-            rows = compared.read_csv(folder / compared.RUNS)
+            axis = compared.axis_in(recipe["settings"], folder / RECIPE)
+            rows = compared.read_csv(folder / compared.RUNS, axis)
             runs = {(row["scene"], row["dynamism"], int(row["seed"])) for row in rows}
-            names += [f"runs/{Run(scene=s, dynamism=d, seed=k).name}.npz" for s, d, k in runs]
+            named = [Run(scene=s, dynamism=d, seed=k, axis=axis).name for s, d, k in runs]
+            names += [f"runs/{name}.npz" for name in named]
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return [RECIPE]  # damaged, which its hash says
     except LogFormatError:  # the same

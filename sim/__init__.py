@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The moving world: importing it registers an environment ``mobilia/<Scene>-v1`` for each scene.
+"""The moving world: importing it registers an environment ``mobilia/<Scene>-v2`` for each scene.
 
 The number is the version of the world (``sim.core.versions``); ids of older ones say what became
 of it.
@@ -12,7 +12,7 @@ from gymnasium.envs.registration import register, registry
 from scenes.registry import OWN
 from sim.core.versions import WORLD, gone
 
-for _scene in OWN:  # "random-rooms" is mobilia/RandomRooms-v1
+for _scene in OWN:  # "random-rooms" is mobilia/RandomRooms-v2
     _name = _scene.title().replace("-", "")
     for _version in range(WORLD + 1):
         _id = f"mobilia/{_name}-v{_version}"

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.kinds import is_door, kind_of
 from sim.actors.rearranging import is_out
 from sim.moments import Moment
 from sim.world.world import World
@@ -27,13 +26,7 @@ JOIN_S = 0.5  # rests shorter than that do not end an event
 NEAR_M = 1.5  # a person nearer than that is near the robot, centre to centre
 JUMP_M = 0.5  # the truth leaps by that against odometry between two frames: kidnapped
 CHAIR, DOOR, PERSON, CHANGE, KIDNAP = "chair", "door", "person", "change", "kidnap"
-
-
-def _kind_of(kind: str) -> str:
-    """Of the events of a mover; what is neither a door nor a person is pushed like a chair."""
-    if is_door(kind):
-        return DOOR
-    return PERSON if kind_of(kind).group == "person" else CHAIR
+_KIND = {"door": DOOR, "person": PERSON}  # by group; all else that moves is pushed like a chair
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +73,7 @@ class EventWatch:
         movers = world.scene.movers
         self._mover_of_body = world.bodies.mover_of_body
         self._movers = [
-            None if m.kind == "robot" else _Mover(_kind_of(m.kind), m.name, m.radius)
+            None if m.group == "robot" else _Mover(_KIND.get(m.group, CHAIR), m.name, m.radius)
             for m in movers
         ]
         self._people = np.array([m.group == "person" for m in movers], dtype=bool)

@@ -123,7 +123,7 @@ def environments(seconds: float) -> Iterator[Row]:
     steps = max(20, round(37.5 * seconds / REPEATS))
     ideal = Lms221Config.ideal()
     for scene, least in (("Arena", 2000), ("Office", 1000)):
-        id_ = f"mobilia/{scene}-v1"
+        id_ = f"mobilia/{scene}-v2"
         for name, laser in (("ideal scan", ideal), ("every effect", None)):
             env: Any = gymnasium.make(id_, disable_env_checker=True, time_limit_s=1e6, laser=laser)
             many = gymnasium.make_vec(

@@ -52,19 +52,22 @@ def _write(out: Path, plan: Plan, runs: list[Driven]) -> list[dict[str, Any]]:
     goals = [row for run in runs for row in tables.goal_rows(run)]
     rows = [tables.run_row(run) for run in runs]
     summary = tables.levels(goals, rows)
-    write_csv(out / "goals.csv", goals, tables.GOAL_COLUMNS)
-    write_csv(out / "runs.csv", rows, tables.RUN_COLUMNS)
-    write_csv(out / "levels.csv", summary, tables.LEVEL_COLUMNS)
-    whole = [row | {"results": run.goals} for row, run in zip(rows, runs, strict=True)]
+    write_csv(out / "goals.csv", goals, tables.GOAL_COLUMNS, plan.axis)
+    write_csv(out / "runs.csv", rows, tables.RUN_COLUMNS, plan.axis)
+    write_csv(out / "levels.csv", summary, tables.LEVEL_COLUMNS, plan.axis)
+    whole = [
+        {plan.axis if k == "dynamism" else k: v for k, v in row.items()} | {"results": run.goals}
+        for row, run in zip(rows, runs, strict=True)
+    ]
     text = json.dumps({"schema": SCHEMA, "runs": whole}, indent=1, allow_nan=False)
     write_text(out / "runs.json", text + "\n")
-    pictures.curves(out / "closed_loop.png", summary)
+    pictures.curves(out / "closed_loop.png", summary, plan.axis)
     shown = dict.fromkeys((plan.levels[0], plan.levels[-1]))
     picked = [
         [r for r in runs if (r.identity["dynamism"], r.identity["seed"]) == (level, plan.seeds[0])]
         for level in shown
     ]
-    pictures.paths(out / "paths.png", picked)
+    pictures.paths(out / "paths.png", picked, plan.axis)
     return summary
 
 
@@ -74,8 +77,9 @@ def success_table(plan: Plan, rows: list[dict[str, Any]]) -> Table:
     title = f"{plan.scene}: goals reached, %; median precision, cm; runs lost"
     caption = f"reached: within {plan.loop.tolerance_m:g} m in truth; lost: {LOST_RULE}"
     return level_table(
-        title, caption, plan.levels, plan.slams, lambda level, slam: _cell(at[level, slam])
-    )
+        title, caption, plan.levels, plan.slams, lambda level, slam: _cell(at[level, slam]),
+        plan.axis,
+    )  # fmt: skip
 
 
 def _cell(row: dict[str, Any]) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Success and precision against dynamism, and the paths of some runs over the floor plan."""
+"""Success and precision against the level, and the paths of some runs over the floor plan."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MARKS = {"reached": "#168c5a", "wrong": "#ce2c3c", "given up": "#8a8f98", "faile
 
 
 @styled({"axes.grid": False})
-def curves(path: Path, levels: Sequence[Row]) -> None:
+def curves(path: Path, levels: Sequence[Row], axis: str = "dynamism") -> None:
     """``closed_loop.png``: a panel each for success and precision, with 95 % intervals."""
     figure = Figure(figsize=(10.0, 4.2))
     success, precision = figure.subplots(1, 2)
@@ -46,7 +46,7 @@ def curves(path: Path, levels: Sequence[Row]) -> None:
         title=f"{scene}: median precision, 95 % interval",
     )  # fmt: skip
     for ax in (success, precision):
-        ax.set(xlabel="dynamism", xticks=sorted({row["dynamism"] for row in levels}))
+        ax.set(xlabel=axis, xticks=sorted({row["dynamism"] for row in levels}))
         ax.grid(alpha=0.35)
     handles, labels = success.get_legend_handles_labels()
     figure.legend(
@@ -71,7 +71,7 @@ def _line(  # noqa: PLR0913 (a curve and its style)
 
 
 @styled({"axes.grid": False})
-def paths(path: Path, rows: Sequence[Sequence[Driven]]) -> None:
+def paths(path: Path, rows: Sequence[Sequence[Driven]], axis: str = "dynamism") -> None:
     """``paths.png``: runs as panels, true path over the room as it was at the start."""
     first = rows[0][0].identity
     scene = scenes.build(first["scene"], 0)
@@ -87,6 +87,9 @@ def paths(path: Path, rows: Sequence[Sequence[Driven]]) -> None:
         plan = FloorPlan(world.scene, *size)
         for c, run in enumerate(runs):
             _panel(axes[r, c], run, room, plan, world.scene)
+            who = run.identity
+            level = f"{axis} {who['dynamism']:g}"
+            axes[r, c].set_title(f"{who['slam']}, {level}, seed {who['seed']}", fontsize=9)
     figure.legend(handles=_legend(), loc="outside lower center", ncols=6, frameon=False)
     save(figure, path)
 
@@ -103,8 +106,6 @@ def _panel(ax: Axes, run: Driven, room: Any, plan: FloorPlan, scene: Scene) -> N
         x, y = plan.to_pixels(place)[0].tolist()
         ax.plot(x, y, "o", color=MARKS[goal["outcome"]], ms=11, mec="white")
         ax.text(x, y, str(k + 1), color="white", ha="center", va="center", fontsize=8)
-    who = run.identity
-    ax.set_title(f"{who['slam']}, dynamism {who['dynamism']:g}, seed {who['seed']}", fontsize=9)
     ax.set(xlim=(0, room.shape[1]), ylim=(room.shape[0], 0))
     ax.axis("off")
 

@@ -19,6 +19,7 @@ from scripts.comparison.plan import (
     sources,
 )
 from scripts.jobs import Job
+from scripts.knobs import axis_of, options_with
 from scripts.names import file_name
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError
@@ -26,6 +27,7 @@ from slam.errors import InvalidValueError
 RUNS = "runs"  # folder of the jobs' files
 SCHEMA = 1  # of the tables of a drive
 MAX_RUNS = 100_000
+# "dynamism" is the level, as in ``scripts.comparison.columns``.
 IDENTITY = ("scene", "dynamism", "seed", "slam")
 
 
@@ -35,6 +37,7 @@ class Plan:
 
     goals    names, or how many of the seed's order; () is all
     scanner  by name (``sim.sensors.lidar.registry``)
+    axis     what the levels are of; motion, change and crowd are held (``scripts.knobs.Axis``)
     """
 
     scene: str
@@ -44,14 +47,19 @@ class Plan:
     goals: tuple[str, ...] | int = ()
     loop: LoopConfig = field(default_factory=LoopConfig)
     scanner: str = "full"
+    axis: str = "dynamism"
+    motion: float | None = None
+    change: float | None = None
+    crowd: str | None = None
 
     def __post_init__(self) -> None:
+        axis_of(asdict(self))
         for name in ("slams", "levels", "seeds"):
             values = getattr(self, name)
             if not values or len(set(values)) != len(values):
                 raise InvalidValueError(f"Plan.{name} must be one or more, each once, got {values}")
         if any(not 0.0 <= level <= 1.0 for level in self.levels):
-            raise InvalidValueError(f"--dynamism must lie in [0, 1], got {self.levels}")
+            raise InvalidValueError(f"--{self.axis} must lie in [0, 1], got {self.levels}")
         if min(self.seeds) < 0:
             raise InvalidValueError(f"--seeds must be >= 0, got {self.seeds}")
         if isinstance(self.goals, int) and self.goals < 1:
@@ -68,12 +76,13 @@ class Plan:
                     yield dict(zip(IDENTITY, identity, strict=True)), self._job(level, seed, name)
 
     def _job(self, level: float, seed: int, name: str) -> Job:
+        room = axis_of(asdict(self)).at(level) | options_with(self.crowd)
         goals = list(self.goals) if isinstance(self.goals, tuple) else self.goals
         return Job(
-            name=f"{file_name(self.scene)}_d{level:g}_s{seed}_{file_name(name)}",
+            name=f"{file_name(self.scene)}_{self.axis[0]}{level:g}_s{seed}_{file_name(name)}",
             call=runs.run_one,
             arguments={
-                "scene": self.scene, "dynamism": level, "seed": seed, "slam": name,
+                "scene": self.scene, "room": room, "seed": seed, "slam": name,
                 "goals": goals or None, "loop": asdict(self.loop), "laser": self.scanner,
             },
             code=(

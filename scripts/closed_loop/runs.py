@@ -24,15 +24,18 @@ def run_one(  # noqa: PLR0913 (the arguments of a job)
     path: Path,
     *,
     scene: str,
-    dynamism: float,
+    room: Mapping[str, Any],
     seed: int,
     slam: str,
     goals: list[str] | int | None,
     loop: Mapping[str, Any],
     laser: str = "full",
 ) -> None:
-    """A job: one run, into ``path``. A SLAM that cannot be made has failed at every goal."""
-    simulation = Simulation(scene, seed=seed, dynamism=dynamism, laser=laser)
+    """A job: one run, into ``path``. A SLAM that cannot be made has failed at every goal.
+
+    room  dynamism, motion, change and crowd, as ``Simulation`` takes them
+    """
+    simulation = Simulation(scene, seed=seed, laser=laser, **room)
     try:
         system = limited(slam, Limits())
     except SlamFailedError as error:

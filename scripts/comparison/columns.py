@@ -18,6 +18,7 @@ from slam.trajectory import Trajectory
 
 STEADY_SCANS = 5  # timings count after this
 
+# "dynamism" is the level, of whatever axis: a table over motion or change calls it so on file.
 IDENTITY = ("scene", "dynamism", "seed", "slam")
 COLUMNS = (*IDENTITY, "outcome", "failure", "scans", *table.COLUMNS)
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from scripts.comparison.columns import COLUMNS
 from scripts.comparison.plan import Run
+from scripts.knobs import AXES
 from scripts.output import check_whole
 from sim.recording.sums import check_vouched
 from slam.archives import read_arrays
@@ -39,11 +40,16 @@ UNKNOWN = 255
 Row = dict[str, Any]
 
 
-def write_csv(path: Path, rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> None:
-    """One line for each row; None and NaN are empty, numbers are written so that they read back."""
+def write_csv(
+    path: Path, rows: Sequence[Mapping[str, Any]], columns: Sequence[str], axis: str = "dynamism"
+) -> None:
+    """One line for each row; None and NaN are empty, numbers are written so that they read back.
+
+    axis  how the column "dynamism" is called on file: what the levels are of
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
+    writer.writerow([axis if column == "dynamism" else column for column in columns])
     for row in rows:
         writer.writerow([_cell(row.get(column)) for column in columns])
     write_text(path, text.getvalue())
@@ -55,9 +61,10 @@ def _cell(value: Any) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def write_json(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """``{"schema": 1, "runs": [...]}``; null where a cell is empty."""
-    plain = [{name: _plain(row.get(name)) for name in COLUMNS} for row in rows]
+def write_json(path: Path, rows: Sequence[Mapping[str, Any]], axis: str = "dynamism") -> None:
+    """``{"schema": 1, "runs": [...]}``; null where a cell is empty. ``axis``: as ``write_csv``."""
+    names = {name: axis if name == "dynamism" else name for name in COLUMNS}
+    plain = [{names[name]: _plain(row.get(name)) for name in COLUMNS} for row in rows]
     text = json.dumps({"schema": SCHEMA, "runs": plain}, indent=1, allow_nan=False)
     write_text(path, text + "\n")
 
@@ -188,23 +195,28 @@ class Compared:
         return read_json(self.folder / "recipe.json")
 
     @cached_property
+    def axis(self) -> str:
+        """What the levels are of, one of ``scripts.knobs.AXES``; rows call it "dynamism"."""
+        return axis_in(self.recipe.get("settings"), self.folder / "recipe.json")
+
+    @cached_property
     def runs(self) -> list[Row]:
         """Rows of ``runs.csv``: numbers as floats (seed and counts too), empty as None."""
-        return read_csv(self.folder / RUNS)
+        return read_csv(self.folder / RUNS, self.axis)
 
     @cached_property
     def levels(self) -> list[Row]:
         """Rows of ``levels.csv``."""
-        return read_csv(self.folder / LEVELS)
+        return read_csv(self.folder / LEVELS, self.axis)
 
     @cached_property
     def paired(self) -> list[Row]:
         """Rows of ``paired.csv``."""
-        return read_csv(self.folder / PAIRED)
+        return read_csv(self.folder / PAIRED, self.axis)
 
     def run(self, scene: str, dynamism: float, seed: int) -> RunFile:
         """One simulated run with all SLAMs."""
-        name = Run(scene=scene, dynamism=dynamism, seed=int(seed)).name
+        name = Run(scene=scene, dynamism=dynamism, seed=int(seed), axis=self.axis).name
         return RunFile(self.folder / "runs" / f"{name}.npz")
 
 
@@ -223,13 +235,28 @@ _WORDS = frozenset(
 )
 
 
-def read_csv(path: Path) -> list[Row]:
-    """The rows of a table: numbers as floats, empty cells as None; vouched for, if by anything."""
+def axis_in(settings: object, path: Path) -> str:
+    """What the levels are of by the settings in the recipe ``path``; before, always dynamism."""
+    axis = settings.get("axis", AXES[0]) if isinstance(settings, dict) else AXES[0]
+    if axis not in AXES:
+        raise LogFormatError(path, f"axis must be one of {', '.join(AXES)}, got {axis!r:.80}")
+    return str(axis)
+
+
+def read_csv(path: Path, axis: str = "dynamism") -> list[Row]:
+    """The rows of a table: numbers as floats, empty cells as None; vouched for, if by anything.
+
+    axis  as in ``write_csv``
+    """
     check_file(path)
     check_vouched(path)
     try:
         with path.open(newline="", encoding="utf-8") as file:
-            return [{k: _value(k, v) for k, v in row.items()} for row in csv.DictReader(file)]
+            names = {axis: "dynamism"}
+            return [
+                {names.get(k, k): _value(k, v) for k, v in row.items()}
+                for row in csv.DictReader(file)
+            ]
     except (
         OSError,
         ValueError,

@@ -48,12 +48,16 @@ def carry_out(
             for run in plan.runs():
                 own = {name: done[job.name] for its, name, job in entries if its == run}
                 merged = files.merge(staged / "runs" / f"{run.name}.npz", recordings[run.name], own)
-                about = asdict(run) | _about(recordings[run.name])
+                about = {k: v for k, v in asdict(run).items() if k != "axis"}
+                about |= _about(recordings[run.name])
                 rows += [about | row for row in merged]
-            files.write_csv(staged / files.RUNS, rows, COLUMNS)
-            files.write_json(staged / files.RUNS_JSON, rows)
-            files.write_csv(staged / files.LEVELS, tables.levels(rows), tables.LEVEL_COLUMNS)
-            files.write_csv(staged / files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS)
+            files.write_json(staged / files.RUNS_JSON, rows, plan.axis)
+            for name, table, columns in (
+                (files.RUNS, rows, COLUMNS),
+                (files.LEVELS, tables.levels(rows), tables.LEVEL_COLUMNS),
+                (files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS),
+            ):
+                files.write_csv(staged / name, table, columns, plan.axis)
             write_recipe(staged, "compare", settings)
     return rows
 
@@ -84,4 +88,4 @@ def median_errors(plan: Plan, scene: str, rows: list[dict[str, Any]]) -> Table:
         return f"{ate_cm:.2f} ({lost})"
 
     title = f"{scene}: median unaligned ATE in cm (runs lost of {len(plan.seeds)})"
-    return level_table(title, f"lost: {LOST_RULE}", plan.levels, plan.slams, cell)
+    return level_table(title, f"lost: {LOST_RULE}", plan.levels, plan.slams, cell, plan.axis)

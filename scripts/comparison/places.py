@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenes.kinds import is_door
+from scenes.kinds import KINDS
 from scripts.comparison.recording import Recording
 from scripts.comparison.sight import Sight, clearance
 from slam import se2
@@ -20,6 +20,11 @@ STILL_S, SEEN_SCANS, LATELY_S = 2.0, 5, 2.0
 APART_M = 0.2  # points nearer to a wall than this tell nothing about a mover
 GRAIN_M = 0.02  # hits nearer to one another are one point
 BELIEVED = 0.5
+
+
+def _group(kind: str) -> str:
+    """What moves a kind; one that a module registers, and this process does not know, is itself."""
+    return KINDS[kind].group if kind in KINDS else kind
 
 
 @dataclass(eq=False)
@@ -84,7 +89,7 @@ class Places:
         """
         self._drive, self._near_static, self._believes = drive, near_static, believes
         self._rows = [
-            k for k, kind in enumerate(drive.kinds) if kind != "robot" and not is_door(kind)
+            k for k, kind in enumerate(drive.kinds) if _group(kind) not in ("door", "robot")
         ]
         self.standing = {row: Place(drive.poses[0, row], 0, new=False) for row in self._rows}
         self.left: list[OldPlace] = []
@@ -111,7 +116,7 @@ class Places:
 
     def _leave(self, row: int, place: Place) -> None:
         """People leave no place: they never stood there for good."""
-        if place.scans >= SEEN_SCANS and self._drive.kinds[row] != "person":
+        if place.scans >= SEEN_SCANS and _group(self._drive.kinds[row]) != "person":
             points = place.points()
             self.left.append(OldPlace(points, believed=self._believes(points)))
 

@@ -14,11 +14,11 @@ from typing import Any
 import scenes
 import sim
 import slam
-from scripts import axis as axes
 from scripts.checked import whole
 from scripts.comparison import entry, recording
 from scripts.imports import with_imports
 from scripts.jobs import Job
+from scripts.knobs import axis_of, options_with
 from scripts.names import file_name
 from sim.recording.recipe import Recipe
 from sim.simulation import n_frames
@@ -33,16 +33,20 @@ MAX_RUNS = 100_000
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """One simulated run; ``name`` as in the files: ``office_d0.25_s100``."""
+    """One simulated run; ``name`` as in the files: ``office_d0.25_s100``, ``office_m0.25_s100``.
+
+    dynamism  its level, which is of ``axis``
+    """
 
     scene: str
     dynamism: float
     seed: int
+    axis: str = "dynamism"
 
     @property
     def name(self) -> str:
         """Letters, digits, - _ . only."""
-        return f"{file_name(self.scene)}_d{self.dynamism:g}_s{self.seed}"
+        return f"{file_name(self.scene)}_{self.axis[0]}{self.dynamism:g}_s{self.seed}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,11 +54,12 @@ class Plan:
     """Every SLAM on every scene at every level with every seed.
 
     slams, scenes  by name or as module:Class, module:function
-    levels    of dynamism, each in [0, 1]; with an ``axis`` (``scripts.axis``) of that alone
+    levels    of dynamism, each in [0, 1], or of another ``axis`` (``scripts.knobs``)
     seeds     whole numbers >= 0, the same at every level
     seconds   of driving
     every     one scan in so many is kept
     scanner   by name (``sim.sensors.lidar.registry``)
+    motion, change, crowd  the same in every run; None: as ``scripts.knobs.Axis`` says
     scan_limit_s  that module:Class and pipe:COMMAND may take for a scan before they count as hung
     """
 
@@ -66,10 +71,14 @@ class Plan:
     every: int = 8
     scanner: str = "full"
     scan_limit_s: float = Limits.scan_s
-    axis: str = axes.BOTH
+    axis: str = "dynamism"
+    motion: float | None = None
+    change: float | None = None
+    crowd: str | None = None
 
     def __post_init__(self) -> None:
         Limits(scan_s=self.scan_limit_s)
+        axis_of(asdict(self))
         for name in ("slams", "scenes", "levels", "seeds"):
             values = getattr(self, name)
             if not values or len(set(values)) != len(values):
@@ -89,7 +98,7 @@ class Plan:
     def runs(self) -> list[Run]:
         """Every simulated run, scene by scene, level by level."""
         return [
-            Run(scene=scene, dynamism=level, seed=seed)
+            Run(scene=scene, dynamism=level, seed=seed, axis=self.axis)
             for scene in self.scenes
             for level in self.levels
             for seed in self.seeds
@@ -97,9 +106,10 @@ class Plan:
 
     def recipe(self, run: Run) -> Recipe:
         """Of a run's simulation."""
-        own: dict[str, Any] = axes.at(self.axis, run.dynamism, Recipe)
-        scanned: dict[str, Any] = {"seconds": self.seconds, "scanner": self.scanner}
-        return Recipe(scene=run.scene, seed=run.seed, **own, **scanned)
+        return Recipe(
+            scene=run.scene, seed=run.seed, **axis_of(asdict(self)).at(run.dynamism),
+            seconds=self.seconds, scanner=self.scanner, options=options_with(self.crowd),
+        )  # fmt: skip
 
     def recordings(self) -> dict[str, Job]:
         """The jobs that simulate, by the names of the runs."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from scenes.groups import CROWDS, groups_of, named, with_held
 from scripts.debugger.question import Question
 from scripts.debugger.recording import Checkpoint, Pair, Sighting, Strip, Tape, row_at, sightings
 from sim.twins.absence import Change
@@ -25,7 +26,6 @@ CURED = 0.5
 LAST_S = 1.0
 REPEATED = 3  # of the cures by several at once
 PAIRED = 4  # the likeliest of which pairs are tried
-MODES = ("out", "frozen")
 VERDICTS = ("none", "weak", "undecided", "culprit", "several", "joint", "not the movers")
 
 Note = Callable[[str, int, int], None]
@@ -35,7 +35,7 @@ Note = Callable[[str, int, int], None]
 class Trial:
     """One re-run.
 
-    kind      "single", "pair" or "all"
+    kind      "single" (with what it holds), "pair", "group" or "all"
     rise_m    error gathered from the checkpoint to the horizon; NaN: the SLAM failed
     share     of the original's rise that is gone
     path_m    most that the robot's path differs from the original
@@ -184,7 +184,8 @@ def _try_all(found: Inquest, checkpoint: Checkpoint, note: Note) -> None:
     for done, (kind, change) in enumerate(plan):
         note(str(change), done, len(plan))
         found.trials.append(_trial(found, checkpoint, kind, change))
-    if not found.cures and any(t.cured for t in found.trials):
+    plain = not found.question.who
+    if plain and not found.cures and any(t.cured for t in found.trials):
         for change in _pairs(found):
             note(str(change), len(plan), len(plan))
             found.trials.append(_trial(found, checkpoint, "pair", change))
@@ -205,14 +206,36 @@ def _plan(found: Inquest) -> list[tuple[str, Change]]:
     if not everybody:
         return []
     controls = [("all", Change(out=everybody)), ("all", Change(frozen=everybody))]
-    one = [(suspect.name,) for suspect in found.suspects]
-    return controls + [("single", Change(**{mode: name})) for name in one for mode in MODES]
+    asked = found.question.who
+    if asked:
+        return controls + [trial for word in asked for trial in _asked(found.tape, word)]
+    plan = controls + [trial for group in _crowds(found) for trial in _asked(found.tape, group)]
+    return plan + [trial for s in found.suspects for trial in _asked(found.tape, s.name)]
+
+
+def _asked(tape: Tape, word: str) -> list[tuple[str, Change]]:
+    """A mover, a group or a pattern out, with what they hold, and frozen."""
+    names = named(tape.movers, word) if tape.movers else (word,)
+    called, kind = ("", "single") if names == (word,) else (word, "group")
+    out = Change(out=with_held(tape.holds, names), called=called)
+    return [(kind, out), (kind, Change(frozen=names, called=called))]
+
+
+def _crowds(found: Inquest) -> list[str]:
+    """Groups of a crowd of which two or more were seen."""
+    seen = {suspect.name for suspect in found.suspects}
+    groups = groups_of(found.tape.movers)
+    return [word for word in CROWDS if len(seen & set(groups.get(word, ()))) > 1]
 
 
 def _pairs(found: Inquest) -> list[Change]:
     likeliest = [suspect.name for suspect in found.suspects[:PAIRED]]
+    pairs = itertools.combinations(likeliest, 2)
+    holds = found.tape.holds
     return [
-        Change(**{mode: pair}) for pair in itertools.combinations(likeliest, 2) for mode in MODES
+        change
+        for pair in pairs
+        for change in (Change(out=with_held(holds, pair)), Change(frozen=pair))
     ]
 
 

@@ -23,7 +23,9 @@ from slam.frames import Float
 from slam.trajectory import read_tum
 
 COMMANDS = ("run", "demo")
-NO_OPTIONS = ("scene", "seed", "dynamism", "laser", "labels", "tags")
+NO_OPTIONS = (
+    "scene", "seed", "dynamism", "motion", "change", "crowd", "laser", "labels", "tags",
+)  # fmt: skip
 OF_THE_RUN = ("slams", "seconds", "simulation")  # in the recipe of a run; the rest is the world's
 
 

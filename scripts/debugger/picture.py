@@ -129,9 +129,11 @@ class _Camera:
         self._hits(picture, strip.frames[row], believed)
         self._outline(picture, believed)
         was = self._found.tape.strip.poses[row if trial is None else row + self._found.first]
-        for name in _named(self._found):
-            gone = name in change.out
-            self._ring(picture, was if gone else poses, names.index(name), gone)
+        for label, group in _labelled(self._found):
+            for name in group:
+                gone = name in change.out
+                self._ring(picture, was if gone else poses, names.index(name), gone)
+            self._label(picture, was, names.index(group[0]), label)
         x0, y0, x1, y1 = self._window
         cell = np.ascontiguousarray(picture[y0:y1, x0:x1])
         left, low, metre = 14, len(cell) - 14, round(self._view.plan.scale)
@@ -158,6 +160,12 @@ class _Camera:
         cv2.circle(picture, centre, radius, draw.BLUE, THICK, cv2.LINE_AA)
         cv2.line(picture, centre, tip, draw.BLUE, THICK, cv2.LINE_AA)
 
+    def _label(self, picture: Picture, poses: Float, m: int, label: str) -> None:
+        """The word beside the first of those named."""
+        x, y = self._view.to_pixels([poses[m][:2]])[0].round().astype(int).tolist()
+        side = round((self._radii[m] + 0.2) * self._view.plan.scale)
+        draw.text(picture, label, (x + side, y - 8), 16, CULPRIT, bold=True)
+
     def _ring(self, picture: Picture, poses: Float, m: int, gone: bool) -> None:
         """Around somebody named; in dashes where one was who is out."""
         x, y, yaw = poses[m].tolist()
@@ -177,8 +185,14 @@ class _Camera:
 
 def _named(found: Inquest) -> list[str]:
     """Who the verdict names, or would have."""
+    return [name for _, names in _labelled(found) for name in names]
+
+
+def _labelled(found: Inquest) -> list[tuple[str, tuple[str, ...]]]:
+    """The same by the trials that name them, with the word for all of each."""
     trials = [t for t in found.named or found.cures[:1] if t.kind != "all"]
-    return [name for trial in trials for name in (*trial.change.out, *trial.change.frozen)]
+    changes = [trial.change for trial in trials]
+    return [(c.called or (c.out or c.frozen)[0], c.out or c.frozen) for c in changes]
 
 
 def _title(found: Inquest, width: int) -> Picture:
@@ -246,6 +260,9 @@ def _curve(ax: mpl.axes.Axes, found: Inquest, trial: Trial, times: Float, named:
             "lw": 1.3,
         }
         label = "all movers out" if trial.change.out else "all movers frozen"
+    elif trial.kind == "group" and not named:
+        style = {"color": "#b06a00", "lw": 1.3, "ls": "-" if trial.change.out else "--"}
+        label = str(trial.change)
     elif named:
         style = {"color": tuple(c / 255.0 for c in CULPRIT), "lw": 2.2}
         label = str(trial.change)

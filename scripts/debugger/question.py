@@ -21,6 +21,7 @@ class Question:
     horizon_s  from where it is found to the end of the re-runs
     top        only so many suspects, the likeliest; 0: all
     repeats    other draws of the scanner's noise, for the original and for each cure
+    who        try only these: movers, groups or patterns (``scenes.groups``); (): whoever was seen
     """
 
     rule: Rule = field(default_factory=Rule)
@@ -29,6 +30,7 @@ class Question:
     horizon_s: float = 4.0
     top: int = 0
     repeats: int = 3
+    who: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("lead_s", "horizon_s"):

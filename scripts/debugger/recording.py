@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.scene import Hold, Mover
 from scripts.debugger.episode import Case
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation, n_frames
@@ -82,11 +83,14 @@ class Tape:
 
     commands  (v m/s, omega rad/s) before each scan; rows of ``strip`` are every ``case.every``th
     states    by row: the scan with which it begins, and the simulation saved before that
+    movers, holds  of the scene
     """
 
     case: Case
     names: tuple[str, ...]
     kinds: tuple[str, ...]
+    movers: tuple[Mover, ...] = ()
+    holds: tuple[Hold, ...] = ()
     strip: Strip = field(default_factory=Strip)
     commands: list[tuple[float, float]] = field(default_factory=list)
     states: dict[int, tuple[int, bytes]] = field(default_factory=dict)
@@ -116,7 +120,11 @@ def record(case: Case, note: Callable[[int, int], None] = lambda done, of: None)
     """Run the case from beginning to end; ``note`` gets scans done and of how many."""
     simulation = simulate(case)
     world, track = simulation.world, Track(case.slam, create(case.slam))
-    tape = Tape(case=case, names=world.mover_names, kinds=tuple(m.kind for m in world.scene.movers))
+    movers = world.scene.movers
+    tape = Tape(
+        case=case, names=world.mover_names, kinds=tuple(m.kind for m in movers), movers=movers,
+        holds=world.scene.holds,
+    )  # fmt: skip
     pilot, period = Pilot(world), simulation.scan_period_s
     keep = case.every * max(1, round(KEPT_S / (period * case.every)))
     count = n_frames(case.seconds, period)

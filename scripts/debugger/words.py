@@ -52,8 +52,10 @@ def headline(found: Inquest) -> tuple[str, str]:
         return f"Undecided: {why}", sure + _tries(found)
     if verdict == "joint":
         together = found.named[0]
+        singles = any(trial.kind == "single" for trial in found.trials)
+        alone = "nobody alone, but " if singles else ""
         return (
-            f"Joint: nobody alone, but {who(together)} cures it",
+            f"Joint: {alone}{who(together)} cures it",
             f"{sure} Cured in {together.again} of {question.repeats}.",
         )
     why = "sensor, geometry or odometry"
@@ -98,10 +100,10 @@ def table(found: Inquest) -> Table:
     shown.add_column("verdict")
     seen = {s.name: s for s in found.suspects}
     shown.add_row("nothing", "", "", f"{found.rise_m:.2f}", "", "", "as it was")
-    order = {"all": 0, "single": 1, "pair": 2}
+    order = {"all": 0, "group": 1, "single": 2, "pair": 3}
     for trial in sorted(found.trials, key=lambda t: (order[t.kind], -_or_last(t.share))):
         names = trial.change.out or trial.change.frozen
-        sighting = seen.get(names[0]) if len(names) == 1 else None
+        sighting = seen.get(names[0]) if trial.kind == "single" else None
         shown.add_row(
             escape(who(trial)),
             str(sighting.beams) if sighting else "",
@@ -162,6 +164,7 @@ def _trial(found: Inquest, trial: Trial) -> dict[str, Any]:
     words: dict[str, Any] = {
         "out": list(trial.change.out),
         "frozen": list(trial.change.frozen),
+        **({"called": trial.change.called} if trial.change.called else {}),
         "kind": trial.kind,
         "cured": trial.cured,
         **{n: None if trial.failed else getattr(trial, n) for n in numbers},

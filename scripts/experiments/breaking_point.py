@@ -26,12 +26,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FormatStrFormatter, NullLocator
 
-from scripts import axis as axes
 from scripts.comparison import folder, make
 from scripts.comparison.plan import Plan
 from scripts.comparison.tables import number
 from scripts.experiments.measured import add_options, head, seeds_of, table
 from scripts.figures import save, styled
+from scripts.knobs import AXES
 from scripts.marks import fill_page
 from scripts.result_files import write
 from sim.core.versions import WORLD
@@ -172,7 +172,7 @@ def _shown(error_m: float) -> float:
 
 
 def _finish(ax: Axes, axis: str, scene: str, levels: Sequence[float]) -> None:
-    name = "dynamism" if axis == axes.BOTH else axis
+    name = axis
     ax.set(
         title=scene, yscale="log", xlabel=f"{name}, 0 to 1", ylim=(0.8 * LEAST_CM, 1.3 * MOST_CM)
     )
@@ -227,7 +227,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--slams", nargs="+", default=list(SLAMS))
     parser.add_argument("--scenes", nargs="+", default=list(SCENES))
-    parser.add_argument("--axis", nargs="+", choices=axes.AXES, default=["motion", "change"])
+    parser.add_argument("--axis", nargs="+", choices=AXES, default=["motion", "change"])
     parser.add_argument("--levels", nargs="+", type=float, default=[0.0, 0.25, 0.5, 0.75, 1.0])
     parser.add_argument("--every", type=int, default=8, help="use one scan in so many")
     parser.add_argument("--scanner", default="noise")

@@ -71,7 +71,7 @@ print(json.dumps({"us": 1e6 * each, "beams": len(ranges), "version": irsim.__ver
 def ours(chairs: int, people: int, share: float) -> float:
     """CPU s of one step of the arena."""
     env = gymnasium.make(
-        "mobilia/Arena-v1", disable_env_checker=True, laser=Lms221Config.ideal(), time_limit_s=1e6
+        "mobilia/Arena-v2", disable_env_checker=True, laser=Lms221Config.ideal(), time_limit_s=1e6
     )
     action = np.array([0.1 / 0.8, 0.4 / 1.2], np.float32)
     env.reset(

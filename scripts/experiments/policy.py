@@ -14,7 +14,7 @@ import sim  # noqa: F401  (registers the environments)
 if __name__ == "__main__":
     argparse.ArgumentParser(description=__doc__).parse_args()
     rooms = gymnasium.make_vec(
-        "mobilia/Office-v1", num_envs=8, vectorization_mode="vector_entry_point"
+        "mobilia/Office-v2", num_envs=8, vectorization_mode="vector_entry_point"
     )
     seen, infos = rooms.reset(seed=1)
     start, hits = infos["pose"].copy(), 0

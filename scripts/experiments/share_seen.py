@@ -26,9 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import scenes
-from scripts import axis as axes
 from scripts import workers
 from scripts.experiments.measured import add_options, head, seeds_of, table
+from scripts.knobs import AXES, Axis
 from scripts.marks import fill_page
 from scripts.result_files import write
 from sim.core.versions import WORLD
@@ -95,7 +95,7 @@ class Resightings:
 
 def measure(case: Case) -> Row:
     """One run's row: shares of 1, m, s; ``real_time_factor`` is of this machine."""
-    settings: dict[str, Any] = axes.at(case.axis, case.level, Simulation)
+    settings: dict[str, Any] = Axis(name=case.axis).at(case.level)
     simulation = Simulation(case.scene, seed=case.seed, laser=case.scanner, labels=True, **settings)
     world, period_s = simulation.world, simulation.scan_period_s
     pilot, resightings = Pilot(world), Resightings(world, case.away_s)
@@ -202,7 +202,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", nargs="+", default=scenes.names())
     parser.add_argument("--levels", nargs="+", type=float, default=[0.0, 0.25, 0.5, 0.75, 1.0])
-    parser.add_argument("--axis", choices=axes.AXES, default=axes.BOTH)
+    parser.add_argument("--axis", choices=AXES, default="dynamism")
     parser.add_argument("--scanner", default=SCANNER)
     parser.add_argument("--away", type=float, default=5.0, help="s out of view")
     add_options(parser, "share_seen.json", PAGE)

@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from sim.simulation import Simulation
 
 # Of a run's settings.
-SIMULATED = ("scene", "seconds", "seed", "dynamism", "scan_height_m", "laser")
+KNOBS = ("motion", "change", "crowd")
+SIMULATED = ("scene", "seconds", "seed", "dynamism", *KNOBS, "scan_height_m", "laser")
 
 
 @dataclass(eq=False, kw_only=True)
@@ -187,7 +188,8 @@ def of_episode(path: Path, *, view: str | None = "follow", trust: bool = False) 
     made = read_recipe(path / RECIPE)
     check_world(path / RECIPE, made.world)
     recipe = replace(made.recipe, scene=admitted(made.recipe.scene, "scene", trust))
-    settings = {"scene": recipe.scene, "dynamism": recipe.dynamism, "seed": recipe.seed}
+    settings = {**asdict(recipe), **recipe.options}
+    settings.pop("twin")
     if not recipe.twin:
         simulation = Simulation(**recipe.simulation())
         title = title_of(settings)
@@ -211,7 +213,8 @@ def of_compared(path: Path, *, view: str | None = "follow", trust: bool = False)
 
     again = run_of(path)
     recipe = replace(again.recipe, scene=admitted(again.recipe.scene, "scene", trust))
-    simulation, title = Simulation(**recipe.simulation()), title_of(asdict(recipe))
+    simulation = Simulation(**recipe.simulation())
+    title = title_of({**asdict(recipe), **recipe.options})
     footage = of_simulation(
         simulation, seconds=recipe.seconds, title=title, view=view, every=again.every
     )
@@ -243,9 +246,13 @@ def of_log(path: Path) -> Footage:
 
 
 def title_of(settings: Mapping[str, Any]) -> str:
-    """``office · dynamism 0.5 · seed 4``."""
+    """``office · dynamism 0.5 · seed 4``; motion, change and crowd where they are given."""
     twin = f" · {settings['twin']} twin" if settings.get("twin") else ""
-    return (
-        f"{settings['scene']} · dynamism {settings.get('dynamism', 0.5)} · "
-        f"seed {settings.get('seed', 0)}{twin}"
-    )
+    knobs = [f"{k} {settings[k]}" for k in KNOBS if settings.get(k) is not None]
+    words = [
+        str(settings["scene"]),
+        f"dynamism {settings.get('dynamism', 0.5)}",
+        *knobs,
+        f"seed {settings.get('seed', 0)}{twin}",
+    ]
+    return " · ".join(words)

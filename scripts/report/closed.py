@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from scripts.closed_loop.plan import SCHEMA
 from scripts.closed_loop.tables import LEVEL_COLUMNS
-from scripts.comparison.folder import Row, read_csv, read_json
+from scripts.comparison.folder import Row, axis_in, read_csv, read_json
 from scripts.metrics.metric import digits
 from scripts.output import check_whole
 from scripts.report import style
@@ -43,8 +43,13 @@ class Driven:
         return list(dict.fromkeys(str(row["slam"]) for row in self.rows))
 
     @property
+    def axis(self) -> str:
+        """What the levels are of."""
+        return str(self.settings.get("axis", "dynamism"))
+
+    @property
     def levels(self) -> list[float]:
-        """Of dynamism, ascending."""
+        """Of that axis, ascending."""
         return sorted({float(row["dynamism"]) for row in self.rows})
 
     def of(self, slam: str) -> list[Row]:
@@ -61,7 +66,7 @@ def driven(folder: Path) -> Driven:
     loop = settings.get("loop")
     if not isinstance(loop, dict) or not {"tolerance_m", "plan_on"} <= loop.keys():
         raise LogFormatError(folder / "recipe.json", "its settings lack 'loop'")
-    rows = read_csv(folder / "levels.csv")
+    rows = read_csv(folder / "levels.csv", axis_in(settings, folder / "recipe.json"))
     missing = [column for column in LEVEL_COLUMNS if not rows or column not in rows[0]]
     if missing:
         raise LogFormatError(folder / "levels.csv", f"a table without '{missing[0]}'")
@@ -69,7 +74,7 @@ def driven(folder: Path) -> Driven:
 
 
 def curves(drive: Driven, slams: Sequence[str]) -> list[tuple[str, str]]:
-    """(name, SVG) of goals reached and of precision against dynamism; ``slams`` give colours."""
+    """(name, SVG) of goals reached and of precision against the level; ``slams`` give colours."""
     return [
         ("goals reached", _curve(drive, slams, SUCCESS, "goals truly reached, %")),
         ("precision", _curve(drive, slams, PRECISION, "distance from the goal, cm")),
@@ -90,8 +95,8 @@ def _curve(drive: Driven, slams: Sequence[str], keys: tuple[str, str, str], labe
         ax.set_ylabel(label)
         ax.set_ylim(0.0, 103.0 if keys == SUCCESS else None)
         ax.yaxis.set_major_locator(MaxNLocator(5))
-        style.level_axis(ax, drive.levels)
-    return style.svg(figure, f"{label} against dynamism in {drive.scene}")
+        style.level_axis(ax, drive.levels, drive.axis)
+    return style.svg(figure, f"{label} against {drive.axis} in {drive.scene}")
 
 
 def _percent(value: float | None) -> float:
@@ -118,7 +123,7 @@ def table(drive: Driven) -> Table:
         for slam in drive.slams
         for row in drive.of(slam)
     ]  # fmt: skip
-    head = ["SLAM", "dynamism", "reached", "wrong", "given up", "failed", "precision, cm",
+    head = ["SLAM", drive.axis, "reached", "wrong", "given up", "failed", "precision, cm",
             "time, s", "collisions per km", "near misses per km", "runs lost"]  # fmt: skip
     return Table(caption=drive.scene, head=head, rows=rows)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Degradation curves: a metric against dynamism, a line with its interval for each SLAM."""
+"""Degradation curves: a metric against the level, a line with its interval for each SLAM."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def curve(study: Study, scene: str, key: str) -> str:
         for slam in study.slams:
             _line(ax, study, scene, slam, metric)
         _axes(ax, study, metric)
-    return style.svg(figure, f"{metric.name} against dynamism in {scene}")
+    return style.svg(figure, f"{metric.name} against {study.axis} in {scene}")
 
 
 def _line(ax: Axes, study: Study, scene: str, slam: str, metric: Metric) -> None:
@@ -52,7 +52,7 @@ def _times(value: float | None, factor: float) -> float:
 
 def _axes(ax: Axes, study: Study, metric: Metric) -> None:
     ax.set_ylabel(metric.heading)
-    style.level_axis(ax, study.levels)
+    style.level_axis(ax, study.levels, study.axis)
     if metric.key == "nees_over_3":
         ax.axhline(1.0, color=style.TRUTH, lw=1.0, ls="--", zorder=0)
         style.remark(ax, 1.0, "honest", style.TRUTH)

@@ -114,7 +114,7 @@ def _levels(study: Study, keys: Iterable[str]) -> list[tuple[str, list[tables.Ta
 
 
 def _scene(study: Study, scene: str) -> dict[str, Any]:
-    """Maps of a typical run at the most dynamism; the worst run of ours."""
+    """Maps of a typical run at the highest level; the worst run of ours."""
     typical = study.typical(scene, study.levels[-1], study.ours)
     worst = study.worst(scene, study.ours)
     there, run = study.run(typical), study.run(worst)
@@ -123,15 +123,15 @@ def _scene(study: Study, scene: str) -> dict[str, Any]:
         "typical": typical,
         "maps": pictures.map_panels(there, study.slams),
         "worst": worst,
-        "said": _worst_in_words(worst),
+        "said": _worst_in_words(worst, study.axis),
         "errors": pictures.errors(run, study.slams),
         "strip": pictures.strip(run, study.ours, study.slams),
     }
 
 
-def _worst_in_words(row: dict[str, Any]) -> str:
+def _worst_in_words(row: dict[str, Any], axis: str) -> str:
     ate = METRICS["ate_unaligned_m"]
-    words_ = f"dynamism {row['dynamism']:g}, seed {row['seed']:g}: {row['outcome']}"
+    words_ = f"{axis} {row['dynamism']:g}, seed {row['seed']:g}: {row['outcome']}"
     if row["ate_unaligned_m"] is not None and math.isfinite(row["ate_unaligned_m"]):
         words_ += f", position error {ate.show(row['ate_unaligned_m'])} cm"
     if row["lost_at_s"] is not None:
@@ -161,7 +161,11 @@ def _command(settings: dict[str, Any]) -> str:
     words_ = ["mobilia", "compare"]
     for option, values in (("--slam", settings["slams"]), ("--scene", settings["scenes"])):
         words_ += [option, *map(str, values)]
-    words_ += ["--dynamism", *(f"{level:g}" for level in settings["levels"])]
+    axis = settings.get("axis", "dynamism")
+    words_ += [f"--{axis}", *(f"{level:g}" for level in settings["levels"])]
+    for name in ("motion", "change", "crowd"):
+        if settings.get(name) is not None:
+            words_ += [f"--{name}", str(settings[name])]
     words_ += ["--seeds", str(len(seeds)), "--first-seed", str(seeds[0])]
     words_ += ["--seconds", f"{settings['seconds']:g}", "--every", str(settings["every"])]
     words_ += ["--scanner", settings["scanner"], "--scan-limit", f"{settings['scan_limit_s']:g}"]

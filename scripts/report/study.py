@@ -39,9 +39,14 @@ class Study:
         """In the order in which they were named."""
         return list(dict.fromkeys(str(row["scene"]) for row in self.compared.runs))
 
+    @property
+    def axis(self) -> str:
+        """What the levels are of; rows call it "dynamism"."""
+        return self.compared.axis
+
     @cached_property
     def levels(self) -> list[float]:
-        """Of dynamism, ascending."""
+        """Of that axis, ascending."""
         return sorted({float(row["dynamism"]) for row in self.compared.runs})
 
     @property

@@ -94,9 +94,9 @@ def line(ax: Axes, points: Sequence[Point], color: str, mark: str) -> None:
                     transform=ax.get_xaxis_transform())  # fmt: skip
 
 
-def level_axis(ax: Axes, levels: Sequence[float]) -> None:
-    """Dynamism, a tick for each level."""
-    ax.set_xlabel("dynamism")
+def level_axis(ax: Axes, levels: Sequence[float], axis: str = "dynamism") -> None:
+    """What the levels are of, a tick for each level."""
+    ax.set_xlabel(axis)
     ax.set_xticks(levels)
     ax.set_xticklabels([f"{level:g}" for level in levels])
 

@@ -52,7 +52,7 @@ def of_levels(study: Study, scene: str, metric: Metric) -> Table:
             mark = "best" if row is not None and row["value"] == best else ""
             cells.append(_value(row, metric, mark))
         rows.append(cells)
-    return Table(caption=metric.heading, head=["dynamism", *slams], rows=rows, slams=slams)
+    return Table(caption=metric.heading, head=[study.axis, *slams], rows=rows, slams=slams)
 
 
 def _best(rows: Sequence[Row | None], metric: Metric) -> float | None:
@@ -81,7 +81,7 @@ def of_pairs(study: Study, scene: str, metric: Metric) -> Table:
         rows.append(cells)
     return Table(
         caption=f"{metric.heading}: {study.ours} minus …",
-        head=["dynamism", *study.rivals],
+        head=[study.axis, *study.rivals],
         rows=rows,
         slams=study.rivals,
     )
@@ -111,12 +111,12 @@ def of_outcomes(study: Study, scene: str) -> Table:
             mark = "worse" if rest else ""
             cells.append(Cell(text=f"{fine} of {ended.total()}", small=", ".join(rest), mark=mark))
         rows.append(cells)
-    head = ["finished at dynamism", *(f"{level:g}" for level in study.levels)]
+    head = [f"finished at {study.axis}", *(f"{level:g}" for level in study.levels)]
     return Table(caption=scene, head=head, rows=rows)
 
 
 def growth(study: Study, scene: str) -> Table:
-    """What dynamism does to each SLAM: from the lowest level to the highest."""
+    """What the axis does to each SLAM: from the lowest level to the highest."""
     ate, lost = METRICS["ate_unaligned_m"], METRICS["lost"]
     ends = (study.levels[0], study.levels[-1])
     rows = []
@@ -132,7 +132,7 @@ def growth(study: Study, scene: str) -> Table:
         ])  # fmt: skip
     head = [f"{ate.name} at {end:g}, {ate.shown}" for end in ends]
     lost_head = [f"{lost.name} at {end:g}" for end in ends]
-    caption = f"From dynamism {ends[0]:g} to {ends[1]:g}"
+    caption = f"From {study.axis} {ends[0]:g} to {ends[1]:g}"
     return Table(caption=caption, head=["SLAM", *head, "grows", *lost_head], rows=rows)
 
 

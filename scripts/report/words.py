@@ -25,11 +25,11 @@ def listed(words: list[str]) -> str:
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
 
 
-def levels_text(levels: list[float], of: list[float]) -> str:
+def levels_text(levels: list[float], of: list[float], axis: str = "dynamism") -> str:
     """Of levels: "at dynamism 0 and 0.5", "at every level"."""
     if len(levels) == len(of):
-        return "at every level" if len(of) > 1 else f"at dynamism {levels[0]:g}"
-    return "at dynamism " + listed([f"{level:g}" for level in levels])
+        return "at every level" if len(of) > 1 else f"at {axis} {levels[0]:g}"
+    return f"at {axis} " + listed([f"{level:g}" for level in levels])
 
 
 def leaders(study: Study, scene: str) -> list[str]:
@@ -44,7 +44,7 @@ def leaders(study: Study, scene: str) -> list[str]:
         if found:
             led.setdefault(min(found)[1], []).append(dynamism)
     return [
-        f"{slam} has the lowest median position error {levels_text(at, study.levels)}"
+        f"{slam} has the lowest median position error {levels_text(at, study.levels, study.axis)}"
         + _clearly(study, scene, slam, at)
         for slam, at in led.items()
     ]
@@ -105,7 +105,7 @@ def _places(study: Study, rival: str, metric: Metric, side: int) -> tuple[str, f
             most = max(most, abs(row["median_difference"] or 0.0))
     if len(study.scenes) > 1 and all(places.get(s) == study.levels for s in study.scenes):
         return "everywhere", most
-    said = [f"{scene} {levels_text(at, study.levels)}" for scene, at in places.items()]
+    said = [f"{scene} {levels_text(at, study.levels, study.axis)}" for scene, at in places.items()]
     return "; ".join(said), most
 
 

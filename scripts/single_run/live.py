@@ -9,14 +9,21 @@ from typing import Any
 
 from scripts.console import note
 from scripts.film.footage import of_scene
+from scripts.knobs import Held
 from scripts.single_run.session import Outputs, run_session
 
 
-def tour(
-    scene: str, seconds: float, dynamism: float, seed: int, scan_height_m: float, scanner: str
+def tour(  # noqa: PLR0913 (options of a verb)
+    scene: str,
+    seconds: float,
+    dynamism: float,
+    seed: int,
+    scan_height_m: float,
+    scanner: str,
+    held: Held | None = None,
 ) -> dict[str, Any]:
     """The settings of a tour, as ``on_scene`` takes them."""
-    world = {"scene": scene, "dynamism": dynamism, "seed": seed}
+    world = {"scene": scene, "dynamism": dynamism, **(held or Held()).given(), "seed": seed}
     return {**world, "seconds": seconds, "scan_height_m": scan_height_m, "laser": scanner}
 
 

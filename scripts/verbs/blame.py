@@ -15,9 +15,11 @@ from rich.progress import Progress
 from scripts import interrupt
 from scripts.console import console, note, progress
 from scripts.debugger.question import Question
+from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check, file_name, run_name
 from scripts.scanner_option import Scanner
 from scripts.trust import Trust
+from scripts.verbs.compare import named
 from slam.errors import InvalidValueError
 from slam.evaluation.divergence import Rule
 from slam.files import write_text
@@ -43,6 +45,9 @@ def blame(
     ] = None,
     scene: Annotated[str | None, typer.Option(help="Instead of RUN: a scene to simulate.")] = None,
     dynamism: Annotated[float, typer.Option(help="How much the scene moves, 0 to 1.")] = 0.5,
+    motion: Motion = None,
+    change: Change = None,
+    crowd: CrowdOption = None,
     seed: Annotated[int, typer.Option(help="Of the simulated run, whole number >= 0.")] = 0,
     seconds: Annotated[float, typer.Option(help="Length of the simulated tour, s.")] = 60.0,
     scanner: Scanner = "full",
@@ -66,6 +71,12 @@ def blame(
     top: Annotated[
         int, typer.Option(help="Try only this many of the likeliest; 0: all observed.")
     ] = Question.top,
+    who: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Try only these: a mover, a group (escorts, chairs) or a pattern (group[0-3])."
+        ),
+    ] = None,
     repeats: Annotated[
         int, typer.Option(help="Repeats of original and cure with other noise.")
     ] = Question.repeats,
@@ -78,7 +89,8 @@ def blame(
     """Find which mover misled a SLAM, by running the world again without it.
 
     The first divergence of the run is found, world and SLAM are put back to some seconds before,
-    and run on from there with one mover taken out or frozen at a time. Writes blame.png, blame.json
+    and run on from there with one mover (and what it holds) or one group of a crowd taken out or
+    frozen at a time. Writes blame.png, blame.json
     and the recipe.
 
     [bold]mobilia blame out/run-office[/bold]
@@ -89,7 +101,7 @@ def blame(
         raise InvalidValueError("name exactly one of RUN and --scene")
     question = Question(
         rule=Rule(threshold_m=threshold, within_s=within), at_s=at, lead_s=lead,
-        horizon_s=horizon, top=top, repeats=repeats,
+        horizon_s=horizon, top=top, repeats=repeats, who=named(who or []),
     )  # fmt: skip
     check([slam] if slam else [], scene)
     from scripts.debugger.episode import Case, case_of
@@ -97,7 +109,8 @@ def blame(
     if run is not None:
         case, name = case_of(run, slam, every, trust), run_name(run)
     else:
-        world = {"scene": scene, "dynamism": dynamism, "seed": seed}
+        held = Held(motion=motion, change=change, crowd=crowd)
+        world = {"scene": scene, "dynamism": dynamism, **held.given(), "seed": seed}
         settings, name = _world(world, option or [], scanner), f"{scene}-{seed}"
         case = Case(settings=settings, seconds=seconds, slam=slam or "shunting", every=every)
     if at is not None and not 0.0 <= at <= case.seconds:

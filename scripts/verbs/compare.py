@@ -6,13 +6,14 @@ from __future__ import annotations
 import re
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
 
 from scripts.checked import whole
 from scripts.console import console
+from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels, chosen
 from scripts.names import check
 from scripts.oracle_option import Oracles, with_oracles
 from scripts.scanner_option import Scanner, every_of
@@ -34,6 +35,9 @@ def compare(
     dynamism: Annotated[
         list[str] | None, typer.Option(help="Levels, as start:stop:step or one by one.")
     ] = None,
+    motion: MotionLevels = None,
+    change: ChangeLevels = None,
+    crowd: CrowdOption = None,
     seeds: Annotated[int, typer.Option(help="Seeds at every level, the same at each.")] = 10,
     first_seed: Annotated[
         int, typer.Option(help="The first of them; the SLAMs here were tuned on 0 to 19.")
@@ -57,6 +61,7 @@ def compare(
 ) -> None:
     """Run SLAMs on the same simulated runs; write tables of error against dynamism.
 
+    With levels of --motion or --change instead, the other of the two is at 0 unless it is given.
     If it is killed, the same command continues. With a SLAM added, only that SLAM runs.
 
     [bold]mobilia compare --slam shunting ekf odometry --scene arena --dynamism 0:1:0.5 --seeds 3
@@ -71,10 +76,14 @@ def compare(
     from scripts.comparison.plan import Plan
 
     workers.check_jobs(jobs)
+    axis, at, held = axis_levels(dynamism, motion, change)
     plan = Plan(
         slams=slams,
         scenes=rooms,
-        levels=levels(dynamism or ["0:1:0.25"]),
+        axis=axis,
+        levels=at,
+        **held,
+        crowd=crowd,
         seeds=tuple(range(first_seed, first_seed + seeds)),
         seconds=seconds,
         every=every_of(scanner, every, 8),
@@ -100,17 +109,26 @@ def named(values: list[str]) -> tuple[str, ...]:
     return tuple(word for words in parts for word in words if word)
 
 
-def levels(values: list[str]) -> tuple[float, ...]:
+def axis_levels(
+    dynamism: list[str] | None, motion: list[str] | None, change: list[str] | None
+) -> tuple[str, tuple[float, ...], dict[str, Any]]:
+    """The axis, its levels and what is held, from the three options; default 0 to 1 dynamism."""
+    given = {"dynamism": dynamism, "motion": motion, "change": change}
+    axis, at, held = chosen(*(levels(values or [], f"--{k}") for k, values in given.items()))
+    return axis, at or levels(["0:1:0.25"]), dict(held)
+
+
+def levels(values: list[str], option: str = "--dynamism") -> tuple[float, ...]:
     """``["0:1:0.5"]`` or ``["0", "0.5,1"]`` -> (0, 0.5, 1)."""
     found: list[float] = []
     for word in named(values):
         if ":" in word:
-            found += sweep(word, "--dynamism")
+            found += sweep(word, option)
             continue
         try:
             found.append(float(word))
         except ValueError:
             raise InvalidValueError(
-                f"--dynamism must be numbers or start:stop:step, got {word!r}"
+                f"{option} must be numbers or start:stop:step, got {word!r}"
             ) from None
     return tuple(found)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from slam.settings import Row, Settings
 
 BY_DEVICE = "TD: technical description 8008970/06-2003, TL: telegram listing 8007954"
-ROOMS = ("actors", "dynamism")  # what belongs to no SLAM
+ROOMS = ("actors", "dynamism", "crowds")  # what belongs to no SLAM
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of dynamism that are printed
 
 
@@ -22,7 +22,7 @@ def config(
     what: Annotated[
         str,
         typer.Argument(
-            help="A SLAM (or a variant, SLAM{PATH=VALUE}), actors, dynamism or a scanner."
+            help="A SLAM (or a variant, SLAM{PATH=VALUE}), actors, dynamism, crowds or a scanner."
         ),
     ],
     group: Annotated[
@@ -41,6 +41,9 @@ def config(
     if what == "dynamism":
         _print_dynamism(as_json)
         return
+    if what == "crowds":
+        _print_crowds(as_json)
+        return
     from sim.sensors.lidar import numbers
 
     tree, default = (None, None) if numbers.is_scanner(what) else _trees(what)
@@ -56,11 +59,38 @@ def config(
     _print(rows, changed)
 
 
-def _print_dynamism(as_json: bool) -> None:
-    """The dynamism curves: each rate at five levels."""
-    from sim.core.dynamism import CURVES
+def _print_crowds(as_json: bool) -> None:
+    """The whole crowd of each scene, at motion 1."""
+    from dataclasses import asdict
 
-    rows = [(rate, [rate.at(level) for level in LEVELS]) for rate in CURVES]
+    from scenes.crowd import MIXES, OTHERS
+
+    mixes = {**MIXES, "any other": OTHERS}
+    if as_json:
+        words = {scene: asdict(crowd) for scene, crowd in mixes.items()}
+        print(json.dumps({"crowds": words}, indent=1))
+        return
+    from rich.table import Table
+
+    from scripts.console import console
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("scene")
+    table.add_column("crowd at motion 1", overflow="fold")
+    for scene, crowd in mixes.items():
+        table.add_row(scene, str(crowd))
+    console.print(table)
+    console.print("At motion m there are m times as many of each. Another: --crowd escorts:6")
+
+
+def _print_dynamism(as_json: bool) -> None:
+    """The dynamism curves: each rate of motion, and change, at five levels."""
+    from sim.core.dynamism import CURVES as OF_MOTION
+    from sim.core.dynamism import Rate
+
+    meaning = "of what can move, the share elsewhere when seen again"
+    curves = (*OF_MOTION, Rate("change", meaning, "1", lambda d: d))
+    rows = [(rate, [rate.at(level) for level in LEVELS]) for rate in curves]
     if as_json:
         words = [
             {"field": rate.field, "meaning": rate.meaning, "unit": rate.unit,

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check
 from scripts.scanner_option import Scanner
 
@@ -21,6 +22,9 @@ def demo(
     dynamism: Annotated[
         float, typer.Option(help="How much the room moves: 0 nothing, 1 most.")
     ] = 0.5,
+    motion: Motion = None,
+    change: Change = None,
+    crowd: CrowdOption = None,
     seed: Annotated[int, typer.Option(help="Seed of everything, whole number >= 0.")] = 0,
     scan_height: Annotated[
         float, typer.Option(help="Height of the scanner above the floor, m.")
@@ -43,5 +47,6 @@ def demo(
     from scripts.single_run.session import Outputs
 
     outputs = Outputs(folder=out, command="demo", overwrite=overwrite, film=film, film_fps=FILM_FPS)
-    settings = tour(scene, seconds, dynamism, seed, scan_height, scanner)
+    held = Held(motion=motion, change=change, crowd=crowd)
+    settings = tour(scene, seconds, dynamism, seed, scan_height, scanner, held)
     on_scene(["shunting"], settings, outputs)

@@ -12,9 +12,10 @@ from rich.markup import escape
 
 from scripts.checked import whole
 from scripts.console import console
+from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels
 from scripts.names import check
 from scripts.scanner_option import Scanner, every_of
-from scripts.verbs.compare import levels, named
+from scripts.verbs.compare import axis_levels, named
 from slam.errors import InvalidValueError
 from slam.variants import with_set
 
@@ -26,6 +27,9 @@ def drive(
     dynamism: Annotated[
         list[str] | None, typer.Option(help="Levels, start:stop:step or one by one; 0:1:0.25.")
     ] = None,
+    motion: MotionLevels = None,
+    change: ChangeLevels = None,
+    crowd: CrowdOption = None,
     seeds: Annotated[
         list[str] | None, typer.Option(help="How many seeds, from 100 on; or several seeds.")
     ] = None,
@@ -61,10 +65,14 @@ def drive(
     from sim.loop.config import LoopConfig
 
     workers.check_jobs(jobs)
+    axis, at, held = axis_levels(dynamism, motion, change)
     plan = Plan(
         scene=scene,
         slams=slams,
-        levels=levels(dynamism or ["0:1:0.25"]),
+        axis=axis,
+        levels=at,
+        **held,
+        crowd=crowd,
         seeds=_seeds(named(seeds or ["5"])),
         goals=_goals(named(goals or [])),
         loop=LoopConfig(plan_on=plan_on, limit_s=seconds, scans=every_of(scanner, every, 4)),

@@ -17,6 +17,7 @@ from rich.table import Table
 from scenes import registry
 from scripts import interrupt
 from scripts.console import console, note, progress
+from scripts.knobs import Change, CrowdOption, Held, Motion, options_with
 from scripts.scanner_option import Scanner, rate_hz
 from slam.errors import InvalidValueError
 
@@ -34,6 +35,9 @@ def generate(
     dynamism_sweep: Annotated[
         str, typer.Option(help="Several instead, each with the same seeds: start:stop:step.")
     ] = "",
+    motion: Motion = None,
+    change: Change = None,
+    crowd: CrowdOption = None,
     episodes: Annotated[int, typer.Option(help="Episodes (at each dynamism).")] = 1,
     seconds: Annotated[float, typer.Option(help="Length of an episode, s.")] = 60.0,
     seed: Annotated[int, typer.Option(help="Seed of the first episode; each next one adds 1.")] = 0,
@@ -41,10 +45,6 @@ def generate(
         bool,
         typer.Option("--twins", help="Each episode also semi-static and static, with one path."),
     ] = False,
-    change: Annotated[
-        float | None,
-        typer.Option(help="Share of what is out of sight that is found elsewhere later, 0 to 1."),
-    ] = None,
     sessions: Annotated[
         int, typer.Option(help="So many sessions of one building instead, --change apart.")
     ] = 0,
@@ -67,9 +67,11 @@ def generate(
     from sim.recording.dataset import Plan, writing
     from sim.recording.recipe import Recipe
 
+    Held(motion=motion, change=change, crowd=crowd)  # complains by the options' names
     first = Recipe(
-        scene=scene, seed=seed, dynamism=levels[0], seconds=seconds, scanner=scanner, change=change
-    )
+        scene=scene, seed=seed, dynamism=levels[0], motion=motion, change=change, seconds=seconds,
+        scanner=scanner, options=options_with(crowd),
+    )  # fmt: skip
     plan = Plan(recipe=first, dynamisms=levels, episodes=episodes, twins=twins, sessions=sessions)
     workers.check_jobs(jobs)
     registry.find(scene)  # a wrong name is told, and a module found, before anything starts

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check, run_name
 from scripts.oracle_option import Oracles, with_oracles
 from scripts.scanner_option import Scanner
@@ -35,6 +36,9 @@ def run(
     dynamism: Annotated[
         float, typer.Option(help="How much the simulated room moves: 0 nothing, 1 most.")
     ] = 0.5,
+    motion: Motion = None,
+    change: Change = None,
+    crowd: CrowdOption = None,
     seed: Annotated[int, typer.Option(help="Seed of the simulated run, whole number >= 0.")] = 0,
     scan_height: Annotated[
         float, typer.Option(help="Height of the simulated scanner above the floor, m.")
@@ -70,7 +74,8 @@ def run(
         from scripts.single_run.session import Outputs
 
         folder = out or Path("out") / f"run-{scene.replace(':', '-')}"
-        settings = tour(scene, seconds, dynamism, seed, scan_height, scanner)
+        held = Held(motion=motion, change=change, crowd=crowd)
+        settings = tour(scene, seconds, dynamism, seed, scan_height, scanner, held)
         on_scene(
             slam, settings, Outputs(folder=folder, command="run", overwrite=overwrite, film=film)
         )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
+from scenes.kinds import KINDS
 from sim.core.bodies import Bodies
 from sim.core.engine import Engine, call_force
 from slam._jit import njit
@@ -34,9 +35,13 @@ class Contact:
     force: float
 
     @property
+    def _person(self) -> bool:
+        return self.kind in KINDS and KINDS[self.kind].group == "person"
+
+    @property
     def hard(self) -> bool:
         """A collision one would hear: into something fixed or a person, or above HARD_FORCE."""
-        return self.kind in ("static", "person") or self.force > HARD_FORCE
+        return self.kind == "static" or self._person or self.force > HARD_FORCE
 
 
 class Touches(NamedTuple):

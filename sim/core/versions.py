@@ -2,7 +2,7 @@
 """The version of the world: when one seed comes to give another world, the number goes up.
 
 A world is all that a seed gives: the layout, what moves when, the scans and the wheels' ticks.
-Environment ids end in the number (``mobilia/Office-v1``), recipes hold it as ``world``; a recipe
+Environment ids end in the number (``mobilia/Office-v2``), recipes hold it as ``world``; a recipe
 without was written before that, by world ``UNSAID``. What was made in another version cannot be
 made again in this one: that is refused with a ``WorldVersionError``, never silently other.
 
@@ -65,4 +65,5 @@ def check_world(path: Path, version: int) -> None:
 
 def gone(name: str, version: int, **_: Any) -> NoReturn:
     """What the environment id of an old version makes: a ``WorldVersionError``."""
-    raise WorldVersionError(f"{name}-v{version} is gone, use {name}-v{WORLD}. {CHANGES[version]}.")
+    changes = ". ".join(CHANGES[k] for k in range(version, WORLD))
+    raise WorldVersionError(f"{name}-v{version} is gone, use {name}-v{WORLD}. {changes}.")

@@ -11,8 +11,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from scenes.crowd import crowd_of
 from scenes.scan_plane import SCAN_HEIGHT
 from sim.core.checks import instance, number, one_of, switch, whole_numbers
+from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.gym.actions import clipped
 from sim.gym.observation import Observation, observed, space_of
@@ -78,8 +80,8 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     the first reset raises ``ResetNeededError``.
 
     ### Arguments
-    ``scene``, ``dynamism``, ``laser``, ``scan_height_m``, ``odometry``, ``labels`` as in
-    ``sim.Simulation``;
+    ``scene``, ``dynamism``, ``motion``, ``change``, ``crowd``, ``laser``, ``scan_height_m``,
+    ``odometry``, ``labels`` as in ``sim.Simulation``;
     ``pose_source``: None, "odometry", "shunting", any other SLAM's name, "module:Class", a
     ``SlamSystem``, or "truth"; it takes every scan and is reset with the environment, a failure of
     it is a ``SlamFailedError``. Reward and the end of an episode go by the truth in any case;
@@ -96,7 +98,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     | `start`                   | (x, y, heading) of the robot; refused where it does not fit   |
     | `n_chairs`, `n_people`    | counts, for scenes that have them                             |
     | `scene`                   | any options of the scene recipe, e.g. ``{"n_chairs": 8}``     |
-    | `dynamism`                | 0 to 1, or a ``sim.core.dynamism.Dynamism`` |
+    | `dynamism`                | 0 to 1, or a ``sim.core.dynamism.Dynamism``; replaces motion  |
+    |                           | and change of the constructor too                             |
+    | `motion`, `change`        | 0 to 1, one of the two axes alone                             |
+    | `crowd`                   | who is there besides: "none", "escorts:6,boards:2"            |
     | `moving_share`            | share of chairs on the move at any time                       |
     | `rates`                   | single rates of ``Dynamism``, e.g. ``{"door_rate": 0.1}``     |
     | `scan_height_m`           | of the scanner above the floor                                |
@@ -109,6 +114,8 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     ### Version history
     The number is that of the world (``sim.core.versions``).
+    v2: two axes, motion and change, and crowds; dynamism d of v1 is ``Dynamism.world_1(d)`` with
+    ``crowd="none"``.
     v1: the table of ``sim.core.dynamism`` was set anew; the same seed gives another world than in
     v0. v0: first version; making it raises ``WorldVersionError``.
     """
@@ -122,7 +129,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self,
         scene: str = "office",
         *,
-        dynamism: float = 0.5,
+        dynamism: float | Dynamism = 0.5,
+        motion: float | None = None,
+        change: float | None = None,
+        crowd: str | None = None,
         laser: ScannerConfig | str | None = None,
         scan_height_m: float = SCAN_HEIGHT,
         odometry: str = "pioneer3dx",
@@ -143,6 +153,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         switch("terminate_on_collision", terminate_on_collision)
         switch("labels", labels)
         instance("scene", scene, str)
+        Dynamism.of(dynamism, motion=motion, change=change)
         instance("odometry", odometry, str)
         width, height = whole_numbers("render_size", render_size, "(width, height) in px", MAX_PX)
         self.render_mode = render_mode
@@ -151,6 +162,9 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._settings: dict[str, Any] = {
             "scene": scene,
             "dynamism": dynamism,
+            "motion": motion,
+            "change": change,
+            "crowd": crowd if crowd is None else str(crowd_of(crowd)),
             "laser": scanner_of(laser),
             "scan_height_m": scan_height_m,
             "odometry": odometry,

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from scenes.crowd import crowd_of
 from sim.core.checks import numbers
 from sim.core.dynamism import Dynamism
 from sim.sensors.lidar.models.lms221 import Lms221Config
@@ -18,8 +19,8 @@ from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from slam.errors import InvalidValueError
 
 OPTIONS = (
-    "goal", "start", "seeds", "scene", "n_chairs", "n_people", "dynamism", "moving_share", "rates",
-    "scan_height_m", "resolution_deg", "noise_std_m", "laser",
+    "goal", "start", "seeds", "scene", "n_chairs", "n_people", "dynamism", "motion", "change",
+    "crowd", "moving_share", "rates", "scan_height_m", "resolution_deg", "noise_std_m", "laser",
 )  # fmt: skip
 
 FAR_M = 1e4  # of a goal from the world's origin: the observation space tells no more
@@ -53,9 +54,14 @@ def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> E
             )
     merged = dict(settings)
     merged |= _scene_options(given, settings)
-    passed_on = ("n_chairs", "n_people", "scan_height_m")
+    passed_on = ("n_chairs", "n_people", "scan_height_m", "crowd")
     merged |= {name: given[name] for name in passed_on if name in given}
-    merged["dynamism"] = _rates(merged["dynamism"], given)
+    merged["dynamism"] = _rates(merged, given)
+    merged |= {"motion": None, "change": None}
+    if merged.get("crowd") is None:
+        merged.pop("crowd", None)
+    else:
+        merged["crowd"] = str(crowd_of(merged["crowd"]))
     merged["laser"] = _laser(merged["laser"], given)
     if "start" in given:
         merged["start"] = _finite("start", given["start"], 3, "(x m, y m, heading rad)")
@@ -104,8 +110,12 @@ def _finite(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
     return out
 
 
-def _rates(dynamism: float | Dynamism, given: Mapping[str, Any]) -> Dynamism:
-    rates = Dynamism.of(given.get("dynamism", dynamism), given.get("moving_share"))
+def _rates(settings: Mapping[str, Any], given: Mapping[str, Any]) -> Dynamism:
+    """Of the environment; a dynamism of the episode replaces all that the environment has said."""
+    said = settings if "dynamism" not in given else {}
+    axes = {name: given.get(name, said.get(name)) for name in ("motion", "change")}
+    dynamism = given.get("dynamism", settings["dynamism"])
+    rates = Dynamism.of(dynamism, given.get("moving_share"), **axes)
     changes = mapping("rates", given.get("rates"))
     known = {f.name for f in fields(Dynamism)}
     for name in sorted(set(changes) - known):

@@ -56,6 +56,11 @@ class Plan:
         count = self.episodes * len(self.dynamisms)
         if count > MAX_EPISODES:
             raise InvalidValueError(f"Plan: at most {MAX_EPISODES} episodes, got {count}")
+        both = self.recipe.motion is not None and self.recipe.change is not None
+        if both and len(self.dynamisms) > 1:
+            raise InvalidValueError(
+                "Plan.dynamisms: with motion and change both given, all levels are the same"
+            )
         names = [name for recipe in self.jobs() for name in self.folders(recipe)]
         if len(set(names)) != len(names):
             raise InvalidValueError("Plan.dynamisms are too close: two episodes have one name")

@@ -42,7 +42,7 @@ class ObjectsMessage:
     KIND = "visualization_msgs/msg/MarkerArray"
 
     def __init__(self, movers: Sequence[Mover]) -> None:
-        self._rows = [k for k, mover in enumerate(movers) if mover.kind != "robot"]
+        self._rows = [k for k, mover in enumerate(movers) if mover.group != "robot"]
         shown = [movers[k] for k in self._rows]
         marks, n = Marks(), len(shown)
         poses, colors = marks(7 * n).reshape(n, 7), marks(4 * n, np.float32).reshape(n, 4)
@@ -71,15 +71,18 @@ class ObjectsMessage:
 def _marker(mover: Mover, row: int, pose: Float, color: NDArray[np.float32]) -> object:
     x, y, z, qx, qy, qz, qw = pose.tolist()
     r, g, b, a = color.tolist()
-    door, height = mover.group == "door", kind_of(mover.kind).height_m
-    wide, deep = (mover.radius, LEAF_M) if door else (2.0 * mover.radius, 2.0 * mover.radius)
+    door, row_of = mover.group == "door", kind_of(mover.kind)
+    height, half = row_of.height_m, row_of.half_length_m
+    wide, deep = 2.0 * (half + mover.radius), 2.0 * mover.radius
+    if door:
+        wide, deep = mover.radius, LEAF_M
     none = np.zeros(0, dtype=np.uint8)
     return message(
         "visualization_msgs/msg/Marker",
         header=header(WORLD),
         ns=mover.kind,
         id=row,
-        type=_CUBE if door else _CYLINDER,
+        type=_CUBE if door or half > 0.0 else _CYLINDER,
         action=0,
         pose=message(
             "geometry_msgs/msg/Pose",

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from scenes.crowd import crowd_of
 from sim.core.checks import number, one_of
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
@@ -36,6 +37,7 @@ RECIPE = "recipe.json"
 SCHEMA = 1
 MAX_BYTES = 1 << 16
 MAX_SECONDS = 86_400.0
+_AXES = ("motion", "change")
 _DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "rosbags")
 
 
@@ -44,9 +46,11 @@ class Recipe:
     """What decides an episode.
 
     scene       registered name or ``module:function``; ``options`` of it, e.g. n_chairs, and
-                ``scan_height_m``, but nothing that ``Simulation`` or ``Recipe`` has a name for
+                ``scan_height_m`` and ``crowd``, but nothing that ``Simulation`` or ``Recipe`` has
+                a name for
     seed        whole number >= 0
     dynamism    number in [0, 1]
+    motion, change  one of its two axes alone, in [0, 1]; None: as dynamism says
     seconds     of driving
     scanner     registered name, and which errors: "utm30lx:noise" (``sim.sensors.lidar.registry``);
                 "full", "noise" and "ideal" are those of the LMS-221
@@ -68,6 +72,7 @@ class Recipe:
     range_mode: str = "80m"
     odometry: str = "pioneer3dx"
     twin: str = ""
+    motion: float | None = None
     change: float | None = None
     session: int | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -76,7 +81,7 @@ class Recipe:
         if not isinstance(self.scene, str) or not self.scene:
             raise InvalidValueError(f"Recipe.scene must be a name, got {self.scene!r}")
         Seeds(self.seed)
-        Dynamism.at(self.dynamism)
+        Dynamism.of(Dynamism.at(self.dynamism), motion=self.motion, change=self.change)
         number("Recipe.seconds", self.seconds)
         if not 0.0 < self.seconds <= MAX_SECONDS:
             raise InvalidValueError(
@@ -94,6 +99,8 @@ class Recipe:
                 f"Recipe.options are of the scene: {taken[0]!r} is none, it would override the "
                 f"recipe's own, got {self.options[taken[0]]!r}"
             )
+        if "crowd" in self.options:
+            crowd_of(self.options["crowd"])
         self.laser()
 
     def _check_change(self) -> None:
@@ -108,13 +115,13 @@ class Recipe:
 
     @property
     def share_changed(self) -> float:
-        """Of the things, from one session to the next: ``change``, else the dynamism."""
+        """Of things out of sight, or from one session to the next: ``change``, else dynamism."""
         return float(self.dynamism if self.change is None else self.change)
 
     @property
     def rearranges(self) -> bool:
         """Whether things are put elsewhere during the episode, and written down."""
-        return self.session is None and self.twin in ("", TWINS[0]) and bool(self.change)
+        return self.session is None and self.twin in ("", TWINS[0]) and self.share_changed > 0.0
 
     def laser(self) -> ScannerConfig:
         """How the scanner is set."""
@@ -126,9 +133,8 @@ class Recipe:
 
     def simulation(self) -> dict[str, Any]:
         """Arguments of ``Simulation``."""
-        more: dict[str, Any] = {} if self.change is None else {"change": self.change}
-        if self.session is not None:
-            more = {"change": self.share_changed, "session": self.session}
+        later = (*_AXES, "session")
+        more = {name: getattr(self, name) for name in later if getattr(self, name) is not None}
         return {
             "scene": self.scene,
             "seed": self.seed,
@@ -146,15 +152,20 @@ class Recipe:
 
     @property
     def name(self) -> str:
-        """Of the episode's folder: ``office-d0.50-s0001``, with the twin's name at the end."""
+        """Of the episode's folder: ``office-d0.5-m0.2-c0-s0001``; at the end the twin's name.
+
+        ``-m`` is motion and ``-c`` change, where they are given.
+        """
         scene = re.sub(r"[^A-Za-z0-9_.]+", "-", self.scene).strip("-.")
         twin = f"-{self.twin}" if self.twin else ""
         session = "" if self.session is None else f"-session{self.session:02d}"
-        return f"{scene}-d{self.dynamism:.4g}-s{self.seed:04d}{session}{twin}"
+        levels = [(axis[0], getattr(self, axis)) for axis in ("dynamism", *_AXES)]
+        level = "".join(f"-{letter}{at:.4g}" for letter, at in levels if at is not None)
+        return f"{scene}{level}-s{self.seed:04d}{session}{twin}"
 
     def words(self) -> dict[str, Any]:
-        """As JSON has it; what was added since the first recipes is left out where it is None."""
-        later = ("change", "session")
+        """As it is written; what was added since the first recipes has no word where it is None."""
+        later = (*_AXES, "session")
         return {k: v for k, v in asdict(self).items() if k not in later or v is not None}
 
     @property

@@ -6,6 +6,10 @@ ray; a door, which cannot leave its hinge, stands wide open instead, unseen and 
 still keep a hand's breadth off the open leaf). One that is **frozen** stays where it is, whatever
 pushes it: nobody shoves it, it does not walk (a foot in the air comes down), no closer pulls it.
 
+Who goes out takes along what it holds (a board, a train of trolleys); of a couch between two the
+other one stays, with empty hands. Who followed somebody that is out stands where it is. A chair
+that somebody has just taken up stays, and whoever held what is out goes on without.
+
 The model keeps its size, so a state saved without either fits a simulation with it and the other
 way round. Nobody else draws other numbers: every actor has a generator of its own. What the others
 do may differ all the same, because they meet, or no longer meet, what was changed.
@@ -21,8 +25,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.groups import with_held
 from scenes.kinds import is_door, joint_of_door
 from sim.actors.doors import OPENED
+from sim.actors.holding import QB, VA, VB
 from sim.actors.people import columns, gait
 from sim.sensors.lidar.candidates import HULL_GROUP
 from sim.sensors.lidar.device import LaserScanner
@@ -37,10 +43,14 @@ BESIDE_M, APART_M = 20.0, 3.0  # from the floor to the first one parked, and bet
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """What is different: names of movers that are out, and of those that are frozen."""
+    """What is different: names of movers that are out, and of those that are frozen.
+
+    called  what they are called together, "" for their names
+    """
 
     out: tuple[str, ...] = ()
     frozen: tuple[str, ...] = ()
+    called: str = ""
 
     def __post_init__(self) -> None:
         names = [*self.out, *self.frozen]
@@ -49,7 +59,7 @@ class Change:
 
     def __str__(self) -> str:
         named = (("out", self.out), ("frozen", self.frozen))
-        words = [f"{' + '.join(names)} {how}" for how, names in named if names]
+        words = [f"{self.called or ' + '.join(names)} {how}" for how, names in named if names]
         return ", ".join(words) or "as it was"
 
 
@@ -62,16 +72,20 @@ def apply(simulation: Simulation, change: Change) -> None:
     world = simulation.world
     for name in (*change.out, *change.frozen):
         _check(world, name)
-    for name in change.out:
+    out = with_held(world.scene.holds, change.out)
+    for name in out:
         _hide(world, name)
-    if change.out:
+    if out:
         _look_again(simulation)
-    for name in change.out:
+    for name in out:
         _park(world, name)
-    for name in change.frozen:
+    if out:
+        _let_go(world, out)
+    frozen = [name for name in change.frozen if name not in out]
+    for name in (*frozen, *_left_behind(world, out)):
         _halt(world, name, seated=True)
     world.people.dress()
-    world.pin(_pinned(world, (*change.out, *change.frozen)))
+    world.pin(_pinned(world, (*out, *frozen)))
 
 
 def _check(world: World, name: str) -> None:
@@ -84,7 +98,7 @@ def _check(world: World, name: str) -> None:
 
 
 def _kind(world: World, name: str) -> str:
-    return world.scene.movers[world.mover_names.index(name)].kind
+    return world.scene.movers[world.mover_names.index(name)].group
 
 
 def _bodies(world: World, name: str) -> Int:
@@ -134,6 +148,30 @@ def _park(world: World, name: str) -> None:
         gait.stand(qpos, table.torsos[i : i + 1], world.people.feet[i : i + 1])
         physics, mocap = (qpos, world.data.qvel), (world.data.mocap_pos, world.data.mocap_quat)
         gait.walk(0.0, physics, table.torsos, table.limbs, world.people.feet, table.sitting, mocap)
+
+
+def _let_go(world: World, out: Sequence[str]) -> None:
+    """Open the hands of those who are out, and the hands on what is out; no force stays."""
+    people, (_, dofs) = world.people, world.bodies.addresses(out)
+    held, task, qfrc = people.table.held, people.crowd.task, world.data.qfrc_applied
+    gone = np.isin(held.at[:, VA], dofs) | np.isin(held.at[:, VB], dofs)
+    for k in np.flatnonzero(gone & (held.at[:, QB] >= 0)):
+        for first in (held.at[k, VA], held.at[k, VB]):
+            qfrc[first : first + 3] = 0.0
+        held.at[k, [QB, VB]] = -1
+    discs = people.table.at.discs[:, 1]
+    rows = np.flatnonzero(np.isin(discs, dofs))
+    empty = np.isin(task[:, columns.HELD], rows) | np.isin(discs[: len(task)], dofs)
+    for i in np.flatnonzero(empty & (task[:, columns.HELD] >= 0)):
+        task[i, columns.HELD] = -1
+        if task[i, columns.WALKING] == columns.TO_CHAIR or task[i, columns.HAND] >= 0:
+            task[i, columns.WALKING] = columns.STANDS
+
+
+def _left_behind(world: World, out: Sequence[str]) -> list[str]:
+    """Those whose leader is out, and who is not out as well."""
+    roles = world.scene.roles.items()
+    return [name for name, role in roles if role.leader in out and name not in out]
 
 
 def _free_seat(world: World, name: str) -> None:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the golden test holds: a digest of every kind of result, and a few numbers beside it.
 
+What moves there moves as in world 1, without a crowd or change out of sight, but for ``CROWDED``.
+
 ``python -m tests.golden.digests`` prints how today's results differ from ``golden.json``;
 ``--write`` records them anew; ``--only WORD`` looks at those whose name holds the word. A change of
 code that moves things must leave the file alone. A change that moves a number writes it in a commit
@@ -29,12 +31,13 @@ import numpy as np
 
 from scripts.comparison.make import carry_out
 from scripts.comparison.plan import Plan
-from scripts.film.footage import of_scene
+from scripts.film.footage import of_simulation, title_of
 from scripts.film.render import pictures_at
+from sim.core.dynamism import Dynamism
 from sim.recording.episode import record
-from sim.recording.recipe import Recipe, made_with
+from sim.recording.recipe import RECIPE, Recipe, made_with, read_recipe
 from sim.recording.sums import read_sums
-from sim.simulation import stream
+from sim.simulation import Simulation, stream
 from slam import create, se2
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import Frame
@@ -43,6 +46,8 @@ from slam.logs import open_log
 FILE = Path(__file__).with_name("golden.json")
 TOLERANCE = 1e-6  # m and rad: beyond rounding, below anything that a figure shows
 OF_THE_MACHINE = ("ms_per_scan_p50", "ms_per_scan_p99", "peak_memory_mb")  # columns of runs.csv
+WORLD_1: dict[str, Any] = {"change": 0.0, "options": {"crowd": "none"}}  # of a recipe
+CROWDED: tuple[tuple[str, float], ...] = ()  # rows of this world: (("0.5 of world 2", 0.5),)
 Golden = dict[str, Any]
 
 
@@ -68,7 +73,7 @@ class _Digest:
         return self._hash.hexdigest()
 
 
-def frames_of(scene: str, dynamism: float) -> Golden:
+def frames_of(scene: str, dynamism: float | Dynamism) -> Golden:
     """Scans, labels, odometry and truth of 3 s."""
     digest, last = _Digest(), None
     for frame in stream(scene, seed=7, dynamism=dynamism, seconds=3.0, labels=True):
@@ -105,13 +110,15 @@ def estimates_of(frames: Iterable[Frame], name: str, **options: Any) -> Golden:
 
 
 def on_room(scene: str, name: str, **options: Any) -> Golden:
-    """On 6 s of a simulated room in which half of all moves."""
-    return estimates_of(stream(scene, seed=11, dynamism=0.5, seconds=6.0), name, **options)
+    """On 6 s of a simulated room as it was at dynamism 0.5 of world 1."""
+    rates = Dynamism.world_1(0.5)
+    return estimates_of(stream(scene, seed=11, dynamism=rates, seconds=6.0), name, **options)
 
 
 def on_kidnap() -> Golden:
     """On 8 s of a tour and back at its start, unknown to the wheels: lost, found."""
-    there = list(stream("office", seed=11, dynamism=0.25, seconds=8.0))[::2]
+    rates = Dynamism.world_1(0.25)
+    there = list(stream("office", seed=11, dynamism=rates, seconds=8.0))[::2]
     step = there[1].stamp_ns - there[0].stamp_ns
     frames, last = list(there), there[-1]
     for k, frame in enumerate(there, 1):
@@ -148,20 +155,23 @@ def on_intel(name: str, scans: int, **options: Any) -> Golden:
 
 
 def episode() -> Golden:
-    """Every file of a generated episode, but its recipe, which names this machine."""
+    """The messages of a generated episode and its other files, but for its recipe, which names this
+    machine, and what holds the episode's name."""
     with tempfile.TemporaryDirectory() as folder:
-        recipe = Recipe(scene="office", seed=5, dynamism=0.5, seconds=1.0)
+        recipe = Recipe(scene="office", seed=5, dynamism=0.5, seconds=1.0, **WORLD_1)
         record(recipe, Path(folder))
         sums = read_sums(Path(folder) / recipe.name)
-    sums.pop("recipe.json")
-    return {"sha256": sums}
+        made = read_recipe(Path(folder) / recipe.name / RECIPE)
+    kept = ("map.pgm", "map.yaml", "relations.txt", "trajectory.tum")
+    messages = {"messages": str(made.result["messages_sha256"])}
+    return {"sha256": {name: sums[name] for name in kept} | messages}
 
 
 def compared() -> Golden:
     """``runs.csv`` of a small comparison without what the machine decides, and its statistics."""
     plan = Plan(
         slams=("shunting", "occupancy", "ekf", "odometry"), scenes=("arena",), levels=(0.0, 1.0),
-        seeds=(7,), seconds=2.0,
+        seeds=(7,), seconds=2.0, change=0.0, crowd="none",
     )  # fmt: skip
     digest = _Digest()
     with tempfile.TemporaryDirectory() as folder:
@@ -179,7 +189,9 @@ def compared() -> Golden:
 
 def film() -> Golden:
     """Two film frames without OpenGL."""
-    footage = of_scene({"scene": "arena", "seconds": 2.0, "dynamism": 1.0, "seed": 3}, view=None)
+    simulation = Simulation("arena", seed=3, dynamism=Dynamism.world_1(1.0), labels=True)
+    title = title_of({"scene": "arena", "dynamism": 1.0, "seed": 3})
+    footage = of_simulation(simulation, seconds=2.0, title=title, view=None)
     digest = _Digest()
     pictures = pictures_at(footage.stream, footage.show(["shunting"]), [0.5, 1.5], whole=True)
     digest.add(*pictures)
@@ -192,9 +204,9 @@ def _numbers(values: Any) -> list[float]:
 
 MAKERS: dict[str, Callable[[], Golden]] = {
     **{
-        f"frames/{scene}/{level}": lambda scene=scene, level=level: frames_of(scene, level)
+        f"frames/{scene}/{name}": lambda scene=scene, rates=rates: frames_of(scene, rates)
         for scene in ("arena", "office")
-        for level in (0.0, 1.0)
+        for name, rates in (("0.0", 0.0), ("1.0", Dynamism.world_1(1.0)), *CROWDED)
     },
     **{
         f"estimates/{scene}/{title}": lambda scene=scene, name=name, o=o: on_room(scene, name, **o)

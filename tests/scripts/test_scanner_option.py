@@ -94,10 +94,10 @@ def test_a_run_goes_back_to_a_checkpoint_bit_for_bit(laser: str) -> None:
 @pytest.mark.parametrize("laser", ["utm30lx", "rplidar_a1:noise"])
 def test_the_observation_follows_the_scanner(laser: str) -> None:
     beams = scanner_of(laser).spec().n_beams
-    env = gymnasium.make("mobilia/Arena-v1", laser=laser)
+    env = gymnasium.make("mobilia/Arena-v2", laser=laser)
     seen, _ = env.reset(seed=3)
     assert env.observation_space["ranges"].shape == seen["ranges"].shape == (beams,)
-    rooms = gymnasium.make_vec("mobilia/Arena-v1", num_envs=2, laser=laser)
+    rooms = gymnasium.make_vec("mobilia/Arena-v2", num_envs=2, laser=laser)
     stacked, _ = rooms.reset(seed=3)
     assert stacked["ranges"].shape == (2, beams)
     for _ in range(3):

@@ -10,18 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from scenes.scene import Mover
 from sim.events import CHAIR, CHANGE, DOOR, KIDNAP, NEAR_M, PERSON, Event, EventWatch
 from sim.moments import Moment, toured
 from sim.simulation import Simulation
 from slam.frames import BeamLabels, Frame, LaserSpec, Odometry, Scan
 
-MOVERS = [("chair0", "chair_swivel", 0.3), ("door0", "door", 0.9), ("someone", "person", 0.25),
+MOVERS = [("chair0", "chair_swivel", 0.3), ("door0", "door", 0.9), ("someone", "person_coat", 0.25),
           ("robot", "robot", 0.25)]  # fmt: skip
 SPEC = LaserSpec(n_beams=2, angle_min=0.0, angle_increment=0.1)
 
 
 def watch() -> EventWatch:
-    movers = [SimpleNamespace(name=n, kind=k, radius=r) for n, k, r in MOVERS]
+    movers = [Mover(name=n, kind=k, radius=r) for n, k, r in MOVERS]
     bodies = SimpleNamespace(mover_of_body=np.array([-1, 0, 1, 2, 3]))
     scene = SimpleNamespace(movers=movers, bounds=(0.0, 0.0, 9.0, 9.0))
     world: Any = SimpleNamespace(scene=scene, bodies=bodies, change=0.0)

@@ -2,9 +2,9 @@
 """How people decide, all of them in one compiled call per control tick.
 
 Each person stays somewhere, walks to the next goal down its flow field (``sim.core.flow``) or
-follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that hits nothing soon (``sim.actors.people.avoidance``). A person
-whose way is blocked by a chair loses patience and pushes it; now and then one sits down
-(``sim.actors.people.sitting``).
+follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that
+hits nothing soon (``sim.actors.people.avoidance``). A person whose way is blocked by a chair loses
+patience and pushes it; now and then one sits down (``sim.actors.people.sitting``).
 """
 
 from __future__ import annotations

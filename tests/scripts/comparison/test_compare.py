@@ -31,7 +31,10 @@ from slam.evaluation.lost import LOST_M
 
 REPO = Path(__file__).resolve().parents[3]
 SECONDS = 1.6
-PLAN = {"scenes": ("arena",), "levels": (1.0,), "seeds": (7,), "seconds": SECONDS}
+PLAN = {
+    "scenes": ("arena",), "levels": (1.0,), "seeds": (7,), "seconds": SECONDS, "change": 0.0,
+    "crowd": "none",
+}  # fmt: skip
 OF_THE_MACHINE = ("ms_per_scan_p50", "ms_per_scan_p99", "peak_memory_mb")
 
 
@@ -152,7 +155,7 @@ def test_killed_and_resumed_and_one_slam_more(tmp_path):
         "from pathlib import Path; from scripts.comparison import make; "
         "from scripts.comparison.plan import Plan; "
         "make.carry_out(Plan(slams=('odometry', 'occupancy'), scenes=('arena',), levels=(1.0,),"
-        f" seeds=(7,), seconds={SECONDS}), Path({str(tmp_path / 'a')!r}))"
+        f" seeds=(7,), seconds={SECONDS}, change=0.0, crowd='none'), Path({str(tmp_path / 'a')!r}))"
     )
     process = subprocess.Popen([sys.executable, "-c", command], cwd=REPO)
     while not list(tmp_path.glob("a/entries/arena*.npz")) and process.poll() is None:

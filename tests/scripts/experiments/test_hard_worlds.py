@@ -11,11 +11,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scripts import axis as axes
 from scripts.comparison import folder
 from scripts.comparison.plan import Plan
 from scripts.experiments import breaking_point, share_seen
-from sim.recording.recipe import Recipe
+from scripts.knobs import Axis
+from sim.core.dynamism import Dynamism
 from slam import system
 from slam.errors import InvalidValueError
 from slam.estimate import Estimate
@@ -26,14 +26,15 @@ N, S, SEMI, M = (int(kind) for kind in BeamClass)
 
 
 def test_a_level_sets_both_axes_or_one():
-    def apart(*, dynamism: float, motion: float = 0.0) -> None: ...
-
-    assert axes.at("both", 0.5, Recipe) == {"dynamism": 0.5}
-    assert axes.at("motion", 0.5, apart) == {"dynamism": 0.0, "motion": 0.5}
-    with pytest.raises(InvalidValueError, match="apart has no change="):
-        axes.at("change", 0.5, apart)
-    with pytest.raises(InvalidValueError, match="axis must be one of both, motion, change"):
-        axes.at("speed", 0.5, Recipe)
+    at = Axis(name="motion").at(0.5)
+    rates = Dynamism.of(**at)
+    assert (rates.crowd, rates.change) == (0.5, 0.0)
+    rates = Dynamism.of(**Axis(name="change").at(0.5))
+    assert (rates.crowd, rates.change) == (0.0, 0.5)
+    rates = Dynamism.of(**Axis().at(0.5))
+    assert (rates.crowd, rates.change) == (0.5, 0.5)
+    with pytest.raises(InvalidValueError, match="axis must be one of dynamism, motion, change"):
+        Axis(name="speed")
     with pytest.raises(InvalidValueError, match="axis must be one of"):
         Plan(slams=("odometry",), scenes=("arena",), levels=(1.0,), seeds=(7,), axis="speed")
 
@@ -137,7 +138,16 @@ class Raises(OdometrySlam):
 def test_the_breaking_point_of_a_tiny_plan(tmp_path: Path, capsys, monkeypatch):
     for name, kind in (("sure", Sure), ("raises", Raises)):
         monkeypatch.setitem(system._registry, name, kind)
-    words = ["--slams", "sure", "raises", "oracle(odometry)", "--scenes", "arena", "--axis", "both"]
+    words = [
+        "--slams",
+        "sure",
+        "raises",
+        "oracle(odometry)",
+        "--scenes",
+        "arena",
+        "--axis",
+        "dynamism",
+    ]
     words += ["--levels", "0", "1", "--seeds", "1", "--seconds", "1.6", "--no-page"]
     files = {name: str(tmp_path / name) for name in ("out", "results.json", "picture.png")}
     words += ["--out", files["out"], "--results", files["results.json"]]
@@ -162,11 +172,11 @@ def test_the_breaking_point_of_a_tiny_plan(tmp_path: Path, capsys, monkeypatch):
     assert len(kept) == 8
     assert breaking_point.main(words) == 0
     assert {p: p.stat().st_mtime_ns for p in kept} == kept
-    assert folder.read(tmp_path / "out" / "both").recipe["settings"]["axis"] == "both"
+    assert folder.read(tmp_path / "out" / "dynamism").recipe["settings"]["axis"] == "dynamism"
 
 
 def test_what_cannot_be_planned_is_one_line(tmp_path: Path, capsys):
-    words = ["--scenes", "arenna", "--axis", "both", "--no-page", "--out", str(tmp_path)]
+    words = ["--scenes", "arenna", "--axis", "dynamism", "--no-page", "--out", str(tmp_path)]
     words += ["--results", str(tmp_path / "r.json")]
     assert breaking_point.main(words) == 1
     assert "Did you mean 'arena'" in capsys.readouterr().err

@@ -106,7 +106,7 @@ def test_a_log_runs_from_end_to_end(tmp_path: Path, called):
 def test_list_names_scenes_slams_and_environments(called):
     done = called("list")
     assert done.returncode == 0
-    for word in ("arena", "office", "shunting", "odometry", "mobilia/Office-v1"):
+    for word in ("arena", "office", "shunting", "odometry", "mobilia/Office-v2"):
         assert word in done.stdout
 
 

@@ -15,7 +15,7 @@ from sim.gym.env import MobiliaEnv
 from sim.view import gl
 from slam.errors import InvalidValueError, MobiliaError
 
-IDS = ("mobilia/Arena-v1", "mobilia/Office-v1")
+IDS = ("mobilia/Arena-v2", "mobilia/Office-v2")
 
 
 def make(id_: str, **settings):
@@ -29,13 +29,13 @@ def test_the_checker_finds_nothing_to_say(id_):
 
 
 def test_it_can_be_made_without_importing_sim_first():
-    env = gymnasium.make("sim:mobilia/Arena-v1", disable_env_checker=True)
+    env = gymnasium.make("sim:mobilia/Arena-v2", disable_env_checker=True)
     observation, _ = env.reset(seed=0)
     assert env.observation_space.contains(observation)
 
 
 def rollout(seed: int, steps: int = 12):
-    env = make("mobilia/Arena-v1")
+    env = make("mobilia/Arena-v2")
     seen = [env.reset(seed=seed)[0]]
     for k in range(steps):
         seen.append(env.step(np.array([0.5, math.sin(0.3 * k)], np.float32))[0])
@@ -49,7 +49,7 @@ def test_the_seed_and_only_the_seed_decides_a_run():
 
 
 def test_no_return_is_range_max_and_invalid_and_an_inf_in_the_frame():
-    env = make("mobilia/Office-v1")
+    env = make("mobilia/Office-v2")
     observation, info = env.reset(seed=0)
     scan = info["frame"].scan
     np.testing.assert_array_equal(observation["valid"].astype(bool), scan.valid)
@@ -59,7 +59,7 @@ def test_no_return_is_range_max_and_invalid_and_an_inf_in_the_frame():
 
 
 def test_truth_is_in_info_only():
-    env = make("mobilia/Arena-v1")
+    env = make("mobilia/Arena-v2")
     observation, info = env.reset(seed=0)
     assert set(observation) == {"ranges", "valid", "encoders", "time"}
     assert {"pose", "frame", "beam_time", "contacts", "movers"} <= set(info)
@@ -70,7 +70,7 @@ def test_truth_is_in_info_only():
 
 
 def test_reward_is_the_progress_towards_the_goal_and_the_goal_ends_the_episode():
-    env = make("mobilia/Arena-v1", dynamism=0.0)
+    env = make("mobilia/Arena-v2", dynamism=0.0)
     _, info = env.reset(seed=1, options={"scene": {"n_chairs": 0}})
     x, y, theta = info["pose"]
     goal = (x + 1.2 * math.cos(theta), y + 1.2 * math.sin(theta))
@@ -88,7 +88,7 @@ def test_reward_is_the_progress_towards_the_goal_and_the_goal_ends_the_episode()
 
 
 def test_without_a_goal_the_reward_is_zero_and_time_truncates():
-    env = make("mobilia/Arena-v1", time_limit_s=0.2)
+    env = make("mobilia/Arena-v2", time_limit_s=0.2)
     env.reset(seed=0)
     ends = [env.step(np.zeros(2, np.float32))[1:4] for _ in range(8)]
     assert all(reward == 0.0 and not terminated for reward, terminated, _ in ends)
@@ -98,7 +98,7 @@ def test_without_a_goal_the_reward_is_zero_and_time_truncates():
 
 def test_a_hard_collision_ends_the_episode_only_when_asked():
     def crash(**settings):
-        env = make("mobilia/Arena-v1", dynamism=0.0, time_limit_s=30.0, **settings)
+        env = make("mobilia/Arena-v2", dynamism=0.0, time_limit_s=30.0, **settings)
         env.reset(seed=2, options={"scene": {"n_chairs": 0}})
         for _ in range(700):
             _, _, terminated, _, info = env.step(np.array([1.0, 0.0], np.float32))
@@ -111,7 +111,7 @@ def test_a_hard_collision_ends_the_episode_only_when_asked():
 
 
 def test_the_map_is_a_picture_and_needs_no_gl():
-    env = make("mobilia/Office-v1", render_mode="map", render_size=(320, 240))
+    env = make("mobilia/Office-v2", render_mode="map", render_size=(320, 240))
     env.reset(seed=0)
     picture = env.render()
     assert picture.shape == (240, 320, 3)
@@ -123,7 +123,7 @@ def test_the_map_is_a_picture_and_needs_no_gl():
 @pytest.mark.skipif(gl.find().backend is None, reason="NO OpenGL HERE: 3D pictures not tested")
 def test_the_cameras_see_a_room():
     for view in ("top", "follow", "persp"):
-        env = make("mobilia/Arena-v1", render_mode="rgb_array", view=view, render_size=(160, 120))
+        env = make("mobilia/Arena-v2", render_mode="rgb_array", view=view, render_size=(160, 120))
         env.reset(seed=0)
         picture = env.render()
         env.close()
@@ -154,18 +154,19 @@ def test_the_cameras_see_a_room():
     ],
 )
 def test_wrong_options_are_refused_by_name(options, message):
-    env = make("mobilia/Arena-v1")
+    env = make("mobilia/Arena-v2")
     with pytest.raises(MobiliaError, match=message):
         env.reset(seed=0, options=options)
 
 
 def test_an_episode_can_have_its_own_counts_rates_laser_and_start():
-    env = make("mobilia/Arena-v1")
+    env = make("mobilia/Arena-v2")
     start = (1.2, 1.1, 0.7)
     observation, info = env.reset(
         seed=3,
         options={
             "n_chairs": 2,
+            "crowd": "none",  # nobody stands where it starts
             "rates": {"chair_push_rate": 0.3},
             "moving_share": 1.0,
             "resolution_deg": 1.0,
@@ -186,7 +187,7 @@ def test_an_episode_can_have_its_own_counts_rates_laser_and_start():
 
 
 def test_a_start_on_a_chair_is_refused():
-    env = make("mobilia/Arena-v1")
+    env = make("mobilia/Arena-v2")
     layout = {"seeds": {"layout": 1}}
     _, info = env.reset(seed=0, options=layout)
     with pytest.raises(InvalidValueError, match="taken by chair0"):
@@ -197,7 +198,7 @@ def test_wrong_settings_are_refused():
     with pytest.raises(InvalidValueError, match="render_mode"):
         MobiliaEnv("arena", render_mode="human3000")
     with pytest.raises(InvalidValueError, match="time_limit_s"):
-        make("mobilia/Arena-v1", time_limit_s=0.0)
+        make("mobilia/Arena-v2", time_limit_s=0.0)
 
 
 ODD_ACTIONS = [

@@ -18,7 +18,7 @@ ENTRY = "slam.odometry:OdometrySlam"
 
 def make(source, **settings):
     return gymnasium.make(
-        "mobilia/Arena-v1", pose_source=source, disable_env_checker=True, **settings
+        "mobilia/Arena-v2", pose_source=source, disable_env_checker=True, **settings
     ).unwrapped
 
 
@@ -95,7 +95,7 @@ def test_what_is_no_source_is_refused():
 
 def many(source, n=2):
     return gymnasium.make_vec(
-        "mobilia/Arena-v1", num_envs=n, vectorization_mode="vector_entry_point", pose_source=source
+        "mobilia/Arena-v2", num_envs=n, vectorization_mode="vector_entry_point", pose_source=source
     )
 
 

@@ -18,7 +18,7 @@ SETTINGS = {"time_limit_s": 0.25, "dynamism": 0.8}
 
 def make(**settings):
     return gymnasium.make_vec(
-        "mobilia/Arena-v1",
+        "mobilia/Arena-v2",
         num_envs=N,
         vectorization_mode="vector_entry_point",
         **{**SETTINGS, **settings},
@@ -34,7 +34,7 @@ def actions(step: int) -> np.ndarray:
 def test_it_is_the_single_environments_through_resets(mode, n_threads):
     many = make(autoreset_mode=mode, n_threads=n_threads)
     singles = gymnasium.make_vec(
-        "mobilia/Arena-v1",
+        "mobilia/Arena-v2",
         num_envs=N,
         vectorization_mode="sync",
         vector_kwargs={"autoreset_mode": gymnasium.vector.AutoresetMode[mode.upper()]},

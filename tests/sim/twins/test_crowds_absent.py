@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who holds something goes out with it; groups by one word; leaders that are out or frozen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scenes
+from scenes.groups import group_of, groups_of, named, with_held
+from sim.actors.holding import QB
+from sim.actors.people import columns
+from sim.simulation import Simulation
+from sim.twins.absence import Change, apply
+from slam.errors import UnknownNameError
+
+CROWD = "escorts:3,groups:4,boards:1,trains:1,couches:1,cleaners:1"
+ROOM = {"scene": "arena", "seed": 3, "n_chairs": 4, "n_people": 0, "labels": True,
+        "dynamism": 0.6, "change": 0.0, "crowd": CROWD, "walls": "visible"}  # fmt: skip
+
+
+def drive(simulation, scans):
+    frames = []
+    for k in range(scans):
+        simulation.world.set_command(0.3, 0.4 if k % 40 < 20 else -0.4)
+        frames.append(simulation.observe())
+    return frames
+
+
+@pytest.fixture(scope="module")
+def before():
+    """A crowd after three seconds: state, where everybody is, what comes next."""
+    simulation = Simulation(**ROOM)
+    drive(simulation, 110)
+    block = simulation.save_state()
+    return block, simulation.world.mover_poses(), drive(simulation, 40), simulation.save_state()
+
+
+def changed(before, change):
+    simulation = Simulation(**ROOM)
+    simulation.load_state(before[0])
+    apply(simulation, change)
+    return simulation
+
+
+def pose(simulation, name):
+    return simulation.world.mover_poses()[simulation.world.mover_names.index(name)]
+
+
+def way(simulation, before, name):
+    at = pose(simulation, name) - before[1][simulation.world.mover_names.index(name)]
+    return float(np.hypot(at[0], at[1]))
+
+
+def test_saved_with_things_in_hand_it_goes_on_bit_for_bit(before):
+    again = Simulation(**ROOM)
+    again.load_state(before[0])
+    assert (again.world.people.table.held.at[:, QB] >= 0).sum() >= 5
+    assert drive(again, 40) == before[2]
+    assert again.save_state() == before[3]
+
+
+def test_groups_have_words_patterns_and_single_names():
+    movers = scenes.build("arena", 3, crowd=CROWD, n_chairs=4, n_people=1).movers
+    groups = groups_of(movers)
+    assert groups["boards"] == ("board_pusher0", "board0")
+    assert set(groups["trains"]) == {"train_puller0", "wagon0", "wagon1"}
+    assert set(groups["couches"]) == {"couch0", "carrier0", "carrier1"}
+    assert groups["people"] == ("person0",)
+    assert len(groups["escorts"]) == 3
+    assert {m.name for m in movers} - {"robot"} == {n for of in groups.values() for n in of}
+    assert group_of(movers[-1]) == "robot"
+    assert named(movers, "escorts") == named(movers, "escort*") == groups["escorts"]
+    assert named(movers, "group[0-1]") == ("group0", "group1")
+    assert named(movers, "escort1") == ("escort1",)
+    for nobody in ("escort7", "robot", "dragons", "x*"):
+        with pytest.raises(UnknownNameError, match=r"Groups: .*escorts"):
+            named(movers, nobody)
+
+
+def test_whoever_goes_out_takes_along_what_it_holds_and_no_more():
+    holds = scenes.build("arena", 3, crowd=CROWD).holds
+    assert with_held(holds, ["board_pusher0"]) == ("board_pusher0", "board0")
+    assert with_held(holds, ["train_puller0"]) == ("train_puller0", "wagon0", "wagon1")
+    assert with_held(holds, ["carrier0"]) == ("carrier0", "couch0")
+    assert with_held(holds, ["wagon0"]) == ("wagon0", "wagon1")
+    assert with_held(holds, ["board0", "escort0"]) == ("board0", "escort0")
+
+
+@pytest.mark.parametrize(
+    ("name", "gone"),
+    [("board_pusher0", ["board0"]), ("train_puller0", ["wagon0", "wagon1"])],
+)
+def test_what_is_parked_stays_parked_and_is_met_by_no_ray(before, name, gone):
+    simulation = changed(before, Change(out=(name,)))
+    world = simulation.world
+    there = [pose(simulation, each) for each in (name, *gone)]
+    frames = drive(simulation, 40)
+    rows = [world.mover_names.index(each) for each in (name, *gone)]
+    own = np.flatnonzero(np.isin(world.bodies.mover_of_body, rows))
+    assert not any(np.isin(f.labels.body, own).any() for f in frames)
+    for each, at in zip((name, *gone), there, strict=True):
+        assert at[0] > world.scene.bounds[2] + 10.0
+        np.testing.assert_array_equal(pose(simulation, each), at)
+    others = ["escort0", "group0", "couch0"]
+    assert all(pose(simulation, each)[0] < world.scene.bounds[2] for each in others)
+
+
+def test_a_thing_alone_out_leaves_its_holder_free_and_undragged(before):
+    simulation = changed(before, Change(out=("board0",)))
+    world = simulation.world
+    i = world.people.names.index("board_pusher0")
+    dof = world.people.table.at.discs[i, 1]
+    assert world.people.crowd.task[i, columns.HELD] == -1
+    speeds = []
+    for _ in range(40):
+        drive(simulation, 1)
+        speeds.append(float(np.hypot(*world.data.qvel[dof : dof + 2])))
+        assert (world.data.qfrc_applied[dof : dof + 3] == 0.0).all()
+    assert max(speeds) < 2.5
+    x, y, _ = pose(simulation, "board_pusher0")
+    xmin, ymin, xmax, ymax = world.scene.bounds
+    assert xmin < x < xmax
+    assert ymin < y < ymax
+
+
+def test_who_follows_a_leader_that_is_out_stands_and_one_that_is_not_goes_on(before):
+    simulation = changed(before, Change(out=("group0",)))
+    names = ("group1", "group2", "group3")
+    drive(simulation, 5)
+    there = {name: pose(simulation, name) for name in names}
+    drive(simulation, 80)
+    assert all(np.hypot(*(pose(simulation, n) - there[n])[:2]) < 0.5 for n in names)
+    assert max(way(simulation, before, f"escort{k}") for k in range(3)) > 0.5
+
+
+def test_a_frozen_leader_stays_and_keeps_its_people_about_it(before):
+    simulation = changed(before, Change(frozen=("group0",)))
+    there = pose(simulation, "group0")
+    drive(simulation, 110)
+    np.testing.assert_array_equal(pose(simulation, "group0"), there)
+    for k in (1, 2, 3):
+        assert np.hypot(*(pose(simulation, f"group{k}") - there)[:2]) < 3.0
+
+
+def test_a_frozen_holder_keeps_its_thing_and_a_frozen_thing_its_place(before):
+    simulation = changed(before, Change(frozen=("board_pusher0",)))
+    drive(simulation, 60)
+    assert way(simulation, before, "board_pusher0") == 0.0
+    assert way(simulation, before, "board0") < 0.8
+    simulation = changed(before, Change(frozen=("board0",)))
+    drive(simulation, 60)
+    assert way(simulation, before, "board0") == 0.0
+
+
+def test_a_whole_group_out_is_met_by_no_ray_and_without_it_the_rest_goes_on(before):
+    block, _, frames, _ = before
+    movers = scenes.build("arena", 3, crowd=CROWD, n_chairs=4, n_people=0).movers
+    escorts = named(movers, "escorts")
+    simulation = changed(before, Change(out=escorts, called="escorts"))
+    world = simulation.world
+    rows = [world.mover_names.index(name) for name in escorts]
+    own = np.flatnonzero(np.isin(world.bodies.mover_of_body, rows))
+    assert any(np.isin(f.labels.body, own).any() for f in frames)
+    after = drive(simulation, 40)
+    assert not any(np.isin(f.labels.body, own).any() for f in after)
+    assert str(Change(out=escorts, called="escorts")) == "escorts out"
+    Simulation(**ROOM).load_state(simulation.save_state())
+    assert block
