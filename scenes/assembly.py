@@ -15,6 +15,7 @@ from functools import cache
 
 import mujoco
 
+from scenes.kinds import kind_of
 from scenes.marks import Mark, marks
 from scenes.mjcf import check_materials, parsed
 from scenes.scene import Pose
@@ -47,6 +48,11 @@ def part_marks(name: str) -> tuple[Mark, ...]:
 def hull_radius(name: str) -> float:
     """Radius of a planar part's hull, m."""
     return float(part(name).geom("hull").size[0])
+
+
+def reach_of(name: str) -> float:
+    """Radius of the disc around a planar part that holds all its hulls, m."""
+    return hull_radius(name) + kind_of(name).half_length_m
 
 
 class Assembly:

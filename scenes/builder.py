@@ -16,6 +16,7 @@ from scenes.scene import Kind, Mover, Pose
 
 LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
 LEAF_HALF = 0.025  # m, half thickness of a door leaf with its trim
+TRACK = 0.11  # m from the middle of a wall to that of a leaf that slides before it
 LATCH = -0.2  # rad, where the closer of a door that rests closed would pull it: it stays shut
 WIDE = 1.25  # rad; whatever its rest, room is kept for a leaf this far open
 
@@ -69,6 +70,27 @@ class Builder:
         self.door_angles[name], self._turns[name] = angle, turn
         return mover
 
+    def add_sliding_door(self, kind: Kind, name: str, edge: Pose, *, left: bool) -> Mover:
+        """Hang a sliding door, closed; ``edge`` is the end of its opening, in the wall's middle.
+
+        kind  "door_sliding", or "door_lift" before the cabin of a lift
+        left  on which side of the wall it runs, seen along the closed leaf
+        """
+        track = moved(edge, (0.0, TRACK if left else -TRACK, 0.0))
+        paint = {"metal_white": "metal"} if kind == "door_lift" else {}
+
+        def prepare(child: mujoco.MjSpec) -> None:
+            for geom in child.geoms:
+                geom.material = paint.get(geom.material, geom.material)
+
+        self._parts.put(kind, name, track, prepare)
+        panel = part(kind).geom("panel")
+        mover = Mover(name=name, kind=kind, radius=float(panel.pos[0] + panel.size[0]))
+        self.movers.append(mover)
+        self.initial[name] = track
+        self.door_angles[name], self._turns[name] = 0.0, 0.0
+        return mover
+
     def doorway(self, name: str) -> Pose:
         """Middle of a door's opening, and the direction of its closed leaf."""
         return moved(self.initial[name], (0.5 * self._width(name), 0.0, 0.0))
@@ -77,6 +99,9 @@ class Builder:
         """The leaf of a door that stands open as a box: cx, cy, half_x, half_y, yaw."""
         x, y, yaw = self.initial[name]
         half = 0.5 * self._width(name)
+        if self._turns[name] == 0.0:  # it slides aside
+            centre = moved((x, y, yaw), (-half, 0.0, 0.0))
+            return [centre[0], centre[1], half, LEAF_HALF, yaw]
         centre = moved(
             (x, y, yaw + max(self.door_angles[name], WIDE) * self._turns[name]), (half, 0.0, 0.0)
         )

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 
+import mujoco
 import numpy as np
 
 from scenes import look
@@ -30,6 +31,9 @@ MOST = 80  # of each kind
 QUEUE_M = 0.75  # from one to the next
 GROUP = 4  # people in one
 WAGONS = 2  # of a train
+ROW = 4  # chairs in a row at a wall
+CHAIR_M = 0.68  # from one to the next: hulls of 0.29 m and a hand's breadth
+ROW_WALL, ROW_BEFORE = 0.08, 0.4  # m, behind a row and before it
 COAT = "person_coat"  # what accompanies the robot is dressed for a tour in winter
 
 
@@ -45,7 +49,8 @@ class Crowd:
     beds      hospital beds, each pushed by somebody
     trains    trains of two trolleys, each pulled by somebody
     couches   each carried by two people
-    cleaners  people who take chairs from place to place
+    cleaners  people who put chairs in a tight row at a wall, and later bring them back; chairs are
+              rolled, not lifted on each other
     """
 
     escorts: int = 0
@@ -102,7 +107,7 @@ MIXES = {
     "classroom": Crowd(escorts=10, boards=2, groups=4),
     "corridor": Crowd(escorts=8, streams=8, beds=1),
     "gallery": Crowd(escorts=14, groups=12, boards=2),
-    "office": Crowd(escorts=12, streams=4, boards=2, couches=1, cleaners=1),
+    "office": Crowd(escorts=12, streams=4, boards=1, couches=1, cleaners=1),
     "random-rooms": Crowd(escorts=10, streams=4),
     "station": Crowd(escorts=14, streams=36, queue=6, trains=2),
     "warehouse": Crowd(escorts=8, trains=3, streams=6),
@@ -120,48 +125,63 @@ def mix(scene: str, level: float) -> Crowd:
 class _Filling:
     """A scene that is being filled."""
 
-    def __init__(self, scene: Scene, crowd: Crowd) -> None:
+    def __init__(self, scene: Scene, crowd: Crowd, session: int) -> None:
         self.scene, self.crowd = scene, crowd
-        self.rng = np.random.default_rng([scene.seed, _STREAM])
+        self.rng = np.random.default_rng([scene.seed, _STREAM, session])
         self.parts = Assembly()
         self.movers: list[Mover] = []
         self.initial: dict[str, Pose] = {}
         self.roles: dict[str, Role] = {}
         self.holds: list[Hold] = []
-        self.floor = _free_floor(scene)
+        self.floor = _free_floor(scene, list(scene.rooms.values()))
+        self.halls = _free_floor(scene, _halls(scene))
 
     def fits(self, discs: list[tuple[float, float, float]]) -> bool:
         points = np.array([disc[:2] for disc in discs])
         gaps = self.floor.clearance(points)
-        return bool((gaps >= np.array([disc[2] for disc in discs]) + MARGIN).all())
+        inside = all(self._indoors(*disc) for disc in discs)
+        return inside and bool((gaps >= np.array([disc[2] for disc in discs]) + MARGIN).all())
+
+    def _indoors(self, x: float, y: float, radius: float) -> bool:
+        return any(
+            a + radius <= x <= c - radius and b + radius <= y <= d - radius
+            for a, b, c, d in self.scene.rooms.values()
+        )
 
     def add(self, kind: str, name: str, pose: Pose) -> None:
         """Put a mover at a pose and take its floor."""
         paint = look.dress(self.rng) if kind_of(kind).group == "person" else {}
 
-        def prepare(child: object) -> None:
-            for geom in child.geoms if paint else ():  # type: ignore[attr-defined]
+        def prepare(child: mujoco.MjSpec) -> None:
+            for geom in child.geoms if paint else ():
                 geom.material = paint.get(geom.material, geom.material)
             if kind_of(kind).group == "person":
-                stand(child, pose)  # type: ignore[arg-type]
+                stand(child, pose)
 
         self.parts.put(kind, name, (0.0, 0.0, 0.0), prepare)
         self.movers.append(Mover(name=name, kind=kind, radius=hull_radius(kind)))
         self.initial[name] = pose
-        for x, y, radius in _discs(kind, pose):
-            self.floor.block(x, y, radius)
+        self.block(_discs(kind, pose))
+
+    def block(self, discs: list[tuple[float, float, float]]) -> None:
+        """Take floor."""
+        for disc in discs:
+            self.floor.block(*disc)
+            self.halls.block(*disc)
 
     def anywhere(self, kinds: list[tuple[str, Pose]], what: str) -> list[Pose]:
-        """Poses of a rigid set of things, given in the first one's frame, where all have room."""
+        """Poses of a rigid set of things, given in the first one's frame, where all have room.
+
+        What is long stands in a hall, where the scene has one.
+        """
+        floor = self.floor if len(kinds) == 1 else self.halls
         for _ in range(_TRIES):
-            place = self.floor.find(self.rng, hull_radius(kinds[0][0]) + MARGIN)
+            place = floor.find(self.rng, hull_radius(kinds[0][0]) + MARGIN)
             if place is None:
                 break
             first = (*place, float(self.rng.uniform(-math.pi, math.pi)))
             poses = [moved(first, local) for _, local in kinds]
-            discs = [
-                d for (kind, _), p in zip(kinds, poses, strict=True) for d in _discs(kind, p)
-            ]
+            discs = [d for (kind, _), p in zip(kinds, poses, strict=True) for d in _discs(kind, p)]
             if self.fits(discs):
                 return poses
         raise InvalidValueError(f"crowd: {what} does not fit on the floor of '{self.scene.name}'")
@@ -187,14 +207,14 @@ class _Filling:
         )
 
 
-def with_crowd(scene: Scene, crowd: Crowd) -> Scene:
-    """The scene with a crowd in it; the given one is left as it is.
+def with_crowd(scene: Scene, crowd: Crowd, session: int = 0) -> Scene:
+    """The scene with a crowd in it, another one each session; the given scene is left as it is.
 
     Raises ``InvalidValueError`` where it does not fit on the floor.
     """
     if not crowd:
         return scene
-    filling = _Filling(scene, crowd)
+    filling = _Filling(scene, crowd, session)
     for each in fields(crowd):
         if getattr(crowd, each.name):
             _PUT[each.name](filling, getattr(crowd, each.name))
@@ -332,8 +352,35 @@ def _couches(filling: _Filling, n: int) -> None:
 
 def _cleaners(filling: _Filling, n: int) -> None:
     for k in range(n):
+        row = _row_of_chairs(filling)
         filling.put([("person", f"cleaner{k}", (0.0, 0.0, 0.0))], "a cleaner")
-        filling.roles[f"cleaner{k}"] = Role(does="clean", slow=0.8)
+        filling.roles[f"cleaner{k}"] = Role(does="clean", slow=0.8, places=row)
+
+
+def _row_of_chairs(filling: _Filling) -> tuple[tuple[float, float], ...]:
+    """Places for a row of chairs at a wall, with room before it to put them there."""
+    rooms, radius = list(filling.scene.rooms.values()), hull_radius("chair_swivel")
+    for _ in range(_TRIES):
+        a, b, c, d = rooms[int(filling.rng.integers(len(rooms)))]
+        side, along = int(filling.rng.integers(4)), float(filling.rng.uniform(0.0, 1.0))
+        half, other = (0.5 * (c - a), 0.5 * (d - b))[:: 1 if side % 2 == 0 else -1]
+        wall: Pose = (0.5 * (a + c), 0.5 * (b + d), 0.5 * math.pi * side)
+        if half <= 0.5 * ROW * CHAIR_M:
+            continue
+        first = (2.0 * along - 1.0) * (half - 0.5 * ROW * CHAIR_M) - 0.5 * (ROW - 1) * CHAIR_M
+        places = [
+            moved(wall, (first + CHAIR_M * k, -other + radius + ROW_WALL, 0.0))[:2]
+            for k in range(ROW)
+        ]
+        before = [
+            moved(wall, (first + CHAIR_M * k, -other + 2.0 * radius + ROW_BEFORE, 0.0))[:2]
+            for k in range(ROW)
+        ]
+        discs = [(*p, radius) for p in places] + [(*p, hull_radius("person")) for p in before]
+        if filling.fits(discs):
+            filling.block(discs)
+            return tuple(places)
+    raise InvalidValueError(f"crowd: a row of {ROW} chairs does not fit in '{filling.scene.name}'")
 
 
 _PUT: dict[str, Callable[[_Filling, int], None]] = {
@@ -376,9 +423,19 @@ def _discs(kind: str, pose: Pose) -> list[tuple[float, float, float]]:
     return [(*moved(pose, (at, 0.0, 0.0))[:2], radius) for at in offsets]
 
 
-def _free_floor(scene: Scene) -> Floor:
-    """The rooms' floor less furniture, doorways, goals and everything that is there already."""
-    floor = Floor(list(scene.rooms.values()), scene.obstacles)
+def _halls(scene: Scene) -> list[tuple[float, float, float, float]]:
+    """Rooms with two goals or more, between which long things move; all, where there is none."""
+    inside = {
+        name: sum(a <= x <= c and b <= y <= d for x, y in scene.goals.values())
+        for name, (a, b, c, d) in scene.rooms.items()
+    }
+    halls = [scene.rooms[name] for name, n in inside.items() if n > 1]
+    return halls or list(scene.rooms.values())
+
+
+def _free_floor(scene: Scene, rects: list[tuple[float, float, float, float]]) -> Floor:
+    """The floor of rooms less furniture, doorways, goals and everything that is there already."""
+    floor = Floor(rects, scene.obstacles)
     for mover in scene.movers:
         x, y, yaw = scene.initial[mover.name]
         if mover.group == "door":

@@ -85,8 +85,24 @@ KINDS = {
     "person": KindOfMover(group="person", height_m=1.75, z_order=4, icon="person"),
     "person_coat": KindOfMover(group="person", height_m=1.75, z_order=4, icon="person"),
     "door": KindOfMover(group="door", height_m=2.0, z_order=2, icon="door"),
+    "door_sliding": KindOfMover(
+        group="door", height_m=2.0, z_order=2, icon="door_sliding", part="door_sliding"
+    ),
+    "door_lift": KindOfMover(
+        group="door", height_m=2.0, z_order=2, icon="door_sliding", part="door_sliding"
+    ),
     "robot": KindOfMover(group="robot", height_m=0.45, z_order=3, icon="robot"),
 }  # fmt: skip
+
+
+def is_door(kind: str) -> bool:
+    """Whether a kind by that name is a door, swinging or sliding; also for names of recordings."""
+    return kind.partition("_")[0] == "door"
+
+
+def joint_of_door(kind: str) -> str:
+    """Its one joint: "hinge", rad, or "slide", m."""
+    return "hinge" if kind == "door" else "slide"
 
 
 def register(kind: str, row: KindOfMover) -> None:

@@ -24,6 +24,8 @@ WRITTEN = {
     "start": "start:robot",
     "goal": "goal:NAME",
     "door": "door:ROOM:left|right",
+    "sliding": "sliding:ROOM:left|right",
+    "lift": "lift:ROOM:left|right",
     "opening": "opening:NAME",
     "seat": "seat:KIND:N",
     "spot": "spot:KIND:N",
@@ -64,7 +66,7 @@ def check_written(source: str, found: Iterable[Mark]) -> None:
     for mark in found:
         form = WRITTEN.get(mark.words[0], "")
         short = len(mark.words) < len(form.split(":"))
-        if short or (mark.words[0] == "door" and mark.words[2] not in ("left", "right")):
+        if short or (form.endswith("left|right") and mark.words[2] not in ("left", "right")):
             name = ":".join(mark.words)
             raise InvalidValueError(f"plan '{source}': mark '{name}' must be written {form}")
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from scenes import look
-from scenes.assembly import hull_radius
+from scenes.assembly import reach_of
 from scenes.builder import Builder
 from scenes.marks import Mark
 from scenes.placement import Floor
@@ -80,13 +80,15 @@ def free_floor(builder: Builder) -> Floor:
     for goal in plan.find("goal"):
         floor.block(goal.pose[0], goal.pose[1], GOAL_RADIUS)
     for mover in builder.movers:
-        if mover.kind != "door":
-            floor.block(*builder.initial[mover.name][:2], mover.radius)
+        if mover.group != "door":
+            floor.block(*builder.initial[mover.name][:2], reach_of(mover.kind))
     return floor
 
 
 def hang_doors(builder: Builder, rng: np.random.Generator, doors: str = "open") -> None:
     """A door at each ``door:ROOM:left|right`` mark, whose closer brings it to a seeded angle.
+
+    Sliding doors, at marks of their own, rest closed.
 
     doors  "open" (held open), "ajar", "closed", or "mixed": each door one of the three
     """
@@ -97,6 +99,15 @@ def hang_doors(builder: Builder, rng: np.random.Generator, doors: str = "open") 
         builder.add_door(
             f"door{index}", mark.pose, clockwise=mark.words[2] == "right", angle=round(angle, 3)
         )
+    hang_sliding_doors(builder)
+
+
+def hang_sliding_doors(builder: Builder) -> None:
+    """A closed one at each ``sliding:...`` and ``lift:...`` mark, numbered on after the others."""
+    for first, kind in (("sliding", "door_sliding"), ("lift", "door_lift")):
+        for mark in builder.plan.find(first):
+            name = f"door{len(builder.door_angles)}"
+            builder.add_sliding_door(kind, name, mark.pose, left=mark.words[2] == "left")
 
 
 def seat_chairs(
@@ -106,7 +117,7 @@ def seat_chairs(
     order = draws.chairs.permutation(len(seats))[:n]
     for index in sorted(order.tolist()):
         kind: Kind = "chair_visitor" if seats[index].words[1] == "chair_visitor" else "chair_swivel"
-        pose = _askew(floor, seats[index].pose, hull_radius(kind) + MARGIN, draws.chairs, PULLED)
+        pose = _askew(floor, seats[index].pose, reach_of(kind) + MARGIN, draws.chairs, PULLED)
         if pose is not None:
             _add_chair(builder, floor, kind, pose, draws)
     while sum(m.group == "chair" for m in builder.movers) < n:
@@ -119,7 +130,7 @@ def seat_chairs(
 def park(builder: Builder, floor: Floor, kind: Kind, n: int, rng: np.random.Generator) -> None:
     """``n`` things on a seeded choice of ``spot:KIND:N`` marks, somewhat askew; others anywhere."""
     spots = [mark for mark in builder.plan.find("spot") if mark.words[1] == kind]
-    radius = hull_radius(kind) + MARGIN
+    radius = reach_of(kind) + MARGIN
     chosen = [spots[i] for i in sorted(rng.permutation(len(spots))[:n].tolist())]
     for index in range(n):
         pose = None
@@ -127,7 +138,7 @@ def park(builder: Builder, floor: Floor, kind: Kind, n: int, rng: np.random.Gene
             pose = _askew(floor, chosen[index].pose, radius, rng, ASKEW)
         pose = pose or _anywhere(floor, kind, f"n_{kind}s", n, rng)
         builder.add(kind, f"{kind}{index}", pose)
-        floor.block(pose[0], pose[1], hull_radius(kind))
+        floor.block(pose[0], pose[1], reach_of(kind))
 
 
 def scatter(
@@ -139,7 +150,7 @@ def scatter(
         pose = _anywhere(floor, kind, field, n, rng)
         paint = look.dress(draws.colours) if kind == "person" else None
         builder.add(kind, f"{kind}{index}", pose, paint=paint)
-        floor.block(pose[0], pose[1], hull_radius(kind))
+        floor.block(pose[0], pose[1], reach_of(kind))
 
 
 def furnished(plan: Plan, draws: Draws, n_chairs: int, n_people: int, doors: str) -> Builder:
@@ -178,14 +189,22 @@ def finish(builder: Builder, name: str, seed: int, options: Mapping[str, object]
         obstacles=plan.boxes,
         start=plan.start,
         options=dict(options),
+        places=_places(plan),
     )
+
+
+def _places(plan: Plan) -> tuple[tuple[str, Pose], ...]:
+    """Seats, spots and places of bins by the kind that stands there, and openings."""
+    found = [(mark.words[1], mark.pose) for mark in (*plan.seats, *plan.find("spot"))]
+    found += [("bin", mark.pose) for mark in plan.find("bin")]
+    return (*found, *(("opening", mark.pose) for mark in plan.find("opening")))
 
 
 def _add_chair(builder: Builder, floor: Floor, kind: Kind, pose: Pose, draws: Draws) -> None:
     index = sum(m.group == "chair" for m in builder.movers)
     paint = look.upholster(draws.colours) if kind == "chair_swivel" else None
     builder.add(kind, f"chair{index}", pose, paint=paint)
-    floor.block(pose[0], pose[1], hull_radius(kind))
+    floor.block(pose[0], pose[1], reach_of(kind))
 
 
 def _askew(
@@ -205,7 +224,7 @@ def _askew(
 
 
 def _anywhere(floor: Floor, kind: Kind, field: str, n: int, rng: np.random.Generator) -> Pose:
-    place = floor.find(rng, hull_radius(kind) + MARGIN)
+    place = floor.find(rng, reach_of(kind) + MARGIN)
     if place is None:
         raise InvalidValueError(f"{field} = {n} does not fit on the floor of this scene")
     return place[0], place[1], float(rng.uniform(-math.pi, math.pi))

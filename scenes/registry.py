@@ -24,8 +24,10 @@ OWN = {
     "arena": "scenes.arena:arena",
     "classroom": "scenes.classroom:classroom",
     "corridor": "scenes.corridor:corridor",
+    "gallery": "scenes.gallery:gallery",
     "office": "scenes.office:office",
     "random-rooms": "scenes.random_rooms:random_rooms",
+    "station": "scenes.station:station",
     "warehouse": "scenes.warehouse:warehouse",
 }
 """This project's scenes by name, as ``module:function``: imported when one is asked for."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.footprint import static_raster
-from scenes.kinds import Group, kind_of
+from scenes.kinds import Group, joint_of_door, kind_of
 from scenes.scan_plane import SCAN_HEIGHT
 from slam.errors import InvalidValueError
 from slam.system import Raster
@@ -28,7 +28,7 @@ class Mover:
     """Something that can move.
 
     name    prefix of its names in the model: body "<name>/base", joints "<name>/x|y|yaw"; for a
-            door body "<name>/leaf", joint "<name>/hinge"
+            door body "<name>/leaf", joint "<name>/hinge" or, of one that slides, "<name>/slide"
     kind    which part it is: a key of ``scenes.kinds.KINDS``, else ``UnknownNameError``
     radius  m, footprint disc of its hull; for a door the width of its leaf
     """
@@ -92,8 +92,8 @@ class Scene:
     movers       every movable thing, the robot last
     initial      world pose (x m, y m, yaw rad) of each mover at reset. For the planar ones this is
                  the qpos of "<name>/x|y|yaw"; for a door its hinge and the closed leaf's direction
-    door_angles  rad, angle of each door at rest: qpos of "<name>/hinge" at reset, and the closer's
-                 ``springref``, so that nothing moves by itself
+    door_angles  rad, angle of each door at rest (of one that slides m, 0): qpos of "<name>/hinge"
+                 at reset, and the closer's ``springref``, so that nothing moves by itself
     goals        room or spot -> (x, y) m, free floor at least 1.2 m from any door
     rooms        room -> (xmin, ymin, xmax, ymax) m of its floor
     bounds       xmin, ymin, xmax, ymax of the whole floor, m
@@ -103,6 +103,8 @@ class Scene:
     scan_height_m  of the robot's scanner above the floor; ``scenes.at_scan_height`` changes it
     roles        what those of a crowd do, by mover name
     holds        who holds what
+    places       (kind, pose) of the plan's seats and spots, whether taken or not, and ("opening",
+                 pose) of each doorway without a door
     """
 
     name: str
@@ -120,6 +122,7 @@ class Scene:
     scan_height_m: float = SCAN_HEIGHT
     roles: Mapping[str, Role] = field(default_factory=dict)
     holds: tuple[Hold, ...] = ()
+    places: tuple[tuple[str, Pose], ...] = ()
 
     @cached_property
     def static_map(self) -> Raster:
@@ -133,8 +136,9 @@ class Scene:
     def place(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Write ``initial`` and ``door_angles`` into ``data.qpos`` (velocities stay untouched)."""
         for mover in self.movers:
-            if mover.kind == "door":
-                data.qpos[_address(model, f"{mover.name}/hinge")] = self.door_angles[mover.name]
+            if mover.group == "door":
+                joint = f"{mover.name}/{joint_of_door(mover.kind)}"
+                data.qpos[_address(model, joint)] = self.door_angles[mover.name]
                 continue
             for joint, value in zip(("x", "y", "yaw"), self.initial[mover.name], strict=True):
                 data.qpos[_address(model, f"{mover.name}/{joint}")] = value

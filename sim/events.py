@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actors.rearranging import is_out
 from sim.moments import Moment
 from sim.world.world import World
 from slam import se2
@@ -24,7 +25,7 @@ MIN_SHIFT_M = 0.05  # what moves less than that has not been moved; for a door, 
 JOIN_S = 0.5  # rests shorter than that do not end an event
 NEAR_M = 1.5  # a person nearer than that is near the robot, centre to centre
 JUMP_M = 0.5  # the truth leaps by that against odometry between two frames: kidnapped
-CHAIR, DOOR, PERSON, KIDNAP = "chair", "door", "person", "kidnap"
+CHAIR, DOOR, PERSON, CHANGE, KIDNAP = "chair", "door", "person", "change", "kidnap"
 _KIND = {"door": DOOR, "person": PERSON}  # by group; all else that moves is pushed like a chair
 
 
@@ -32,7 +33,8 @@ _KIND = {"door": DOOR, "person": PERSON}  # by group; all else that moves is pus
 class Event:
     """Something that happened.
 
-    kind     "chair" (or another thing that is pushed), "door", "person" (near the robot), "kidnap"
+    kind     "chair" (or another thing that is pushed), "door", "person" (near the robot),
+             "change" (it was put elsewhere out of sight), "kidnap"
     name     of the mover, "" for a kidnap
     start_s, end_s  s since the first frame
     seen     whether a beam hit it meanwhile; False for frames without labels
@@ -76,6 +78,8 @@ class EventWatch:
         ]
         self._people = np.array([m.group == "person" for m in movers], dtype=bool)
         self._kidnaps: list[Event] = []
+        self._changes: list[Event] | None = [] if world.change else None
+        self._bounds = world.scene.bounds
         self._first_ns: int | None = None
         self._last: Frame | None = None
 
@@ -83,7 +87,8 @@ class EventWatch:
     def kinds(self) -> list[str]:
         """Kinds of events that this world can have."""
         there = {m.kind for m in self._movers if m is not None}
-        return [kind for kind in (CHAIR, DOOR, PERSON) if kind in there]
+        there |= set() if self._changes is None else {CHANGE}
+        return [kind for kind in (CHAIR, DOOR, PERSON, CHANGE) if kind in there]
 
     def note(self, moment: Moment) -> None:
         """Take in the next moment."""
@@ -92,8 +97,12 @@ class EventWatch:
         seconds = (frame.stamp_ns - self._first_ns) / NS_PER_S
         seen = self._seen(frame.labels)
         stirs = np.where(self._people, self._near(moment), moment.moving)
+        changed = {event.name for event in moment.rearranged}
         for row, mover in enumerate(self._movers):
-            if mover is not None:
+            if mover is not None and mover.name in changed:
+                mover.close()
+                self._change(mover.name, seconds)
+            elif mover is not None and not is_out(moment.poses[row], self._bounds):
                 self._update(mover, moment.poses[row], bool(stirs[row]), bool(seen[row]), seconds)
         if self._last is not None and _leapt(self._last, frame):
             self._kidnaps.append(Event(kind=KIDNAP, name="", start_s=seconds, end_s=seconds))
@@ -101,13 +110,18 @@ class EventWatch:
 
     def events(self) -> list[Event]:
         """All so far in the order of their beginnings; those still going on end now."""
-        found = list(self._kidnaps)
+        found = [*self._kidnaps, *(self._changes or ())]
         for mover in self._movers:
             if mover is not None:
                 found += mover.done
                 if mover.open is not None and mover.far:
                     found.append(mover.open)
         return sorted(found, key=lambda event: (event.start_s, event.kind, event.name))
+
+    def _change(self, name: str, seconds: float) -> None:
+        """It stands elsewhere at once."""
+        if self._changes is not None:
+            self._changes.append(Event(kind=CHANGE, name=name, start_s=seconds, end_s=seconds))
 
     def _seen(self, labels: BeamLabels | None) -> NDArray[np.bool_]:
         """(movers,) whether a beam of this scan hit each."""
@@ -143,7 +157,8 @@ def _shift(mover: _Mover, pose: Float) -> float:
     assert mover.rest is not None
     x, y, yaw = mover.rest
     if mover.kind == DOOR:
-        return abs(se2.wrap(float(pose[2]) - yaw)) * mover.radius
+        turned = abs(se2.wrap(float(pose[2]) - yaw)) * mover.radius
+        return max(turned, math.hypot(float(pose[0]) - x, float(pose[1]) - y))
     return math.hypot(float(pose[0]) - x, float(pose[1]) - y)
 
 

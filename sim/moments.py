@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.actors.rearranging import Rearrangement
 from sim.driving.drive import TourConfig
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation, n_frames
@@ -22,11 +23,13 @@ class Moment:
 
     poses   (n, 3) m, m, rad in the world, as ``World.mover_poses``
     moving  (n,) whether it moves just then
+    rearranged  what was changed out of sight just before the scan
     """
 
     frame: Frame
     poses: Float
     moving: NDArray[np.bool_]
+    rearranged: tuple[Rearrangement, ...] = ()
 
 
 def toured(
@@ -42,7 +45,12 @@ def toured(
     for _ in range(n_frames(seconds, simulation.scan_period_s)):
         world.set_command(*pilot.command(simulation.scan_period_s))
         poses, moving = world.mover_poses(), world.movers_moving()
-        yield Moment(frame=simulation.observe(), poses=poses, moving=moving)
+        frame = simulation.observe()
+        for event in simulation.rearranged:
+            row = world.mover_names.index(event.name)
+            poses[row], moving[row] = event.after, False
+        rearranged = tuple(simulation.rearranged)
+        yield Moment(frame=frame, poses=poses, moving=moving, rearranged=rearranged)
 
 
 def thinned(moments: Iterable[Moment], every: int) -> Iterator[Moment]:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from sim.actors.rearranging import Rearrangement
 from sim.actors.robot import DriveConfig
 from sim.core import state
 from sim.core.contacts import Contact
@@ -49,8 +50,11 @@ class Simulation:
     scene      name of a registered scene, or ``module:function``
     seed       whole number or ``Seeds``; every part draws from its own stream
     dynamism   0 (nothing moves) to 1, or the rates themselves
-    motion, change  one of the two axes alone, in [0, 1] (``sim.core.dynamism``)
+    motion     in [0, 1]: that axis alone at this level instead (``sim.core.dynamism``)
     moving_share  in [0, 1]: of the chairs, on the move at any time (``sim.actors.rolling``)
+    change     in [0, 1]: of what is out of sight, the share that is found elsewhere later
+               (``sim.actors.rearranging``)
+    session    number of a session of the same building (``sim.world.sessions``)
     laser      a scanner by name ("utm30lx", "lms221:noise"; ``sim.sensors.lidar.registry``), a
                ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
@@ -76,6 +80,7 @@ class Simulation:
         moving_share: float | None = None,
         motion: float | None = None,
         change: float | None = None,
+        session: int | None = None,
         laser: ScannerConfig | str | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
@@ -88,8 +93,9 @@ class Simulation:
         drive = drive or DriveConfig()
         rates = Dynamism.of(dynamism, moving_share, motion=motion, change=change)
         self.world = World(
-            scene, seed=seed, dynamism=rates, drive=drive, start=start, chairs=chairs, **options
-        )
+            scene, seed=seed, dynamism=rates, change=change, session=session, drive=drive,
+            start=start, chairs=chairs, **options,
+        )  # fmt: skip
         self.odometry_preset = odometry
         seeds = self.world.seeds
         self.laser = LaserScanner(self.world.model, laser, seeds.generator("lidar"))
@@ -101,6 +107,7 @@ class Simulation:
         self._labels: BeamLabels | None = None
         self._frame: Frame | None = None
         self.contacts: list[Contact] = []  # what the robot touched during the last scan
+        self.rearranged: list[Rearrangement] = []  # what changed out of sight just before it
         self._room()
 
     def _tag_cameras(self, tags: str) -> TagCameras | None:
@@ -141,6 +148,7 @@ class Simulation:
     def _advance(self) -> None:
         """Let the time of one scan pass."""
         world, tags = self.world, self._tags
+        self.rearranged = world.rearrange(self.spec)
         noted = self.laser.begin(world.data)
         window = self.laser.window
         if window.before:  # the scan begins within the step that the one before ended with
@@ -181,6 +189,7 @@ class Simulation:
         self._advance()
         self._scan, self._frame = self.laser.finish(), None
         self.contacts = self.world.take_contacts()
+        self.world.saw(self._scan.bodies)
         self._timing.roll(self.encoders, self._travel, bool(self.contacts))
         self._labels = self._labeller.label(self._scan) if self._labeller else None
         return self._scan
@@ -251,7 +260,7 @@ class Simulation:
             self._tags.load(arrays, words["tags"])
         if self._labeller is not None and len(arrays["seen"]):
             self._labeller.last_seen[...] = arrays["seen"]
-        self.contacts, self._scan, self._frame = [], None, None
+        self.contacts, self.rearranged, self._scan, self._frame = [], [], None, None
 
     def metadata(self) -> StreamMetadata:
         """What a recording says about itself."""

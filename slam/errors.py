@@ -28,6 +28,10 @@ class UnknownNameError(MobiliaError, LookupError):
         return str(self.args[0]) if self.args else ""
 
 
+class NeedsLabelsError(InvalidValueError):
+    """An oracle was given a frame without labels: there is no truth to take returns out by."""
+
+
 class UntrustedNameError(MobiliaError):
     """A file names code to run, which opening it must not do."""
 

@@ -12,9 +12,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.errors import InvalidValueError, MobiliaError, NotFiniteError, SlamFailedError
+from slam.errors import (
+    InvalidValueError,
+    MobiliaError,
+    NeedsLabelsError,
+    NotFiniteError,
+    SlamFailedError,
+)
 from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame
+from slam.oracle import shown
 from slam.system import CanSave, HasChanges, HasLandmarks, SaysCells, SlamSystem, create, told
 from slam.trajectory import Trajectory
 
@@ -84,10 +91,13 @@ def asked_trajectory(system: SlamSystem, stamps_ns: NDArray[np.int64]) -> Trajec
 
 @contextmanager
 def judged() -> Iterator[None]:
-    """Whatever somebody's SLAM raises becomes a ``SlamFailedError`` with its outcome."""
+    """Whatever somebody's SLAM raises becomes a ``SlamFailedError`` with its outcome.
+
+    But for ``NeedsLabelsError``: what lacks is the stream's.
+    """
     try:
         yield
-    except SlamFailedError:
+    except (SlamFailedError, NeedsLabelsError):
         raise
     except NotFiniteError as error:
         raise SlamFailedError(f"raised {told(error)}", "nan") from error
@@ -194,7 +204,7 @@ class Track:
         """
         for frame in frames:
             try:
-                self.take(frame.without_truth())
+                self.take(shown(self.system, frame))
             except SlamFailedError as error:
                 return error
         return None
@@ -216,9 +226,8 @@ class Replay:
     def run(self, frames: Iterable[Frame]) -> Iterator[Frame]:
         """Give each frame, stripped of truth, to every system; yield it back with its truth."""
         for frame in frames:
-            blind = frame.without_truth()
             for track in self.tracks.values():
-                track.take(blind)
+                track.take(shown(track.system, frame))
             if frame.truth is not None:
                 self._stamps.append(frame.stamp_ns)
                 self._poses.append(frame.truth)

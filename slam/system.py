@@ -13,6 +13,7 @@ Who wants one of these asks whether it is there (``slam.replay.Track``), never f
 ``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class,
 ``create("pipe:./my_slam --option")`` a program in any language (``slam.guests.pipe``).
 ``create("shunting{matching.reward=7}")`` sets numbers of its config (``slam.variants``).
+``create("oracle(shunting)")`` shows it no returns from movers (``slam.oracle``).
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from slam.frames import Frame
 from slam.names import first_line, join_folders, refuse_code
 from slam.settings import Settings
 from slam.trajectory import Trajectory
-from slam.variants import parsed
+from slam.variants import inside, oracle_of, parsed
 
 __all__ = [
     "CanSave", "Changes", "Estimate", "HasChanges", "HasLandmarks", "Landmarks", "Raster",
@@ -159,14 +160,14 @@ def describe(name: str) -> str:
 
 def check_name(name: str) -> None:
     """Raise what ``create`` raises for a name that nothing is registered under; import nothing."""
-    base = parsed(name)[0]
+    base = parsed(inside(name))[0]
     if ":" in base or base in OWN or base in _registry:
         return
     near = difflib.get_close_matches(base, names(), n=1)
     hint = f" Did you mean '{near[0]}'?" if near else ""
     raise UnknownNameError(
         f"no SLAM is called '{base}'.{hint} Known: {', '.join(names())}, or module:Class, "
-        "or pipe:COMMAND."
+        "or pipe:COMMAND, or oracle(SLAM)."
     )
 
 
@@ -175,7 +176,7 @@ def config_of(name: str) -> tuple[Settings, Settings] | None:
 
     None for one that has none, or is not ours. Raises as ``create`` does for its numbers.
     """
-    base, changes = parsed(name)
+    base, changes = parsed(inside(name))
     kind = getattr(_registered(base), "config_class", None)
     if kind is None:
         return None
@@ -193,6 +194,11 @@ def create(name: str, **config: Any) -> SlamSystem:
     ``UntrustedNameError`` for a name of code that was read from a file (``slam.names``).
     """
     refuse_code(name, "SLAM")
+    if (wanted := oracle_of(name)) is not None:
+        oracle: SlamSystem = importlib.import_module("slam.oracle").Oracle(
+            create(wanted[0], **config), wanted[1]
+        )
+        return oracle
     name, changes = parsed(name)
     if changes:
         if "config" in config:

@@ -2,7 +2,8 @@
 """A SLAM's name with numbers set: ``shunting{matching.reward=7}``, ``ekf{preset=corners}``.
 
 Such a variant may be named wherever a SLAM is: ``create``, ``--slam``, recipes. Values are JSON, or
-words without quotes.
+words without quotes. An oracle (``slam.oracle``) has the name of the SLAM in it:
+``oracle(shunting{matching.reward=7},moving)``.
 """
 
 from __future__ import annotations
@@ -14,15 +15,17 @@ from typing import Any
 from slam.errors import InvalidValueError
 
 PIPE = "pipe:"  # what follows is a command, which may hold braces of its own
+ORACLE = "oracle("
+TAKEN_OUT = ("movable", "moving")  # returns that an oracle takes out, the default first
 
 
 def parsed(name: str) -> tuple[str, dict[str, Any]]:
-    """The SLAM's own name, and values by path: empty for a name without braces.
+    """The SLAM's own name, and values by path: empty for a name without braces, or an oracle's.
 
     Raises ``InvalidValueError`` for what is not ``path=value,...`` in the braces.
     """
     base, brace, rest = name.partition("{")
-    if not brace or name.startswith(PIPE):
+    if not brace or name.startswith((PIPE, ORACLE)):
         return name, {}
     if not rest.endswith("}"):
         raise InvalidValueError(f"SLAM '{name}': '{{' without '}}' at the end")
@@ -33,6 +36,47 @@ def parsed(name: str) -> tuple[str, dict[str, Any]]:
             raise InvalidValueError(f"SLAM '{name}': '{path}' is set twice")
         changes[path] = value
     return base, changes
+
+
+def oracle_of(name: str) -> tuple[str, str] | None:
+    """``("shunting", "moving")`` of "oracle(shunting,moving)"; None for the name of no oracle.
+
+    Raises ``InvalidValueError`` for one without a SLAM, with another last word, or of an oracle.
+    """
+    if not name.startswith(ORACLE):
+        return None
+    words = name[len(ORACLE) : -1]
+    if not name.endswith(")"):
+        raise InvalidValueError(f"SLAM '{name}': '{ORACLE}' without ')' at the end")
+    slam, comma, last = words.rpartition(",")
+    takes_out = last.strip()
+    if not comma or takes_out not in TAKEN_OUT:
+        if comma and ":" not in words and "}" not in last:
+            raise InvalidValueError(
+                f"SLAM '{name}': an oracle takes out {' or '.join(TAKEN_OUT)} returns, "
+                f"got {takes_out!r}"
+            )
+        slam, takes_out = words, TAKEN_OUT[0]
+    slam = slam.strip()
+    if not slam or slam.startswith(ORACLE):
+        raise InvalidValueError(f"SLAM '{name}': expected oracle(SLAM) of a SLAM that is no oracle")
+    return slam, takes_out
+
+
+def inside(name: str) -> str:
+    """The SLAM within an oracle; any other name as it is."""
+    found = oracle_of(name)
+    return name if found is None else found[0]
+
+
+def oracle_named(word: str) -> str:
+    """The oracle's name of "SLAM" or "SLAM,moving", as ``--oracle`` takes it.
+
+    The default is left out of it. Raises as ``oracle_of`` does.
+    """
+    slam, takes_out = oracle_of(f"{ORACLE}{word})") or ("", "")
+    short = f"{ORACLE}{slam})"
+    return short if oracle_of(short) == (slam, takes_out) else f"{ORACLE}{slam},{takes_out})"
 
 
 def assignment(word: str, where: str) -> tuple[str, Any]:
@@ -61,19 +105,20 @@ def _word(value: Any) -> str:
 def with_set(names: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
     """The names with each of the words "[SLAM.]PATH=VALUE" (``--set``) in the SLAM that it is for.
 
-    With one SLAM beside "odometry" the prefix may be left out. Raises ``InvalidValueError`` where
-    several SLAMs could be meant, or none of that name runs, and ``UnknownNameError`` with the
-    nearest path for one that a registered SLAM does not have.
+    With one SLAM beside "odometry" the prefix may be left out; a SLAM and its oracle are one, and
+    both get the numbers. Raises ``InvalidValueError`` where several SLAMs could be meant, or none
+    of that name runs, and ``UnknownNameError`` with the nearest path for one that a registered SLAM
+    does not have.
     """
     from slam.system import config_of
     from slam.system import names as registered
 
     changes = {name: dict[str, Any]() for name in names}
-    able = [name for name in changes if name != "odometry"]
+    able = [name for name in changes if inside(name) != "odometry"]
     for word in words:
         path, value = assignment(word, "--set")
         first, _, rest = path.partition(".")
-        meant = [name for name in able if parsed(name)[0] == first] if rest else []
+        meant = [name for name in able if parsed(inside(name))[0] == first] if rest else []
         if meant:
             path = rest
         elif rest and first in registered():
@@ -81,7 +126,7 @@ def with_set(names: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
                 f"--set {word}: '{first}' does not run; these run: {', '.join(names)}. "
                 f"Did you mean '--set {word.partition('.')[2]}'?"
             )
-        elif len(able) == 1:
+        elif len({inside(name) for name in able}) == 1:
             meant = able
         else:
             raise InvalidValueError(
@@ -102,5 +147,7 @@ def with_set(names: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
 def _with(name: str, more: Mapping[str, Any]) -> str:
     if not more:
         return name
+    if (found := oracle_of(name)) is not None:
+        return oracle_named(f"{_with(found[0], more)},{found[1]}")
     base, own = parsed(name)
     return named(base, {**own, **more})

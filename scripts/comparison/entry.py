@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,8 @@ from scripts.comparison.memory import PeakMemory
 from scripts.comparison.recording import Recording, load
 from slam.errors import SlamFailedError
 from slam.frames import Float, Frame
-from slam.guests import Limits, PipeSlam, limited
+from slam.guests import Limits, limited
+from slam.oracle import shown
 from slam.replay import Track
 from slam.system import Raster, create
 
@@ -32,21 +34,20 @@ def enter(path: Path, *, recording: str, slam: str, scan_limit_s: float = Limits
     of its own, which it may crash or hang for ``scan_limit_s`` at a scan.
     """
     drive = load(path.parent.parent / recording)
-    frames = [frame.without_truth() for frame in drive.frames]
     limits = Limits(scan_s=scan_limit_s)
-    _warm_up(slam, frames, limits)
+    _warm_up(slam, drive.frames, limits)
     run = Entry(slam, drive, limits)
-    run.over(frames)
+    run.over(drive.frames)
     np.savez_compressed(path, **run.arrays())
 
 
-def _warm_up(slam: str, frames: list[Frame], limits: Limits) -> None:
+def _warm_up(slam: str, frames: Sequence[Frame], limits: Limits) -> None:
     if slam in _warm or ":" in slam:  # the latter begin anew with each run
         return
     with suppress(SlamFailedError):  # the run itself will tell
         track = Track(name=slam, system=limited(slam, limits))
         for frame in frames[:WARM_SCANS]:
-            track.take(frame)
+            track.take(shown(track.system, frame))
         track.map()
     _warm.add(slam)
 
@@ -67,10 +68,11 @@ class Entry:
         self.raster: Raster | None = None
         self.final: Any = None
 
-    def over(self, frames: list[Frame]) -> None:
+    def over(self, frames: Sequence[Frame]) -> None:
         """All scans, or those up to its failure."""
         if self.failure is not None:
             return
+        frames = [shown(self.track.system, frame) for frame in frames]
         try:
             for k, frame in enumerate(frames):
                 self.memory.begin()
@@ -108,9 +110,10 @@ class Entry:
         return arrays
 
     def _peak_memory_mb(self) -> float | None:
-        if not isinstance(self.track.system, PipeSlam):
+        of_its_own = getattr(self.track.system, "memory_growth_bytes", None)
+        if of_its_own is None:
             return self.memory.growth_mb
-        grown = self.track.system.memory_growth_bytes()
+        grown = of_its_own()
         return None if grown is None else grown / 1e6
 
 

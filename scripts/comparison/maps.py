@@ -24,6 +24,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.kinds import is_door
 from scripts.comparison.places import BELIEVED, LATELY_S, OldPlace, Places
 from scripts.comparison.recording import Recording
 from scripts.comparison.sight import Sight, clearance
@@ -105,7 +106,7 @@ class MapJudge:
         self.places = Places(drive, self._static, self._believes)
         shape = drive.static_map.values.shape
         self._seen: NDArray[np.uint8] = np.zeros(shape, dtype=np.uint8)  # where movers were hit
-        self._doors = [row for row, kind in enumerate(drive.kinds) if kind == "door"]
+        self._doors = [row for row, kind in enumerate(drive.kinds) if is_door(kind)]
         self._door_seen = dict.fromkeys(self._doors, -math.inf)
         self._next_s = EVERY_S
         self._ghosts: list[tuple[float, float]] = []
@@ -195,12 +196,19 @@ class MapJudge:
         along = np.arange(FRAME_M, width - FRAME_M + 1e-9, STEP_M)
         return hinge + FRAME_M * way, hinge + (width - FRAME_M) * way, hinge + along[:, None] * way
 
+    def _angle(self, row: int, k: int) -> float:
+        """How far a door stands open at scan k, rad; a leaf that slid by its width: pi / 2."""
+        pose, closed = self._drive.poses[k, row], self._drive.closed[row]
+        turned = abs(se2.wrap(float(pose[2] - closed[2])))
+        slid = math.hypot(float(pose[0] - closed[0]), float(pose[1] - closed[1]))
+        return max(turned, 0.5 * math.pi * slid / float(self._drive.radii_m[row]))
+
     def _doors_right(self, believed: Believed, k: int) -> list[bool]:
         right = []
         for row in self._doors:
             if self._seconds[k] - self._door_seen[row] > LATELY_S:
                 continue
-            angle = abs(se2.wrap(float(self._drive.poses[k, row, 2] - self._drive.closed[row, 2])))
+            angle = self._angle(row, k)
             points = self._leaf(row)[2]
             blocked = (clearance(points, self._drive, k, without=row) < NEAR_M).any()
             if blocked or CLOSED_RAD <= angle <= OPEN_RAD:

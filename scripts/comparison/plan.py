@@ -25,7 +25,7 @@ from sim.simulation import n_frames
 from slam.errors import InvalidValueError
 from slam.guests import Limits
 from slam.names import join_folders, loaded
-from slam.variants import PIPE
+from slam.variants import PIPE, inside
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
@@ -160,6 +160,7 @@ def scripts_of(file: str, module: str) -> tuple[Path, ...]:
 def source_of(slam: str) -> tuple[Path, ...]:
     """The file of a SLAM's own module, or those that a command names, and what Python files among
     them import from beside them: with any of it changed, its runs are made again."""
+    slam = inside(slam)
     kind, _, command = slam.partition(":")
     if not command:
         return ()

@@ -17,7 +17,7 @@ from sim.recording.recipe import Recipe
 from sim.simulation import Simulation
 from slam.archives import read_arrays
 from slam.errors import InvalidValueError, LogFormatError
-from slam.frames import BeamClass, Float, Frame, LaserSpec, Odometry, Scan
+from slam.frames import BeamClass, BeamLabels, Float, Frame, LaserSpec, Odometry, Scan
 from slam.system import Raster
 from slam.trajectory import Trajectory
 
@@ -31,7 +31,7 @@ _SPEC_ARRAYS = ("beam_time_offsets", "T_robot_laser")
 class Recording:
     """n thinned scans of one run, of a scene with m movers.
 
-    frames    n of them, with truth and without labels
+    frames    n of them, with truth, and with labels of which only the kind is kept
     hit       (n, beams) int16: the mover that each beam met, ``STATIC`` or ``NOTHING``
     poses     (n, m, 3) m, m, rad of the movers in the world, doors at their hinge along the leaf
     moving    (n, m) whether each of them moves
@@ -73,7 +73,7 @@ def record(path: Path, *, every: int, **recipe: Any) -> None:
         labels = moment.frame.labels
         assert labels is not None
         mover = np.where(labels.body >= 0, mover_of_body[labels.body], NOTHING)
-        rows.append(_row(moment, mover))
+        rows.append(_row(moment, mover, labels.kind))
     truth_map = scene.static_map
     arrays: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     arrays |= _spec_arrays(simulation.spec)
@@ -99,8 +99,8 @@ def _counted(moments: Iterator[Moment], returns: NDArray[np.int64]) -> Iterator[
         yield moment
 
 
-def _row(moment: Moment, mover: NDArray[np.int64]) -> dict[str, Any]:
-    """Of a scan that everybody gets, which met ``mover``."""
+def _row(moment: Moment, mover: NDArray[np.int64], kind: NDArray[np.uint8]) -> dict[str, Any]:
+    """Of a scan that everybody gets, which met ``mover`` of a ``BeamClass`` ``kind``."""
     frame = moment.frame
     assert frame.scan is not None
     twist = frame.odometry.twist
@@ -112,6 +112,7 @@ def _row(moment: Moment, mover: NDArray[np.int64]) -> dict[str, Any]:
         "increment_covariances": frame.odometry.increment_covariance,
         "twists": np.zeros(3) if twist is None else twist,
         "hit": mover.astype(np.int16),
+        "label_kinds": kind,
         "mover_poses": moment.poses,
         "moving": moment.moving,
     }
@@ -132,6 +133,18 @@ def load(path: Path) -> Recording:
         raise LogFormatError(path, f"no recording of a comparison: {error}") from error
 
 
+def _labels(kind: NDArray[np.uint8], hit: NDArray[np.int16]) -> BeamLabels:
+    """As far as they are kept: ``kind``. Instead of the body the mover, the rest unknown."""
+    n = len(kind)
+    return BeamLabels(
+        body=hit.astype(np.int32),
+        kind=kind,
+        displacement=np.zeros(n, dtype=np.float32),
+        incidence=np.full(n, np.nan, dtype=np.float32),
+        mixed=np.zeros(n, dtype=np.bool_),
+    )
+
+
 def _recording(a: Mapping[str, Any]) -> Recording:
     there = [name for name in _SPEC_LATER if f"laser_{name}" in a]
     scalars = {name: a[f"laser_{name}"].item() for name in (*_SPEC, *there)}
@@ -147,6 +160,7 @@ def _recording(a: Mapping[str, Any]) -> Recording:
             ),
             scan=Scan(stamp_ns=int(stamp_ns), ranges=a["ranges"][k], spec=spec),
             truth=a["truth"][k],
+            labels=_labels(a["label_kinds"][k], a["hit"][k]),
         )
         for k, stamp_ns in enumerate(a["stamps_ns"])
     ]

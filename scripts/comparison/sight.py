@@ -9,6 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.kinds import is_door
 from scripts.comparison.recording import Recording
 from slam import se2
 from slam.frames import Float, Scan
@@ -82,7 +83,7 @@ def clearance(points: Float, drive: Recording, k: int, *, without: int = -1) -> 
         x, y, yaw = drive.poses[k, row].tolist()
         reach = float(drive.radii_m[row])
         offset = points - (x, y)
-        if kind == "door":
+        if is_door(kind):
             along = offset[:, 0] * math.cos(yaw) + offset[:, 1] * math.sin(yaw)
             offset = offset - np.clip(along, 0.0, reach)[:, None] * (math.cos(yaw), math.sin(yaw))
             reach = 0.0

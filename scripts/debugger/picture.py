@@ -19,6 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
+from scenes.kinds import is_door
 from scripts.debugger.counterfactual import CURED, Inquest, Trial
 from scripts.debugger.recording import Strip, simulate
 from scripts.debugger.words import headline, who
@@ -169,7 +170,7 @@ class _Camera:
         """Around somebody named; in dashes where one was who is out."""
         x, y, yaw = poses[m].tolist()
         radius = self._radii[m] + 0.12
-        if self._found.tape.kinds[m] == "door":
+        if is_door(self._found.tape.kinds[m]):
             radius = 0.5 * self._radii[m] + 0.1
             x += 0.5 * self._radii[m] * math.cos(yaw)
             y += 0.5 * self._radii[m] * math.sin(yaw)

@@ -27,6 +27,7 @@ from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 from slam.evaluation.divergence import errors_since_m
 from slam.frames import Float, Frame
 from slam.frontend.odometry_sum import MotionSum
+from slam.oracle import shown
 from slam.replay import Track
 from slam.system import create
 
@@ -38,7 +39,7 @@ KEPT_S = 0.5  # the world's state is kept this often
 class Strip:
     """What a SLAM was shown and what it made of it, row by row; n updates, m movers.
 
-    frames  n, without truth          truth   n poses of the robot in the world
+    frames  n, as it may see them     truth   n poses of the robot in the world
     believed  n poses in the map      poses   n times (m, 3) of the movers
     beams   n times (m,) returns from each mover
     """
@@ -52,10 +53,10 @@ class Strip:
     def take(self, frame: Frame, poses: Float, beams: NDArray[np.int64], track: Track) -> None:
         """One more row."""
         assert frame.truth is not None
-        blind = frame.without_truth()
-        self.frames.append(blind)
+        seen = shown(track.system, frame)
+        self.frames.append(seen)
         self.truth.append(frame.truth)
-        self.believed.append(track.take(blind).T_map_robot)
+        self.believed.append(track.take(seen).T_map_robot)
         self.poses.append(poses)
         self.beams.append(beams)
 

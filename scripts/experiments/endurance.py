@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scripts.comparison.memory import reading_kb
+from sim.actors.rearranging import is_out
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation
 from slam.frames import Float
@@ -40,7 +41,8 @@ class Report:
         self.not_finite += int(not np.isfinite(world.data.qpos).all())
         self.fastest = max(self.fastest, float(np.abs(world.data.qvel).max()))
         for mover, pose in zip(world.scene.movers, poses, strict=True):
-            if mover.kind != "door" and _escaped(simulation, pose):
+            inside = mover.group != "door" and not is_out(pose, world.scene.bounds)
+            if inside and _escaped(simulation, pose):
                 self.escapes[mover.name] = self.escapes.get(mover.name, 0) + 1
         self.memory_mb.append(reading_kb("VmRSS") * 1024.0 / 1e6)
 

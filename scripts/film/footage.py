@@ -17,11 +17,17 @@ from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
 from scripts.trust import admitted
 from sim.core.versions import check_world, world_of
 from sim.recording.sums import check_vouched
-from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+from slam.errors import (
+    InvalidValueError,
+    LogFormatError,
+    NeedsLabelsError,
+    UnknownNameError,
+)
 from slam.frames import NS_PER_S, Stream
 from slam.logs import open_log
 from slam.logs.bag import read_bag
 from slam.logs.bag_topics import is_bag
+from slam.oracle import Oracle
 from slam.replay import Replay, primary_of, systems_named
 
 if TYPE_CHECKING:
@@ -54,8 +60,17 @@ class Footage:
     made_with: Mapping[str, Any] = field(default_factory=dict)
 
     def show(self, slams: Sequence[str], *, pace: Pace | None = None, size: Size = SIZE) -> Show:
-        """A show of the first of ``slams``, with the others and odometry beside it."""
+        """A show of the first of ``slams``, with the others and odometry beside it.
+
+        Raises ``NeedsLabelsError`` for an oracle on frames without labels.
+        """
         replay = Replay.of(systems_named(slams))
+        for name, track in replay.tracks.items():
+            if isinstance(track.system, Oracle) and not self.stage.labelled:
+                raise NeedsLabelsError(
+                    f"{name}: {self.title} has no labels to take movers' returns out by. "
+                    "A simulated scene has them (--scene), and a bag of 'mobilia generate'."
+                )
         return Show(
             replay=replay,
             primary=primary_of(replay),

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.transforms import Affine2D
 
+from scenes.kinds import is_door
 from scripts.comparison.folder import RunFile
 from scripts.figures import error_series, in_first_frame
 from scripts.report import style
@@ -167,7 +168,7 @@ def _movers(ax: Axes, run: RunFile, k: int) -> None:
             continue
         color = MOVING if run.moving[k, m] else RESTING
         radius = float(run.radii_m[m])
-        if run.kinds[m] == "door":
+        if is_door(run.kinds[m]):
             tip = (x + radius * math.cos(theta), y + radius * math.sin(theta))
             ax.plot([x, tip[0]], [y, tip[1]], color=color, lw=2.4, solid_capstyle="round")
         else:

@@ -15,13 +15,14 @@ from scripts.checked import whole
 from scripts.console import console
 from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels, chosen
 from scripts.names import check
+from scripts.oracle_option import Oracles, with_oracles
 from scripts.scanner_option import Scanner, every_of
 from scripts.verbs.generate import sweep
 from slam.errors import InvalidValueError
 from slam.guests.limits import Limits
-from slam.variants import PIPE, with_set
+from slam.variants import ORACLE, PIPE
 
-BETWEEN = re.compile(r",(?![^{]*\})")  # a comma outside braces
+BETWEEN = re.compile(r",(?![^{]*\}|[^(]*\))")  # a comma outside braces and brackets
 
 
 def compare(
@@ -29,6 +30,7 @@ def compare(
         list[str], typer.Option(help="SLAMs, by name, module:Class or pipe:COMMAND: --slam A B C.")
     ],
     out: Annotated[Path, typer.Option(help="Folder of the comparison.")],
+    oracle: Oracles = None,
     scene: Annotated[list[str] | None, typer.Option(help="Scenes; default arena office.")] = None,
     dynamism: Annotated[
         list[str] | None, typer.Option(help="Levels, as start:stop:step or one by one.")
@@ -66,7 +68,8 @@ def compare(
     --out out/compare[/bold]
     """
     whole("--seeds", seeds, 1, 10_000)
-    slams, rooms = with_set(named(slam), set_ or []), named(scene or ["arena", "office"])
+    slams = with_oracles(named(slam), oracle, set_)
+    rooms = named(scene or ["arena", "office"])
     check(slams, *rooms)
     from scripts import workers
     from scripts.comparison.make import carry_out, median_errors
@@ -100,8 +103,9 @@ def compare(
 
 def named(values: list[str]) -> tuple[str, ...]:
     """Words may also be joined by commas, but for the command of a pipe, which may hold some, and
-    inside the braces of a variant."""
-    parts = ([value] if value.startswith(PIPE) else BETWEEN.split(value) for value in values)
+    inside the braces of a variant and the brackets of an oracle."""
+    whole = (PIPE, ORACLE + PIPE)
+    parts = ([value] if value.startswith(whole) else BETWEEN.split(value) for value in values)
     return tuple(word for words in parts for word in words if word)
 
 

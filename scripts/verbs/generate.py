@@ -45,6 +45,9 @@ def generate(
         bool,
         typer.Option("--twins", help="Each episode also semi-static and static, with one path."),
     ] = False,
+    sessions: Annotated[
+        int, typer.Option(help="So many sessions of one building instead, --change apart.")
+    ] = 0,
     jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
     cluster: Annotated[
         str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
@@ -69,7 +72,7 @@ def generate(
         scene=scene, seed=seed, dynamism=levels[0], motion=motion, change=change, seconds=seconds,
         scanner=scanner, options=options_with(crowd),
     )  # fmt: skip
-    plan = Plan(recipe=first, dynamisms=levels, episodes=episodes, twins=twins)
+    plan = Plan(recipe=first, dynamisms=levels, episodes=episodes, twins=twins, sessions=sessions)
     workers.check_jobs(jobs)
     registry.find(scene)  # a wrong name is told, and a module found, before anything starts
     with writing(out, plan) as dataset:

@@ -11,9 +11,9 @@ import typer
 
 from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check, run_name
+from scripts.oracle_option import Oracles, with_oracles
 from scripts.scanner_option import Scanner
 from slam.errors import InvalidValueError
-from slam.variants import with_set
 
 
 def run(
@@ -51,6 +51,7 @@ def run(
         bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
     ] = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
+    oracle: Oracles = None,
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
@@ -64,7 +65,7 @@ def run(
     """
     if (log is None) == (scene is None):
         raise InvalidValueError("name exactly one of --log and --scene")
-    slam = list(with_set(slam, set_ or []))
+    slam = list(with_oracles(slam, oracle, set_))
     check(slam, scene)
     if log is not None:
         on_log(slam, log, out or Path("out") / f"run-{run_name(log)}", overwrite, film)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Doors with closers: opened for whoever comes, blown or pushed about at the dynamism rate.
 
+Sliding doors stay open while anybody stands in them; a lift's opens when the cabin has come.
+
 The closer (spring to the angle of rest, damper) is in the model. A hand, a draught or the opener
 for the robot adds a torque through ``qfrc_applied``; at all other times that is exactly zero, so a
 door at rest sleeps.
@@ -16,6 +18,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.kinds import joint_of_door
 from sim.actors.config import ACTORS
 from sim.core.bodies import Bodies
 from sim.core.draws import between, waiting
@@ -23,15 +26,21 @@ from slam._jit import njit
 
 Float = NDArray[np.float64]
 
-# columns of the schedule, (m, 4): next event s, end of the present one s, its angle rad, and
-# until when the door is kept open for someone s
-NEXT, UNTIL, ANGLE, KEPT = 0, 1, 2, 3
+# columns of the schedule, (m, 5): next event s, end of the present one s, its angle rad, until
+# when the door is kept open for someone s, and when the cabin behind it comes s (inf: uncalled)
+NEXT, UNTIL, ANGLE, KEPT, COMES = 0, 1, 2, 3, 4
+SWINGS, SLIDES, LIFT = 0.0, 1.0, 2.0  # sorts of door
 # the numbers, as the kernels see them
 _D = ACTORS.doors
 OPENED, PASSABLE, REST_STEP = _D.opened_rad, _D.passable_rad, _D.rest_step
 RATE_MAX, RATE_GAIN = _D.rate_max, _D.rate_gain
 TORQUE_MAX, TORQUE_GAIN = _D.torque_max, _D.torque_gain
 NEAR, FACING, CLEAR = _D.near_m, _D.facing, _D.clear_m
+SLIDE_MAX, SLIDE_OPENED, SLIDE_HELD_S = _D.slide_max, _D.slide_opened, _D.slide_held_s
+LIFT_S, LIFT_HELD_S = _D.lift_s, _D.lift_held_s
+SHUT_M, STOPPED_M, STILL_MPS, SLIDE_STARTS_S = (
+    _D.slide_shut_m, _D.slide_stopped_m, _D.slide_still_mps, _D.slide_starts_s,
+)  # fmt: skip
 HELD_S, EVENT_LEAST_S, EVENT_MOST_S = _D.held_s, _D.event_least_s, _D.event_most_s
 
 
@@ -48,9 +57,10 @@ def robot_asks(robot: Float, middle: Float) -> bool:
 def torque_to(target: float, q: float, qd: float, closer: Float) -> float:
     """N m that turns the leaf to ``target`` at a hand's pace.
 
-    closer  (5,) stiffness N m/rad, damping N m s/rad, friction N m, inertia kg m2, rest rad
+    closer  (7,) stiffness N m/rad, damping N m s/rad, friction N m, inertia kg m2, rest rad, most
+            rate rad/s, sort; the same with N, kg and m for a leaf that slides
     """
-    rate = min(max(RATE_GAIN * (target - q), -RATE_MAX), RATE_MAX)
+    rate = min(max(RATE_GAIN * (target - q), -closer[5]), closer[5])
     friction = math.copysign(closer[2], rate) if abs(rate) > 0.02 else 0.0
     push = closer[0] * (q - closer[4]) + closer[1] * rate + friction
     torque = push + TORQUE_GAIN * closer[3] * (rate - qd)
@@ -61,10 +71,10 @@ class Leaves(NamedTuple):
     """The doors of a model, m of them.
 
     rates      (m,) events that nobody in sight causes, 1/s
-    addresses  (m, 2) in qpos and dof; middles (m, 2) m; closers (m, 5); limits (m, 2) rad
+    addresses  (m, 2) in qpos and dof; middles (m, 2) m; closers (m, 7); limits (m, 2) rad
     passage    (m, 3) of ``sim.actors.people.right_of_way``: columns 1 asked for by a person, 2 a
                person is in the way
-    schedule   (m, 4) in the columns named above; draws (m,) generators
+    schedule   (m, 5) in the columns named above; draws (m,) generators
     """
 
     rates: Float
@@ -75,6 +85,38 @@ class Leaves(NamedTuple):
     passage: Float
     schedule: Float
     draws: NDArray[np.uint64]
+
+
+@njit
+def kept_open(time: float, lift: bool, asked: bool, inside: bool, q: float, row: Float) -> bool:
+    """Whether a sliding door is to stand open now; ``row`` of the schedule is brought up to date.
+
+    A lift that is shut comes some time after it was called, from within or without.
+    """
+    if not lift:
+        if asked or inside:
+            row[KEPT] = time + SLIDE_HELD_S
+        return bool(time < row[KEPT])
+    if time >= row[COMES]:
+        row[KEPT], row[COMES] = time + LIFT_HELD_S, math.inf
+    elif asked and time >= row[KEPT] and q < SHUT_M and row[COMES] == math.inf:
+        row[COMES] = time + LIFT_S
+    elif (asked or inside) and q >= SHUT_M:
+        row[KEPT] = max(row[KEPT], time + SLIDE_HELD_S)
+    return bool(time < row[KEPT])
+
+
+@njit
+def slide_on(time: float, lift: bool, q: float, qd: float, row: Float) -> tuple[float, bool]:
+    """Where a sliding door that nobody needs is driven to, and whether it is driven at all.
+
+    A leaf that is stopped by something on its way opens again.
+    """
+    if time < row[UNTIL] and not lift:
+        return row[ANGLE], True
+    if time > max(row[KEPT], row[UNTIL]) + SLIDE_STARTS_S and q > STOPPED_M and abs(qd) < STILL_MPS:
+        row[KEPT] = time + SLIDE_HELD_S
+    return -SHUT_M, q > SHUT_M
 
 
 @njit
@@ -94,6 +136,14 @@ def swing(time: float, robot: Float, leaves: Leaves, physics: tuple[Float, Float
             row[NEXT] = time + waiting(draws, d, rates[d])
             row[ANGLE] = between(draws, d, low, high)
             row[UNTIL] = time + between(draws, d, EVENT_LEAST_S, EVENT_MOST_S)
+        if closer[6] != SWINGS:
+            asked = passage[d, 1] > 0.0 or robot_asks(robot, middles[d])
+            lift, inside = closer[6] == LIFT, passage[d, 2] > 0.0
+            target, driven = SLIDE_OPENED * high, True
+            if not kept_open(time, lift, asked, inside, qpos[at], row):
+                target, driven = slide_on(time, lift, qpos[at], qvel[dof], row)
+            qfrc[dof] = torque_to(target, qpos[at], qvel[dof], closer) if driven else 0.0
+            continue
         if (
             passage[d, 1] > 0.0
             or robot_asks(robot, middles[d])
@@ -130,7 +180,8 @@ class Doors:
         self.names = list(names)
         m = len(self.names)
         self.passage = np.zeros((m, 3))
-        self.schedule = np.full((m, 4), -math.inf)
+        self.schedule = np.full((m, 5), -math.inf)
+        self.schedule[:, COMES] = math.inf
         self._draws = counters.copy()
         qpos, dof = bodies.addresses(self.names)
         self.addresses = np.column_stack([qpos, dof])
@@ -139,9 +190,16 @@ class Doors:
         heading = self.hinges[:, 2].tolist()
         self.along = np.array([[math.cos(a), math.sin(a)] for a in heading]).reshape(m, 2)
         self.middles = self.hinges[:, :2] + 0.5 * self.widths[:, None] * self.along
-        self._closers, self._limits = np.zeros((m, 5)), np.zeros((m, 2))
+        self._closers, self._limits = np.zeros((m, 7)), np.zeros((m, 2))
+        kinds = {mover.name: mover.kind for mover in bodies.scene.movers}
         for d, name in enumerate(self.names):
-            self._closers[d], self._limits[d] = _closer(model, model.joint(f"{name}/hinge"))
+            joint = model.joint(f"{name}/{joint_of_door(kinds[name])}")
+            self._closers[d, :5], self._limits[d] = _closer(model, joint)
+            self._closers[d, 5:] = (
+                (RATE_MAX, SWINGS)
+                if kinds[name] == "door"
+                else (SLIDE_MAX, LIFT if kinds[name] == "door_lift" else SLIDES)
+            )
             self.schedule[d, NEXT] = waiting(self._draws, d, rate)
         self.leaves = Leaves(
             np.full(m, rate), self.addresses, self.middles, self._closers, self._limits,
@@ -155,7 +213,17 @@ class Doors:
         open have the same ways through them, which are costly to find.
         """
         boxes = np.zeros((len(self.names), 5))
-        for d, (x, y, closed, sign) in enumerate(self.hinges.tolist()):
+        for d, (x, y, closed, sign, slides) in enumerate(self.hinges.tolist()):
+            if slides != 0.0:  # out of the way, in front of the wall, when somebody comes
+                half = 0.5 * float(self.widths[d])
+                boxes[d] = (
+                    x - half * math.cos(closed),
+                    y - half * math.sin(closed),
+                    half,
+                    0.03,
+                    closed,
+                )
+                continue
             rest = REST_STEP * round(float(self._closers[d, 4]) / REST_STEP)
             yaw, half = closed + sign * rest, 0.5 * float(self.widths[d])
             boxes[d] = x + half * math.cos(yaw), y + half * math.sin(yaw), half, 0.03, yaw

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.kinds import joint_of_door
 from sim.core.checks import numbers
 from sim.core.flow import box_clearance
 from slam._jit import njit
@@ -43,7 +44,9 @@ def _poses(
     for i in range(len(first)):
         q = first[i]
         if door[i]:
-            out[i, 0], out[i, 1] = hinge[i, 0], hinge[i, 1]
+            slid = hinge[i, 4] * qpos[q]
+            out[i, 0] = hinge[i, 0] + slid * math.cos(hinge[i, 2])
+            out[i, 1] = hinge[i, 1] + slid * math.sin(hinge[i, 2])
             out[i, 2] = hinge[i, 2] + hinge[i, 3] * qpos[q]
         else:
             out[i, 0], out[i, 1], out[i, 2] = qpos[q], qpos[q + 1], qpos[q + 2]
@@ -74,10 +77,11 @@ class Bodies:
         self.mover_of_body = self._owners()
         n = len(scene.movers)
         self._qpos, self._dof = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
-        self._hinge = np.zeros((n, 4))  # doors: hinge x, y m; heading rad when closed; sign
+        # doors: hinge x, y m; heading rad when closed; turn, and metres along the heading, by qpos
+        self._hinge = np.zeros((n, 5))
         data: mujoco.MjData | None = None
         for i, mover in enumerate(scene.movers):
-            if mover.kind == "door":
+            if mover.group == "door":
                 if data is None:
                     data = mujoco.MjData(self.model)
                     mujoco.mj_kinematics(self.model, data)
@@ -85,7 +89,7 @@ class Bodies:
             else:
                 self._add_planar(i, mover)
         self._robot_at = 0 if self.robot is None else int(self._qpos[self.robot])
-        kinds = np.array([m.kind == "door" for m in scene.movers], dtype=bool)
+        kinds = np.array([m.group == "door" for m in scene.movers], dtype=bool)
         self._is_door = kinds
         self._planar, self._doors = np.nonzero(~kinds)[0], np.nonzero(kinds)[0]
 
@@ -103,12 +107,16 @@ class Bodies:
         self._qpos[i], self._dof[i] = addresses[0], int(joints[0].dofadr[0])
 
     def _add_door(self, i: int, mover: Mover, data: mujoco.MjData) -> None:
-        joint = self.model.joint(f"{mover.name}/hinge")
+        joint = self.model.joint(f"{mover.name}/{joint_of_door(mover.kind)}")
         self._qpos[i], self._dof[i] = int(joint.qposadr[0]), int(joint.dofadr[0])
+        body = int(joint.bodyid[0])
         x, y = data.xanchor[joint.id][:2].tolist()
-        centre = data.xipos[int(joint.bodyid[0])]
+        centre = data.xipos[body]
         heading = math.atan2(float(centre[1]) - y, float(centre[0]) - x)
-        self._hinge[i] = x, y, heading, math.copysign(1.0, data.xaxis[joint.id][2])
+        if mover.kind == "door":
+            self._hinge[i] = x, y, heading, math.copysign(1.0, data.xaxis[joint.id][2]), 0.0
+        else:
+            self._hinge[i] = x, y, heading, 0.0, -1.0
 
     def rows(self, names: Sequence[str]) -> NDArray[np.int64]:
         """Index into ``scene.movers`` of each name."""
@@ -119,8 +127,14 @@ class Bodies:
         rows = self.rows(names)
         return self._qpos[rows].astype(np.int64), self._dof[rows].astype(np.int64)
 
+    def any_at(self, qpos: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(n,) whether the first address of each mover is one of these."""
+        return np.isin(self._qpos, qpos)
+
     def hinges(self, names: Sequence[str]) -> Float:
-        """(n, 4) hinge x, y m, heading of the closed leaf rad, sign of opening, by door name."""
+        """(n, 5) of each named door, closed: hinge x, y m, heading of the leaf rad; how its joint
+        turns it (1, -1; 0: not) and shifts it along its heading (-1; 0: not).
+        """
         return self._hinge[self.rows(names)]
 
     def radii(self, names: Sequence[str]) -> Float:
@@ -143,7 +157,7 @@ class Bodies:
             raise InvalidValueError(f"start must be a finite pose of a robot, got {pose!r}")
         data.qpos[self._robot_at : self._robot_at + 3] = x, y, yaw
         for k, mover in enumerate(self.scene.movers):
-            if k == self.robot or mover.kind == "door":
+            if k == self.robot or mover.group == "door":
                 continue
             free = math.hypot(here[k, 0] - x, here[k, 1] - y) - float(self.radius[k])
             if free < float(self.radius[self.robot]):
@@ -156,7 +170,10 @@ class Bodies:
         _read_robot(data.qpos, self._robot_at, wheels, pose, travel)
 
     def poses(self, data: mujoco.MjData) -> Float:
-        """(n, 3) pose of each mover; a door at its hinge, heading along the leaf."""
+        """(n, 3) pose of each mover; a door at its hinge, heading along the leaf.
+
+        One that slides is where the end of its leaf is that leads when it opens.
+        """
         return self.poses_of(data.qpos)
 
     def poses_of(self, qpos: Float) -> Float:
@@ -171,6 +188,15 @@ class Bodies:
         last = first + (1 if self._is_door[row] else 3)
         target[first:last] = source[first:last]
 
+    def put(self, data: mujoco.MjData, rows: Sequence[int], poses: Float) -> None:
+        """Let planar movers stand still at (k, 3) poses; whoever sleeps sleeps on there."""
+        for row, pose in zip(rows, poses, strict=True):
+            first, joint = int(self._qpos[row]), int(self._dof[row])
+            data.qpos[first : first + 3] = pose
+            own = self.model.dof_bodyid == self.model.dof_bodyid[joint]
+            data.qvel[own] = 0.0
+        self.restore_physics(data, self.physics_state(data))
+
     def speeds(self, data: mujoco.MjData) -> Float:
         """(n,) m/s, the greater of the centre's speed and the rim's by turning."""
         out = np.zeros(len(self.radius))
@@ -179,7 +205,8 @@ class Bodies:
         rim = np.abs(v[:, 2]) * self.radius[self._planar]
         out[self._planar] = np.maximum(np.sqrt(v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1]), rim)
         turning = np.abs(data.qvel[self._dof[self._doors]])
-        out[self._doors] = turning * self.radius[self._doors]
+        slides = self._hinge[self._doors, 4] != 0.0
+        out[self._doors] = turning * np.where(slides, 1.0, self.radius[self._doors])
         return out
 
     def clearance(self, data: mujoco.MjData) -> float:

@@ -70,7 +70,7 @@ class Dynamism:
                      shoves unless it is None
     door_rate        1/s for each door           stay_mean      s, infinite: nobody ever leaves
     pace             factor on each person's preferred speed
-    crowd            in [0, 1]: of the scene's whole crowd (``scenes.crowd``), the share there is
+    crowd            in [0, 1]: share of the scene's whole crowd (``scenes.crowd``) that is there
     change           in [0, 1]: of what can move, elsewhere than when the robot last saw it
     push_speed_min/max  m/s a shove gives a chair
     kick_speed_min/max  m/s a kick gives a bin

@@ -27,6 +27,7 @@ STREAMS = (
     "bins",
     "tags",
     "loads",
+    "change",
 )
 
 

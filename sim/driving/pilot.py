@@ -26,6 +26,7 @@ SIGHT_M, AJAR, REPLAN_S, DECIDE_S = _D.sight_m, _D.ajar_rad, _D.replan_s, _D.dec
 LEAF_DISCS, LEAF_M = _D.leaf_discs, _D.leaf_m
 BODY, DOOR, ROBOT = 0, 1, 2
 PARTS = 3  # discs of what is long: its middle and its two ends
+LEAP_MPS = 10.0  # m/s; what is faster was put there by hand (``sim.actors.rearranging``)
 
 
 class Pilot:
@@ -40,10 +41,12 @@ class Pilot:
         self.world = world
         scene = world.scene
         config = config or TourConfig()
-        self._doors = np.array([m.kind == "door" for m in scene.movers], dtype=np.bool_)
-        self._closed = world.bodies.hinges([m.name for m in scene.movers if m.kind == "door"])[:, 2]
+        self._doors = np.array([m.group == "door" for m in scene.movers], dtype=np.bool_)
+        self._closed = world.bodies.hinges([m.name for m in scene.movers if m.group == "door"])[
+            :, 2
+        ]
         number = {"door": DOOR, "robot": ROBOT}
-        self._kinds = np.array([number.get(m.kind, BODY) for m in scene.movers], dtype=np.int64)
+        self._kinds = np.array([number.get(m.group, BODY) for m in scene.movers], dtype=np.int64)
         self._radii = np.array([m.radius for m in scene.movers], dtype=np.float64)
         halves = [kind_of(m.kind).half_length_m for m in scene.movers]
         self._halves = np.array(halves, dtype=np.float64)
@@ -156,6 +159,8 @@ def _surroundings(  # noqa: PLR0913 (kernel)
                     bx += reach * math.cos(before[k, 2])
                     by += reach * math.sin(before[k, 2])
                 vx, vy = (x - bx) / dt, (y - by) / dt
+                if vx * vx + vy * vy > LEAP_MPS * LEAP_MPS:
+                    vx, vy = 0.0, 0.0
             dx, dy = x - here[0], y - here[1]
             if dx * dx + dy * dy < sight * sight:
                 discs[count, 0], discs[count, 1], discs[count, 2] = x, y, radius

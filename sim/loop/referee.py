@@ -106,6 +106,6 @@ class Referee:
         ):
             offset = pose[:2] - goal
             room = math.hypot(offset[0], offset[1]) - radius - self._radii[-1]
-            if mover.kind not in ("robot", "door") and room < 0.0:
+            if mover.group not in ("robot", "door") and room < 0.0:
                 return mover.name
         return ""

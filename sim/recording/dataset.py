@@ -8,15 +8,17 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from sim.core.checks import whole
 from sim.core.versions import check_world
+from sim.recording.days import FILES, write_days
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
 from sim.recording.verify import Finding, check_hashes, finding, listed_in
 from sim.twins.twins import TWINS
+from sim.world.times_of_day import MOST_SESSIONS
 from slam import bounded, locks
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import PART, is_part, make_folder, reason, write_text
@@ -34,12 +36,15 @@ class Plan:
     recipe      of the first one; the k-th episode has its seed plus k
     dynamisms   numbers in [0, 1]
     twins       whether each episode is one drive in three versions
+    sessions    0, or how many sessions of one building there are (``sim.world.sessions``): one
+                episode each, all of one seed and one dynamism
     """
 
     recipe: Recipe
     dynamisms: tuple[float, ...]
     episodes: int
     twins: bool = False
+    sessions: int = 0
 
     def __post_init__(self) -> None:
         whole("Plan.episodes", self.episodes, 1, MAX_EPISODES)
@@ -47,6 +52,7 @@ class Plan:
             raise InvalidValueError(
                 f"Plan.dynamisms must be different numbers, got {self.dynamisms}"
             )
+        self._check_sessions()
         count = self.episodes * len(self.dynamisms)
         if count > MAX_EPISODES:
             raise InvalidValueError(f"Plan: at most {MAX_EPISODES} episodes, got {count}")
@@ -59,8 +65,20 @@ class Plan:
         if len(set(names)) != len(names):
             raise InvalidValueError("Plan.dynamisms are too close: two episodes have one name")
 
+    def _check_sessions(self) -> None:
+        whole("Plan.sessions", self.sessions, 0, MOST_SESSIONS)
+        alone = self.episodes == 1 and len(self.dynamisms) == 1 and not self.twins
+        if self.sessions and not alone:
+            raise InvalidValueError(
+                "Plan.sessions are of one building: one episode, one dynamism and no twins, got "
+                f"{self.episodes}, {self.dynamisms} and {self.twins}"
+            )
+
     def jobs(self) -> list[Recipe]:
         """One recipe for each drive."""
+        if self.sessions:
+            (level,) = self.dynamisms
+            return [replace(self.recipe, dynamism=level, session=k) for k in range(self.sessions)]
         first, twin = asdict(self.recipe), "dynamic" if self.twins else ""
         return [
             Recipe(**{**first, "dynamism": d, "seed": self.recipe.seed + k, "twin": twin})
@@ -82,8 +100,15 @@ class Plan:
 
     def text(self) -> str:
         """``dataset.json``."""
-        words = {"schema": SCHEMA, **asdict(self), "recipe": self.recipe.words()}
-        return json.dumps(words, indent=1, sort_keys=True) + "\n"
+        told = asdict(self) | {"recipe": self.recipe.words()}
+        if not self.sessions:
+            del told["sessions"]
+        return json.dumps({"schema": SCHEMA, **told}, indent=1, sort_keys=True) + "\n"
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """What lies beside the episodes: the plan, and the truth of its sessions."""
+        return (PLAN, *(FILES if self.sessions else ()))
 
 
 class Dataset:
@@ -124,7 +149,9 @@ class Dataset:
     def finish(self) -> None:
         """Write SHA256SUMS over the plan and all files of all episodes, their own SHA256SUMS among
         them; ``OutputError`` when one is missing."""
-        sums = {PLAN: sha256(self.path / PLAN)}
+        if self.plan.sessions:
+            write_days(self.path, self.plan.recipe, self.plan.sessions)
+        sums = {name: sha256(self.path / name) for name in self.plan.files}
         for name in self.plan.planned():
             try:
                 sums |= _sums_of(self.path / name)
@@ -165,25 +192,37 @@ def check_dataset(path: Path) -> list[Finding]:
     An episode that is not planned is foreign, one that is planned and not there is missing.
     """
     listed, found = listed_in(path)
+    files: tuple[str, ...] = (PLAN,)
     try:
-        planned: Mapping[str, Recipe | None] = read_plan(path).planned()
+        plan = read_plan(path)
+        planned: Mapping[str, Recipe | None] = plan.planned()
+        files = plan.files
     except LogFormatError as error:
         missing = not os.path.lexists(path / PLAN)
         found.append(Fault(kind="incomplete" if missing else "damaged", name=PLAN, why=str(error)))
-        planned = dict.fromkeys(sorted({name.partition("/")[0] for name in listed} - {PLAN}))
+        planned = dict.fromkeys(
+            sorted({name.partition("/")[0] for name in listed} - {PLAN, *FILES})
+        )
+        files = (PLAN, *(name for name in FILES if name in listed))
+    for name in files:
+        if name != PLAN and not os.path.lexists(path / name):
+            why = f"{path / name} is missing: 'mobilia generate' as before writes it anew"
+            found.append(Fault(kind="incomplete", name=name, why=why))
     episodes = [check_hashes(path / name, recipe) for name, recipe in planned.items()]
     if listed:
-        found += _against(path, listed, episodes)
-    found += _strangers(path, set(planned))
+        found += _against(path, listed, files, episodes)
+    found += _strangers(path, set(planned), files)
     return [finding(path.resolve().name, found), *episodes]
 
 
-def _against(path: Path, listed: Mapping[str, str], episodes: Sequence[Finding]) -> list[Fault]:
+def _against(
+    path: Path, listed: Mapping[str, str], files: Sequence[str], episodes: Sequence[Finding]
+) -> list[Fault]:
     """Where the dataset's SHA256SUMS and those of the episodes do not say the same."""
     sums: dict[str, str] = {}
-    for name in (PLAN, *(episode.episode for episode in episodes)):
+    for name in (*files, *(episode.episode for episode in episodes)):
         try:
-            sums |= {PLAN: sha256(path / PLAN)} if name == PLAN else _sums_of(path / name)
+            sums |= {name: sha256(path / name)} if name in files else _sums_of(path / name)
         except LogFormatError:  # told already; all that is listed of it passes
             sums |= {k: v for k, v in listed.items() if k == name or k.startswith(f"{name}/")}
     found = []
@@ -200,9 +239,9 @@ def _against(path: Path, listed: Mapping[str, str], episodes: Sequence[Finding])
     return found
 
 
-def _strangers(path: Path, planned: set[str]) -> list[Fault]:
+def _strangers(path: Path, planned: set[str], files: Sequence[str]) -> list[Fault]:
     """What lies beside the episodes."""
-    there = set(os.listdir(path)) - {PLAN, SUMS}
+    there = set(os.listdir(path)) - {*files, SUMS}
     return foreign(path, there, planned)
 
 

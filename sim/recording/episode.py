@@ -15,9 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from sim.actors.rearranging import Rearrangement
 from sim.moments import Moment, toured
 from sim.recording import topics
 from sim.recording.bag import BagWriter
+from sim.recording.rearranged import REARRANGED, write_rearranged
 from sim.recording.recipe import RECIPE, Recipe, write_recipe
 from sim.recording.relations import write_relations
 from sim.recording.sums import write_sums
@@ -98,17 +100,21 @@ def _write(
     note: Callable[[], None],
 ) -> Result:
     scene, summary = simulation.world.scene, _Summary()
+    rearranged: list[Rearrangement] = []
     with _whole(parent / recipe.name) as folder:
         bag = BagWriter(folder, simulation.spec, movers=scene.movers, height_m=scene.scan_height_m)
         with bag:
             for moment in moments:
                 bag.write(moment)
                 summary.take(moment.frame)
+                rearranged += moment.rearranged
                 note()
         truth = summary.truth()
         write_tum(folder / "trajectory.tum", truth)
         write_relations(folder / "relations.txt", truth)
         write_map(folder / "map", scene.static_map)
+        if recipe.rearranges:
+            write_rearranged(folder / REARRANGED, rearranged, scene.bounds)
         result = {**summary.result(), "messages_sha256": bag.messages_sha256}
         if topics.names():
             result["topics"] = topics.names()

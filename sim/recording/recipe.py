@@ -26,6 +26,7 @@ from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from sim.sensors.odometry.config import PRESETS
 from sim.simulation import Simulation
 from sim.twins.twins import TWINS
+from sim.world.times_of_day import checked
 from sim.world.world import World
 from slam.bounded import text_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
@@ -56,6 +57,10 @@ class Recipe:
     resolution_deg, range_mode  of the LMS-221 (``Lms221Config``)
     odometry    preset of the wheel encoders
     twin        "", or which one of a drive's three versions (``sim.twins.twins``)
+    change      in [0, 1]: share of what is out of sight that is found elsewhere later
+                (``sim.actors.rearranging``); None: as the simulation has it
+    session     number of a session of the same building (``sim.world.sessions``), ``change`` then
+                being the share that stands elsewhere than in the session before; None: no sessions
     """
 
     scene: str
@@ -69,6 +74,7 @@ class Recipe:
     twin: str = ""
     motion: float | None = None
     change: float | None = None
+    session: int | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -84,6 +90,7 @@ class Recipe:
         one_of("Recipe.odometry", self.odometry, tuple(PRESETS))
         if self.twin != "":
             one_of("Recipe.twin", self.twin, TWINS)
+        self._check_change()
         if not isinstance(self.options, Mapping):
             raise InvalidValueError(f"Recipe.options must be a mapping, got {self.options!r}")
         taken = sorted(_NOT_OPTIONS.intersection(self.options))
@@ -96,6 +103,26 @@ class Recipe:
             crowd_of(self.options["crowd"])
         self.laser()
 
+    def _check_change(self) -> None:
+        if self.change is not None:
+            number("Recipe.change", self.change)
+            if not 0.0 <= self.change <= 1.0:
+                raise InvalidValueError(f"Recipe.change must lie in [0, 1], got {self.change}")
+        if self.session is not None:
+            checked(self.session)
+            if self.twin:
+                raise InvalidValueError(f"Recipe.session and twin exclude each other: {self.twin}")
+
+    @property
+    def share_changed(self) -> float:
+        """Of things out of sight, or from one session to the next: ``change``, else dynamism."""
+        return float(self.dynamism if self.change is None else self.change)
+
+    @property
+    def rearranges(self) -> bool:
+        """Whether things are put elsewhere during the episode, and written down."""
+        return self.session is None and self.twin in ("", TWINS[0]) and self.share_changed > 0.0
+
     def laser(self) -> ScannerConfig:
         """How the scanner is set."""
         if not isinstance(self.scanner, str):
@@ -106,6 +133,8 @@ class Recipe:
 
     def simulation(self) -> dict[str, Any]:
         """Arguments of ``Simulation``."""
+        later = (*_AXES, "session")
+        more = {name: getattr(self, name) for name in later if getattr(self, name) is not None}
         return {
             "scene": self.scene,
             "seed": self.seed,
@@ -113,7 +142,7 @@ class Recipe:
             "laser": self.laser(),
             "odometry": self.odometry,
             "labels": True,
-            **{name: getattr(self, name) for name in _AXES if getattr(self, name) is not None},
+            **more,
             **self.options,
         }
 
@@ -129,14 +158,15 @@ class Recipe:
         """
         scene = re.sub(r"[^A-Za-z0-9_.]+", "-", self.scene).strip("-.")
         twin = f"-{self.twin}" if self.twin else ""
+        session = "" if self.session is None else f"-session{self.session:02d}"
         levels = [(axis[0], getattr(self, axis)) for axis in ("dynamism", *_AXES)]
         level = "".join(f"-{letter}{at:.4g}" for letter, at in levels if at is not None)
-        return f"{scene}{level}-s{self.seed:04d}{twin}"
+        return f"{scene}{level}-s{self.seed:04d}{session}{twin}"
 
     def words(self) -> dict[str, Any]:
-        """As it is written; an axis that is not given has no word."""
-        words = asdict(self)
-        return {k: v for k, v in words.items() if k not in _AXES or v is not None}
+        """As it is written; what was added since the first recipes has no word where it is None."""
+        later = (*_AXES, "session")
+        return {k: v for k, v in asdict(self).items() if k not in later or v is not None}
 
     @property
     def sha256(self) -> str:

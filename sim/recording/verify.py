@@ -14,6 +14,7 @@ from sim.core.versions import not_this_world
 from sim.recording import topics
 from sim.recording.bag import MessageHash
 from sim.recording.episode import record
+from sim.recording.rearranged import REARRANGED
 from sim.recording.recipe import RECIPE, Made, Recipe, read_recipe
 from sim.recording.sums import SUMS, Fault, check_vouched, faults, read_sums
 from slam.errors import LogFormatError, OutputError
@@ -95,7 +96,8 @@ def check_hashes(folder: Path, planned: Recipe | None = None) -> Finding:
             found.append(Fault(kind="damaged", name=RECIPE, why=str(error)))
         return finding(folder.name, found)
     bag = f"{made.recipe.name}.mcap"
-    found += _unlisted(folder, listed, (*_FILES, bag))
+    more = (REARRANGED,) if made.recipe.rearranges else ()
+    found += _unlisted(folder, listed, (*_FILES, bag, *more))
     if planned is not None and made.recipe != planned:
         why = f"{folder / RECIPE} is not the recipe that is planned for it"
         found.append(Fault(kind="damaged", name=RECIPE, why=why))

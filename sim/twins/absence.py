@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.groups import with_held
+from scenes.kinds import is_door, joint_of_door
 from sim.actors.doors import OPENED
 from sim.actors.holding import QB, VA, VB
 from sim.actors.people import columns, gait
@@ -131,8 +132,9 @@ def _look_again(simulation: Simulation) -> None:
 def _park(world: World, name: str) -> None:
     row, qpos = world.mover_names.index(name), world.data.qpos
     addresses = _qpos_of(world, name)
-    if _kind(world, name) == "door":
-        joint = world.model.joint(f"{name}/hinge")
+    kind = _kind(world, name)
+    if is_door(kind):
+        joint = world.model.joint(f"{name}/{joint_of_door(kind)}")
         qpos[addresses] = min(OPENED, float(joint.range[1]))
         return
     _, ymin, xmax, _ = world.scene.bounds

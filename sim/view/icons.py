@@ -114,6 +114,14 @@ def _door(width: float) -> tuple[Shape, ...]:
     )
 
 
+def _door_sliding(width: float) -> tuple[Shape, ...]:
+    leaf = np.array([[-0.03, 0.0], [width, 0.0]])
+    return (
+        Shape(lines=(leaf,), colour=INK, width=0.06),
+        Shape(lines=(leaf,), colour=STEEL, width=0.03),
+    )
+
+
 def _chair_swivel(cloth: Colour) -> tuple[Shape, ...]:
     arms = tuple(
         np.array([[0.0, 0.0], [0.31 * math.cos(t), 0.31 * math.sin(t)]])
@@ -231,6 +239,7 @@ DRAWINGS: dict[str, Callable[[float, Colour | None], tuple[Shape, ...]]] = {
     "hospital_bed": lambda size, colour: _hospital_bed(),
     "couch": lambda size, colour: _couch(colour or GREEN),
     "person": lambda size, colour: _person(colour or BLUE),
+    "door_sliding": lambda size, colour: _door_sliding(size),
     "door": lambda size, colour: _door(size),
     "robot": lambda size, colour: _robot(),
 }

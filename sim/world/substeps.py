@@ -178,7 +178,7 @@ def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:
 
 
 @njit
-def _advance(  # noqa: PLR0913 (kernel)
+def _advance(  # noqa: C901, PLR0913 (kernel)
     first: int,
     last: int,
     resumed: bool,

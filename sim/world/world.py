@@ -15,23 +15,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes import build
-from scenes.crowd import mix
+from scenes.crowd import Crowd, crowd_of, mix, with_crowd
 from scenes.scene import Scene
 from sim.actors.castors import checked_level, stand_on_castors
 from sim.actors.chairs import pushers, tables
 from sim.actors.doors import Doors
 from sim.actors.people.people import People
+from sim.actors.rearranging import Rearrangement, Rearranging
 from sim.actors.robot import Drive, DriveConfig
 from sim.core import state
 from sim.core.bodies import Bodies
-from sim.core.checks import instance
+from sim.core.checks import instance, number
 from sim.core.contacts import Contact, RobotContacts
 from sim.core.dynamism import Dynamism
 from sim.core.engine import engine
 from sim.core.seeds import Seeds
-from sim.world import substeps
+from sim.world import sessions, substeps
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
+from sim.world.times_of_day import time_of
 from slam.errors import InvalidValueError
+from slam.frames import LaserSpec
 
 __all__ = ["SUBSTEPS_PER_S", "SUBSTEPS_PER_TICK", "World"]
 
@@ -45,8 +48,12 @@ class World:
     scene     a built ``Scene``, or the name of one; a name is built from the "layout" stream
     seed      whole number or ``Seeds``
     dynamism  number in [0, 1] (see ``sim.core.dynamism``), or the rates themselves
-    motion, change  one of the two axes alone, in [0, 1]
+    motion    in [0, 1]: that axis alone at this level instead
     moving_share  in [0, 1]: keep that share of chairs and loads on the move, instead of shoves
+    change    in [0, 1]: of the things out of sight, the share that is found elsewhere when the
+              robot sees them again (``sim.actors.rearranging``)
+    session   number of a session of the same building (``sim.world.sessions``): then ``change`` is
+              the share of what stands elsewhere than in the session before
     drive     limits of the robot
     start     (x m, y m, heading rad) of the robot instead of the scene's
     chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.castors``)
@@ -66,6 +73,7 @@ class World:
         moving_share: float | None = None,
         motion: float | None = None,
         change: float | None = None,
+        session: int | None = None,
         drive: DriveConfig | None = None,
         start: Sequence[float] | None = None,
         chairs: str = "planar",
@@ -73,6 +81,12 @@ class World:
     ) -> None:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
         self.rates = Dynamism.of(dynamism, moving_share, motion=motion, change=change)
+        change = self.rates.change
+        if session is not None:
+            self.rates = sessions.slowed(self.rates, time_of(session).motion)
+            crowd = self._crowd_of(scene, options)
+            scene, self.seeds = sessions.opened(scene, self.seeds, change, session, options)
+            scene, options, change = with_crowd(scene, crowd, session), {}, 0.0
         built = self._built(scene, options)
         self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
         self.model: mujoco.MjModel = self.scene.compile()
@@ -101,6 +115,7 @@ class World:
             counters=self._counters("people"),
         )
         self._people_rows = self.bodies.rows(self.people.names)
+        self._rearranging = self._rearranger(change)
         self.scene.place(self.model, self.data)
         if start is not None:
             self.bodies.place_robot(self.data, start)
@@ -114,13 +129,20 @@ class World:
 
     def _built(self, scene: Scene | str, options: dict[str, Any]) -> Scene:
         if isinstance(scene, str):
-            crowd = mix(scene, self.rates.crowd)
-            options = {"crowd": str(crowd), **options} if crowd else options
-            return build(scene, seed=self.seeds.integer("layout"), **options)
+            options = dict(options)
+            crowd = self._crowd_of(scene, options)
+            return build(scene, seed=self.seeds.integer("layout"), crowd=str(crowd), **options)
         if options:
             raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")
         instance("scene", scene, Scene)
         return scene
+
+    def _crowd_of(self, scene: Scene | str, options: dict[str, Any]) -> Crowd:
+        """The crowd that ``options`` name, which is taken out of them, or the scene's mix."""
+        if not isinstance(scene, str):
+            return Crowd()
+        given = options.pop("crowd", None)
+        return mix(scene, self.rates.crowd) if given is None else crowd_of(given)
 
     def _named(self, kind: str) -> list[str]:
         """Movers whose kind starts so: "chair" means both sorts."""
@@ -144,6 +166,43 @@ class World:
             self.people.table, self._doors.leaves, shoved, rolled, self._pinned
         )
         return substeps.plain((self._clock, engine(self.model, data), robot, physics, actors))
+
+    def _rearranger(self, change: float) -> Rearranging | None:
+        number("change", change)
+        if not 0.0 <= change <= 1.0:
+            raise InvalidValueError(f"change must lie in [0, 1], got {change!r}")
+        if change == 0.0 or self.bodies.robot is None:
+            return None
+        counters = self._counters("change")
+        return Rearranging(self.model, self.scene, self.bodies, share=change, counters=counters)
+
+    @property
+    def change(self) -> float:
+        """The share of what is out of sight that is put elsewhere."""
+        return 0.0 if self._rearranging is None else self._rearranging.share
+
+    def seen_since_drawn(self) -> NDArray[np.bool_]:
+        """(n,) whether each mover was seen since it was last drawn for a change out of sight."""
+        found = self._rearranging
+        return np.zeros(len(self.mover_names), bool) if found is None else found.seen()
+
+    def rearrange(self, spec: LaserSpec) -> list[Rearrangement]:
+        """Between two scans, at given moments: change what that scanner cannot see now."""
+        if self._rearranging is None or not self._rearranging.due(self.time_ns * 1e-9):
+            return []
+        poses, busy = self.mover_poses(), np.zeros(len(self.mover_names), dtype=np.bool_)
+        busy[self.people.in_use(self.bodies)] = True
+        busy |= self.bodies.any_at(self._pinned.at)
+        done = self._rearranging.rearrange(self.time_ns * 1e-9, spec, poses, busy)
+        rows = sorted({self.mover_names.index(event.name) for event in done})
+        if rows:
+            self.bodies.put(self.data, rows, poses[rows])
+        return done
+
+    def saw(self, hit: NDArray[np.int32]) -> None:
+        """Take in which bodies a scan has hit: ``rearrange`` changes only what was seen."""
+        if self._rearranging is not None:
+            self._rearranging.saw(hit)
 
     def pin(self, pinned: substeps.Pinned) -> None:
         """Hold things at a place from now on, and bring all poses up to date."""
@@ -243,6 +302,8 @@ class World:
         arrays: dict[str, NDArray[Any]] = {"drive": self._drive.state}
         parts = {kind: shoves.arrays() for kind, shoves in self._shoves.items()}
         parts |= {"doors": self._doors.arrays(), "people": self.people.arrays()}
+        if self._rearranging is not None:
+            parts["change"] = self._rearranging.arrays()
         for owner, own in parts.items():
             arrays |= {f"{owner}.{name}": a for name, a in own.items()}
         return arrays

@@ -22,10 +22,11 @@ from slam.guests import protocol
 from slam.guests.limits import Limits
 from slam.guests.wire import Wire
 from slam.names import child_environment, join_folders, refuse_code
+from slam.oracle import Oracle
 from slam.path import PosePath
 from slam.system import Estimate, Raster, SlamSystem, create, register_prefix
 from slam.trajectory import Trajectory
-from slam.variants import PIPE
+from slam.variants import PIPE, oracle_of
 
 
 @register_prefix(PIPE)
@@ -182,6 +183,9 @@ def limited(name: str, limits: Limits | None) -> SlamSystem:
     """``create(name)`` for comparisons: with limits, whatever is not ours runs in a child."""
     if limits is None or ":" not in name:
         return create(name)
+    if (wanted := oracle_of(name)) is not None:  # its labels stay on this side
+        refuse_code(name, "SLAM")
+        return Oracle(limited(wanted[0], limits), wanted[1])
     if name.startswith(PIPE):
         return create(name, scan_limit_s=limits.scan_s, first_limit_s=limits.first_s)
     return guarded(name, limits)

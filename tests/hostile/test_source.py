@@ -38,7 +38,7 @@ STARTERS = {
     "sim/view/gl.py": "our own Python, without the working folder",
     "scripts/film/encode.py": "ffmpeg",
     "scripts/robustness/kills.py": "our own Python",
-    "scripts/quotes/results.py": "git, for the commit of a results file",
+    "scripts/result_files.py": "git, for the commit of a results file",
     "scripts/experiments/compare_irsim.py": "an interpreter that the user names",
 }
 

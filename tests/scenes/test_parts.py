@@ -51,6 +51,16 @@ def test_a_long_part_collides_with_three_spheres_in_a_row(kind):
     assert len(set(model.geom_size[solid, 0])) == 1
 
 
+def test_long_things_are_put_where_all_their_hulls_have_room():
+    scene = scenes.filled("arena", 4, loads=dict.fromkeys(LONG, 2))
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    scene.place(model, data)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    assert sum(mover.kind in LONG for mover in scene.movers) == 2 * len(LONG)
+
+
 def seen_across(kind, x, turn=1.0):
     """How far in front of the x axis of a part a laser at its height meets it; nan if it passes."""
     model = mujoco.MjModel.from_xml_path(str(PARTS[0].parent / f"{kind}.xml"))

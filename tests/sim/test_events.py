@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from scenes.scene import Mover
-from sim.events import CHAIR, DOOR, KIDNAP, NEAR_M, PERSON, Event, EventWatch
+from sim.events import CHAIR, CHANGE, DOOR, KIDNAP, NEAR_M, PERSON, Event, EventWatch
 from sim.moments import Moment, toured
 from sim.simulation import Simulation
 from slam.frames import BeamLabels, Frame, LaserSpec, Odometry, Scan
@@ -24,7 +24,8 @@ SPEC = LaserSpec(n_beams=2, angle_min=0.0, angle_increment=0.1)
 def watch() -> EventWatch:
     movers = [Mover(name=n, kind=k, radius=r) for n, k, r in MOVERS]
     bodies = SimpleNamespace(mover_of_body=np.array([-1, 0, 1, 2, 3]))
-    world: Any = SimpleNamespace(scene=SimpleNamespace(movers=movers), bodies=bodies)
+    scene = SimpleNamespace(movers=movers, bounds=(0.0, 0.0, 9.0, 9.0))
+    world: Any = SimpleNamespace(scene=scene, bodies=bodies, change=0.0)
     return EventWatch(world)
 
 
@@ -108,3 +109,18 @@ def test_more_dynamism_is_more_events_and_none_of_it_is_none():
     assert counts[0] == 0
     assert counts[1] > 3
     assert made.kinds == [CHAIR, DOOR, PERSON]
+
+
+def test_what_is_put_elsewhere_out_of_sight_is_an_event_of_its_own_and_no_push():
+    simulation = Simulation("arena", seed=1, dynamism=0.0, change=1.0, laser="lms221:noise")
+    made, told = EventWatch(simulation.world), []
+    assert made.kinds == [CHAIR, CHANGE]
+    simulation.world.set_command(0.0, 1.5)
+    for _ in range(240):
+        poses, moving = simulation.world.mover_poses(), simulation.world.movers_moving()
+        frame, rearranged = simulation.observe(), tuple(simulation.rearranged)
+        told += [event.name for event in rearranged]
+        made.note(Moment(frame=frame, poses=poses, moving=moving, rearranged=rearranged))
+    assert told
+    assert {e.kind for e in made.events()} == {CHANGE}
+    assert sorted(e.name for e in made.events()) == sorted(told)

@@ -21,6 +21,8 @@ APART, TOUCHING, SOON, LEAST_PACE = _S.apart_m, _S.touching, _S.soon_s, _S.least
 HURRY, HURRY_MOST, HURRY_FROM = _S.hurry, _S.hurry_most, _S.hurry_from
 CHANGE, KEEP_RIGHT, SLOW = _S.change, _S.keep_right, _S.slow
 LOOK_S, WALL = _S.look_s, _S.wall
+STANDS_MPS = ACTORS.following.moving_mps
+CROWD_SPARE, CROWD_BRAKE = _S.crowd_spare_m, _S.crowd_brake
 
 
 @njit
@@ -38,8 +40,13 @@ def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> flo
 
 
 @njit
-def danger(i: int, vx: float, vy: float, near: Int, discs: Float, fade: float) -> float:
-    """Cost of what person ``i`` would run into at velocity (vx, vy)."""
+def danger(  # noqa: PLR0913 (kernel)
+    i: int, vx: float, vy: float, near: Int, discs: Float, fade: float, dense: float
+) -> float:
+    """Cost of what person ``i`` would run into at velocity (vx, vy).
+
+    fade, dense  weight of things and of people
+    """
     x, y, r, ux, uy = (
         discs[i, columns.X],
         discs[i, columns.Y],
@@ -50,11 +57,11 @@ def danger(i: int, vx: float, vy: float, near: Int, discs: Float, fade: float) -
     cost = 0.0
     for k in range(len(near)):
         other = discs[near[k]]
-        weight = (
-            1.0
-            if other[columns.KIND] == columns.PERSON or other[columns.KIND] == columns.ROBOT
-            else fade
-        )
+        weight = fade
+        if other[columns.KIND] == columns.PERSON:
+            weight = dense
+        elif other[columns.KIND] == columns.ROBOT:
+            weight = 1.0
         if weight <= 0.0:
             continue
         dx, dy, reach = other[columns.X] - x, other[columns.Y] - y, r + other[columns.R] + APART
@@ -115,7 +122,7 @@ def choose(
             if c < here:
                 cost += WALL * (here - c)
         if cost < best:
-            cost += danger(i, vx, vy, near, discs, fade)
+            cost += danger(i, vx, vy, near, discs, fade, state[i, columns.DENSE])
         if cost < best:
             best, best_x, best_y = cost, vx, vy
     return best_x, best_y
@@ -127,29 +134,43 @@ def spare_robot(
 ) -> tuple[float, float]:
     """The velocity less what would run into the robot: nobody pushes it, not even when held up.
 
-    Nor does anybody run into it with what is held.
+    Nor does anybody run into it with what is held: who pulls a train slows down when a wagon comes
+    near the robot. Those of a crowd stop earlier.
     """
     vx, vy = wanted
     discs, held = crowd.discs, crowd.task[i, columns.HELD]
+    spare, brake = SPARE, ACCEL
+    if crowd.state[i, columns.DENSE] < 1.0:
+        spare, brake = CROWD_SPARE, CROWD_BRAKE
     for k in range(len(near)):
         robot = discs[near[k]]
         if robot[columns.KIND] != columns.ROBOT:
             continue
-        vx, vy = _spare(vx, vy, discs[i], robot)
+        vx, vy = _spare(vx, vy, discs[i], robot, spare, brake)
         for part in range(len(discs) if held >= 0 else 0):
-            if crowd.owner[part] == held:
-                vx, vy = _spare(vx, vy, discs[part], robot)
+            if crowd.owner[part] != held:
+                continue
+            u, v = discs[part, columns.U], discs[part, columns.V]
+            own = math.sqrt(u * u + v * v)
+            if own < STANDS_MPS:
+                vx, vy = _spare(vx, vy, discs[part], robot, spare, brake)
+                continue
+            sx, sy = _spare(u, v, discs[part], robot, spare, brake)
+            share = min(max((sx * u + sy * v) / (own * own), 0.0), 1.0)
+            vx, vy = share * vx, share * vy
     return vx, vy
 
 
 @njit
-def _spare(vx: float, vy: float, disc: Float, robot: Float) -> tuple[float, float]:
+def _spare(
+    vx: float, vy: float, disc: Float, robot: Float, spare: float, brake: float
+) -> tuple[float, float]:
     dx, dy = robot[columns.X] - disc[columns.X], robot[columns.Y] - disc[columns.Y]
     far = math.sqrt(max(dx * dx + dy * dy, 1e-6))
     ux, uy = dx / far, dy / far
-    gap = far - disc[columns.R] - robot[columns.R] - SPARE
-    # A person stops at ACCEL; what the robot itself comes nearer is stepped back from.
+    gap = far - disc[columns.R] - robot[columns.R] - spare
+    # A person stops at ``brake``; what the robot itself comes nearer is stepped back from.
     approach = vx * ux + vy * uy - (robot[columns.U] * ux + robot[columns.V] * uy)
-    allowed = math.sqrt(2.0 * ACCEL * gap) if gap > 0.0 else 4.0 * gap
+    allowed = math.sqrt(2.0 * brake * gap) if gap > 0.0 else 4.0 * gap
     excess = min(max(approach - allowed, 0.0), SPARE_MPS)
     return vx - excess * ux, vy - excess * uy

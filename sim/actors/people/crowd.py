@@ -2,9 +2,9 @@
 """How people decide, all of them in one compiled call per control tick.
 
 Each person stays somewhere, walks to the next goal down its flow field (``sim.core.flow``) or
-follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that hits nothing soon (``sim.actors.people.avoidance``). A person
-whose way is blocked by a chair loses patience and pushes it; now and then one sits down
-(``sim.actors.people.sitting``).
+follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that
+hits nothing soon (``sim.actors.people.avoidance``). A person whose way is blocked by a chair loses
+patience and pushes it; now and then one sits down (``sim.actors.people.sitting``).
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from sim.actors.config import ACTORS
 from sim.actors.holding import Held
 from sim.actors.people import columns
 from sim.actors.people.avoidance import ACCEL, choose, spare_robot
-from sim.actors.people.carrying import may_take, pushes, put_down, to_what_is_taken
+from sim.actors.people.carrying import clean, pushes, to_what_is_taken
 from sim.actors.people.following import (
     Leaders,
     faces,
     follow,
+    make_room,
     make_way,
     near_place,
     note_ways,
@@ -43,7 +44,7 @@ from sim.actors.people.right_of_way import (
 )
 from sim.actors.people.sitting import Hulls, may_sit, on_chair, sit, to_chair
 from sim.core.draws import between, uniform, waiting
-from sim.core.flow import FAR, Field, time_at, way_at
+from sim.core.flow import FAR, Field, clearance_at, time_at, way_at
 from slam._jit import njit
 
 _W = ACTORS.walking
@@ -51,6 +52,10 @@ STILL, DOORWAY = _W.still_mps, _W.doorway_m
 ARRIVE_LEAST, ARRIVE_MOST = _W.arrive_least_s, _W.arrive_most_s
 LOOK_LEAST, LOOK_MOST = _W.look_least_s, _W.look_most_s
 NEAR_S, NEAR_BLOCKED, NO_PROGRESS = _W.near_s, _W.near_blocked_s, _W.no_progress_s
+SIGHT_M = ACTORS.holding.sight_m
+NEAR, CROWD_NEAR = 24, 64  # discs around one that are looked at, without and with a crowd
+_S = ACTORS.steering
+LANE_HALF, LANE, LANE_SIDE, LANE_WALL = _S.lane_half_m, _S.lane, _S.lane_side_m, _S.lane_wall_m
 GIVES_UP, TURN_GAIN, TURN_MOST = _W.blocked_s, _W.turn_gain, _W.turn_most
 
 
@@ -125,6 +130,8 @@ def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[
     left = time_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
     speed = min(pace * state[i, columns.SPEED] * state[i, columns.SLOW], 0.3 + 1.2 * left)
     wx, wy = speed * wx, speed * wy
+    if state[i, columns.STAYS] == 0.0:
+        wx, wy = keep_right(i, wx, wy, field, discs)
     for d in range(ways.doors.shape[0]):
         side, turn = ways.sides[i, d], ways.passage[d, columns.TURN]
         if side == 0:
@@ -134,6 +141,33 @@ def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[
         elif ways.doors[d, columns.ANGLE] < OPEN:
             wx, wy = hold_off(i, d, (wx, wy), ways, discs)
     return wx, wy
+
+
+@njit
+def keep_right(i: int, wx: float, wy: float, field: Field, discs: Float) -> tuple[float, float]:
+    """The wanted velocity of one of a stream, which keeps to the right side of a corridor."""
+    x, y = discs[i, columns.X], discs[i, columns.Y]
+    speed = math.sqrt(wx * wx + wy * wy)
+    if speed < STILL or clearance_at(field, x, y) > LANE_HALF:
+        return wx, wy
+    rx, ry = wy / speed, -wx / speed
+    if clearance_at(field, x + LANE_SIDE * rx, y + LANE_SIDE * ry) < LANE_WALL:
+        return wx, wy
+    return wx + LANE * speed * rx, wy + LANE * speed * ry
+
+
+@njit
+def way_left(i: int, field: Field, crowd: Crowd) -> float:
+    """s to the goal, of person ``i`` or whatever of the thing it pushes is nearest to it."""
+    discs, goal = crowd.discs, crowd.task[i, columns.GOAL]
+    left = time_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
+    if crowd.state[i, columns.TURN_RATE] < TURN_MOST:
+        for part in range(len(discs)):
+            if crowd.owner[part] == crowd.task[i, columns.HELD]:
+                left = min(
+                    left, time_at(field, goal, discs[part, columns.X], discs[part, columns.Y])
+                )
+    return left
 
 
 @njit
@@ -171,7 +205,7 @@ def plan(  # noqa: C901, PLR0913 (kernel)
     if state[i, columns.SIT] > 0.0:  # getting up
         state[i, columns.BEST_AT] = time
         return
-    left = time_at(field, task[i, columns.GOAL], discs[i, columns.X], discs[i, columns.Y])
+    left = way_left(i, field, crowd)
     state[i, columns.WALKED_S] += tick
     if discs[i, columns.U] ** 2 + discs[i, columns.V] ** 2 < STILL * STILL:
         state[i, columns.BLOCKED] += tick
@@ -194,17 +228,20 @@ def plan(  # noqa: C901, PLR0913 (kernel)
 def nearby(i: int, crowd: Crowd, sides: Int, near: Int) -> int:
     """Rows of discs within 3 m of person ``i``, into ``near``; returns how many.
 
+    Who pushes something long looks farther.
+
     The leaf of a door one wants to pass is no obstacle: ``at_door`` deals with it; nor is the chair
     that one sits down on, nor what one holds.
     """
     discs, count = crowd.discs, 0
     seat, held = crowd.task[i, columns.SEAT], crowd.task[i, columns.HELD]
+    reach = 9.0 if crowd.state[i, columns.TURN_RATE] >= TURN_MOST else SIGHT_M * SIGHT_M
     for k in range(discs.shape[0]):
         dx, dy = (
             discs[k, columns.X] - discs[i, columns.X],
             discs[k, columns.Y] - discs[i, columns.Y],
         )
-        if k in (i, seat) or dx * dx + dy * dy > 9.0 or count == len(near):
+        if k in (i, seat) or dx * dx + dy * dy > reach or count == len(near):
             continue
         if held >= 0 and crowd.owner[k] == held:
             continue
@@ -236,12 +273,22 @@ def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) ->
             crowd.yaws[row] = qpos[q + 2]
     for d in range(at.doors.shape[0]):
         q, v = at.doors[d]
-        x, y, closed, sign = at.hinges[d]
+        x, y, closed, sign, slides = at.hinges[d]
         ways.doors[d, columns.ANGLE] = qpos[q]
+        if slides != 0.0:
+            ways.doors[d, columns.ANGLE] = 0.5 * math.pi * qpos[q] / ways.doors[d, columns.WIDTH]
         c, s = math.cos(closed + sign * qpos[q]), math.sin(closed + sign * qpos[q])
         for part in range(3):
             row = k + 3 * d + part
             length = (0.35 + 0.3 * part) * ways.doors[d, columns.WIDTH]
+            if slides != 0.0:
+                along = length + slides * qpos[q]
+                discs[row, columns.X], discs[row, columns.Y] = x + along * c, y + along * s
+                discs[row, columns.U], discs[row, columns.V] = (
+                    slides * qvel[v] * c,
+                    slides * qvel[v] * s,
+                )
+                continue
             discs[row, columns.X], discs[row, columns.Y] = x + length * c, y + length * s
             discs[row, columns.U] = -length * s * sign * qvel[v]
             discs[row, columns.V] = length * c * sign * qvel[v]
@@ -249,8 +296,9 @@ def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) ->
     for part in range(len(crowd.long)):
         row = int(crowd.long[part, 0])
         q, v = at.discs[row]
-        rx, ry = crowd.long[part, 1] * math.cos(qpos[q + 2]), crowd.long[part, 1] * math.sin(
-            qpos[q + 2]
+        rx, ry = (
+            crowd.long[part, 1] * math.cos(qpos[q + 2]),
+            crowd.long[part, 1] * math.sin(qpos[q + 2]),
         )
         end = discs[first + part]
         end[columns.X], end[columns.Y] = qpos[q] + rx, qpos[q + 1] + ry
@@ -293,9 +341,7 @@ def patience(i: int, time: float, crowd: Crowd) -> float:
 
 
 @njit
-def wish(
-    i: int, time: float, tick: float, people: People
-) -> tuple[float, float]:
+def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float]:
     """The velocity person ``i`` would like to have, whatever it does; keeps account of the way."""
     crowd, field = people.crowd, people.field
     state, task = crowd.state, crowd.task
@@ -307,11 +353,12 @@ def wish(
         if rests(i, time, crowd):
             return 0.0, 0.0
         wx, wy = follow(i, field, people.leaders, crowd)
+        wx, wy = make_room(i, (wx, wy), field, crowd)
         wx, wy = make_way(i, (wx, wy), people.leaders, crowd)
     elif doing == columns.QUEUES:
         wx, wy = stand_in_line(i, time, people.leaders, crowd)
     else:
-        wx, wy = to_what_is_taken(i, crowd)
+        wx, wy = to_what_is_taken(i, field, people.leaders, crowd)
     if wx * wx + wy * wy > 0.09:
         counts = 0.0 if doing == columns.FOLLOWS and near_place(i, crowd) else tick
         state[i, columns.WALKED_S] += counts  # who is with the leader has nowhere to get on to
@@ -321,23 +368,6 @@ def wish(
             return wx, wy
     state[i, columns.BLOCKED] = max(0.0, state[i, columns.BLOCKED] - 2.0 * tick)
     return wx, wy
-
-
-@njit
-def hand(i: int, time: float, stay: float, goal: int, people: People) -> None:
-    """Who takes chairs along takes one, or puts it down where it has arrived or given up.
-
-    goal  where it was going before this tick
-    """
-    crowd, task = people.crowd, people.crowd.task
-    if task[i, columns.HAND] < 0:
-        return
-    if may_take(i, time, people.field, crowd, people.held, people.at.discs, people.weights):
-        new_trip(i, time, stay, people.field, crowd)
-    elif task[i, columns.HELD] >= 0 and task[i, columns.WALKING] == columns.STANDS:
-        put_down(i, time, crowd, people.held)
-    elif task[i, columns.GOAL] != goal:
-        put_down(i, time, crowd, people.held)
 
 
 @njit
@@ -352,14 +382,14 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
     qpos, qvel, ctrl = physics
     at, field, ways, crowd = people.at, people.field, people.ways, people.crowd
     servos = people.servos
-    near = np.zeros(24, dtype=np.int64)
+    crowded = (crowd.state[:, columns.DENSE] < 1.0).any()
+    near = np.zeros(CROWD_NEAR if crowded else NEAR, dtype=np.int64)
     sense(at, qpos, qvel, ways, crowd)
     note_ways(tick, people.leaders, crowd)
     spread_out(field, people.leaders, crowd)
     for i in range(len(servos)):
-        goal = crowd.task[i, columns.GOAL]
         plan(i, time, tick, stay, ways.doors, field, crowd)
-        hand(i, time, stay, goal, people)
+        clean(i, time, field, people.leaders, crowd, people.held, at.discs, people.weights)
     give_turns(ways, field, crowd)
     for i in range(len(servos)):
         if on_chair(i, crowd):
@@ -370,7 +400,7 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
         count = nearby(i, crowd, ways.sides, near)
         fade = patience(i, time, crowd)
         if crowd.state[i, columns.TURN_RATE] < TURN_MOST:
-            vx, vy = pushes(i, wanted, near[:count], crowd)
+            vx, vy = pushes(i, wanted, near[:count], field, crowd)
         else:
             vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
         vx, vy = spare_robot(i, (vx, vy), near[:count], crowd)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sim.actors.config import ACTORS
 from sim.actors.people import columns
 from sim.actors.people.right_of_way import Crowd, Float, Int
-from sim.core.flow import Field, clearance_at
+from sim.core.flow import FAR, Field, clearance_at, time_at, way_at
 from slam._jit import njit
 
 _F = ACTORS.following
@@ -29,6 +29,9 @@ MARGIN, SIGHT, GAIN = _F.margin_m, _F.sight_m, _F.gain
 FASTEST, THERE, SERVED_S = _F.fastest_mps, _F.there_m, _F.served_s
 NARROW, WAY_M, WAY_HALF, ASIDE = _F.narrow_m, _F.way_m, _F.way_half_m, _F.aside_mps
 TAKEN_M, CROSSING = _F.taken_m, _F.crossing_m2
+NARROW_SIDE, ASKED_S, ROOM_M = _F.narrow_side_m, _F.asked_s, _F.room_m
+ROOM_PUSH_M, ROOM_HALF = _F.room_push_m, _F.room_half_m
+TURN_MOST = ACTORS.walking.turn_most
 HELD_UP_S, NEAR_M, REST_S = _F.held_up_s, _F.near_m, _F.rest_s
 CRUMBS = 160  # remembered of each leader: 40 m
 BEHIND = -0.5  # m; a place farther behind is one on the leader's way
@@ -41,7 +44,8 @@ class Leaders(NamedTuple):
     rows    (l,) disc row of each leader
     trail   (l, CRUMBS, 2) m, places it has been at, a ring
     course  (l, 4) heading rad of its formation, s it has stood, last crumb, number of crumbs
-    lines   (q, 3) place in a line x, y m, and the number of places of that line
+    lines   (q, 7) place in a line x, y m, and the number of places of that line; of a row of chairs
+            also the disc row of the chair that stands there (-1 none) and its pose before
     """
 
     rows: Int
@@ -50,14 +54,14 @@ class Leaders(NamedTuple):
     lines: Float
 
 
-def leaders_of(rows: list[int], lines: list[tuple[float, float, float]]) -> Leaders:
+def leaders_of(rows: list[int], lines: list[tuple[float, ...]]) -> Leaders:
     """Of discs in these rows, not yet on their way."""
     n = len(rows)
     return Leaders(
         np.array(rows, dtype=np.int64),
         np.zeros((n, CRUMBS, 2)),
         np.zeros((n, 4)),
-        np.array(lines, dtype=np.float64).reshape(-1, 3),
+        np.array(lines, dtype=np.float64).reshape(-1, 7),
     )
 
 
@@ -105,9 +109,15 @@ def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tu
     course, disc = leaders.course[k], crowd.discs[leaders.rows[k]]
     ahead, left = crowd.state[i, columns.AHEAD], crowd.state[i, columns.LEFT]
     far = math.sqrt(ahead * ahead + left * left)
-    if clearance_at(field, disc[columns.X], disc[columns.Y]) < NARROW:  # in file, one after another
-        left = 0.3 * left
-        ahead = ahead if ahead > 0.5 else -far
+    clear = clearance_at(field, disc[columns.X], disc[columns.Y])
+    if clear < NARROW:  # those beside it go in file, those ahead keep between the walls
+        room = max(clear - NARROW_SIDE, 0.1)
+        if ahead <= 0.5:
+            ahead = -float(crowd.state[i, columns.FILE])
+        elif abs(left) > room:
+            ahead += 0.5 * (abs(left) - room)
+            left = room if left > 0.0 else -room
+        far = math.sqrt(ahead * ahead + left * left)
     if ahead < BEHIND:  # on the way that the leader has come
         back = min(int(-ahead / CRUMB), int(course[COUNT]) - 1)
         at = (int(course[LAST]) - back) % CRUMBS
@@ -133,7 +143,9 @@ def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
             x, y = place_of(i, task[i, columns.LEADER], field, leaders, crowd)
             state[i, columns.SPOT_X], state[i, columns.SPOT_Y] = x, y
     for i in range(len(task)):
-        for j in range(i + 1 if task[i, columns.WALKING] == columns.FOLLOWS else len(task), len(task)):
+        for j in range(
+            i + 1 if task[i, columns.WALKING] == columns.FOLLOWS else len(task), len(task)
+        ):
             if (
                 task[j, columns.WALKING] != columns.FOLLOWS
                 or task[j, columns.LEADER] != task[i, columns.LEADER]
@@ -145,7 +157,13 @@ def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
                 p, q = state[i, columns.SPOT_X + axis], state[j, columns.SPOT_X + axis]
                 gain += (a - p) ** 2 + (b - q) ** 2 - (a - q) ** 2 - (b - p) ** 2
             if gain > CROSSING:
-                for column in (columns.AHEAD, columns.LEFT, columns.SPOT_X, columns.SPOT_Y):
+                for column in (
+                    columns.AHEAD,
+                    columns.LEFT,
+                    columns.FILE,
+                    columns.SPOT_X,
+                    columns.SPOT_Y,
+                ):
                     state[i, column], state[j, column] = state[j, column], state[i, column]
 
 
@@ -170,6 +188,33 @@ def make_way(
 
 
 @njit
+def make_room(
+    i: int, wanted: tuple[float, float], field: Field, crowd: Crowd
+) -> tuple[float, float]:
+    """The velocity of person ``i``, sideways where it stands in the way of one who is held up."""
+    discs, task, state = crowd.discs, crowd.task, crowd.state
+    for j in range(len(task)):
+        if task[j, columns.WALKING] != columns.WALKS or state[j, columns.BLOCKED] < ASKED_S:
+            continue
+        dx, dy = (
+            discs[i, columns.X] - discs[j, columns.X],
+            discs[i, columns.Y] - discs[j, columns.Y],
+        )
+        pushing = state[j, columns.TURN_RATE] < TURN_MOST
+        reach = ROOM_PUSH_M if pushing else ROOM_M
+        if dx * dx + dy * dy > reach * reach:
+            continue
+        c, s = math.cos(crowd.yaws[j]), math.sin(crowd.yaws[j])
+        if not pushing:
+            c, s = way_at(field, task[j, columns.GOAL], discs[j, columns.X], discs[j, columns.Y])
+        ahead, left = c * dx + s * dy, c * dy - s * dx
+        if ahead > 0.0 and abs(left) < ROOM_HALF:
+            side = 1.0 if left >= 0.0 else -1.0
+            return wanted[0] - side * ASIDE * s, wanted[1] + side * ASIDE * c
+    return wanted
+
+
+@njit
 def near_place(i: int, crowd: Crowd) -> bool:
     """Whether person ``i`` is as good as at its place."""
     dx = crowd.state[i, columns.SPOT_X] - crowd.discs[i, columns.X]
@@ -190,6 +235,41 @@ def rests(i: int, time: float, crowd: Crowd) -> bool:
 
 
 @njit
+def route(i: int, tx: float, ty: float, field: Field, crowd: Crowd) -> tuple[float, float]:
+    """A place in sight of person ``i`` on the way to (tx, ty): itself, or a step round the walls.
+
+    Round walls one goes the way to the goal that is the nearest to it.
+    """
+    x, y = crowd.discs[i, columns.X], crowd.discs[i, columns.Y]
+    if in_sight(field, x, y, tx, ty):
+        return tx, ty
+    goal, least = -1, FAR
+    for k in range(field.times.shape[0]):
+        time = time_at(field, k, tx, ty)
+        if time < least:
+            goal, least = k, time
+    if goal < 0:
+        return tx, ty
+    wx, wy = way_at(field, goal, x, y)
+    return x + wx, y + wy
+
+
+@njit
+def in_file(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
+    """Where person ``i`` goes who does not see its place: in file on the way of leader ``k``."""
+    x, y = crowd.discs[i, columns.X], crowd.discs[i, columns.Y]
+    course, count = leaders.course[k], int(leaders.course[k, COUNT])
+    own = min(int(crowd.state[i, columns.FILE] / CRUMB), count - 1)
+    for step in range(count):  # one's own place, then those behind it, then those before it
+        back = own + step if own + step < count else count - 1 - step
+        at = (int(course[LAST]) - back) % CRUMBS
+        if in_sight(field, x, y, leaders.trail[k, at, 0], leaders.trail[k, at, 1]):
+            return float(leaders.trail[k, at, 0]), float(leaders.trail[k, at, 1])
+    leader = crowd.discs[leaders.rows[k]]
+    return route(i, leader[columns.X], leader[columns.Y], field, crowd)
+
+
+@njit
 def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """The velocity with which person ``i`` would like to keep its place."""
     k = crowd.task[i, columns.LEADER]
@@ -199,11 +279,7 @@ def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float,
     u, v = disc[columns.U], disc[columns.V]
     if not in_sight(field, x, y, tx, ty):
         u, v = 0.0, 0.0
-        for back in range(0, int(course[COUNT]), 2):  # the newest crumb that is in sight
-            at = (int(course[LAST]) - back) % CRUMBS
-            tx, ty = leaders.trail[k, at, 0], leaders.trail[k, at, 1]
-            if in_sight(field, x, y, tx, ty):
-                break
+        tx, ty = in_file(i, k, field, leaders, crowd)
     far = math.sqrt((tx - x) ** 2 + (ty - y) ** 2)
     if far < TAKEN_M and taken(i, tx, ty, crowd):  # as near as one gets
         return share_of(far) * u, share_of(far) * v
@@ -245,7 +321,7 @@ def to_place(dx: float, dy: float, u: float, v: float) -> tuple[float, float]:
 def stand_in_line(i: int, time: float, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Velocity to one's place in the line, which moves up by one every ``SERVED_S``."""
     place = crowd.task[i, columns.PLACE]
-    first = crowd.task[i, columns.GOAL]
+    first = crowd.task[i, columns.FIRST]
     n = int(leaders.lines[first, 2])
     now = (place - int(time / SERVED_S)) % n
     tx, ty = leaders.lines[first + now, 0], leaders.lines[first + now, 1]
@@ -260,10 +336,13 @@ def faces(i: int, leaders: Leaders, crowd: Crowd) -> float:
     if k < 0:
         return float(crowd.state[i, columns.LOOK])
     disc = crowd.discs[leaders.rows[k]]
-    dx, dy = disc[columns.X] - crowd.discs[i, columns.X], disc[columns.Y] - crowd.discs[i, columns.Y]
+    dx, dy = (
+        disc[columns.X] - crowd.discs[i, columns.X],
+        disc[columns.Y] - crowd.discs[i, columns.Y],
+    )
     return math.atan2(dy, dx)
 
 
 def arrays(leaders: Leaders) -> dict[str, NDArray[np.generic]]:
     """The live arrays that are state."""
-    return {"trail": leaders.trail, "course": leaders.course}
+    return {"trail": leaders.trail, "course": leaders.course, "lines": leaders.lines}

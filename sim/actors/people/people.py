@@ -24,6 +24,7 @@ from sim.core.flow import Field, FlowMap, nowhere
 
 Float = NDArray[np.float64]
 _LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
+FILE_FIRST, FILE_STEP = 0.95, 0.65  # m behind a leader, of the first in file and each after it
 _LOOKS = np.uint64(0xD1342543DE82EF95)  # sets the second generator of each person apart
 
 
@@ -94,7 +95,7 @@ class People:
             draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
         )
         self.crowd.task[:, [columns.WALKING, columns.GOAL]] = 0
-        self.crowd.state[:, [columns.STAYS, columns.SLOW]] = 1.0
+        self.crowd.state[:, [columns.STAYS, columns.SLOW, columns.DENSE]] = 1.0
         self.crowd.state[:, columns.TURN_RATE] = crowd.TURN_MOST
         alive = n > 0 and math.isfinite(stay_mean) and len(scene.goals) > 0
         servos = [model.actuator(f"{p}/vx").id for p in self.names]
@@ -122,31 +123,34 @@ class People:
         state, task = self.crowd.state, self.crowd.task
         leaders = list(dict.fromkeys(r.leader for r in scene.roles.values() if r.leader))
         self._cleaners = [name for name in self.names if _role(scene, name).does == "clean"]
-        goals, lines = list(scene.goals), []
+        goals, lines, behind = list(scene.goals), _Lines(), dict.fromkeys(leaders, FILE_FIRST)
         for i, name in enumerate(self.names):
             role = _role(scene, name)
             state[i, [columns.STAYS, columns.SLOW]] = role.stay, role.slow
             state[i, [columns.AHEAD, columns.LEFT]] = role.slot
+            if name in scene.roles:
+                state[i, columns.DENSE] = ACTORS.steering.dense
             if role.goals:
                 self.crowd.allowed[i] = [goal in role.goals for goal in goals]
+            if role.places:
+                task[i, columns.FIRST] = lines.first_of(role)
             if role.does == "follow":
                 task[i, columns.WALKING] = columns.FOLLOWS
                 task[i, columns.LEADER] = leaders.index(role.leader)
+                state[i, columns.FILE] = behind[role.leader]
+                behind[role.leader] += FILE_STEP
             elif role.does == "queue":
                 task[i, columns.WALKING], task[i, columns.PLACE] = columns.QUEUES, role.turn
-                if role.turn == 0:
-                    first = len(lines)
-                    lines += [(*place, float(len(role.places))) for place in role.places]
-                task[i, columns.GOAL] = first
             elif role.does == "clean":
                 task[i, columns.HAND] = len(scene.holds) + self._cleaners.index(name)
+                task[i, columns.PLACE] = 0
         for hold in scene.holds:
             if hold.holder in self.names:
                 i = self.names.index(hold.holder)
                 task[i, columns.HELD] = planar.index(hold.held)
                 if not hold.hinged:
                     state[i, columns.TURN_RATE] = ACTORS.holding.turn_most
-        return following.leaders_of([planar.index(name) for name in leaders], lines)
+        return following.leaders_of([planar.index(name) for name in leaders], lines.rows)
 
     def start(self, data: mujoco.MjData) -> None:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand."""
@@ -163,8 +167,7 @@ class People:
             )
             n_goals = max(len(self.table.field.times), 1)
             goal = int(uniform(draws, i) * n_goals)
-            if task[i, columns.WALKING] != columns.QUEUES:
-                task[i, columns.GOAL] = goal
+            task[i, columns.GOAL] = goal
         self.stand(data)
 
     def dress(self) -> None:
@@ -178,6 +181,13 @@ class People:
             gait.stand(data.qpos, t.torsos, self.feet)
             physics, mocap = (data.qpos, data.qvel), (data.mocap_pos, data.mocap_quat)
             gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.sitting, mocap)
+
+    def in_use(self, bodies: Bodies) -> NDArray[np.int64]:
+        """Rows of the movers that somebody sits on or holds, or goes to for that."""
+        rows = self.crowd.task[:, [columns.SEAT, columns.HELD]].ravel()
+        names = _planar(bodies, self.names)
+        used = [names[k] for k in rows[rows >= 0].tolist()]
+        return bodies.rows([*used, *(hold.held for hold in bodies.scene.holds)])
 
     def swinging(self) -> NDArray[np.bool_]:
         """(n,) True for those with a foot in the air."""
@@ -198,15 +208,16 @@ class People:
 
 def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:
     m = len(doors.names)
-    table = np.zeros((m, 8))
+    table = np.zeros((m, columns.N_DOOR))
     table[:, [columns.CX, columns.CY]] = doors.middles
     table[:, [columns.EX, columns.EY]] = doors.along
-    sign = doors.hinges[:, 3]
+    sign = np.where(doors.hinges[:, 4] != 0.0, 1.0, doors.hinges[:, 3])
     table[:, columns.NX], table[:, columns.NY] = (
         -sign * doors.along[:, 1],
         sign * doors.along[:, 0],
     )
     table[:, columns.WIDTH] = doors.widths
+    table[:, columns.SLIDES] = doors.hinges[:, 4]
     sides = np.zeros((n_people, m), dtype=np.int64)
     return right_of_way.Doors(doors=table, passage=doors.passage, sides=sides)
 
@@ -261,6 +272,22 @@ def _discs(
 def _weights(model: mujoco.MjModel, planar: Sequence[str]) -> Float:
     rows = [(model.body(f"{n}/base").mass[0], model.body(f"{n}/base").inertia[2]) for n in planar]
     return np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+
+class _Lines:
+    """Rows of ``Leaders.lines``: those who stand in one line share it, each row of chairs is one."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[float, ...]] = []
+        self._known: dict[object, int] = {}
+
+    def first_of(self, role: Role) -> int:
+        """Row of the first place of somebody's line."""
+        if role.places not in self._known:
+            self._known[role.places] = len(self.rows)
+            n = float(len(role.places))
+            self.rows += [(x, y, n, -1.0, 0.0, 0.0, 0.0) for x, y in role.places]
+        return self._known[role.places]
 
 
 def _role(scene: Scene, name: str) -> Role:

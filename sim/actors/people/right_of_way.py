@@ -35,7 +35,7 @@ class Crowd(NamedTuple):
 
     discs (k, 6) people first; yaws rad of people and things; owner (k,) disc row of the mover that
     each disc is of; long (p, 2) disc row and m along its x axis of the last p discs, which are the
-    ends of what is long; allowed (n, goals) where each one goes; state (n, 22); task (n, 7);
+    ends of what is long; allowed (n, goals) where each one goes; state (n, 24); task (n, 8);
     draws (2 n,) generators:
     of each one's trips, then of each one's looking about while standing, which happens as often as
     time allows. So the trips of a person are the same, however long each takes.
@@ -52,7 +52,7 @@ class Crowd(NamedTuple):
 
 
 class Doors(NamedTuple):
-    """doors (m, 8), passage (m, 3), and from which side each person wants through, sides (n, m)."""
+    """doors (m, 9), passage (m, 3), and from which side each person wants through, sides (n, m)."""
 
     doors: Float
     passage: Float
@@ -63,7 +63,7 @@ class Addresses(NamedTuple):
     """Where things stand in qpos and qvel.
 
     discs (k, 2) first qpos and dof of each planar mover in the order of the disc rows;
-    doors (m, 2) of each hinge; hinges (m, 4) hinge x, y m, heading closed rad, sign of opening
+    doors (m, 2) of each hinge; hinges (m, 5) of ``sim.core.bodies.Bodies.hinges``
     """
 
     discs: Int
@@ -106,7 +106,7 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:  # noqa: C901 (
             distance = math.sqrt(dx * dx + dy * dy)
             hx = dx + 0.5 * door[columns.WIDTH] * door[columns.EX]
             hy = dy + 0.5 * door[columns.WIDTH] * door[columns.EY]
-            swept = (
+            swept = door[columns.SLIDES] == 0.0 and (
                 dx * door[columns.NX] + dy * door[columns.NY] > 0.0 and hx * hx + hy * hy < SWEPT
             )
             if distance < CLEAR or swept:  # nobody is hit by a leaf that moves by itself
@@ -137,7 +137,8 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:  # noqa: C901 (
                     discs[i, columns.X] - door[columns.CX],
                     discs[i, columns.Y] - door[columns.CY],
                 )
-                reach = PULL if turn > 0 else PUSH  # who pulls a door starts earlier
+                # who pulls a door starts earlier, and what slides looks ahead
+                reach = PULL if turn > 0 or doors[d, columns.SLIDES] != 0.0 else PUSH
                 asked = asked or dx * dx + dy * dy < reach * reach
         passage[d, columns.ASKED] = 1.0 if asked else 0.0
 
@@ -175,7 +176,10 @@ def hold_off(
         if k != i and ways.sides[k, d] == side:
             kx, ky = discs[k, columns.X] - door[columns.CX], discs[k, columns.Y] - door[columns.CY]
             first += kx * kx + ky * ky < dx * dx + dy * dy
-    if side > 0:
+    if door[columns.SLIDES] != 0.0:
+        rx, ry, stop = side * door[columns.NX], side * door[columns.NY], PUSH_STOP
+        gap = dx * rx + dy * ry
+    elif side > 0:
         rx = dx + 0.5 * door[columns.WIDTH] * door[columns.EX]
         ry = dy + 0.5 * door[columns.WIDTH] * door[columns.EY]
         gap = math.sqrt(rx * rx + ry * ry)

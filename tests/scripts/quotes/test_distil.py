@@ -76,8 +76,8 @@ def test_a_folder_that_other_code_made_is_refused(compared: Compared, tmp_path: 
 
 
 def test_code_that_is_not_committed_names_no_commit(monkeypatch):
-    from scripts.quotes import results
+    from scripts import result_files
 
-    monkeypatch.setattr(results, "_git", lambda *words: " M slam/se2.py")
+    monkeypatch.setattr(result_files, "_git", lambda *words: " M slam/se2.py")
     with pytest.raises(InvalidValueError, match=r"slam/se2\.py"):
-        results.commit()
+        result_files.commit()

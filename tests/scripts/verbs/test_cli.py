@@ -9,15 +9,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 
-from scripts.cli import main
 from sim.simulation import stream
 from slam.logs.carmen_writer import write_carmen
 from slam.maps import read_map
@@ -37,22 +34,6 @@ def mobilia(*words: str | Path, **environment: str) -> subprocess.CompletedProce
         cwd=REPO,
         env={**os.environ, "COLUMNS": "200", **environment},
     )
-
-
-@pytest.fixture
-def called(capsys, monkeypatch) -> Callable[..., SimpleNamespace]:
-    """``mobilia`` without the process: what it printed, and its exit status."""
-
-    def call(*words: str | Path) -> SimpleNamespace:
-        monkeypatch.setattr(sys, "argv", ["mobilia", *map(str, words)])
-        monkeypatch.setattr(sys, "path", [*sys.path])
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = capsys.readouterr()
-        return SimpleNamespace(returncode=ended.value.code, stdout=printed.out, stderr=printed.err)
-
-    return call
 
 
 @pytest.fixture(scope="module")

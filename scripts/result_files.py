@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Results files: small, with a line for each thing measured, and the commit that made them."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from slam.errors import InvalidValueError, LogFormatError
+from slam.files import write_text
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "docs" / "results"
+SCHEMA = 1
+CODE = ("slam", "sim", "scenes", "scripts")
+
+
+def commit(*code: str) -> str:
+    """The last commit that changed ``code`` (paths; default all of it).
+
+    Raises ``InvalidValueError`` where the code here is another than that.
+    """
+    paths = code or CODE
+    changed = _git("status", "--porcelain", "--untracked-files=no", "--", *paths)
+    if changed:
+        raise InvalidValueError(
+            f"commit these first, so that results can name the code:\n{changed}"
+        )
+    return _git("log", "-1", "--format=%H", "--", *paths)
+
+
+def _git(*words: str) -> str:
+    done = subprocess.run(
+        ["git", *words], cwd=ROOT, capture_output=True, text=True, check=False, timeout=60
+    )
+    if done.returncode != 0:
+        raise InvalidValueError(f"git {words[0]} must work in {ROOT}: {done.stderr.strip()}")
+    return done.stdout.rstrip()
+
+
+def write(path: Path, head: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> None:
+    """JSON with a line for each entry of ``head`` and of each table."""
+    entries = [f"{json.dumps(key)}: {_plain(value)}" for key, value in head.items()]
+    for name, table in tables.items():
+        lines = ",\n".join(f"  {json.dumps(key)}: {_plain(row)}" for key, row in table.items())
+        entries.append(f"{json.dumps(name)}: {{\n{lines}\n }}")
+    write_text(path, "{\n " + ",\n ".join(entries) + "\n}\n")
+
+
+def _plain(value: Any) -> str:
+    return json.dumps(_rounded(value), allow_nan=False)
+
+
+def _rounded(value: Any) -> Any:
+    """Six digits; infinity as "inf", which JSON has no number for, NaN as null."""
+    if isinstance(value, Mapping):
+        return {key: _rounded(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(one) for one in value]
+    if not isinstance(value, float):
+        return value
+    if math.isnan(value):
+        return None
+    return float(f"{value:.6g}") if math.isfinite(value) else str(value)
+
+
+def load(path: Path) -> dict[str, Any]:
+    """A results file; ``LogFormatError`` for what is none of this schema."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise LogFormatError(path, f"no results file: {error}") from error
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        raise LogFormatError(path, f"no results file of schema {SCHEMA}")
+    return data
