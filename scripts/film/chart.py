@@ -20,7 +20,9 @@ CLAIM = 2.0  # sigmas of the band
 BAND_PALE = 0.82
 NEAR_M = 1.5  # of the people lane (``sim.events.NEAR_M``; logs film without the simulator)
 MAX_POINTS = 1200  # of a curve as drawn
-_LANES = {"chair": "pushed", "door": "doors", "person": "people", "unsure": "unsure"}
+_LANES = {
+    "chair": "pushed", "door": "doors", "person": "people", "change": "unseen", "unsure": "unsure",
+}  # fmt: skip
 _HEADINGS_DEG = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 45.0, 90.0, 180.0)
 _LOW = -3.0  # 1 mm, as a power of ten m
 
@@ -71,7 +73,7 @@ class ErrorChart:
     """Paints the pane.
 
     primary  the SLAM whose claims are shown;   colors  of all of them
-    lanes    which of "chair", "door", "person", "unsure" there are, from the top
+    lanes    which of "chair", "door", "person", "change", "unsure" there are, from the top
     """
 
     def __init__(

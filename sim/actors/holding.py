@@ -50,6 +50,7 @@ def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:  # noqa: PL
     for k in range(len(held.at)):
         for axis in range(3 if held.at[k, DROPPED] >= 0 else 0):
             qfrc[held.at[k, DROPPED] + axis] = 0.0
+            qfrc[held.at[k, VA] + axis] = 0.0
         held.at[k, DROPPED] = -1
         if held.at[k, QB] >= 0:
             for axis in range(3):

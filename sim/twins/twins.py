@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from scenes.crowd import mix
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.driving.drive import TourConfig
@@ -64,7 +65,9 @@ class Twins:
     tries     tours tried until one keeps clear of everything in the static twin
     settings  as for ``Simulation``
 
-    The drive is remembered (1 to 2 KB a scan), frames are simulated anew at each ``moments``.
+    Where no crowd is given it is the scene's without escorts: at rest about the robot, they would
+    stand in its way. The drive is remembered (1 to 2 KB a scan), frames are simulated anew at each
+    ``moments``.
     Raises ``InvalidValueError`` when every tour crosses a mover, naming those of the last one.
     """
 
@@ -80,6 +83,10 @@ class Twins:
         **settings: Any,
     ) -> None:
         seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
+        if "crowd" not in settings and isinstance(scene, str):
+            axes = {name: settings.get(name) for name in ("moving_share", "motion", "change")}
+            whole = mix(scene, Dynamism.of(dynamism, **axes).crowd)
+            settings["crowd"] = str(replace(whole, escorts=0))
         self._labels = bool(settings.get("labels", False))
         crossed: list[str] = []
         for attempt in range(max(1, tries)):

@@ -28,6 +28,8 @@ def trio():
         laser=Lms221Config.noise_only(),
         labels=True,
         n_chairs=14,
+        change=0.0,
+        crowd="none",
     )
     return made, {name: list(made[name]) for name in TWINS}
 
