@@ -2,8 +2,8 @@
 """Hands: what is pushed, pulled or carried is held by a bounded spring and damper.
 
 What the hand does to the thing, the thing does to the hand: who pushes a heavy bed into a wall is
-stopped by it. The torque of two hands is taken up by the feet. Forces are generalised forces of planar joints (x, y, yaw), written before each
-substep.
+stopped by it. The torque of two hands is taken up by the feet. Forces are generalised forces of
+planar joints (x, y, yaw), written before each substep.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Held(NamedTuple):
 
 
 @njit
-def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:
+def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:  # noqa: PLR0915 (kernel)
     """Write the forces of all hands into ``qfrc``."""
     for k in range(len(held.at)):
         for axis in range(3 if held.at[k, DROPPED] >= 0 else 0):

@@ -18,6 +18,7 @@ from slam._jit import njit
 _C = ACTORS.cleaning
 REACH, NEAR, REST_S = _C.hand_m, _C.near_m, _C.rest_s
 PACE, THERE, TRIP_S = _C.pace_mps, _C.there_m, _C.trip_s
+PEOPLE_STEPS = 2  # of the look ahead, in which people matter
 CHAIR, HOME = 3, 4  # columns of ``Leaders.lines``: the chair of a place, and its pose before
 GIVES_UP_S = ACTORS.walking.blocked_s
 _H = ACTORS.holding
@@ -74,7 +75,7 @@ def runs_into(  # noqa: PLR0913 (kernel)
 ) -> float:
     """Cost of what the parts of a thing would touch soon, going ahead at ``v`` and turning.
 
-    Chairs are pushed along. What is too near already may be left.
+    Chairs are pushed along, and people go out of the way in time. What is too near already may be left.
     """
     discs, closest = crowd.discs, CLOSE_M
     for step in range(1, 5):
@@ -91,10 +92,11 @@ def runs_into(  # noqa: PLR0913 (kernel)
             closest = min(closest, free)
             for k in range(len(near)):
                 other = discs[near[k]]
-                if other[columns.KIND] == columns.CHAIR:
+                kind = other[columns.KIND]
+                if kind == columns.CHAIR or (kind == columns.PERSON and step > PEOPLE_STEPS):
                     continue
                 apart = part[columns.R] + other[columns.R]
-                apart += STOP_ROBOT if other[columns.KIND] == columns.ROBOT else STOP_M
+                apart += STOP_ROBOT if kind == columns.ROBOT else STOP_M
                 dx = other[columns.X] + on * other[columns.U] - x
                 dy = other[columns.Y] + on * other[columns.V] - y
                 if dx * dx + dy * dy < (apart + CLOSE_M) ** 2:
@@ -129,7 +131,8 @@ def pushes(
     me, tip, pivot = discs[i], discs[parts[1]], discs[crowd.task[i, columns.HELD]]
     here = time_at(field, goal, me[columns.X], me[columns.Y])
     ahead = min(time_at(field, goal, tip[columns.X], tip[columns.Y]), here + 5.0)
-    best, best_v, best_omega = ahead, 0.0, 0.0
+    standing = runs_into(0.0, 0.0, parts, pivot, yaw, near, field, crowd)
+    best, best_v, best_omega = ahead + min(standing, CLOSE * CLOSE_M), 0.0, 0.0
     for a in range(-1, 4):
         v = pace * a / 3.0 if a >= 0 else -min(pace, BACKWARDS)
         for b in range(-2, 3):

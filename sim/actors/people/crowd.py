@@ -2,8 +2,8 @@
 """How people decide, all of them in one compiled call per control tick.
 
 Each person stays somewhere, walks to the next goal down its flow field (``sim.core.flow``) or
-follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that hits nothing soon (``sim.actors.people.avoidance``). A person
-whose way is blocked by a chair loses patience and pushes it; now and then one sits down
+follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that
+hits nothing soon (``sim.actors.people.avoidance``). A person whose way is blocked by a chair loses patience and pushes it; now and then one sits down
 (``sim.actors.people.sitting``).
 """
 
@@ -228,14 +228,14 @@ def plan(  # noqa: C901, PLR0913 (kernel)
 def nearby(i: int, crowd: Crowd, sides: Int, near: Int) -> int:
     """Rows of discs within 3 m of person ``i``, into ``near``; returns how many.
 
-    Who pushes something long looks farther.
+    Who holds something looks farther.
 
     The leaf of a door one wants to pass is no obstacle: ``at_door`` deals with it; nor is the chair
     that one sits down on, nor what one holds.
     """
     discs, count = crowd.discs, 0
     seat, held = crowd.task[i, columns.SEAT], crowd.task[i, columns.HELD]
-    reach = 9.0 if crowd.state[i, columns.TURN_RATE] >= TURN_MOST else SIGHT_M * SIGHT_M
+    reach = 9.0 if held < 0 else SIGHT_M * SIGHT_M
     for k in range(discs.shape[0]):
         dx, dy = (
             discs[k, columns.X] - discs[i, columns.X],
@@ -341,7 +341,7 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
     if doing == columns.FOLLOWS:
         state[i, columns.LOOK] = faces(i, people.leaders, crowd)
         if rests(i, time, crowd):
-            return 0.0, 0.0
+            return make_room(i, (0.0, 0.0), field, crowd)
         wx, wy = follow(i, field, people.leaders, crowd)
         wx, wy = make_room(i, (wx, wy), field, crowd)
         wx, wy = make_way(i, (wx, wy), people.leaders, crowd)

@@ -35,6 +35,7 @@ TURN_MOST = ACTORS.walking.turn_most
 HELD_UP_S, NEAR_M, REST_S = _F.held_up_s, _F.near_m, _F.rest_s
 CRUMBS = 160  # remembered of each leader: 40 m
 BEHIND = -0.5  # m; a place farther behind is one on the leader's way
+PLACE_COLUMNS = (columns.AHEAD, columns.LEFT, columns.FILE, columns.SPOT_X, columns.SPOT_Y)
 HEADING, STOOD, LAST, COUNT = range(4)  # columns of ``Leaders.course``
 
 
@@ -275,7 +276,7 @@ def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float,
     k = crowd.task[i, columns.LEADER]
     x, y = crowd.discs[i, columns.X], crowd.discs[i, columns.Y]
     tx, ty = float(crowd.state[i, columns.SPOT_X]), float(crowd.state[i, columns.SPOT_Y])
-    course, disc = leaders.course[k], crowd.discs[leaders.rows[k]]
+    disc = crowd.discs[leaders.rows[k]]
     u, v = disc[columns.U], disc[columns.V]
     if not in_sight(field, x, y, tx, ty):
         u, v = 0.0, 0.0

@@ -267,7 +267,7 @@ def _weights(model: mujoco.MjModel, planar: Sequence[str]) -> Float:
 
 
 class _Lines:
-    """Rows of ``Leaders.lines``: those who stand in one line share it, each row of chairs is one."""
+    """Rows of ``Leaders.lines``: of lines, which are shared, and of rows of chairs."""
 
     def __init__(self) -> None:
         self.rows: list[tuple[float, ...]] = []

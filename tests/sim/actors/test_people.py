@@ -19,7 +19,7 @@ QUARTER_MINUTE = 15
 @pytest.fixture(scope="module")
 def walk() -> dict[str, np.ndarray | World]:
     """75 s of a busy office, one sample in 0.1 s."""
-    world = World("office", seed=2, dynamism=0.8)
+    world = World("office", seed=2, dynamism=Dynamism.world_1(0.8))
     people = world.people
     poses, clearances, tasks, slips = [], [], [], []
     shanks = np.array([[world.model.body(f"{p}/shank_{s}").id for s in "lr"] for p in people.names])
