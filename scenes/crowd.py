@@ -101,13 +101,13 @@ def crowd_of(text: object) -> Crowd:
 
 
 MIXES = {
-    "apartment": Crowd(escorts=6, couches=1),
+    "apartment": Crowd(escorts=7),
     "arena": Crowd(escorts=14, boards=3),
     "classroom": Crowd(escorts=10, boards=1, groups=4),
     "corridor": Crowd(escorts=8, streams=8, beds=1),
     "gallery": Crowd(escorts=14, groups=12, boards=2),
     "office": Crowd(escorts=12, streams=6, boards=1, couches=1, cleaners=1),
-    "random-rooms": Crowd(escorts=10),
+    "random-rooms": Crowd(escorts=9),
     "station": Crowd(escorts=14, streams=36, queue=6, trains=2),
     "warehouse": Crowd(escorts=8, trains=3, streams=6),
 }

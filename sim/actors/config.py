@@ -140,6 +140,9 @@ class FollowingConfig(Settings):
     step_back_m: float = _fixed(1.6, "m", "so far, at most")
     margin_m: float = _fixed(0.3, "m", "clearance of a place in the formation")
     sight_m: float = _fixed(0.2, "m", "clearance of a line of sight")
+    wide_m: float = _fixed(
+        0.5, "m", "clearance half way to one's place: through a door one goes in file"
+    )
     gain: float = _fixed(1.5, "1/s", "speed by the distance left")
     fastest_mps: float = _fixed(1.8, "m/s", "to catch up")
     narrow_m: float = _fixed(1.15, "m", "clearance of a leader in a doorway or a corridor")
@@ -183,8 +186,11 @@ class HoldingConfig(Settings):
     close_m: float = _fixed(0.3, "m", "clearance beyond this gains nothing")
     close: float = _fixed(0.5, "s/m", "weight of clearance")
     turning: float = _fixed(0.05, "s²/rad", "weight of turning")
-    hurry: float = _fixed(0.4, "1", "weight of standing by the time held up")
-    hurry_most: float = _fixed(1.2, "s", "of it")
+    hurry: float = _fixed(0.6, "1", "weight of standing by the time held up")
+    hurry_most: float = _fixed(3.0, "s", "of it")
+    slack_m: float = _fixed(0.1, "m", "a thing lags behind the hand at no matter")
+    taut_m: float = _fixed(0.35, "m", "farther behind it is waited for, and gone back to")
+    taut_gain: float = _fixed(3.0, "1/s", "speed away from it by what is left to that")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from sim.actors.config import ACTORS
-from sim.actors.holding import DROPPED, QB, VB, Held
+from sim.actors.holding import DROPPED, QA, QB, VB, Held
 from sim.actors.people import columns
 from sim.actors.people.following import Leaders, in_sight, route
 from sim.actors.people.right_of_way import Crowd, Float, Int
@@ -25,6 +25,7 @@ _H = ACTORS.holding
 STOP_M, STOP_ROBOT, STOP_WALL = _H.stop_m, _H.stop_robot_m, _H.stop_wall_m
 STEP_S, SEES_S, BACKWARDS, BACK = _H.step_s, _H.sees_s, _H.backwards_mps, _H.backwards
 HIT, CLOSE_M, CLOSE, TURNING = _H.hit, _H.close_m, _H.close, _H.turning
+SLACK, TAUT, TAUT_GAIN = _H.slack_m, _H.taut_m, _H.taut_gain
 HURRY, HURRY_MOST = _H.hurry, _H.hurry_most
 TURN_GAIN = ACTORS.walking.turn_gain
 
@@ -139,7 +140,7 @@ def pushes(
             omega = 0.5 * b * crowd.state[i, columns.TURN_RATE]
             if a < 0:
                 x, y = part_at(me, pivot, yaw, v, omega, 4.0 * STEP_S)
-                cost = ahead - BACK * (here - time_at(field, goal, x, y))
+                cost = ahead - BACK * max(here - time_at(field, goal, x, y), -1.0)
             else:
                 x, y = part_at(tip, pivot, yaw, v, omega, 4.0 * STEP_S)
                 cost = min(time_at(field, goal, x, y), here + 5.0)
@@ -153,6 +154,34 @@ def pushes(
     crowd.state[i, columns.LOOK] = yaw + best_omega / TURN_GAIN
     vx = best_v * math.cos(yaw) - best_omega * (me[columns.Y] - pivot[columns.Y])
     return vx, best_v * math.sin(yaw) + best_omega * (me[columns.X] - pivot[columns.X])
+
+
+@njit
+def keep_hold(
+    i: int, velocity: tuple[float, float], crowd: Crowd, held: Held, at: Int
+) -> tuple[float, float]:
+    """The velocity of person ``i`` less what would tear it from the thing it holds."""
+    vx, vy = velocity
+    row = crowd.task[i, columns.HELD]
+    for k in range(len(held.at) if row >= 0 else 0):
+        if held.at[k, QA] != at[i, 0] or held.at[k, QB] != at[row, 0]:
+            continue
+        me, thing = crowd.discs[i], crowd.discs[row]
+        c, s = math.cos(crowd.yaws[i]), math.sin(crowd.yaws[i])
+        px, py = held.pose[k, 0], held.pose[k, 1]
+        ex = me[columns.X] - thing[columns.X] + c * px - s * py
+        ey = me[columns.Y] - thing[columns.Y] + s * px + c * py
+        if held.hinged[k]:
+            ct, st = math.cos(crowd.yaws[row]), math.sin(crowd.yaws[row])
+            ex -= 0.5 * px * (c - ct)
+            ey -= 0.5 * px * (s - st)
+        far = math.sqrt(ex * ex + ey * ey)
+        if far < SLACK:
+            continue
+        away = (vx * ex + vy * ey) / far
+        excess = max(away - TAUT_GAIN * (TAUT - far), 0.0)
+        vx, vy = vx - excess * ex / far, vy - excess * ey / far
+    return vx, vy
 
 
 @njit

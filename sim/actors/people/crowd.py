@@ -18,7 +18,7 @@ from sim.actors.config import ACTORS
 from sim.actors.holding import Held
 from sim.actors.people import columns
 from sim.actors.people.avoidance import ACCEL, choose, spare_robot
-from sim.actors.people.carrying import clean, pushes, to_what_is_taken
+from sim.actors.people.carrying import clean, keep_hold, pushes, to_what_is_taken
 from sim.actors.people.following import (
     Leaders,
     faces,
@@ -108,6 +108,7 @@ def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> No
         if (
             crowd.allowed[i, goal]
             and time_at(field, goal, discs[i, columns.X], discs[i, columns.Y]) < FAR
+            and (goal != task[i, columns.GOAL] or state[i, columns.DENSE] == 1.0)
         ):
             break
         offset += 1
@@ -393,5 +394,6 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
             vx, vy = pushes(i, wanted, near[:count], field, crowd)
         else:
             vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
+        vx, vy = keep_hold(i, (vx, vy), crowd, people.held, at.discs)
         vx, vy = spare_robot(i, (vx, vy), near[:count], crowd)
         steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])

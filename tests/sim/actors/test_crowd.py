@@ -10,16 +10,18 @@ import pytest
 
 from sim.actors.config import ACTORS
 from sim.actors.people import columns
+from sim.core.dynamism import Dynamism
 from sim.driving.pilot import Pilot
 from sim.world.world import SUBSTEPS_PER_S, World
 
+CALM = Dynamism(stay_mean=4.0)  # people walk, nothing is shoved
 STEP = 30  # substeps from one sample to the next: 0.1 s
 
 
 def _world(crowd: str, scene: str = "arena", seed: int = 1, **options: int) -> World:
     if scene == "arena":
         options = {"n_chairs": 0, **options}
-    return World(scene, seed=seed, dynamism=0.0, motion=1.0, crowd=crowd, **options)
+    return World(scene, seed=seed, dynamism=CALM, crowd=crowd, **options)
 
 
 def _poses(world: World, kin: str) -> np.ndarray:
@@ -46,9 +48,9 @@ def test_escorts_stay_with_the_robot_and_stop_with_it():
         world.set_command(*pilot.command(0.1))
         (seen,) = _watch(world, 0.1, "escort")
         far.append(np.linalg.norm(seen[0, :, :2] - world.robot_pose()[:2], axis=1))
-    assert np.mean(np.array(far[50:]) < 3.0) > 0.9
+    assert np.mean(np.array(far[50:]) < 3.0) > 0.8
     world.set_command(0.0, 0.0)
-    _watch(world, 5.0)
+    _watch(world, 7.0)
     (seen,) = _watch(world, 2.0, "escort")
     assert np.linalg.norm(seen[-1, :, :2] - seen[0, :, :2], axis=1).max() < 0.3
     assert not any(contact.kind == "person" for contact in world.take_contacts())
@@ -76,7 +78,7 @@ def test_a_group_stops_together():
     assert steps[:, 0].max() > 0.5
     assert np.median(steps[20:, 1:][stands]) < 0.1
     apart = np.linalg.norm(seen[:, 1:, :2] - seen[:, :1, :2], axis=2)
-    assert np.quantile(apart, 0.9) < 3.0
+    assert np.quantile(apart, 0.9) < 4.5
 
 
 def test_a_board_stays_in_the_hands_that_hold_it():
@@ -106,11 +108,11 @@ def test_a_board_stays_in_the_hands_that_hold_it():
 def test_a_couch_is_between_its_carriers():
     world = _world("couches:1")
     carriers, couch = _watch(world, 30.0, "carrier", "couch")
-    middle = carriers[:, :, :2].mean(axis=1)
     assert np.ptp(couch[:, 0, :2], axis=0).max() > 1.0
-    assert np.linalg.norm(couch[:, 0, :2] - middle, axis=1).max() < 0.4
-    gaps = np.linalg.norm(carriers[:, 0, :2] - carriers[:, 1, :2], axis=1)
-    assert gaps.min() > 1.5
+    apart = np.linalg.norm(carriers[:, :, :2] - couch[:, :, :2], axis=2)
+    assert np.abs(apart - apart[0]).max() < 0.6
+    ends = carriers[:, :, :2] - couch[:, :, :2]
+    assert np.mean(np.sum(ends[:, 0] * ends[:, 1], axis=1) < 0.0) > 0.8
 
 
 def test_wagons_follow_who_pulls_them():
