@@ -140,9 +140,7 @@ class FollowingConfig(Settings):
     step_back_m: float = _fixed(1.6, "m", "so far, at most")
     margin_m: float = _fixed(0.3, "m", "clearance of a place in the formation")
     sight_m: float = _fixed(0.2, "m", "clearance of a line of sight")
-    wide_m: float = _fixed(
-        0.5, "m", "clearance half way to one's place: through a door one goes in file"
-    )
+    wide_m: float = _fixed(0.5, "m", "clearance half way to one's place, else one goes in file")
     gain: float = _fixed(1.5, "1/s", "speed by the distance left")
     fastest_mps: float = _fixed(1.8, "m/s", "to catch up")
     narrow_m: float = _fixed(1.15, "m", "clearance of a leader in a doorway or a corridor")

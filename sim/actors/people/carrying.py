@@ -76,7 +76,8 @@ def runs_into(  # noqa: PLR0913 (kernel)
 ) -> float:
     """Cost of what the parts of a thing would touch soon, going ahead at ``v`` and turning.
 
-    Chairs are pushed along, and people go out of the way in time. What is too near already may be left.
+    Chairs are pushed along, and people go out of the way in time; the robot is never touched. What
+    is too near already may be left.
     """
     discs, closest = crowd.discs, CLOSE_M
     for step in range(1, 5):
@@ -108,7 +109,8 @@ def runs_into(  # noqa: PLR0913 (kernel)
                             other[columns.Y] - part[columns.Y],
                         )
                         if free < math.sqrt(nx * nx + ny * ny) - apart - 0.01:
-                            return HIT * (1.25 - 0.25 * step) ** 3
+                            cost = HIT * (1.25 - 0.25 * step) ** 3
+                            return 10.0 * cost if kind == columns.ROBOT else cost
                     closest = min(closest, free)
     return CLOSE * (CLOSE_M - closest)
 

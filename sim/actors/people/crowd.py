@@ -3,8 +3,8 @@
 
 Each person stays somewhere, walks to the next goal down its flow field (``sim.core.flow``) or
 follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that
-hits nothing soon (``sim.actors.people.avoidance``). A person whose way is blocked by a chair loses patience and pushes it; now and then one sits down
-(``sim.actors.people.sitting``).
+hits nothing soon (``sim.actors.people.avoidance``). A person whose way is blocked by a chair loses
+patience and pushes it; now and then one sits down (``sim.actors.people.sitting``).
 """
 
 from __future__ import annotations
@@ -394,6 +394,11 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
             vx, vy = pushes(i, wanted, near[:count], field, crowd)
         else:
             vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
+        before = vx * vx + vy * vy
         vx, vy = keep_hold(i, (vx, vy), crowd, people.held, at.discs)
         vx, vy = spare_robot(i, (vx, vy), near[:count], crowd)
+        if crowd.state[i, columns.TURN_RATE] < TURN_MOST:  # nor is a long thing turned into it
+            share = min(math.sqrt((vx * vx + vy * vy) / max(before, 1e-9)), 1.0)
+            turn = crowd.state[i, columns.LOOK] - crowd.yaws[i]
+            crowd.state[i, columns.LOOK] = crowd.yaws[i] + share * turn
         steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])

@@ -118,7 +118,9 @@ class People:
             weights=_weights(model, _planar(bodies, self.names)),
         )
 
-    def _give_roles(self, planar: list[str], scene: Scene) -> following.Leaders:
+    def _give_roles(  # noqa: C901 (one branch for each kind of role)
+        self, planar: list[str], scene: Scene
+    ) -> following.Leaders:
         """Write what everybody does into their rows; who is followed, and the lines."""
         state, task = self.crowd.state, self.crowd.task
         leaders = list(dict.fromkeys(r.leader for r in scene.roles.values() if r.leader))
