@@ -102,13 +102,13 @@ def crowd_of(text: object) -> Crowd:
 
 
 MIXES = {
-    "apartment": Crowd(escorts=6, couches=1),
+    "apartment": Crowd(escorts=7),
     "arena": Crowd(escorts=14, boards=3),
-    "classroom": Crowd(escorts=10, boards=2, groups=4),
+    "classroom": Crowd(escorts=10, boards=1, groups=4),
     "corridor": Crowd(escorts=8, streams=8, beds=1),
     "gallery": Crowd(escorts=14, groups=12, boards=2),
-    "office": Crowd(escorts=12, streams=4, boards=1, couches=1, cleaners=1),
-    "random-rooms": Crowd(escorts=10, streams=4),
+    "office": Crowd(escorts=12, streams=6, boards=1, couches=1, cleaners=1),
+    "random-rooms": Crowd(escorts=9),
     "station": Crowd(escorts=14, streams=36, queue=6, trains=2),
     "warehouse": Crowd(escorts=8, trains=3, streams=6),
 }
@@ -224,18 +224,18 @@ def with_crowd(scene: Scene, crowd: Crowd, session: int = 0) -> Scene:
 def slots(n: int) -> Iterator[tuple[float, float]]:
     """Where ``n`` escorts go, (m ahead, m left) of the robot: before it, beside it, in file.
 
-    The first are in a half ring before it, with a gap to drive into; every fourth goes in file.
+    The first are in a half ring before it, with a gap to drive into; every fifth goes in file.
     """
-    ring = [(1.1, a) for a in (0.75, -0.75, 1.25, -1.25, 1.75, -1.75)]
-    ring += [(1.7, a) for a in (0.45, -0.45, 0.85, -0.85, 1.3, -1.3, 1.75, -1.75)]
-    ring += [(2.3, a) for a in (0.35, -0.35, 0.7, -0.7, 1.05, -1.05)]
+    ring = [(1.1, 0.75), (1.7, 0.45), (1.7, 0.9), (1.1, 1.25), (2.3, 0.35), (2.3, 0.7)]
+    ring += [(1.1, 1.75), (2.3, 1.05), (1.7, 1.35), (1.7, 1.75)]
     at = behind = 0
     for k in range(n):
-        if k % 4 == 3 or at == len(ring):
+        if k % 5 == 4 or at == 2 * len(ring):
             yield -0.95 - 0.7 * behind, 0.0
             behind += 1
         else:
-            distance, angle = ring[at]
+            distance, angle = ring[at // 2]
+            angle = -angle if at % 2 else angle
             yield distance * math.cos(angle), distance * math.sin(angle)
             at += 1
 
@@ -360,7 +360,7 @@ def _cleaners(filling: _Filling, n: int) -> None:
 def _row_of_chairs(filling: _Filling) -> tuple[tuple[float, float], ...]:
     """Places for a row of chairs at a wall, with room before it to put them there."""
     rooms, radius = list(filling.scene.rooms.values()), hull_radius("chair_swivel")
-    for _ in range(_TRIES):
+    for _ in range(10 * _TRIES):
         a, b, c, d = rooms[int(filling.rng.integers(len(rooms)))]
         side, along = int(filling.rng.integers(4)), float(filling.rng.uniform(0.0, 1.0))
         half, other = (0.5 * (c - a), 0.5 * (d - b))[:: 1 if side % 2 == 0 else -1]

@@ -22,6 +22,7 @@ HURRY, HURRY_MOST, HURRY_FROM = _S.hurry, _S.hurry_most, _S.hurry_from
 CHANGE, KEEP_RIGHT, SLOW = _S.change, _S.keep_right, _S.slow
 LOOK_S, WALL = _S.look_s, _S.wall
 STANDS_MPS = ACTORS.following.moving_mps
+HELD_SPARE, HELD_BRAKE = _S.held_spare_m, _S.held_brake
 CROWD_SPARE, CROWD_BRAKE = _S.crowd_spare_m, _S.crowd_brake
 
 
@@ -153,9 +154,9 @@ def spare_robot(
             u, v = discs[part, columns.U], discs[part, columns.V]
             own = math.sqrt(u * u + v * v)
             if own < STANDS_MPS:
-                vx, vy = _spare(vx, vy, discs[part], robot, spare, brake)
+                vx, vy = _spare(vx, vy, discs[part], robot, spare + HELD_SPARE, HELD_BRAKE)
                 continue
-            sx, sy = _spare(u, v, discs[part], robot, spare, brake)
+            sx, sy = _spare(u, v, discs[part], robot, spare + HELD_SPARE, HELD_BRAKE)
             share = min(max((sx * u + sy * v) / (own * own), 0.0), 1.0)
             vx, vy = share * vx, share * vy
     return vx, vy

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from sim.actors.config import ACTORS
-from sim.actors.holding import DROPPED, QB, VB, Held
+from sim.actors.holding import DROPPED, QA, QB, VB, Held
 from sim.actors.people import columns
 from sim.actors.people.following import Leaders, in_sight, route
 from sim.actors.people.right_of_way import Crowd, Float, Int
@@ -18,12 +18,14 @@ from slam._jit import njit
 _C = ACTORS.cleaning
 REACH, NEAR, REST_S = _C.hand_m, _C.near_m, _C.rest_s
 PACE, THERE, TRIP_S = _C.pace_mps, _C.there_m, _C.trip_s
+PEOPLE_STEPS = 2  # of the look ahead, in which people matter
 CHAIR, HOME = 3, 4  # columns of ``Leaders.lines``: the chair of a place, and its pose before
 GIVES_UP_S = ACTORS.walking.blocked_s
 _H = ACTORS.holding
 STOP_M, STOP_ROBOT, STOP_WALL = _H.stop_m, _H.stop_robot_m, _H.stop_wall_m
 STEP_S, SEES_S, BACKWARDS, BACK = _H.step_s, _H.sees_s, _H.backwards_mps, _H.backwards
 HIT, CLOSE_M, CLOSE, TURNING = _H.hit, _H.close_m, _H.close, _H.turning
+SLACK, TAUT, TAUT_GAIN = _H.slack_m, _H.taut_m, _H.taut_gain
 HURRY, HURRY_MOST = _H.hurry, _H.hurry_most
 TURN_GAIN = ACTORS.walking.turn_gain
 
@@ -74,7 +76,8 @@ def runs_into(  # noqa: PLR0913 (kernel)
 ) -> float:
     """Cost of what the parts of a thing would touch soon, going ahead at ``v`` and turning.
 
-    Chairs are pushed along. What is too near already may be left.
+    Chairs are pushed along, and people go out of the way in time; the robot is never touched. What
+    is too near already may be left.
     """
     discs, closest = crowd.discs, CLOSE_M
     for step in range(1, 5):
@@ -91,10 +94,11 @@ def runs_into(  # noqa: PLR0913 (kernel)
             closest = min(closest, free)
             for k in range(len(near)):
                 other = discs[near[k]]
-                if other[columns.KIND] == columns.CHAIR:
+                kind = other[columns.KIND]
+                if kind == columns.CHAIR or (kind == columns.PERSON and step > PEOPLE_STEPS):
                     continue
                 apart = part[columns.R] + other[columns.R]
-                apart += STOP_ROBOT if other[columns.KIND] == columns.ROBOT else STOP_M
+                apart += STOP_ROBOT if kind == columns.ROBOT else STOP_M
                 dx = other[columns.X] + on * other[columns.U] - x
                 dy = other[columns.Y] + on * other[columns.V] - y
                 if dx * dx + dy * dy < (apart + CLOSE_M) ** 2:
@@ -105,7 +109,8 @@ def runs_into(  # noqa: PLR0913 (kernel)
                             other[columns.Y] - part[columns.Y],
                         )
                         if free < math.sqrt(nx * nx + ny * ny) - apart - 0.01:
-                            return HIT * (1.25 - 0.25 * step) ** 3
+                            cost = HIT * (1.25 - 0.25 * step) ** 3
+                            return 10.0 * cost if kind == columns.ROBOT else cost
                     closest = min(closest, free)
     return CLOSE * (CLOSE_M - closest)
 
@@ -129,14 +134,15 @@ def pushes(
     me, tip, pivot = discs[i], discs[parts[1]], discs[crowd.task[i, columns.HELD]]
     here = time_at(field, goal, me[columns.X], me[columns.Y])
     ahead = min(time_at(field, goal, tip[columns.X], tip[columns.Y]), here + 5.0)
-    best, best_v, best_omega = ahead, 0.0, 0.0
+    standing = runs_into(0.0, 0.0, parts, pivot, yaw, near, field, crowd)
+    best, best_v, best_omega = ahead + min(standing, CLOSE * CLOSE_M), 0.0, 0.0
     for a in range(-1, 4):
         v = pace * a / 3.0 if a >= 0 else -min(pace, BACKWARDS)
         for b in range(-2, 3):
             omega = 0.5 * b * crowd.state[i, columns.TURN_RATE]
             if a < 0:
                 x, y = part_at(me, pivot, yaw, v, omega, 4.0 * STEP_S)
-                cost = ahead - BACK * (here - time_at(field, goal, x, y))
+                cost = ahead - BACK * max(here - time_at(field, goal, x, y), -1.0)
             else:
                 x, y = part_at(tip, pivot, yaw, v, omega, 4.0 * STEP_S)
                 cost = min(time_at(field, goal, x, y), here + 5.0)
@@ -150,6 +156,34 @@ def pushes(
     crowd.state[i, columns.LOOK] = yaw + best_omega / TURN_GAIN
     vx = best_v * math.cos(yaw) - best_omega * (me[columns.Y] - pivot[columns.Y])
     return vx, best_v * math.sin(yaw) + best_omega * (me[columns.X] - pivot[columns.X])
+
+
+@njit
+def keep_hold(
+    i: int, velocity: tuple[float, float], crowd: Crowd, held: Held, at: Int
+) -> tuple[float, float]:
+    """The velocity of person ``i`` less what would tear it from the thing it holds."""
+    vx, vy = velocity
+    row = crowd.task[i, columns.HELD]
+    for k in range(len(held.at) if row >= 0 else 0):
+        if held.at[k, QA] != at[i, 0] or held.at[k, QB] != at[row, 0]:
+            continue
+        me, thing = crowd.discs[i], crowd.discs[row]
+        c, s = math.cos(crowd.yaws[i]), math.sin(crowd.yaws[i])
+        px, py = held.pose[k, 0], held.pose[k, 1]
+        ex = me[columns.X] - thing[columns.X] + c * px - s * py
+        ey = me[columns.Y] - thing[columns.Y] + s * px + c * py
+        if held.hinged[k]:
+            ct, st = math.cos(crowd.yaws[row]), math.sin(crowd.yaws[row])
+            ex -= 0.5 * px * (c - ct)
+            ey -= 0.5 * px * (s - st)
+        far = math.sqrt(ex * ex + ey * ey)
+        if far < SLACK:
+            continue
+        away = (vx * ex + vy * ey) / far
+        excess = max(away - TAUT_GAIN * (TAUT - far), 0.0)
+        vx, vy = vx - excess * ex / far, vy - excess * ey / far
+    return vx, vy
 
 
 @njit

@@ -18,7 +18,7 @@ from sim.actors.config import ACTORS
 from sim.actors.holding import Held
 from sim.actors.people import columns
 from sim.actors.people.avoidance import ACCEL, choose, spare_robot
-from sim.actors.people.carrying import clean, pushes, to_what_is_taken
+from sim.actors.people.carrying import clean, keep_hold, pushes, to_what_is_taken
 from sim.actors.people.following import (
     Leaders,
     faces,
@@ -108,6 +108,7 @@ def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> No
         if (
             crowd.allowed[i, goal]
             and time_at(field, goal, discs[i, columns.X], discs[i, columns.Y]) < FAR
+            and (goal != task[i, columns.GOAL] or state[i, columns.DENSE] == 1.0)
         ):
             break
         offset += 1
@@ -228,14 +229,14 @@ def plan(  # noqa: C901, PLR0913 (kernel)
 def nearby(i: int, crowd: Crowd, sides: Int, near: Int) -> int:
     """Rows of discs within 3 m of person ``i``, into ``near``; returns how many.
 
-    Who pushes something long looks farther.
+    Who holds something looks farther.
 
     The leaf of a door one wants to pass is no obstacle: ``at_door`` deals with it; nor is the chair
     that one sits down on, nor what one holds.
     """
     discs, count = crowd.discs, 0
     seat, held = crowd.task[i, columns.SEAT], crowd.task[i, columns.HELD]
-    reach = 9.0 if crowd.state[i, columns.TURN_RATE] >= TURN_MOST else SIGHT_M * SIGHT_M
+    reach = 9.0 if held < 0 else SIGHT_M * SIGHT_M
     for k in range(discs.shape[0]):
         dx, dy = (
             discs[k, columns.X] - discs[i, columns.X],
@@ -351,7 +352,7 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
     if doing == columns.FOLLOWS:
         state[i, columns.LOOK] = faces(i, people.leaders, crowd)
         if rests(i, time, crowd):
-            return 0.0, 0.0
+            return make_room(i, (0.0, 0.0), field, crowd)
         wx, wy = follow(i, field, people.leaders, crowd)
         wx, wy = make_room(i, (wx, wy), field, crowd)
         wx, wy = make_way(i, (wx, wy), people.leaders, crowd)
@@ -403,5 +404,11 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
             vx, vy = pushes(i, wanted, near[:count], field, crowd)
         else:
             vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
+        before = vx * vx + vy * vy
+        vx, vy = keep_hold(i, (vx, vy), crowd, people.held, at.discs)
         vx, vy = spare_robot(i, (vx, vy), near[:count], crowd)
+        if crowd.state[i, columns.TURN_RATE] < TURN_MOST:  # nor is a long thing turned into it
+            share = min(math.sqrt((vx * vx + vy * vy) / max(before, 1e-9)), 1.0)
+            turn = crowd.state[i, columns.LOOK] - crowd.yaws[i]
+            crowd.state[i, columns.LOOK] = crowd.yaws[i] + share * turn
         steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])

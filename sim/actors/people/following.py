@@ -25,7 +25,7 @@ from slam._jit import njit
 _F = ACTORS.following
 CRUMB, COURSE_RATE, MOVING = _F.crumb_m, _F.course_rate, _F.moving_mps
 GIVE_WAY_S, STEP_BACK, STEP_BACK_M = _F.give_way_s, _F.step_back, _F.step_back_m
-MARGIN, SIGHT, GAIN = _F.margin_m, _F.sight_m, _F.gain
+MARGIN, SIGHT, GAIN, WIDE = _F.margin_m, _F.sight_m, _F.gain, _F.wide_m
 FASTEST, THERE, SERVED_S = _F.fastest_mps, _F.there_m, _F.served_s
 NARROW, WAY_M, WAY_HALF, ASIDE = _F.narrow_m, _F.way_m, _F.way_half_m, _F.aside_mps
 TAKEN_M, CROSSING = _F.taken_m, _F.crossing_m2
@@ -35,6 +35,7 @@ TURN_MOST = ACTORS.walking.turn_most
 HELD_UP_S, NEAR_M, REST_S = _F.held_up_s, _F.near_m, _F.rest_s
 CRUMBS = 160  # remembered of each leader: 40 m
 BEHIND = -0.5  # m; a place farther behind is one on the leader's way
+PLACE_COLUMNS = (columns.AHEAD, columns.LEFT, columns.FILE, columns.SPOT_X, columns.SPOT_Y)
 HEADING, STOOD, LAST, COUNT = range(4)  # columns of ``Leaders.course``
 
 
@@ -101,6 +102,17 @@ def in_sight(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
         if clearance_at(field, x + dx * k / steps, y + dy * k / steps) < SIGHT:
             return False
     return True
+
+
+@njit
+def through_door(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
+    """Whether the straight way between two places leads through something narrow."""
+    dx, dy = tx - x, ty - y
+    steps = int(math.sqrt(dx * dx + dy * dy) / 0.15)
+    for k in range(steps // 4 + 2, steps - steps // 4 - 1):
+        if clearance_at(field, x + dx * k / steps, y + dy * k / steps) < WIDE:
+            return True
+    return False
 
 
 @njit
@@ -275,9 +287,9 @@ def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float,
     k = crowd.task[i, columns.LEADER]
     x, y = crowd.discs[i, columns.X], crowd.discs[i, columns.Y]
     tx, ty = float(crowd.state[i, columns.SPOT_X]), float(crowd.state[i, columns.SPOT_Y])
-    course, disc = leaders.course[k], crowd.discs[leaders.rows[k]]
+    disc = crowd.discs[leaders.rows[k]]
     u, v = disc[columns.U], disc[columns.V]
-    if not in_sight(field, x, y, tx, ty):
+    if not in_sight(field, x, y, tx, ty) or through_door(field, x, y, tx, ty):
         u, v = 0.0, 0.0
         tx, ty = in_file(i, k, field, leaders, crowd)
     far = math.sqrt((tx - x) ** 2 + (ty - y) ** 2)

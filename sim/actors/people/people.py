@@ -118,7 +118,9 @@ class People:
             weights=_weights(model, _planar(bodies, self.names)),
         )
 
-    def _give_roles(self, planar: list[str], scene: Scene) -> following.Leaders:
+    def _give_roles(  # noqa: C901 (one branch for each kind of role)
+        self, planar: list[str], scene: Scene
+    ) -> following.Leaders:
         """Write what everybody does into their rows; who is followed, and the lines."""
         state, task = self.crowd.state, self.crowd.task
         leaders = list(dict.fromkeys(r.leader for r in scene.roles.values() if r.leader))
@@ -275,7 +277,7 @@ def _weights(model: mujoco.MjModel, planar: Sequence[str]) -> Float:
 
 
 class _Lines:
-    """Rows of ``Leaders.lines``: those who stand in one line share it, each row of chairs is one."""
+    """Rows of ``Leaders.lines``: of lines, which are shared, and of rows of chairs."""
 
     def __init__(self) -> None:
         self.rows: list[tuple[float, ...]] = []

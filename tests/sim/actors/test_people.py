@@ -19,7 +19,7 @@ QUARTER_MINUTE = 15
 @pytest.fixture(scope="module")
 def walk() -> dict[str, np.ndarray | World]:
     """75 s of a busy office, one sample in 0.1 s."""
-    world = World("office", seed=2, dynamism=0.8)
+    world = World("office", seed=2, dynamism=Dynamism.world_1(0.8))
     people = world.people
     poses, clearances, tasks, slips = [], [], [], []
     shanks = np.array([[world.model.body(f"{p}/shank_{s}").id for s in "lr"] for p in people.names])
@@ -106,7 +106,7 @@ def test_the_physics_has_nothing_to_warn_of(walk):
 
 
 def test_a_swinging_leg_is_a_moving_body():
-    world = World("office", seed=2, dynamism=1.0)
+    world = World("office", seed=2, dynamism=Dynamism.world_1(1.0))
     for _ in range(8 * SUBSTEPS_PER_S):
         world.substep()
     moving = world.moving_bodies()
@@ -206,7 +206,7 @@ def test_a_door_lets_the_robot_through():
 def test_nobody_runs_into_a_robot_that_stands_in_a_doorway():
     """Whoever wants through waits, goes elsewhere or stops before it."""
     door = World("office", seed=1, dynamism=0)._doors.middles[2]
-    world = World("office", seed=1, dynamism=0.9, start=(*door, 0.3))
+    world = World("office", seed=1, dynamism=Dynamism.world_1(0.9), start=(*door, 0.3))
     nearest = math.inf
     for _ in range(30 * SUBSTEPS_PER_S):
         world.substep()
@@ -218,7 +218,7 @@ def test_nobody_runs_into_a_robot_that_stands_in_a_doorway():
 
 def test_somebody_sits_down_gets_up_and_leaves():
     """From walking to the chair to being apart from it again; a saved sitter goes on the same."""
-    world = World("office", seed=1, dynamism=0.6)
+    world = World("office", seed=1, dynamism=Dynamism.world_1(0.6))
     crowd, seen, saved = world.people.crowd, set(), None
     sitter, later = -1, 0
     for k in range(60 * SUBSTEPS_PER_S):
@@ -234,7 +234,10 @@ def test_somebody_sits_down_gets_up_and_leaves():
             assert world.data.xpos[thigh, 2] == pytest.approx(gait.SEAT_HEIGHT, abs=0.02)
             saved, later = world.save_state(), k + 600
         if k == later and saved is not None:
-            expected, fresh = world.data.qpos.copy(), World("office", seed=1, dynamism=0.6)
+            expected, fresh = (
+                world.data.qpos.copy(),
+                World("office", seed=1, dynamism=Dynamism.world_1(0.6)),
+            )
             fresh.load_state(saved)
             for _ in range(600):
                 fresh.substep()

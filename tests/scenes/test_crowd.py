@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a crowd may be called, where it is put, and that it leaves the rest of a scene alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenes import build
+from scenes.crowd import MIXES, ROW, Crowd, crowd_of, far_ends, mix, slots
+from scenes.kinds import kind_of
+from scenes.scene import Scene
+from slam.errors import InvalidValueError
+
+MIXED = "escorts:4,boards:1,couches:1,cleaners:1,groups:4,queue:3"
+
+
+@pytest.fixture(scope="module")
+def pair() -> tuple[Scene, Scene]:
+    """A classroom without and with a crowd."""
+    return build("classroom", seed=3), build("classroom", seed=3, crowd=MIXED)
+
+
+def test_a_crowd_reads_back_what_it_prints():
+    crowd = crowd_of("escorts:6, boards:2")
+    assert crowd == Crowd(escorts=6, boards=2)
+    assert crowd_of(str(crowd)) == crowd
+    assert not crowd_of("none")
+    assert str(Crowd()) == "none"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["dancers:3", "escorts", "escorts:", "escorts:-1", "escorts:1.5", "escorts:6,escorts:2",
+     "escorts:81", "escorts:99999", "escorts:6;boards:2", 7, None],
+)  # fmt: skip
+def test_a_crowd_that_cannot_be_is_refused(text: object):
+    with pytest.raises(InvalidValueError, match="crowd"):
+        crowd_of(text)
+
+
+def test_a_crowd_that_does_not_fit_is_refused():
+    with pytest.raises(InvalidValueError, match="does not fit"):
+        build("apartment", seed=1, crowd="beds:30")
+
+
+def test_counts_grow_with_the_level():
+    whole = Crowd(escorts=10, boards=2, cleaners=1)
+    assert whole.part(0.0) == Crowd()
+    assert whole.part(0.5) == Crowd(escorts=5, boards=1, cleaners=1)
+    assert whole.part(1.0) == whole
+    counts = [mix("arena", level / 10).escorts for level in range(11)]
+    assert counts == sorted(counts)
+    assert counts[-1] == MIXES["arena"].escorts
+
+
+def test_a_crowd_moves_nothing_else(pair: tuple[Scene, Scene]):
+    without, crowded = pair
+    assert {name: crowded.initial[name] for name in without.initial} == dict(without.initial)
+    assert crowded.goals == without.goals
+    assert crowded.door_angles == without.door_angles
+    np.testing.assert_array_equal(crowded.obstacles, without.obstacles)
+    np.testing.assert_array_equal(crowded.static_map.values, without.static_map.values)
+    assert crowded.movers[-1].name == "robot"
+
+
+def test_nobody_stands_in_somebody_else(pair: tuple[Scene, Scene]):
+    before = {mover.name for mover in pair[0].movers}
+    discs = []
+    for mover in pair[1].movers:
+        half, (x, y, yaw) = kind_of(mover.kind).half_length_m, pair[1].initial[mover.name]
+        for at in (-half, 0.0, half) if half else (0.0,):
+            place = (x + at * np.cos(yaw), y + at * np.sin(yaw))
+            if mover.group != "door":
+                discs.append((mover.name, *place, mover.radius))
+    for name, x, y, r in discs:
+        for other, ox, oy, other_r in discs:
+            if name != other and not {name, other} <= before:
+                assert np.hypot(x - ox, y - oy) > r + other_r, (name, other)
+
+
+def test_everybody_has_a_part(pair: tuple[Scene, Scene]):
+    scene = pair[1]
+    does = {name: role.does for name, role in scene.roles.items()}
+    assert sum(what == "follow" for what in does.values()) == 4 + 3 + 1
+    assert len(scene.roles["cleaner0"].places) == ROW
+    assert {(hold.holder, hold.held) for hold in scene.holds} == {
+        ("board_pusher0", "board0"), ("carrier0", "couch0"), ("carrier1", "couch0"),
+    }  # fmt: skip
+
+
+def test_the_same_seed_gives_the_same_crowd():
+    scenes = [build("office", seed=5, crowd="escorts:5,streams:3") for _ in range(2)]
+    assert scenes[0].initial == scenes[1].initial
+    assert scenes[0].roles == scenes[1].roles
+
+
+def test_places_of_a_tour_are_apart():
+    places = np.array(list(slots(16)))
+    gaps = np.linalg.norm(places[:, None] - places[None], axis=2)
+    assert gaps[~np.eye(16, dtype=bool)].min() > 0.5
+    assert np.linalg.norm(places, axis=1).min() > 0.6
+
+
+def test_streams_go_between_the_far_ends():
+    assert set(far_ends(build("corridor", seed=1))) == {"west", "east"}
