@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from slam.variants import oracle_named, with_set
+from slam.set_numbers import with_set
+from slam.variants import oracle_named
 
 Oracles = Annotated[
     list[str] | None,
@@ -26,6 +27,6 @@ def with_oracles(
 ) -> tuple[str, ...]:
     """Names of the SLAMs and of the oracles, each with the numbers of ``--set`` that are for it.
 
-    Raises ``InvalidValueError`` for what is no oracle, and as ``slam.variants.with_set``.
+    Raises ``InvalidValueError`` for what is no oracle, and as ``slam.set_numbers.with_set``.
     """
     return with_set([*slams, *map(oracle_named, oracles or ())], set_ or [])

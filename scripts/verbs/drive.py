@@ -17,7 +17,7 @@ from scripts.names import check
 from scripts.scanner_option import Scanner, every_of
 from scripts.verbs.compare import axis_levels, named
 from slam.errors import InvalidValueError
-from slam.variants import with_set
+from slam.set_numbers import with_set
 
 
 def drive(

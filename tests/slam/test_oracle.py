@@ -21,8 +21,9 @@ from slam.names import NameFromFile
 from slam.odometry import OdometrySlam
 from slam.oracle import Oracle, shown, without
 from slam.replay import Replay, Track
+from slam.set_numbers import with_set
 from slam.system import check_name
-from slam.variants import oracle_named, oracle_of, with_set
+from slam.variants import oracle_named, oracle_of
 from tests.slam.guests import misbehaving
 from tests.world2d import Drive, World2D, arena, frames, laser
 

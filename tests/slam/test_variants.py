@@ -16,10 +16,11 @@ from slam.ekf.config import EkfConfig
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.frames import Frame
 from slam.odometry import OdometrySlam
+from slam.set_numbers import with_set
 from slam.settings import Settings, number
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.tracker import Tracker
-from slam.variants import named, parsed, with_set
+from slam.variants import named, parsed
 from tests.world2d import Drive, World2D, arena, frames, laser
 
 

@@ -19,7 +19,7 @@ from sim.actors.config import ACTORS
 from sim.sensors.lidar import registry
 from slam import config_of
 from slam.errors import UnknownNameError
-from slam.variants import with_set
+from slam.set_numbers import with_set
 
 
 def numbers(capsys: pytest.CaptureFixture[str], what: str, group: str = "") -> list[dict]:
