@@ -104,11 +104,11 @@ def crowd_of(text: object) -> Crowd:
 MIXES = {
     "apartment": Crowd(escorts=7),
     "arena": Crowd(escorts=14, boards=3),
-    "classroom": Crowd(escorts=10, boards=1, groups=4),
+    "classroom": Crowd(escorts=8, groups=8, boards=1),
     "corridor": Crowd(escorts=8, streams=8, beds=1),
     "gallery": Crowd(escorts=14, groups=12, boards=2),
-    "office": Crowd(escorts=12, streams=6, boards=1, couches=1, cleaners=1),
-    "random-rooms": Crowd(escorts=9),
+    "office": Crowd(escorts=8, streams=16, groups=12, boards=1, cleaners=1),
+    "random-rooms": Crowd(escorts=9, groups=4),
     "station": Crowd(escorts=14, streams=36, queue=6, trains=2),
     "warehouse": Crowd(escorts=8, trains=3, streams=6),
 }
@@ -264,7 +264,7 @@ def _near(filling: _Filling, x: float, y: float) -> Pose:
 def _streams(filling: _Filling, n: int) -> None:
     ends = far_ends(filling.scene)
     for k in range(n):
-        filling.put([(COAT if k % 2 else "person", f"stream{k}", (0.0, 0.0, 0.0))], "a stream")
+        filling.put([(COAT, f"stream{k}", (0.0, 0.0, 0.0))], "a stream")
         filling.roles[f"stream{k}"] = Role(does="walk", goals=ends, stay=0.0)
 
 
