@@ -207,17 +207,24 @@ class _Filling:
         )
 
 
-def with_crowd(scene: Scene, crowd: Crowd, session: int = 0) -> Scene:
+def with_crowd(
+    scene: Scene, crowd: Crowd, session: int = 0, *, as_many_as_fit: bool = False
+) -> Scene:
     """The scene with a crowd in it, another one each session; the given scene is left as it is.
 
-    Raises ``InvalidValueError`` where it does not fit on the floor.
+    Raises ``InvalidValueError`` where it does not fit on the floor, unless ``as_many_as_fit`` will
+    do: of each kind up to the first that has no room.
     """
     if not crowd:
         return scene
     filling = _Filling(scene, crowd, session)
     for each in fields(crowd):
-        if getattr(crowd, each.name):
-            _PUT[each.name](filling, getattr(crowd, each.name))
+        try:
+            if getattr(crowd, each.name):
+                _PUT[each.name](filling, getattr(crowd, each.name))
+        except InvalidValueError:
+            if not as_many_as_fit:
+                raise
     return filling.finish()
 
 
@@ -323,14 +330,15 @@ def _trains(filling: _Filling, n: int) -> None:
     for k in range(n):
         who = f"train_puller{k}"
         named = [("person", who, (0.0, 0.0, 0.0))]
-        before, at = who, first
+        before, at, holds = who, first, list[Hold]()
         for wagon in range(WAGONS):
             name = f"wagon{WAGONS * k + wagon}"
             place = (first[0] - gap * wagon, 0.0, 0.0)
             named.append(("trolley", name, place))
-            filling.holds.append(Hold(holder=before, held=name, pose=at, hinged=True))
+            holds.append(Hold(holder=before, held=name, pose=at, hinged=True))
             before, at = name, (-gap, 0.0, 0.0)
         filling.put(named, "a train")
+        filling.holds += holds
         filling.roles[who] = Role(does="walk", goals=_same_room(filling, who), slow=0.75)
 
 

@@ -10,9 +10,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING
 
-from scenes.scene import Hold, Mover
 from slam.errors import UnknownNameError
+
+if TYPE_CHECKING:  # it loads MuJoCo, and words are checked before that
+    from scenes.scene import Hold, Mover
 
 _CROWD = {
     "escort": "escorts", "stream": "streams", "group": "groups", "queue": "queue",

@@ -93,12 +93,8 @@ def _check(world: World, name: str) -> None:
         raise UnknownNameError(
             f"no mover is called '{name}'. Known: {', '.join(world.mover_names)}."
         )
-    if _kind(world, name) == "robot":
+    if world.scene.movers[world.mover_names.index(name)].group == "robot":
         raise InvalidValueError("the robot cannot be taken out: it is who looks")
-
-
-def _kind(world: World, name: str) -> str:
-    return world.scene.movers[world.mover_names.index(name)].group
 
 
 def _bodies(world: World, name: str) -> Int:
@@ -132,7 +128,7 @@ def _look_again(simulation: Simulation) -> None:
 def _park(world: World, name: str) -> None:
     row, qpos = world.mover_names.index(name), world.data.qpos
     addresses = _qpos_of(world, name)
-    kind = _kind(world, name)
+    kind = world.scene.movers[row].kind
     if is_door(kind):
         joint = world.model.joint(f"{name}/{joint_of_door(kind)}")
         qpos[addresses] = min(OPENED, float(joint.range[1]))

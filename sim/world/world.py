@@ -84,9 +84,10 @@ class World:
         change = self.rates.change
         if session is not None:
             self.rates = sessions.slowed(self.rates, time_of(session).motion)
-            crowd = self._crowd_of(scene, options)
+            named, given = scene, options.pop("crowd", None)
             scene, self.seeds = sessions.opened(scene, self.seeds, change, session, options)
-            scene, options, change = with_crowd(scene, crowd, session), {}, 0.0
+            scene = self._crowded(scene, named, given, session)
+            options, change = {}, 0.0
         built = self._built(scene, options)
         self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
         self.model: mujoco.MjModel = self.scene.compile()
@@ -129,20 +130,20 @@ class World:
 
     def _built(self, scene: Scene | str, options: dict[str, Any]) -> Scene:
         if isinstance(scene, str):
-            options = dict(options)
-            crowd = self._crowd_of(scene, options)
-            return build(scene, seed=self.seeds.integer("layout"), crowd=str(crowd), **options)
+            given = options.pop("crowd", None)
+            built = build(scene, seed=self.seeds.integer("layout"), **options)
+            return self._crowded(built, scene, given)
         if options:
             raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")
         instance("scene", scene, Scene)
         return scene
 
-    def _crowd_of(self, scene: Scene | str, options: dict[str, Any]) -> Crowd:
-        """The crowd that ``options`` name, which is taken out of them, or the scene's mix."""
-        if not isinstance(scene, str):
-            return Crowd()
-        given = options.pop("crowd", None)
-        return mix(scene, self.rates.crowd) if given is None else crowd_of(given)
+    def _crowded(self, built: Scene, named: Scene | str, given: object, session: int = 0) -> Scene:
+        """The scene with the crowd that is given, else with the mix of the scene of that name."""
+        if given is not None:
+            return with_crowd(built, crowd_of(given), session)
+        crowd = mix(named, self.rates.crowd) if isinstance(named, str) else Crowd()
+        return with_crowd(built, crowd, session, as_many_as_fit=True)
 
     def _named(self, kind: str) -> list[str]:
         """Movers whose kind starts so: "chair" means both sorts."""

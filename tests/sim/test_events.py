@@ -99,7 +99,7 @@ def test_a_leap_of_the_truth_is_a_kidnap():
 def test_more_dynamism_is_more_events_and_none_of_it_is_none():
     counts = []
     for dynamism in (0.0, 1.0):
-        simulation = Simulation("office", seed=3, dynamism=dynamism, labels=True)
+        simulation = Simulation("office", seed=3, dynamism=dynamism, change=0.0, labels=True)
         made = EventWatch(simulation.world)
         for moment in toured(simulation, 6.0):
             made.note(moment)

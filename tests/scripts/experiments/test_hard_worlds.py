@@ -154,13 +154,15 @@ def test_the_breaking_point_of_a_tiny_plan(tmp_path: Path, capsys, monkeypatch):
     words += ["--picture", files["picture.png"]]
     assert breaking_point.main(words) == 0
     printed = capsys.readouterr().out
-    assert "| both, arena | 0 | 0.0 |" in printed
+    assert "| dynamism, arena | 0 | 0.0 |" in printed
     assert "failed (1)" in printed
     assert (tmp_path / "picture.png").stat().st_size > 10_000
     data = json.loads((tmp_path / "results.json").read_text())
     assert data["levels"] == [0.0, 1.0]
     cells = data["broken"]
-    assert set(cells) == {f"both arena {slam}" for slam in ("sure", "raises", "oracle(odometry)")}
+    assert set(cells) == {
+        f"dynamism arena {slam}" for slam in ("sure", "raises", "oracle(odometry)")
+    }
     sure, raises = cells["both arena sure"], cells["both arena raises"]
     assert sure["claimed_m"] == pytest.approx([math.sqrt(2e-4)] * 2, rel=1e-5)
     assert sure["error_m"] == pytest.approx(sure["ate_median_m"], rel=1e-5)

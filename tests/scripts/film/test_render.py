@@ -23,6 +23,7 @@ from scripts.film.layout import Layout
 from scripts.film.render import pictures_at
 from scripts.film.rerun_log import RerunLog
 from scripts.film.scan_pane import LEGEND, RobotScan, beam_colors
+from sim.core.versions import WORLD
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe
 from sim.simulation import stream
@@ -44,7 +45,7 @@ def run(tmp_path: Path) -> Path:
     folder = tmp_path / "run"
     folder.mkdir()
     settings = {**SETTINGS, "slams": ["shunting", "odometry"], "simulation": {}}
-    recipe = {"schema": 1, "command": "run", "settings": settings, "versions": {}}
+    recipe = {"schema": 1, "command": "run", "settings": settings, "versions": {}, "world": WORLD}
     (folder / "recipe.json").write_text(json.dumps(recipe))
     return folder
 
@@ -240,15 +241,19 @@ def test_what_is_no_run_is_told_in_one_line(run: Path, tmp_path: Path):
     assert "recipe.json: no recipe" in told(run)
     (run / "recipe.json").write_text("[]")
     assert "not a JSON object" in told(run)
-    (run / "recipe.json").write_text('{"settings": {"scene": "arena", "seconds": "long"}}')
+    (run / "recipe.json").write_text(
+        '{"world": 2, "settings": {"scene": "arena", "seconds": "long"}}'
+    )
     assert "no recipe of a run: seconds must be" in told(run)
-    (run / "recipe.json").write_text('{"settings": {"scene": "arena", "slams": [7]}}')
+    (run / "recipe.json").write_text('{"world": 2, "settings": {"scene": "arena", "slams": [7]}}')
     assert "slams must be a list of names, got [7]" in told(run)
     (run / "recipe.json").write_text('{"command": "bench", "settings": {}}')
     assert "made by 'mobilia bench'" in told(run)
     (run / "recipe.json").write_text('{"command": "drive", "settings": {}}')
     assert "made by 'mobilia drive', where each SLAM's robot went its own way" in told(run)
-    (run / "recipe.json").write_text('{"settings": {"log": "intel.log", "slams": ["ekf"]}}')
+    (run / "recipe.json").write_text(
+        '{"world": 2, "settings": {"log": "intel.log", "slams": ["ekf"]}}'
+    )
     assert "render 'intel.log' itself with --slam ekf" in told(run)
 
 

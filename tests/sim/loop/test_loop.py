@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import scenes
+from sim.core.dynamism import Dynamism
 from sim.loop import LoopConfig, closed_loop
 from sim.loop.run import goal_order
 from sim.simulation import Simulation
@@ -106,7 +107,7 @@ def test_the_seed_and_only_the_seed_decides_a_run():
 
 def test_every_slam_gets_the_same_goals_and_the_same_movers():
     def once(offset):
-        simulation = arena(5, dynamism=1.0)
+        simulation = arena(5, dynamism=Dynamism.world_1(1.0))
         run = drive(simulation, Seer(simulation, offset), goals=2, limit_s=3.0)
         return [goal.goal for goal in run.goals], simulation.world.mover_poses(), run.true
 
