@@ -163,7 +163,7 @@ def test_the_breaking_point_of_a_tiny_plan(tmp_path: Path, capsys, monkeypatch):
     assert set(cells) == {
         f"dynamism arena {slam}" for slam in ("sure", "raises", "oracle(odometry)")
     }
-    sure, raises = cells["both arena sure"], cells["both arena raises"]
+    sure, raises = cells["dynamism arena sure"], cells["dynamism arena raises"]
     assert sure["claimed_m"] == pytest.approx([math.sqrt(2e-4)] * 2, rel=1e-5)
     assert sure["error_m"] == pytest.approx(sure["ate_median_m"], rel=1e-5)
     assert sure["lost"] == [0, 0]

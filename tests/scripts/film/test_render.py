@@ -40,6 +40,9 @@ def without_gl(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(live_view.gl, "find", lambda: Gl(backend=None, reason="no GL here"))
 
 
+OF_WORLD = f'{{"world": {WORLD}, "settings": %s}}'
+
+
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
     folder = tmp_path / "run"
@@ -245,7 +248,7 @@ def test_what_is_no_run_is_told_in_one_line(run: Path, tmp_path: Path):
         '{"world": 2, "settings": {"scene": "arena", "seconds": "long"}}'
     )
     assert "no recipe of a run: seconds must be" in told(run)
-    (run / "recipe.json").write_text('{"world": 2, "settings": {"scene": "arena", "slams": [7]}}')
+    (run / "recipe.json").write_text(OF_WORLD % '{"scene": "arena", "slams": [7]}')
     assert "slams must be a list of names, got [7]" in told(run)
     (run / "recipe.json").write_text('{"command": "bench", "settings": {}}')
     assert "made by 'mobilia bench'" in told(run)
