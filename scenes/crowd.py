@@ -105,7 +105,7 @@ MIXES = {
     "apartment": Crowd(escorts=7),
     "arena": Crowd(escorts=14, boards=3),
     "classroom": Crowd(escorts=8, groups=8, boards=1),
-    "corridor": Crowd(escorts=8, streams=8, beds=1),
+    "corridor": Crowd(escorts=5, streams=4, beds=1),
     "gallery": Crowd(escorts=14, groups=12, boards=2),
     "office": Crowd(escorts=8, streams=16, groups=12, boards=1, cleaners=1),
     "random-rooms": Crowd(escorts=9, groups=4),

@@ -7,6 +7,8 @@ Two axes, both at ``d`` when one number ``dynamism`` is given:
             in world 1; ``crowd`` brings people, boards and trains into the room besides, at 1 the
             whole mix of the scene (``scenes.crowd.MIXES``), which is calibrated on the share of
             returns that the scanner sees from what moves (``scripts.experiments.share_seen``).
+            People hide one another, so the share seen rises with about the root of their
+            number: at motion d a share d * d of the crowd is there.
 **change**  of what can move, the share that stands elsewhere than when the robot last saw it
             (``sim.actors.rearranging``).
 
@@ -56,7 +58,7 @@ CURVES = (
         lambda d: 12.0 / d - 10.0 if d > 0.0 else math.inf,
     ),
     Rate("pace", "walking pace, times a person's own", "1", lambda d: 0.7 + 0.3 * d),
-    Rate("crowd", "share of the scene's whole crowd that is there", "1", lambda d: d),
+    Rate("crowd", "share of the scene's whole crowd that is there", "1", lambda d: d * d),
 )  # fmt: skip
 
 
