@@ -23,8 +23,8 @@ def demo(
         float, typer.Option(help="How much the room moves: 0 nothing, 1 most.")
     ] = 0.5,
     motion: Motion = None,
-    change: Change = None,
-    crowd: CrowdOption = None,
+    change: Change = 0.0,
+    crowd: CrowdOption = "none",
     seed: Annotated[int, typer.Option(help="Seed of everything, whole number >= 0.")] = 0,
     scan_height: Annotated[
         float, typer.Option(help="Height of the scanner above the floor, m.")
@@ -40,7 +40,8 @@ def demo(
     Writes a film, the map (PNG, and PGM + YAML for ROS map_server), trajectories (TUM, for evo),
     errors over time, all numbers as JSON and the recipe that made them. About a minute, and half a
     minute more the first time, while Numba compiles. The default seed drives 31 m and lets odometry
-    drift as far as it does in half of all runs; try others.
+    drift as far as it does in half of all runs; try others. Nobody accompanies the robot and nothing
+    changes out of sight unless --crowd and --change say so.
     """
     check(["shunting"], scene)
     from scripts.single_run.live import on_scene, tour
