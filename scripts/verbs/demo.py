@@ -40,8 +40,8 @@ def demo(
     Writes a film, the map (PNG, and PGM + YAML for ROS map_server), trajectories (TUM, for evo),
     errors over time, all numbers as JSON and the recipe that made them. About a minute, and half a
     minute more the first time, while Numba compiles. The default seed drives 31 m and lets odometry
-    drift as far as it does in half of all runs; try others. Nobody accompanies the robot and nothing
-    changes out of sight unless --crowd and --change say so.
+    drift as far as it does in half of all runs; try others. Nobody accompanies the robot, and
+    nothing changes out of sight, unless --crowd and --change say so.
     """
     check(["shunting"], scene)
     from scripts.single_run.live import on_scene, tour

@@ -32,7 +32,7 @@ def test_a_level_sets_both_axes_or_one():
     rates = Dynamism.of(**Axis(name="change").at(0.5))
     assert (rates.crowd, rates.change) == (0.0, 0.5)
     rates = Dynamism.of(**Axis().at(0.5))
-    assert (rates.crowd, rates.change) == (0.5, 0.5)
+    assert (rates.crowd, rates.change) == (0.25, 0.5)
     with pytest.raises(InvalidValueError, match="axis must be one of dynamism, motion, change"):
         Axis(name="speed")
     with pytest.raises(InvalidValueError, match="axis must be one of"):
@@ -138,16 +138,8 @@ class Raises(OdometrySlam):
 def test_the_breaking_point_of_a_tiny_plan(tmp_path: Path, capsys, monkeypatch):
     for name, kind in (("sure", Sure), ("raises", Raises)):
         monkeypatch.setitem(system._registry, name, kind)
-    words = [
-        "--slams",
-        "sure",
-        "raises",
-        "oracle(odometry)",
-        "--scenes",
-        "arena",
-        "--axis",
-        "dynamism",
-    ]
+    words = ["--slams", "sure", "raises", "oracle(odometry)", "--scenes", "arena"]
+    words += ["--axis", "dynamism"]
     words += ["--levels", "0", "1", "--seeds", "1", "--seconds", "1.6", "--no-page"]
     files = {name: str(tmp_path / name) for name in ("out", "results.json", "picture.png")}
     words += ["--out", files["out"], "--results", files["results.json"]]
@@ -170,7 +162,7 @@ def test_the_breaking_point_of_a_tiny_plan(tmp_path: Path, capsys, monkeypatch):
     assert raises["lost"] == [1, 1]
     assert raises["ate_median_m"] == ["inf", "inf"]
     assert raises["claimed_m"] == [None, None]
-    kept = {p: p.stat().st_mtime_ns for p in (tmp_path / "out").glob("both/*/arena*-*.npz")}
+    kept = {p: p.stat().st_mtime_ns for p in (tmp_path / "out").glob("dynamism/*/arena*-*.npz")}
     assert len(kept) == 8
     assert breaking_point.main(words) == 0
     assert {p: p.stat().st_mtime_ns for p in kept} == kept
