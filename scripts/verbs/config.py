@@ -80,7 +80,7 @@ def _print_crowds(as_json: bool) -> None:
     for scene, crowd in mixes.items():
         table.add_row(scene, str(crowd))
     console.print(table)
-    console.print("At motion m there are m times as many of each. Another: --crowd escorts:6")
+    console.print("At motion m there are m * m times as many of each. Another: --crowd escorts:6")
 
 
 def _print_dynamism(as_json: bool) -> None:
