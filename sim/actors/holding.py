@@ -45,7 +45,7 @@ class Held(NamedTuple):
 
 
 @njit
-def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:  # noqa: PLR0915 (kernel)
+def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:
     """Write the forces of all hands into ``qfrc``."""
     for k in range(len(held.at)):
         for axis in range(3 if held.at[k, DROPPED] >= 0 else 0):
@@ -61,16 +61,12 @@ def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:  # noqa: PL
         if qb < 0:
             continue
         c, s = math.cos(qpos[qa + 2]), math.sin(qpos[qa + 2])
-        rx = c * held.pose[k, 0] - s * held.pose[k, 1]
-        ry = s * held.pose[k, 0] + c * held.pose[k, 1]
+        arm, bx, by = held.pose[k, 0], 0.0, 0.0
         if held.hinged[k]:
             # The hand is where holder and thing meet, half way; the thing's end of it turns along.
-            ct, st = math.cos(qpos[qb + 2]), math.sin(qpos[qb + 2])
-            arm = 0.5 * held.pose[k, 0]
-            rx, ry = c * arm - s * held.pose[k, 1], s * arm + c * held.pose[k, 1]
-            bx, by = -ct * arm, -st * arm
-        else:
-            bx, by = 0.0, 0.0
+            arm *= 0.5
+            bx, by = -math.cos(qpos[qb + 2]) * arm, -math.sin(qpos[qb + 2]) * arm
+        rx, ry = c * arm - s * held.pose[k, 1], s * arm + c * held.pose[k, 1]
         ex, ey = qpos[qa] + rx - qpos[qb] - bx, qpos[qa + 1] + ry - qpos[qb + 1] - by
         if ex * ex + ey * ey > LOST * LOST:
             continue
@@ -93,14 +89,6 @@ def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:  # noqa: PL
         qfrc[vb + 2] += torque + bx * fy - by * fx
         qfrc[va] -= fx
         qfrc[va + 1] -= fy
-
-
-def empty() -> Held:
-    """No hands."""
-    return Held(
-        np.zeros((0, 5), dtype=np.int64), np.zeros((0, 3)), np.zeros(0, dtype=np.bool_),
-        np.zeros((0, 2)),
-    )  # fmt: skip
 
 
 def hands(model: mujoco.MjModel, bodies: Bodies, scene: Scene, cleaners: list[str]) -> Held:

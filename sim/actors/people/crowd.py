@@ -23,6 +23,7 @@ from sim.actors.people.following import (
     Leaders,
     faces,
     follow,
+    is_pushing,
     make_room,
     make_way,
     near_place,
@@ -162,7 +163,7 @@ def way_left(i: int, field: Field, crowd: Crowd) -> float:
     """s to the goal, of person ``i`` or whatever of the thing it pushes is nearest to it."""
     discs, goal = crowd.discs, crowd.task[i, columns.GOAL]
     left = time_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
-    if crowd.state[i, columns.TURN_RATE] < TURN_MOST:
+    if is_pushing(i, crowd):
         for part in range(len(discs)):
             if crowd.owner[part] == crowd.task[i, columns.HELD]:
                 left = min(
@@ -316,7 +317,7 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
     state[i, columns.VX] += share * dvx
     state[i, columns.VY] += share * dvy
     heading, most = yaw, state[i, columns.TURN_RATE]
-    if on_chair(i, crowd) or most < TURN_MOST:
+    if on_chair(i, crowd) or is_pushing(i, crowd):
         heading = state[i, columns.LOOK]
     elif state[i, columns.VX] ** 2 + state[i, columns.VY] ** 2 > 0.04:
         heading = math.atan2(state[i, columns.VY], state[i, columns.VX])
@@ -400,14 +401,14 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
         wanted = wish(i, time, tick, people)
         count = nearby(i, crowd, ways.sides, near)
         fade = patience(i, time, crowd)
-        if crowd.state[i, columns.TURN_RATE] < TURN_MOST:
+        if is_pushing(i, crowd):
             vx, vy = pushes(i, wanted, near[:count], field, crowd)
         else:
             vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
         before = vx * vx + vy * vy
         vx, vy = keep_hold(i, (vx, vy), crowd, people.held, at.discs)
         vx, vy = spare_robot(i, (vx, vy), near[:count], crowd)
-        if crowd.state[i, columns.TURN_RATE] < TURN_MOST:  # nor is a long thing turned into it
+        if is_pushing(i, crowd):  # nor is a long thing turned into it
             share = min(math.sqrt((vx * vx + vy * vy) / max(before, 1e-9)), 1.0)
             turn = crowd.state[i, columns.LOOK] - crowd.yaws[i]
             crowd.state[i, columns.LOOK] = crowd.yaws[i] + share * turn

@@ -35,7 +35,6 @@ TURN_MOST = ACTORS.walking.turn_most
 HELD_UP_S, NEAR_M, REST_S = _F.held_up_s, _F.near_m, _F.rest_s
 CRUMBS = 160  # remembered of each leader: 40 m
 BEHIND = -0.5  # m; a place farther behind is one on the leader's way
-PLACE_COLUMNS = (columns.AHEAD, columns.LEFT, columns.FILE, columns.SPOT_X, columns.SPOT_Y)
 HEADING, STOOD, LAST, COUNT = range(4)  # columns of ``Leaders.course``
 
 
@@ -200,6 +199,12 @@ def make_way(
 
 
 @njit
+def is_pushing(i: int, crowd: Crowd) -> bool:
+    """Whether person ``i`` has something long before it, and not lost it since."""
+    return bool(crowd.task[i, columns.HELD] >= 0 and crowd.state[i, columns.TURN_RATE] < TURN_MOST)
+
+
+@njit
 def make_room(
     i: int, wanted: tuple[float, float], field: Field, crowd: Crowd
 ) -> tuple[float, float]:
@@ -212,7 +217,7 @@ def make_room(
             discs[i, columns.X] - discs[j, columns.X],
             discs[i, columns.Y] - discs[j, columns.Y],
         )
-        pushing = state[j, columns.TURN_RATE] < TURN_MOST
+        pushing = is_pushing(j, crowd)
         reach = ROOM_PUSH_M if pushing else ROOM_M
         if dx * dx + dy * dy > reach * reach:
             continue

@@ -53,6 +53,17 @@ def way(simulation, before, name):
     return float(np.hypot(at[0], at[1]))
 
 
+def test_who_pushed_what_is_out_walks_on_with_empty_hands(before):
+    """Its kernel looks up what it holds, which is no row of any table any more."""
+    simulation = changed(before, Change(out=("board0",)))
+    people = simulation.world.people
+    pusher = people.names.index("board_pusher0")
+    assert people.crowd.task[pusher, columns.HELD] == -1
+    drive(simulation, 400)
+    assert way(simulation, before, "board_pusher0") > 0.5
+    assert np.isfinite(simulation.world.data.qpos).all()
+
+
 def test_saved_with_things_in_hand_it_goes_on_bit_for_bit(before):
     again = Simulation(**ROOM)
     again.load_state(before[0])
