@@ -28,12 +28,12 @@ from sim.driving.drive import TourConfig
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation, n_frames, tour
 from slam import create
+from slam.evaluation.lost import LOST_M
 from slam.files import write_text
 from slam.frames import Frame
 from slam.frontend.odometry_sum import thinned
 from slam.replay import Track
 
-LOST_M = 0.5
 FULL_RATE_HZ = 37.5
 SCANNERS = {"noise": Lms221Config.noise_only(), "full": Lms221Config()}
 STRIDES = {"5": 8, "37.5": 1}  # 4.7 Hz, and every scan

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from scripts.metrics.judged import Judged
-from scripts.metrics.metric import Better, Metric, Section
+from scripts.metrics.row import Better, Metric, Section
 from slam.evaluation import metrics
 
 DEG = 180.0 / math.pi

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from scripts.metrics.metric import Metric
+from scripts.metrics.row import Metric
 from scripts.metrics.table import METRICS
 from scripts.quotes.results import Interval, Pair
 from scripts.report.words import levels_text

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from scripts.closed_loop.plan import SCHEMA
 from scripts.closed_loop.tables import LEVEL_COLUMNS
 from scripts.comparison.folder import Row, axis_in, read_csv, read_json
-from scripts.metrics.metric import digits
+from scripts.metrics.row import digits
 from scripts.output import check_whole
 from scripts.report import style
 from scripts.report.curves import HEIGHT, WIDTH

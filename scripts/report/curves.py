@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from scripts.comparison.tables import number
-from scripts.metrics.metric import Metric
+from scripts.metrics.row import Metric
 from scripts.metrics.table import METRICS
 from scripts.report import style
 from scripts.report.study import Study

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from scripts.comparison.tables import FAILED
-from scripts.metrics.metric import Metric, digits
+from scripts.metrics.row import Metric, digits
 from scripts.metrics.table import METRICS
 from scripts.report.study import Row, Study, verdict
 

@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from scripts.comparison.tables import FAILED
-from scripts.metrics.metric import Metric
+from scripts.metrics.row import Metric
 from scripts.metrics.table import EXPLAINED, METRICS
 from scripts.report.study import LEAST_RUNS, Study, verdict
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Doors with closers: opened for whoever comes, blown or pushed about at the dynamism rate.
 
+How often is said elsewhere: ``CURVES`` in ``sim.core.dynamism``.
+
 Sliding doors stay open while anybody stands in them; a lift's opens when the cabin has come.
 
 The closer (spring to the angle of rest, damper) is in the model. A hand, a draught or the opener

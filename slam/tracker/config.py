@@ -141,6 +141,7 @@ class TrackerConfig(Settings):
         logarithms of overlap + 0.1 tempered by 0.3, because beams are not independent.
         """
         printed: dict[str, Any] = {
+            "decay_per_s": 0.8,
             "lateral_sum": 0.19,
             "trace_s": 0.0,
             "short_term_weight": 1.0,

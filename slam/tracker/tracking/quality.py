@@ -3,6 +3,7 @@
 
 A robot that was carried away, or a map that is wrong, shows as a match far below the usual and a
 map in view that is contradicted. Then nothing is written until it is clear where the robot is.
+After how many such frames it is lost: ``QualityConfig.lost_after`` in ``config.py`` here.
 """
 
 from __future__ import annotations

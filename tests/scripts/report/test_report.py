@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from scripts import cli
 from scripts.comparison import folder as files
 from scripts.comparison.columns import COLUMNS
-from scripts.metrics.metric import digits
+from scripts.metrics.row import digits
 from scripts.metrics.table import METRICS
 from scripts.report import closed, page, pictures, tables, words
 from scripts.report.closed import driven

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one metric is: its column, how it is computed, which way is better, how it is shown."""
+"""What a row of the table of metrics (``table``) is: column, computation, how it is shown."""
 
 from __future__ import annotations
 
