@@ -63,7 +63,12 @@ def scans(seconds: float) -> Iterator[Row]:
     """A scan in a station at rest against the number of people in it."""
     costs = {}
     for n in STREAMS:
-        options = {"crowd": f"streams:{n}", "n_people": 0, "n_chairs": 0, "n_trolleys": 0}
+        options: dict[str, Any] = {
+            "crowd": f"streams:{n}",
+            "n_people": 0,
+            "n_chairs": 0,
+            "n_trolleys": 0,
+        }
         world = World("station", seed=SEED, dynamism=0.0, **options)
         costs[n] = _scan_us(world, max(20, round(5 * seconds)))
         how = "station at rest, 361 beams, every effect"
