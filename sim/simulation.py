@@ -59,7 +59,8 @@ class Simulation:
                ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
     drive      limits of the robot
-    start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted
+    start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted; a crowd
+               is put around it
     chairs     their physics: "planar" or "free" (``sim.actors.castors``)
     tags       "truth", or "camera": beside the truth, ``tag_reading`` is what a ceiling camera
                would know of the robot by now (``sim.sensors.tag_cameras``)
@@ -96,7 +97,7 @@ class Simulation:
             scene, seed=seed, dynamism=rates, change=change, session=session, drive=drive,
             start=start, chairs=chairs, **options,
         )  # fmt: skip
-        self.odometry_preset = odometry
+        self.odometry_preset, self.session = odometry, session
         seeds = self.world.seeds
         self.laser = LaserScanner(self.world.model, laser, seeds.generator("lidar"))
         self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=drive.track)
@@ -263,7 +264,8 @@ class Simulation:
         self.contacts, self.rearranged, self._scan, self._frame = [], [], None, None
 
     def metadata(self) -> StreamMetadata:
-        """What a recording says about itself."""
+        """What a recording says about itself; ``extra`` has a session, where there is one."""
+        session = {} if self.session is None else {"session": self.session}
         return StreamMetadata(
             source="simulation",
             scene=self.world.scene.name,
@@ -275,6 +277,7 @@ class Simulation:
                 "laser": asdict(self.laser.config),
                 "scan_height_m": self.world.scene.scan_height_m,
                 "dynamism": asdict(self.world.rates),
+                **session,
             },
         )
 

@@ -68,7 +68,7 @@ def simulation(seconds: float) -> Iterator[Row]:
 
 
 @njit
-def _note(noted: Any, times: int) -> None:
+def note_poses(noted: Any, times: int) -> None:
     """Note all poses, in compiled code as ``sim.world.substeps.advance`` does."""
     for _ in range(times):
         note(noted)
@@ -90,7 +90,7 @@ def scanner(seconds: float) -> Iterator[Row]:
 
         def many(laser: LaserScanner = laser, room: World = room) -> None:
             for _ in range(scans):
-                _note(laser.begin(room.data), int(laser.window.marks[1:].sum()))
+                note_poses(laser.begin(room.data), int(laser.window.marks[1:].sum()))
                 laser.finish()
 
         many()

@@ -17,12 +17,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scripts.comparison.memory import reading_kb
+from scripts.experiments.penetration import Depths
 from sim.actors.rearranging import is_out
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation
 from slam.frames import Float
 
 GROWTH_MB = 8.0  # allowed after the first tenth
+PARTS = 20  # of a run; what was found is printed after each
 
 
 @dataclass
@@ -33,6 +35,7 @@ class Report:
     not_finite: int = 0
     memory_mb: list[float] = field(default_factory=list)
     fastest: float = 0.0
+    forces: dict[str, float] = field(default_factory=dict)  # peaks on the robot, N, by kind
 
     def look(self, simulation: Simulation) -> None:
         """Check everything as it is now."""
@@ -74,30 +77,55 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=120.0, help="simulated")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--dynamism", type=float, default=0.8)
+    parser.add_argument("--motion", type=float, help="apart from the dynamism")
+    parser.add_argument("--change", type=float, help="apart from the dynamism")
     arguments = parser.parse_args()
-    simulation = Simulation(arguments.scene, seed=arguments.seed, dynamism=arguments.dynamism)
+    simulation = Simulation(
+        arguments.scene,
+        seed=arguments.seed,
+        dynamism=arguments.dynamism,
+        motion=arguments.motion,
+        change=arguments.change,
+    )
     pilot, report, began = Pilot(simulation.world), Report(), time.process_time()
-    scans = round(arguments.minutes * 60.0 / simulation.scan_period_s)
+    depths, scans = Depths(simulation), round(arguments.minutes * 60.0 / simulation.scan_period_s)
     for k in range(scans):
         simulation.world.set_command(*pilot.command(simulation.scan_period_s))
         simulation.observe()
+        depths.look()
+        for touch in simulation.contacts:
+            report.forces[touch.kind] = max(report.forces.get(touch.kind, 0.0), touch.force)
         if k % 75 == 0:
             report.look(simulation)
-        if k % max(1, scans // 10) == 0:
-            print(f"{simulation.world.time_ns / 6e10:7.1f} min  {report.memory_mb[-1]:.0f} MB")
-    warnings = {i: w.number for i, w in enumerate(simulation.world.data.warning) if w.number}
-    walked, blocked = simulation.world.people.walked_s()
-    cpu = time.process_time() - began
-    print(f"{arguments.minutes:g} min of {arguments.scene} in {cpu / 60.0:.1f} min of CPU")
-    print(f"warnings {warnings}, escapes {report.escapes}, not finite {report.not_finite}")
-    print(
-        f"memory grew by {report.growth_mb:.1f} MB; fastest joint {report.fastest:.1f} m/s or rad/s"
-    )
-    if walked.sum() > 0.0:
-        print(f"people blocked {100.0 * blocked.sum() / walked.sum():.1f} % of their way")
+        if (k + 1) % max(1, scans // PARTS) == 0 or k + 1 == scans:
+            minutes, cpu = simulation.world.time_ns / 6e10, time.process_time() - began
+            print(f"{minutes:.1f} min of {arguments.scene} in {cpu / 60.0:.1f} min of CPU")
+            _print(report, depths, simulation)
     print(f"goals visited by the robot {pilot.driver.visited}")
-    bad = bool(warnings or report.escapes or report.not_finite or report.growth_mb > GROWTH_MB)
+    bad = bool(
+        _warnings(simulation) or report.escapes or report.not_finite or report.growth_mb > GROWTH_MB
+    )
     return int(bad)
+
+
+def _warnings(simulation: Simulation) -> dict[int, int]:
+    """How often MuJoCo gave each of its warnings."""
+    return {k: w.number for k, w in enumerate(simulation.world.data.warning) if w.number}
+
+
+def _print(report: Report, depths: Depths, simulation: Simulation) -> None:
+    """All that there is to say so far: a run that is cut short has said it."""
+    warnings, grown = _warnings(simulation), report.growth_mb
+    print(f"  warnings {warnings}, escapes {report.escapes}, not finite {report.not_finite}")
+    print(f"  memory {report.memory_mb[-1]:.0f} MB, grew by {grown:.1f} MB")
+    print(f"  fastest joint {report.fastest:.1f} m/s or rad/s")
+    walked, blocked = simulation.world.people.walked_s()
+    if walked.sum() > 0.0:
+        print(f"  people blocked {100.0 * blocked.sum() / walked.sum():.1f} % of their way")
+    for depth, at_s, one, two in sorted(depths.worst.values(), reverse=True)[:3]:
+        print(f"  {one} and {two} were {1000.0 * depth:.0f} mm in each other at {at_s:.1f} s")
+    peaks = ", ".join(f"{kind} {force:.0f} N" for kind, force in sorted(report.forces.items()))
+    print(f"  the robot was touched by {peaks or 'nothing'}", flush=True)
 
 
 if __name__ == "__main__":

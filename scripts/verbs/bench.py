@@ -32,7 +32,7 @@ def bench(
     """
     if not 1.0 <= seconds <= 3600.0:
         raise InvalidValueError(f"--seconds must lie in [1, 3600] s, got {seconds}")
-    from scripts.benches import dataset, world
+    from scripts.benches import crowds, dataset, world
     from scripts.benches import slam as bench_slam
     from scripts.output import machine, versions
 
@@ -41,6 +41,7 @@ def bench(
         world.scanner,
         world.physics,
         world.environments,
+        crowds.rows,
         world.pictures,
         bench_slam.updates,
         bench_slam.ekf,

@@ -11,8 +11,6 @@ a door stands at its hinge and heads along its leaf.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -23,22 +21,19 @@ from scenes.arrangement import opens_to
 from scenes.scene import Pose, Scene
 from sim.core.seeds import Seeds
 from sim.recording.recipe import Recipe
+from sim.recording.tables import POSE, pose_words, read_table, table
 from sim.world.sessions import Arrangement, Days
-from sim.world.times_of_day import time_of
-from slam.bounded import text_of
-from slam.errors import LogFormatError
+from sim.world.times_of_day import MOST_SESSIONS, time_of
 from slam.files import write_text
 from slam.maps import write_map
 
 THINGS, CHANGES = "things.csv", "changes.csv"
 FILES = (THINGS, CHANGES, "map.pgm", "map.yaml")
 STAYED_M, STAYED_RAD = 0.05, 0.1  # what differs by less has stayed
-MAX_BYTES = 1 << 26  # of a table
-_POSE = ("x_m", "y_m", "heading_rad")
-THING_COLUMNS = ("session", "time_of_day", "name", "kind", *_POSE)
+THING_COLUMNS = ("session", "time_of_day", "name", "kind", *POSE)
 CHANGE_COLUMNS = (
     "from_session", "to_session", "name", "kind", "change",
-    *(f"from_{c}" for c in _POSE), *(f"to_{c}" for c in _POSE),
+    *(f"from_{c}" for c in POSE), *(f"to_{c}" for c in POSE),
 )  # fmt: skip
 
 
@@ -138,55 +133,27 @@ def write_days(folder: Path, recipe: Recipe, sessions: int) -> None:
     """All ``FILES`` of a dataset whose sessions have that recipe but for their number."""
     days = days_of(recipe)
     known = things(days, sessions)
-    rows = [(t.session, t.time_of_day, t.name, t.kind, *_words(t.pose)) for t in known]
-    write_text(folder / THINGS, _table(THING_COLUMNS, rows))
+    rows = [(t.session, t.time_of_day, t.name, t.kind, *pose_words(t.pose)) for t in known]
+    write_text(folder / THINGS, table(THING_COLUMNS, rows))
     changed = [
-        (d.first, d.second, d.name, d.kind, d.change, *_words(d.before), *_words(d.after))
+        (d.first, d.second, d.name, d.kind, d.change, *pose_words(d.before), *pose_words(d.after))
         for d in differences(known)
     ]
-    write_text(folder / CHANGES, _table(CHANGE_COLUMNS, changed))
+    write_text(folder / CHANGES, table(CHANGE_COLUMNS, changed))
     write_map(folder / "map", days.scene.static_map)
-
-
-def _words(pose: Pose | None) -> tuple[str, ...]:
-    return ("", "", "") if pose is None else tuple(f"{v:.6f}" for v in pose)
-
-
-def _table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(rows)
-    return text.getvalue()
 
 
 def read_things(folder: Path) -> list[Thing]:
     """``things.csv`` of a dataset; ``LogFormatError`` for anything else."""
-    file = folder / THINGS
     found = []
-    for line, row in _rows(file, THING_COLUMNS):
-        try:
-            numbers = [float(word) for word in row[4:] if word]
-            pose = (numbers[0], numbers[1], numbers[2]) if numbers else None
-            session = int(row[0])
-        except (ValueError, IndexError) as error:
-            raise LogFormatError(file, f"line {line}: {error}") from error
-        if not all(map(math.isfinite, numbers)):
-            raise LogFormatError(file, f"line {line}: a pose must be finite, got {row[4:]}")
+    known = set[tuple[int, str]]()
+    for row in read_table(folder / THINGS, THING_COLUMNS):
+        session = row.whole(0, MOST_SESSIONS - 1)
+        time, name = row.one_of(1, (time_of(session).name,)), row.word(2)
+        if (session, name) in known:
+            raise row.error(f"session {session} has {name!r} twice")
+        known.add((session, name))
         found.append(
-            Thing(session=session, time_of_day=row[1], name=row[2], kind=row[3], pose=pose)
+            Thing(session=session, time_of_day=time, name=name, kind=row.word(3), pose=row.pose(4))
         )
     return found
-
-
-def _rows(file: Path, columns: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
-    try:
-        lines = list(csv.reader(io.StringIO(text_of(file, MAX_BYTES))))
-    except csv.Error as error:
-        raise LogFormatError(file, f"no table: {error}") from error
-    if not lines or lines[0] != list(columns):
-        raise LogFormatError(file, f"expected the columns {', '.join(columns)}")
-    for number, row in enumerate(lines[1:], 2):
-        if len(row) != len(columns):
-            raise LogFormatError(file, f"line {number}: {len(row)} fields, not {len(columns)}")
-        yield number, row

@@ -29,6 +29,7 @@ MAX_SIZE = 4096
 SMALL = 480  # px; up to this height, fewer facets do (a third of the cost)
 PEOPLE_GROUP = 2
 SHADOW_M = 0.25  # radius; smaller things throw no shadow, but for those that make up people
+LOOK_AT_M = 0.7  # height of the middle of a close-up
 EDGE = 24  # grey levels between neighbours that make an edge
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
@@ -75,7 +76,6 @@ class Camera:
             self._option.sitegroup[group] = 0
         self._option.geomgroup[PAINT_GROUP] = 1
         self._view = mujoco.MjvCamera()
-        self._view.type = mujoco.mjtCamera.mjCAMERA_FIXED
         self._soft = samples == 0
         small = (model.geom_rbound > 0.0) & (model.geom_rbound < SHADOW_M)
         self._shadeless = small & (model.geom_group != PEOPLE_GROUP)
@@ -91,7 +91,31 @@ class Camera:
         if number < 0:
             known = [self._model.camera(i).name for i in range(self._model.ncam)]
             raise InvalidValueError(f"camera must be one of {', '.join(known)}, got '{camera}'")
-        self._view.fixedcamid = number
+        self._view.type, self._view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, number
+        return self._picture(data)
+
+    def close_up(
+        self,
+        data: mujoco.MjData,
+        at: tuple[float, float],
+        *,
+        far_m: float = 5.0,
+        azimuth_deg: float = 60.0,
+        down_deg: float = 35.0,
+    ) -> NDArray[np.uint8]:
+        """The same of what stands about (x, y) m, seen from ``far_m`` away.
+
+        azimuth_deg  where it looks to, from the x axis on    down_deg  how steeply
+        """
+        if self._context is None:
+            raise InvalidValueError("this Camera is closed")
+        self._view.type = mujoco.mjtCamera.mjCAMERA_FREE
+        self._view.lookat[:] = (*at, LOOK_AT_M)
+        self._view.distance, self._view.azimuth = far_m, azimuth_deg
+        self._view.elevation = -down_deg
+        return self._picture(data)
+
+    def _picture(self, data: mujoco.MjData) -> NDArray[np.uint8]:
         self._update(data)
         self._gl.make_current()
         picture = np.empty((self.height, self.width, 3), dtype=np.uint8)

@@ -7,7 +7,9 @@ between two of them calls ``mj_forward`` then.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -25,7 +27,7 @@ from sim.actors.rearranging import Rearrangement, Rearranging
 from sim.actors.robot import Drive, DriveConfig
 from sim.core import state
 from sim.core.bodies import Bodies
-from sim.core.checks import instance, number
+from sim.core.checks import instance, number, numbers
 from sim.core.contacts import Contact, RobotContacts
 from sim.core.dynamism import Dynamism
 from sim.core.engine import engine
@@ -55,7 +57,8 @@ class World:
     session   number of a session of the same building (``sim.world.sessions``): then ``change`` is
               the share of what stands elsewhere than in the session before
     drive     limits of the robot
-    start     (x m, y m, heading rad) of the robot instead of the scene's
+    start     (x m, y m, heading rad) of the robot instead of the scene's; a crowd that is put into
+              the scene is put around it, one that is in a built ``Scene`` stays where it is
     chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.castors``)
     options   passed on to ``scenes.build`` when the scene is given by name, e.g. ``n_chairs=10``;
               ``scan_height_m`` and ``crowd`` are some that every scene has; the crowd is the
@@ -86,9 +89,9 @@ class World:
             self.rates = sessions.slowed(self.rates, time_of(session).motion)
             named, given = scene, options.pop("crowd", None)
             scene, self.seeds = sessions.opened(scene, self.seeds, change, session, options)
-            scene = self._crowded(scene, named, given, session)
+            scene = self._crowded(scene, named, given, start, session)
             options, change = {}, 0.0
-        built = self._built(scene, options)
+        built = self._built(scene, start, options)
         self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
         self.model: mujoco.MjModel = self.scene.compile()
         self.data = mujoco.MjData(self.model)
@@ -128,22 +131,35 @@ class World:
         substeps.decide_first(self._room)
         mujoco.mj_step1(self.model, self.data)
 
-    def _built(self, scene: Scene | str, options: dict[str, Any]) -> Scene:
+    def _built(
+        self, scene: Scene | str, start: Sequence[float] | None, options: dict[str, Any]
+    ) -> Scene:
         if isinstance(scene, str):
             given = options.pop("crowd", None)
             built = build(scene, seed=self.seeds.integer("layout"), **options)
-            return self._crowded(built, scene, given)
+            return self._crowded(built, scene, given, start)
         if options:
             raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")
         instance("scene", scene, Scene)
         return scene
 
-    def _crowded(self, built: Scene, named: Scene | str, given: object, session: int = 0) -> Scene:
+    def _crowded(
+        self,
+        built: Scene,
+        named: Scene | str,
+        given: object,
+        start: Sequence[float] | None,
+        session: int = 0,
+    ) -> Scene:
         """The scene with the crowd that is given, else with the mix of the scene of that name."""
         if given is not None:
-            return with_crowd(built, crowd_of(given), session)
-        crowd = mix(named, self.rates.crowd) if isinstance(named, str) else Crowd()
-        return with_crowd(built, crowd, session, as_many_as_fit=True)
+            crowd = crowd_of(given)
+        else:
+            crowd = mix(named, self.rates.crowd) if isinstance(named, str) else Crowd()
+        if not crowd:
+            return built
+        begun = _begun(built, start)
+        return with_crowd(begun, crowd, session, as_many_as_fit=given is None)
 
     def _named(self, kind: str) -> list[str]:
         """Movers whose kind starts so: "chair" means both sorts."""
@@ -339,3 +355,13 @@ class World:
         self.people.dress()
         self.bodies.restore_physics(self.data, arrays)
         self._contacts.take()
+
+
+def _begun(scene: Scene, start: Sequence[float] | None) -> Scene:
+    """The scene with the robot at ``start``, where one is given."""
+    if start is None or not scene.movers or scene.movers[-1].kind != "robot":
+        return scene
+    x, y, yaw = numbers("start", start, 3, "(x m, y m, heading rad)")
+    if not math.isfinite(x + y + yaw):
+        return scene  # what is wrong is said where the robot is placed
+    return replace(scene, start=(x, y, yaw), initial={**scene.initial, "robot": (x, y, yaw)})

@@ -52,6 +52,12 @@ def test_a_stream_replays_from_the_start():
         np.testing.assert_array_equal(a.truth, b.truth)
 
 
+def test_metadata_have_the_session_where_there_is_one():
+    assert "session" not in Simulation("arena").metadata().extra
+    assert Simulation("arena", session=2).metadata().extra["session"] == 2
+    assert stream("arena", session=0, seconds=1.0).metadata.extra["session"] == 0
+
+
 def test_stamps_are_one_scan_period_apart_to_the_nanosecond():
     frames = list(stream("arena", seed=0, seconds=0.4))
     assert [f.stamp_ns for f in frames] == [round(k * 8e9 / 300) for k in range(len(frames))]

@@ -13,6 +13,7 @@ from sim.actors.people import columns
 from sim.core.dynamism import Dynamism
 from sim.driving.pilot import Pilot
 from sim.world.world import SUBSTEPS_PER_S, World
+from slam.errors import InvalidValueError
 
 CALM = Dynamism(stay_mean=4.0)  # people walk, nothing is shoved
 STEP = 30  # substeps from one sample to the next: 0.1 s
@@ -54,6 +55,21 @@ def test_escorts_stay_with_the_robot_and_stop_with_it():
     (seen,) = _watch(world, 2.0, "escort")
     assert np.linalg.norm(seen[-1, :, :2] - seen[0, :, :2], axis=1).max() < 0.3
     assert not any(contact.kind == "person" for contact in world.take_contacts())
+
+
+def test_escorts_begin_around_the_robot_wherever_it_starts():
+    usual = _world("escorts:6,streams:2")
+    x, y, yaw = usual.scene.start
+    start = (-x, -y, yaw + 2.0)
+    world = World("arena", seed=1, dynamism=CALM, n_chairs=0, crowd="escorts:6", start=start)
+    np.testing.assert_allclose(world.robot_pose(), start)
+    for each in (usual, world):
+        far = np.linalg.norm(_poses(each, "escort")[:, :2] - each.robot_pose()[:2], axis=1)
+        assert far.min() > 0.5
+        assert far.max() < 3.0
+    for wrong in ((math.nan, 0.0, 0.0), (50.0, 0.0, 0.0), (0.0, 1.0)):
+        with pytest.raises(InvalidValueError, match="start"):
+            World("arena", seed=1, dynamism=CALM, crowd="escorts:2", start=wrong)
 
 
 def test_streams_go_from_end_to_end():

@@ -77,6 +77,18 @@ def test_only_edges_are_softened():
 
 
 @pytest.mark.usefixtures("_needs_gl")
+def test_a_close_up_is_of_the_place_asked_for_and_leaves_the_cameras_alone(world):
+    model, data = world
+    with Camera(model, 160, 90, samples=0) as camera:
+        top = camera.render(data, "top")
+        near = camera.close_up(data, (0.0, 0.0))
+        aside = camera.close_up(data, (2.0, 1.0), azimuth_deg=150.0)
+        np.testing.assert_array_equal(camera.render(data, "top"), top)
+    assert near.std() > 5.0
+    assert np.abs(near.astype(int) - aside).mean() > 5.0
+
+
+@pytest.mark.usefixtures("_needs_gl")
 def test_hulls_are_hidden_and_frames_are_copies(world):
     model, data = world
     with Camera(model, 160, 90, samples=0) as camera:
@@ -98,6 +110,8 @@ def test_a_camera_says_what_is_wrong(world):
     camera.close()
     with pytest.raises(InvalidValueError, match="closed"):
         camera.render(data, "top")
+    with pytest.raises(InvalidValueError, match="closed"):
+        camera.close_up(data, (0.0, 0.0))
     with pytest.raises(InvalidValueError, match="width"):
         Camera(model, 0, 32)
 
