@@ -17,6 +17,7 @@ from scripts.comparison.folder import Row, axis_in, read_csv, read_json
 from scripts.metrics.row import digits
 from scripts.output import check_whole
 from scripts.report import style
+from scripts.report.answer import percent
 from scripts.report.curves import HEIGHT, WIDTH
 from scripts.report.tables import Cell, Table
 from slam.errors import LogFormatError
@@ -117,8 +118,7 @@ def table(drive: Driven) -> Table:
             *(Cell(text=f"{row[key]:g}") for key in ("wrong", "given_up", "failed")),
             _precision(row),
             *(_number(row[key]) for key in ("time_s", "collisions_per_km", "near_misses_per_km")),
-            Cell(text=f"{row['runs_lost']:g} of {row['runs']:g}",
-                 small=f"{row['runs_recovered']:g} recovered"),
+            _lost(row),
         ]
         for slam in drive.slams
         for row in drive.of(slam)
@@ -126,6 +126,15 @@ def table(drive: Driven) -> Table:
     head = ["SLAM", drive.axis, "reached", "wrong", "given up", "failed", "precision, cm",
             "time, s", "collisions per km", "near misses per km", "runs lost"]  # fmt: skip
     return Table(caption=drive.scene, head=head, rows=rows)
+
+
+def _lost(row: Row) -> Cell:
+    interval = percent(int(row["runs_lost"]), int(row["runs"]))
+    recovered = f"{row['runs_recovered']:g} recovered"
+    return Cell(
+        text=f"{row['runs_lost']:g} of {row['runs']:g}",
+        small=f"{interval}\n{recovered}" if interval else recovered,
+    )
 
 
 def _precision(row: Row) -> Cell:

@@ -12,7 +12,7 @@ import typer
 from rich.markup import escape
 
 from scripts.checked import whole
-from scripts.console import console
+from scripts.console import console, fact
 from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels, chosen
 from scripts.names import check
 from scripts.oracle_option import Oracles, with_oracles
@@ -62,6 +62,7 @@ def compare(
     """Run SLAMs on the same simulated runs; write tables of error against dynamism.
 
     With levels of --motion or --change instead, the other of the two is at 0 unless it is given.
+    It ends with a sentence about the SLAM named first: from which level on it is lost.
     If it is killed, the same command continues. With a SLAM added, only that SLAM runs.
 
     [bold]mobilia compare --slam shunting ekf odometry --scene arena --dynamism 0:1:0.5 --seeds 3
@@ -74,6 +75,7 @@ def compare(
     from scripts import workers
     from scripts.comparison.make import carry_out, median_errors
     from scripts.comparison.plan import Plan
+    from scripts.report.answer import answer, failed, standing
 
     workers.check_jobs(jobs)
     axis, at, held = axis_levels(dynamism, motion, change)
@@ -95,6 +97,11 @@ def compare(
     spent_s = time.perf_counter() - started
     for name in plan.scenes:
         console.print(median_errors(plan, name, rows))
+    for line in failed(rows, plan.axis):
+        fact(line, bad=True)
+    said = (answer(standing(rows, slams[0], name, plan.axis)) for name in plan.scenes)
+    for line in dict.fromkeys(said):
+        fact(line)
     console.print(
         f"{escape(str(out))}: runs.csv, levels.csv, paired.csv, runs/ ({spent_s:.0f} s)",
         soft_wrap=True,
