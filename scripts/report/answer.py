@@ -205,7 +205,7 @@ def _first_level(of: Standing) -> str:
     if low.against == -1:
         return f"at {low.at:g} it is already worse than its own odometry{so}"
     if low.subject.half and so:
-        return f"it is so at 0 already{so}"
+        return f"this begins at 0{so}"
     return ""
 
 
@@ -246,7 +246,7 @@ def controls(of: Standing) -> list[str]:
         said.append(f"Odometry alone is lost in {_sum(alone)}.")
     else:
         said.append(
-            "Odometry did not run: with `--slam … odometry` it is the control that looks at nothing."
+            "Odometry, the control that looks at nothing, did not run: `--slam … odometry`."
         )
     if not best:
         said.append("No oracle ran: `--oracle shunting` tells whether the room is fair.")

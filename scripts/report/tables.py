@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -42,9 +43,8 @@ class Table:
 def of_levels(study: Study, scene: str, metrics: Sequence[Metric]) -> list[Table]:
     """Medians (shares) with their 95 % intervals of the measures that any SLAM has.
 
-    A table for each measure: a row for each level, a column for each SLAM. What would have one
-    column or one row becomes one table: with a single level a row for each SLAM and a column for
-    each measure; of the measures that a single SLAM has, a row for each level.
+    A table for each measure: a row for each level, a column for each SLAM. One table for all with a
+    single level (a row for each SLAM), and for the measures that one SLAM alone has.
     """
     having = {metric: _having(study, scene, metric) for metric in metrics}
     having = {metric: slams for metric, slams in having.items() if slams}
@@ -142,8 +142,8 @@ def _count(row: Row | None) -> Cell:
 def of_pairs(study: Study, scene: str, metrics: Sequence[Metric]) -> list[Table]:
     """The subject against each rival: median difference, its interval, wins-ties-losses.
 
-    A table for each measure: a row for each level, a column for each rival. With one rival, or at
-    one level, it is one table with a column for each measure.
+    A table for each measure: a row for each level, a column for each rival. One table for all
+    measures with a single rival, or a single level.
     """
     subject, rivals, levels = study.subject, study.rivals, study.levels
 
@@ -268,8 +268,12 @@ def worst(study: Study, scene: str) -> Table:
 
 
 def messages(study: Study) -> list[tuple[str, int]]:
-    """Error messages of SLAMs that failed, each with its number of runs, most frequent first."""
-    said = Counter(str(row["failure"]) for row in study.compared.runs if row["failure"])
+    """Error messages of SLAMs that failed, each with its number of runs, most frequent first.
+
+    The number of the scan is left out, so that one failure is one message.
+    """
+    found = (str(row["failure"]) for row in study.compared.runs if row["failure"])
+    said = Counter(re.sub(r", scan \d+,", ",", words) for words in found)
     return said.most_common(12)
 
 

@@ -52,7 +52,7 @@ def row_of(slam: str, level: float, seed: int) -> dict[str, Any]:
     row = {"scene": SCENE, "dynamism": level, "seed": seed, "slam": slam, "scans": SCANS,
            "ms_per_scan_p50": 2.0, "peak_memory_mb": 5.0}  # fmt: skip
     if slam == OWN and level == 1.0:
-        words = "SLAM 'own:Hanging', scan 9, hung: no answer within <10> s"
+        words = f"SLAM 'own:Hanging', scan {seed - 91}, hung: no answer within <10> s"
         return row | {"outcome": "hung", "failure": words, "lost": 1, "lost_at_s": 1.8}
     return row | {
         "outcome": "finished", "lost": 0, "ate_unaligned_m": error_m, "rpe_m_per_m": 0.01,

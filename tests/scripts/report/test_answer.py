@@ -53,7 +53,7 @@ def of(lost: list[int], *, runs: int = 10, levels=(0.0, 0.4, 1.0), failures=(), 
         (
             of([8, 6, 9]),
             "is lost half of the time at every level in arena (8 of 10 runs, 49 to 94 % at "
-            "dynamism 0); it is so at 0 already, so dynamism is not its problem.",
+            "dynamism 0); this begins at 0, so dynamism is not its problem.",
         ),
         (
             of([0, 6, 2]),
@@ -126,7 +126,7 @@ def test_a_level_above_zero_blames_nothing_on_dynamism():
          ["Odometry alone is lost in 15 of 30 runs, 33 to 67 %.",
           "The oracle is never lost (0 of 30 runs, 0 to 11 %), so the room is fair."]),
         (of([0, 6, 9]),
-         ["Odometry did not run: with `--slam … odometry` it is the control that looks at nothing.",
+         ["Odometry, the control that looks at nothing, did not run: `--slam … odometry`.",
           "No oracle ran: `--oracle shunting` tells whether the room is fair."]),
     ],
 )  # fmt: skip

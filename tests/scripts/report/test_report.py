@@ -130,6 +130,12 @@ def test_tables_show_units_intervals_and_failures(folder: Path):
     ]
 
 
+def test_a_failure_at_several_scans_is_one_message(folder: Path):
+    assert tables.messages(study(folder)) == [
+        ("SLAM 'own:Hanging', hung: no answer within <10> s", 6)
+    ]
+
+
 def test_a_ratio_has_its_interval(folder: Path):
     rows = {row[0].text: row for row in tables.growth(study(folder), "room").rows}
     assert [(cell.text, cell.small) for cell in rows["ekf"][3:]] == [
@@ -313,17 +319,27 @@ def test_what_is_no_comparison_is_told_in_a_line(tmp_path: Path, harm, says, mon
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here (apt-get install chromium)")
 def test_a_browser_shows_it_on_a_phone_and_on_a_desk(written: Path, tmp_path: Path):
     with Browser(tmp_path) as browser:
-        for width in (375, 1280):
+        for width in (390, 1280):
             browser.open(written, width)
             assert browser.evaluate("document.documentElement.scrollWidth") == width
             boxes = "[...document.querySelectorAll('.scroll, figure, p, h1, h2, h3, pre, dl')]"
             edge = f"Math.max(...{boxes}.map(box => box.getBoundingClientRect().right))"
             assert browser.evaluate(edge) <= width
             assert browser.evaluate("document.querySelectorAll('svg text').length") > 50
+            boxes = "[...document.querySelectorAll('.scroll')]"
+            hidden = f"{boxes}.filter(box => box.scrollWidth > box.clientWidth)"
+            layers = "getComputedStyle(box).backgroundImage.split('gradient').length - 1"
+            counts = browser.evaluate(f"{hidden}.map(box => {layers})")
+            assert set(counts) <= {4}  # what scrolls sideways has shadows that say so
+            assert counts or width > 390
         assert browser.console == []
         asked = {address for address in browser.requests if not address.startswith("data:")}
         assert asked == {written.as_uri()}
         assert browser.printed().startswith(b"%PDF")
+        browser.call("Emulation.setEmulatedMedia", media="print")
+        browser.open(written, 688)  # A4 without its margins
+        edge = edge.replace(".scroll, figure", "table, svg")
+        assert browser.evaluate(edge) <= 688
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here (apt-get install chromium)")
