@@ -14,7 +14,6 @@ from typing import Any
 import jinja2
 
 from scripts.comparison.plan import Run
-from scripts.comparison.tables import FAILED
 from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, of_section
 from scripts.report import answer, closed, curves, pictures, style, tables, words
 from scripts.report.closed import Driven
@@ -23,6 +22,7 @@ from sim.recording.sums import add_to_sums
 from slam.files import write_text
 
 REPORT = "report.html"
+ANSWERED = ("finished", "lost")  # how a run ends in which nothing failed
 TEMPLATE = Path(__file__).with_name("page.html")
 
 
@@ -154,7 +154,7 @@ def _scene(study: Study, scene: str) -> dict[str, Any]:
         "maps": [maps[0], *sorted(maps[1:], key=lambda panel: panel[0] != subject)],
         "table": tables.worst(study, scene),
         "worst": worst[0],
-        "blame": [blame_command(study, row) for row in worst if row["outcome"] not in FAILED],
+        "blame": [blame_command(study, row) for row in study.worst(scene, subject, ANSWERED)],
         "said": _worst_in_words(worst[0], study.axis),
         "errors": pictures.errors(run, study.slams),
         "strip": pictures.strip(run, subject, study.slams),
@@ -172,10 +172,12 @@ def _worst_in_words(row: dict[str, Any], axis: str) -> str:
 
 
 def blame_worst(study: Study) -> list[str]:
-    """The command for the worst run of the subject that has a cause to look for; none if none."""
-    rows = [row for scene in study.scenes for row in study.worst(scene, study.subject)[:1]
-            if row["outcome"] == "lost"]  # fmt: skip
-    return [blame_command(study, row, str(study.compared.folder)) for row in rows[:1]]
+    """The command for the worst lost run of the subject in each scene."""
+    return [
+        blame_command(study, row, str(study.compared.folder))
+        for scene in study.scenes
+        for row in study.worst(scene, study.subject, ("lost",))[:1]
+    ]
 
 
 def _recipe(study: Study) -> dict[str, Any]:

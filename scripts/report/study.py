@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Container
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -141,9 +142,17 @@ class Study:
             raise LogFormatError(self.compared.folder, f"a run without {row['slam']}")
         return file
 
-    def worst(self, scene: str, slam: str) -> list[Row]:
-        """Its worst runs, the very worst first: those that failed, then by the error."""
-        rows = [row for row in self.compared.runs if (row["scene"], row["slam"]) == (scene, slam)]
+    def worst(self, scene: str, slam: str, outcomes: Container[str] | None = None) -> list[Row]:
+        """Its worst runs, the very worst first: those that failed, then by the error.
+
+        outcomes  of those that ended so alone
+        """
+        rows = [
+            row
+            for row in self.compared.runs
+            if (row["scene"], row["slam"]) == (scene, slam)
+            and (outcomes is None or row["outcome"] in outcomes)
+        ]
         return sorted(rows, key=_badness, reverse=True)[:WORST]
 
     def typical(self, scene: str, dynamism: float, slam: str) -> Row:
