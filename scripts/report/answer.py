@@ -7,7 +7,7 @@ the room can be trusted, ``failed`` who raised, hung or gave no answer. All of t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -85,23 +85,22 @@ class Standing:
         """At a level, at the fewest."""
         return min(level.subject.runs for level in self.levels)
 
-    @property
-    def total(self) -> Lost:
-        """Over all levels."""
-        return _sum(level.subject for level in self.levels)
-
     def place(self, levels: Sequence[float]) -> str:
         """Such as "dynamism 0.5 and 1"."""
         return f"{self.axis} " + listed([f"{level:g}" for level in levels])
 
 
-def _sum(counts: Iterable[Lost]) -> Lost:
-    counts = list(counts)
-    return Lost(
-        lost=sum(one.lost for one in counts),
-        runs=sum(one.runs for one in counts),
-        failed=sum(one.failed for one in counts),
-    )
+def _each(counts: Sequence[Lost]) -> str:
+    """Of levels at which nothing was lost. Not their sum: a seed draws the same room at each."""
+    least = min(counts, key=lambda one: one.runs)
+    if len(counts) == 1:
+        return str(least)
+    interval = percent(0, least.runs)
+    return f"0 of {least.runs} runs at each level" + (f", {interval}" if interval else "")
+
+
+def _worst(counts: Sequence[Lost]) -> Lost:
+    return max(counts, key=lambda one: one.lost / max(one.runs, 1))
 
 
 def standing(rows: Sequence[Row], subject: str, scene: str, axis: str = "dynamism") -> Standing:
@@ -185,13 +184,14 @@ def _loss(of: Standing) -> str:
 def _rarely(of: Standing) -> str:
     """Of a SLAM that is lost half of the time nowhere."""
     top = of.levels[-1].at
-    if not of.total.lost:
-        span = f"up to {of.place([top])}" if len(of.levels) > 1 else f"at {of.place([top])}"
-        return f"is never lost in {of.scene} {span} ({of.total})"
-    most = max(of.levels, key=lambda level: level.subject.lost / level.subject.runs)
-    verb = "fails or is lost" if of.total.failed else "is lost"
+    counts = [level.subject for level in of.levels]
+    if not any(one.lost for one in counts):
+        span = f"up to {of.place([top])}" if len(counts) > 1 else f"at {of.place([top])}"
+        return f"is never lost in {of.scene} {span} ({_each(counts)})"
+    most = of.levels[counts.index(_worst(counts))]
+    verb = "fails or is lost" if any(one.failed for one in counts) else "is lost"
     verb += " in fewer than half of the runs"
-    if len(of.levels) == 1:
+    if len(counts) == 1:
         return f"{verb} at {of.place([top])} in {of.scene} ({most.subject})"
     return (
         f"{verb} at every level in {of.scene} (at the most {most.subject} at {of.place([most.at])})"
@@ -212,11 +212,10 @@ def _first_level(of: Standing) -> str:
 def _too_easy(of: Standing) -> str:
     """Whether a SLAM that is never lost has been tried at all."""
     alone = [level.odometry for level in of.levels if level.odometry is not None]
-    if of.total.lost or not alone or any(one.lost for one in alone):
+    lost = any(level.subject.lost for level in of.levels) or any(one.lost for one in alone)
+    if lost or not alone:
         return ""
-    return (
-        f"but odometry alone is not lost either ({_sum(alone)}), so these runs are too easy to tell"
-    )
+    return "but odometry alone is not lost either, so these runs are too easy to tell"
 
 
 def _unfair(of: Standing) -> str:
@@ -239,21 +238,21 @@ def controls(of: Standing) -> list[str]:
     """What odometry and the oracle did on the same runs, or how to ask them."""
     if of.subject == ODOMETRY or of.subject.startswith(ORACLE):
         return []
-    alone = [level.odometry for level in of.levels if level.odometry is not None]
+    top = of.levels[-1]
     best = [level.oracle for level in of.levels if level.oracle is not None]
     said = []
-    if alone:
-        said.append(f"Odometry alone is lost in {_sum(alone)}.")
+    if top.odometry:
+        said.append(f"Odometry alone is lost in {top.odometry}, at {of.place([top.at])}.")
     else:
         said.append(
             "Odometry, the control that looks at nothing, did not run: `--slam … odometry`."
         )
     if not best:
         said.append("No oracle ran: `--oracle shunting` tells whether the room is fair.")
-    elif not _sum(best).lost:
-        said.append(f"The oracle is never lost ({_sum(best)}), so the room is fair.")
+    elif not any(one.lost for one in best):
+        said.append(f"The oracle is never lost ({_each(best)}), so the room is fair.")
     else:
-        said.append(f"The oracle is lost in {_sum(best)}.")
+        said.append(f"The oracle is lost in up to {_worst(best)}.")
     return said
 
 

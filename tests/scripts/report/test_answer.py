@@ -62,13 +62,12 @@ def of(lost: list[int], *, runs: int = 10, levels=(0.0, 0.4, 1.0), failures=(), 
         ),
         (
             of([0, 0, 0], odometry=[9, 8, 9]),
-            "is never lost in arena up to dynamism 1 (0 of 30 runs, 0 to 11 %).",
+            "is never lost in arena up to dynamism 1 (0 of 10 runs at each level, 0 to 28 %).",
         ),
         (
             of([0, 0, 0], odometry=[0, 0, 0]),
-            "is never lost in arena up to dynamism 1 (0 of 30 runs, 0 to 11 %); but odometry "
-            "alone is not lost either (0 of 30 runs, 0 to 11 %), so these runs are too easy to "
-            "tell.",
+            "is never lost in arena up to dynamism 1 (0 of 10 runs at each level, 0 to 28 %); "
+            "but odometry alone is not lost either, so these runs are too easy to tell.",
         ),
         (
             of([0, 1, 4]),
@@ -122,14 +121,23 @@ def test_a_level_above_zero_blames_nothing_on_dynamism():
 @pytest.mark.parametrize(
     ("case", "said"),
     [
-        (of([0, 6, 9], odometry=[5, 5, 5], oracle=[0, 0, 0]),
-         ["Odometry alone is lost in 15 of 30 runs, 33 to 67 %.",
-          "The oracle is never lost (0 of 30 runs, 0 to 11 %), so the room is fair."]),
-        (of([0, 6, 9]),
-         ["Odometry, the control that looks at nothing, did not run: `--slam … odometry`.",
-          "No oracle ran: `--oracle shunting` tells whether the room is fair."]),
+        (
+            of([0, 6, 9], odometry=[5, 5, 5], oracle=[0, 0, 0]),
+            [
+                "Odometry alone is lost in 5 of 10 runs, 24 to 76 %, at dynamism 1.",
+                "The oracle is never lost (0 of 10 runs at each level, 0 to 28 %), so the room is "
+                "fair.",
+            ],
+        ),
+        (
+            of([0, 6, 9]),
+            [
+                "Odometry, the control that looks at nothing, did not run: `--slam … odometry`.",
+                "No oracle ran: `--oracle shunting` tells whether the room is fair.",
+            ],
+        ),
     ],
-)  # fmt: skip
+)
 def test_the_controls_are_told_or_asked_for(case: Standing, said: list[str]):
     assert controls(case) == said
 
