@@ -184,9 +184,11 @@ def test_a_drive_beside_the_comparison_is_told_too(folder: Path, tmp_path: Path)
     drive = driven(made.make_drive(tmp_path / "drive"))
     assert drive.levels == [0.0, 1.0]
     shown = [[(cell.text, cell.small) for cell in row] for row in closed.table(drive).rows]
-    assert shown[1][:4] == [("shunting", ""), ("1", ""), ("3 of 4", "30 to 95 %"), ("1", "")]
+    assert shown[1][:4] == [("shunting", ""), ("1", ""), ("6 of 8", "60 to 95 %"), ("1", "")]
     assert shown[1][6] == ("12.0", "10.0 to 20.0")
     assert shown[3][6] == ("–", "")  # another SLAM, which believed itself nowhere
+    few = closed.table(driven(made.make_drive(tmp_path / "few", reached=4))).rows[1]
+    assert (few[2].small, few[6].small) == ("40 to 95 %", "")  # five distances are no interval
     text = page.render(study(folder), [drive])
     assert text.count("<svg") == page.render(study(folder)).count("<svg") + 2
     assert "ways planned on the layout" in text
