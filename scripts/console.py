@@ -33,6 +33,12 @@ def note(message: str) -> None:
     console.print(f"[yellow]note:[/yellow] {escape(message)}", highlight=False, soft_wrap=True)
 
 
+def fact(sentence: str, *, bad: bool = False) -> None:
+    """A sentence that is a result."""
+    style = "bold red" if bad else "bold"
+    console.print(escape(sentence), style=style, highlight=False, soft_wrap=True)
+
+
 def progress() -> Progress:
     """A progress bar with time left; silent when the output is no terminal."""
     return Progress(

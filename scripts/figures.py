@@ -28,7 +28,8 @@ _LOOK: dict[str, Any] = {
     "font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
     "axes.spines.right": False, "figure.constrained_layout.use": True,
 }  # fmt: skip
-_SPARE = ("#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f")
+_SPARE = ("#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f", "#59616e", "#b8418f", "#5d8a1e", "#3b2f7d",
+          "#a0583c", "#2f9fd0")  # fmt: skip
 
 
 def color_of(name: str, order: Sequence[str]) -> str:

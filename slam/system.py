@@ -21,6 +21,8 @@ from __future__ import annotations
 import difflib
 import importlib
 import inspect
+import os
+import sysconfig
 import traceback
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -40,6 +42,10 @@ __all__ = [
     "SaysCells", "SlamSystem", "config_of", "create", "describe", "names", "register",
     "register_prefix", "told",
 ]  # fmt: skip
+
+
+_FOLDERS = (*map(sysconfig.get_path, ("stdlib", "purelib", "platlib")), str(Path(__file__).parent))
+_LIBRARIES = ("<frozen ", *(folder + os.sep for folder in _FOLDERS))
 
 
 @runtime_checkable
@@ -238,11 +244,16 @@ def _factory(name: str) -> Factory:
 
 
 def told(error: BaseException) -> str:
-    """An exception of somebody else's code in one line: type, words, and where it was raised."""
+    """An exception of somebody else's code in one line: type, words, and their last line in it.
+
+    That is the last line outside Python's library, installed packages and this one, if there is
+    any: where their code called NumPy, not the line of NumPy that raised.
+    """
     words = str(error).strip().partition("\n")[0]
     what = f"{type(error).__name__}: {words}" if words else type(error).__name__
     trace = traceback.extract_tb(error.__traceback__)
-    where = f" ({Path(trace[-1].filename).name}:{trace[-1].lineno})" if trace else ""
+    theirs = [at for at in trace if not at.filename.startswith(_LIBRARIES)] or trace
+    where = f" ({Path(theirs[-1].filename).name}:{theirs[-1].lineno})" if theirs else ""
     return what + where
 
 

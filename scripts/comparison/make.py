@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -84,8 +85,9 @@ def median_errors(plan: Plan, scene: str, rows: list[dict[str, Any]]) -> Table:
 
     def cell(level: float, slam: str) -> str:
         ate_cm = 100.0 * summary[level, slam, "ate_unaligned_m"]
+        shown = f"{ate_cm:.2f}" if math.isfinite(ate_cm) else "failed"
         lost = round(summary[level, slam, "lost"] * len(plan.seeds))
-        return f"{ate_cm:.2f} ({lost})"
+        return f"{shown} ({lost})"
 
     title = f"{scene}: median unaligned ATE in cm (runs lost of {len(plan.seeds)})"
     return level_table(title, f"lost: {LOST_RULE}", plan.levels, plan.slams, cell, plan.axis)

@@ -17,12 +17,15 @@ from scripts.comparison.folder import Row, axis_in, read_csv, read_json
 from scripts.metrics.row import digits
 from scripts.output import check_whole
 from scripts.report import style
+from scripts.report.answer import percent
 from scripts.report.curves import HEIGHT, WIDTH
+from scripts.report.study import LEAST_RUNS
 from scripts.report.tables import Cell, Table
 from slam.errors import LogFormatError
 
 SUCCESS = ("success", "success_low", "success_high")
 PRECISION = ("precision_m", "precision_m_low", "precision_m_high")
+_OF = {SUCCESS: ("goals",), PRECISION: ("reached", "wrong")}  # whose sum each is of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,6 +93,8 @@ def _curve(drive: Driven, slams: Sequence[str], keys: tuple[str, str, str], labe
             points = []
             for row in drive.of(slam):
                 value, low, high = (_percent(row[key]) for key in keys)
+                if _few(row, keys):
+                    low = high = math.nan
                 points.append((row["dynamism"] + at, value, low, high))
             style.line(ax, points, style.color(slam, slams), style.marker(slam, slams))
         ax.set_ylabel(label)
@@ -112,13 +117,12 @@ def table(drive: Driven) -> Table:
             Cell(text=f"{row['dynamism']:g}"),
             Cell(
                 text=f"{row['reached']:g} of {row['goals']:g}",
-                small=f"{100.0 * row['success_low']:.0f} to {100.0 * row['success_high']:.0f} %",
+                small=_interval(row),
             ),
             *(Cell(text=f"{row[key]:g}") for key in ("wrong", "given_up", "failed")),
             _precision(row),
             *(_number(row[key]) for key in ("time_s", "collisions_per_km", "near_misses_per_km")),
-            Cell(text=f"{row['runs_lost']:g} of {row['runs']:g}",
-                 small=f"{row['runs_recovered']:g} recovered"),
+            _lost(row),
         ]
         for slam in drive.slams
         for row in drive.of(slam)
@@ -128,9 +132,31 @@ def table(drive: Driven) -> Table:
     return Table(caption=drive.scene, head=head, rows=rows)
 
 
+def _few(row: Row, keys: tuple[str, str, str]) -> bool:
+    """Whether it is of too few goals for an interval."""
+    return sum(float(row[column]) for column in _OF[keys]) < LEAST_RUNS
+
+
+def _interval(row: Row) -> str:
+    if _few(row, SUCCESS):
+        return ""
+    return f"{100.0 * row['success_low']:.0f} to {100.0 * row['success_high']:.0f} %"
+
+
+def _lost(row: Row) -> Cell:
+    interval = percent(int(row["runs_lost"]), int(row["runs"]))
+    recovered = f"{row['runs_recovered']:g} recovered"
+    return Cell(
+        text=f"{row['runs_lost']:g} of {row['runs']:g}",
+        small=f"{interval}\n{recovered}" if interval else recovered,
+    )
+
+
 def _precision(row: Row) -> Cell:
     low, high = (row[key] for key in PRECISION[1:])
-    small = "" if low is None or high is None else f"{digits(100 * low)} to {digits(100 * high)}"
+    small = ""
+    if not _few(row, PRECISION) and low is not None and high is not None:
+        small = f"{digits(100 * low)} to {digits(100 * high)}"
     return Cell(text=_number(row["precision_m"], 100.0).text, small=small)
 
 

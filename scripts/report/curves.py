@@ -12,7 +12,7 @@ from scripts.comparison.tables import number
 from scripts.metrics.row import Metric
 from scripts.metrics.table import METRICS
 from scripts.report import style
-from scripts.report.study import Study
+from scripts.report.study import LEAST_RUNS, Study
 
 WIDTH, HEIGHT = 4.0, 2.8  # inches
 
@@ -37,6 +37,8 @@ def _line(ax: Axes, study: Study, scene: str, slam: str, metric: Metric) -> None
         row = study.level(scene, level, slam, metric.key)
         if row is not None:
             value, low, high = (_times(row[k], metric.factor) for k in ("value", "low", "high"))
+            if row["n"] < LEAST_RUNS:  # too few for an interval
+                low = high = math.nan
             points.append((level + at, value, low, high))
         if metric.key != "lost":
             values = [number(run, metric.key) for run in study.runs(scene, level, slam)]

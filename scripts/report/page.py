@@ -13,14 +13,16 @@ from typing import Any
 
 import jinja2
 
+from scripts.comparison.plan import Run
 from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, of_section
-from scripts.report import closed, curves, pictures, style, tables, words
+from scripts.report import answer, closed, curves, pictures, style, tables, words
 from scripts.report.closed import Driven
 from scripts.report.study import LEAST_RUNS, Study
 from sim.recording.sums import add_to_sums
 from slam.files import write_text
 
 REPORT = "report.html"
+ANSWERED = ("finished", "lost")  # how a run ends in which nothing failed
 TEMPLATE = Path(__file__).with_name("page.html")
 
 
@@ -42,10 +44,13 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
         drives=[(drive, closed.curves(drive, slams), closed.table(drive)) for drive in drives],
         css=TEMPLATE.with_name("page.css").read_text(encoding="utf-8"),
         settings=study.compared.recipe["settings"],
+        answers=answers(study),
+        controls=_controls(study),
+        failures=answer.failed(study.compared.runs, study.axis),
         summary=_summary(study),
         curves=_curves(study),
         differences=_differences(study),
-        outcomes=[tables.of_outcomes(study, scene) for scene in study.scenes],
+        outcomes=tables.of_outcomes(study),
         messages=tables.messages(study),
         honesty=_levels(study, of_section("honesty")),
         costs=tables.costs(study, of_section("costs")),
@@ -55,6 +60,34 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
         measures=[metric for metric in EXPLAINED if study.has(metric.key)],
         recipe=_recipe(study),
     )
+
+
+def answers(study: Study) -> list[str]:
+    """The sentence of each scene, names in backticks; the same one only once."""
+    said = [answer.answer(one) for one in _standings(study)]
+    return list(dict.fromkeys(said))
+
+
+def _controls(study: Study) -> list[str]:
+    """A line for each scene, or one for all where they say the same; none of too few runs."""
+    if study.few:
+        return []
+    said = {one.scene: " ".join(answer.controls(one)) for one in _standings(study)}
+    if len(set(said.values())) == 1:
+        return [line for line in said.values() if line][:1]
+    return [f"{scene}: {line}" for scene, line in said.items() if line]
+
+
+def _standings(study: Study) -> list[answer.Standing]:
+    runs = study.compared.runs
+    return [answer.standing(runs, study.subject, scene, study.axis) for scene in study.scenes]
+
+
+def blame_command(study: Study, row: dict[str, Any], folder: str = "FOLDER") -> str:
+    """What to type to learn which mover misled the SLAM of a row; ``folder``: the comparison's."""
+    run = Run(scene=row["scene"], dynamism=row["dynamism"], seed=int(row["seed"]), axis=study.axis)
+    path = f"{folder}/runs/{run.name}.npz"
+    return shlex.join(["mobilia", "blame", path, "--slam", str(row["slam"])])
 
 
 @cache
@@ -76,16 +109,16 @@ def _summary(study: Study) -> dict[str, Any]:
             (scene, words.leaders(study, scene), tables.growth(study, scene))
             for scene in study.scenes
         ],
-        "beaten": words.against_ours(study, -1),
-        "better": words.against_ours(study, 1),
-        "failures": words.failures(study),
-        "enough": study.least_runs >= LEAST_RUNS,
+        "beaten": words.against_subject(study, -1),
+        "better": words.against_subject(study, 1),
         "least": LEAST_RUNS,
     }
 
 
 def _curves(study: Study) -> list[tuple[str, list[tuple[str, str]]]]:
-    """For each scene (name of the metric, SVG)."""
+    """For each scene (name of the metric, SVG); none of a single level, which is no curve."""
+    if len(study.levels) == 1:
+        return []
     return [
         (
             scene,
@@ -96,36 +129,35 @@ def _curves(study: Study) -> list[tuple[str, list[tuple[str, str]]]]:
 
 
 def _differences(study: Study) -> list[tuple[str, list[tables.Table]]]:
-    """For each scene the tables of ours against everybody."""
+    """For each scene the tables of the subject against everybody."""
     found = [METRICS[key] for key in _there(study, PAIRED)]
-    return [
-        (scene, [tables.of_pairs(study, scene, metric) for metric in found])
-        for scene in study.scenes
-    ]
+    return [(scene, tables.of_pairs(study, scene, found)) for scene in study.scenes]
 
 
 def _levels(study: Study, keys: Iterable[str]) -> list[tuple[str, list[tables.Table]]]:
     """For each scene the tables of those measures that are there."""
-    groups = []
-    for scene in study.scenes:
-        made = [tables.of_levels(study, scene, METRICS[key]) for key in _there(study, keys)]
-        groups.append((scene, [table for table in made if table.slams]))
-    return [(scene, found) for scene, found in groups if found]
+    found = [METRICS[key] for key in keys]
+    groups = [(scene, tables.of_levels(study, scene, found)) for scene in study.scenes]
+    return [(scene, made) for scene, made in groups if made]
 
 
 def _scene(study: Study, scene: str) -> dict[str, Any]:
-    """Maps of a typical run at the highest level; the worst run of ours."""
-    typical = study.typical(scene, study.levels[-1], study.ours)
-    worst = study.worst(scene, study.ours)
-    there, run = study.run(typical), study.run(worst)
+    """Maps of a typical run of the subject at the highest level, and its worst runs."""
+    subject = study.subject
+    typical = study.typical(scene, study.levels[-1], subject)
+    worst = study.worst(scene, subject)
+    there, run = study.run(typical), study.run(worst[0])
+    maps = pictures.map_panels(there, study.slams)
     return {
         "name": scene,
         "typical": typical,
-        "maps": pictures.map_panels(there, study.slams),
-        "worst": worst,
-        "said": _worst_in_words(worst, study.axis),
+        "maps": [maps[0], *sorted(maps[1:], key=lambda panel: panel[0] != subject)],
+        "table": tables.worst(study, scene),
+        "worst": worst[0],
+        "blame": [blame_command(study, row) for row in study.worst(scene, subject, ANSWERED)],
+        "said": _worst_in_words(worst[0], study.axis),
         "errors": pictures.errors(run, study.slams),
-        "strip": pictures.strip(run, study.ours, study.slams),
+        "strip": pictures.strip(run, subject, study.slams),
     }
 
 
@@ -137,6 +169,15 @@ def _worst_in_words(row: dict[str, Any], axis: str) -> str:
     if row["lost_at_s"] is not None:
         words_ += f", lost at {row['lost_at_s']:.1f} s"
     return words_ + "."
+
+
+def blame_worst(study: Study) -> list[str]:
+    """The command for the worst lost run of the subject in each scene."""
+    return [
+        blame_command(study, row, str(study.compared.folder))
+        for scene in study.scenes
+        for row in study.worst(scene, study.subject, ("lost",))[:1]
+    ]
 
 
 def _recipe(study: Study) -> dict[str, Any]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Container
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,22 +13,33 @@ from typing import Any
 from scripts.comparison import tables
 from scripts.comparison.columns import COLUMNS
 from scripts.comparison.folder import LEVELS, PAIRED, RUNS, Compared, RunFile, read
-from slam.errors import LogFormatError
+from slam.errors import InvalidValueError, LogFormatError
+from slam.variants import ORACLE
 
 Row = dict[str, Any]
-OURS = "shunting"
 SETTINGS = (
     "slams", "scenes", "levels", "seeds", "seconds", "every", "scanner", "scan_limit_s",
     "lost_rule",
 )  # fmt: skip
 LEAST_RUNS = 6  # with fewer not even all wins are unlikely enough by chance (sign test, 5 %)
+WORST = 3  # runs of a scene that the page lists
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Rows by what they are about. ``ours`` is "shunting", or the first SLAM where it is absent."""
+    """Rows by what they are about.
+
+    asked  the SLAM that the page is about; None: the one named first
+    """
 
     compared: Compared
+    asked: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.asked is not None and self.asked not in self.slams:
+            raise InvalidValueError(
+                f"--subject must be one of {', '.join(self.slams)}, got {self.asked!r:.80}"
+            )
 
     @cached_property
     def slams(self) -> list[str]:
@@ -50,14 +62,24 @@ class Study:
         return sorted({float(row["dynamism"]) for row in self.compared.runs})
 
     @property
-    def ours(self) -> str:
-        """The SLAM that the page asks about."""
-        return OURS if OURS in self.slams else self.slams[0]
+    def subject(self) -> str:
+        """The SLAM that the page is about."""
+        return self.asked or self.slams[0]
 
     @property
     def rivals(self) -> list[str]:
         """All others."""
-        return [slam for slam in self.slams if slam != self.ours]
+        return [slam for slam in self.slams if slam != self.subject]
+
+    @property
+    def contestants(self) -> list[str]:
+        """All others but oracles, which are bounds: they are shown what nobody else is."""
+        return [slam for slam in self.rivals if not slam.startswith(ORACLE)]
+
+    @property
+    def few(self) -> bool:
+        """Whether there are too few runs to say who is better, and for any interval."""
+        return self.least_runs < LEAST_RUNS
 
     @cached_property
     def _by_level(self) -> dict[tuple[str, float, str, str], Row]:
@@ -120,10 +142,18 @@ class Study:
             raise LogFormatError(self.compared.folder, f"a run without {row['slam']}")
         return file
 
-    def worst(self, scene: str, slam: str) -> Row:
-        """Its worst run: one that failed, or else the one of the largest error."""
-        rows = [row for row in self.compared.runs if (row["scene"], row["slam"]) == (scene, slam)]
-        return max(rows, key=_badness)
+    def worst(self, scene: str, slam: str, outcomes: Container[str] | None = None) -> list[Row]:
+        """Its worst runs, the very worst first: those that failed, then by the error.
+
+        outcomes  of those that ended so alone
+        """
+        rows = [
+            row
+            for row in self.compared.runs
+            if (row["scene"], row["slam"]) == (scene, slam)
+            and (outcomes is None or row["outcome"] in outcomes)
+        ]
+        return sorted(rows, key=_badness, reverse=True)[:WORST]
 
     def typical(self, scene: str, dynamism: float, slam: str) -> Row:
         """Its run in the middle."""
@@ -169,8 +199,12 @@ def verdict(row: Row, less_is_better: bool) -> int:
     return 0
 
 
-def study(folder: Path) -> Study:
-    """The comparison in ``folder``; ``LogFormatError`` for one that is missing, old or damaged."""
+def study(folder: Path, subject: str | None = None) -> Study:
+    """The comparison in ``folder``, about ``subject`` (the SLAM named first).
+
+    Raises ``LogFormatError`` for one that is missing, old or damaged, ``InvalidValueError`` for a
+    subject that did not take part.
+    """
     compared = read(folder)
     absent = [key for key in SETTINGS if key not in compared.recipe["settings"]]
     if absent:
@@ -187,4 +221,4 @@ def study(folder: Path) -> Study:
         missing = [column for column in wanted if column not in rows[0]]
         if missing:
             raise LogFormatError(folder / name, f"a table without the column '{missing[0]}'")
-    return Study(compared)
+    return Study(compared, subject)

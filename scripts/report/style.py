@@ -72,7 +72,7 @@ def styled() -> Any:
 def apart(slam: str, slams: Sequence[str], levels: Sequence[float]) -> float:
     """How far beside a level a SLAM is drawn, so that intervals do not hide each other."""
     span = max(levels) - min(levels) or 1.0
-    gap = 0.02 * span * min(1.0, 4.0 / max(len(levels) - 1, 1))
+    gap = 0.02 * span * min(1.0, 4.0 / max(len(levels) - 1, 1), 6.0 / len(slams))
     return gap * (list(slams).index(slam) - 0.5 * (len(slams) - 1))
 
 

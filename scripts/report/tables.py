@@ -4,14 +4,18 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from scripts.comparison.tables import FAILED
+from scripts.comparison.tables import FAILED, by_seed, number
 from scripts.metrics.row import Metric, digits
 from scripts.metrics.table import METRICS
-from scripts.report.study import Row, Study, verdict
+from scripts.report.answer import percent
+from scripts.report.study import LEAST_RUNS, Row, Study, verdict
+from slam.evaluation.statistics import quantile, ratio_interval
+from slam.variants import ORACLE
 
 OUTCOMES = ("finished", "lost", *FAILED)
 _MARKS = {1: "better", -1: "worse", 0: ""}
@@ -36,23 +40,77 @@ class Table:
     slams: Sequence[str] = field(default_factory=tuple)
 
 
-def of_levels(study: Study, scene: str, metric: Metric) -> Table:
-    """A row for each level, a column for each SLAM that has it: median (share), 95 % interval."""
-    slams = [
+def of_levels(study: Study, scene: str, metrics: Sequence[Metric]) -> list[Table]:
+    """Medians (shares) with their 95 % intervals of the measures that any SLAM has.
+
+    A table for each measure: a row for each level, a column for each SLAM. One table for all with a
+    single level (a row for each SLAM), and for the measures that one SLAM alone has.
+    """
+    having = {metric: _having(study, scene, metric) for metric in metrics}
+    having = {metric: slams for metric, slams in having.items() if slams}
+    if not having:
+        return []
+    if len(study.levels) == 1:
+        slams = [slam for slam in study.slams if any(slam in own for own in having.values())]
+        return [_at_one_level(study, scene, list(having), slams)]
+    alone: dict[str, list[Metric]] = {}
+    made = []
+    for metric, slams in having.items():
+        if len(slams) == 1:
+            alone.setdefault(slams[0], []).append(metric)
+        else:
+            made.append(_of_metric(study, scene, metric, slams))
+    return made + [_of_slam(study, scene, slam, own) for slam, own in alone.items()]
+
+
+def _having(study: Study, scene: str, metric: Metric) -> list[str]:
+    return [
         slam
         for slam in study.slams
         if any(study.level(scene, level, slam, metric.key) for level in study.levels)
     ]
-    rows = []
-    for level in study.levels:
-        found = [study.level(scene, level, slam, metric.key) for slam in slams]
-        best = _best(found, metric)
-        cells = [Cell(text=f"{level:g}")]
-        for row in found:
-            mark = "best" if row is not None and row["value"] == best else ""
-            cells.append(_value(row, metric, mark))
-        rows.append(cells)
+
+
+def _of_metric(study: Study, scene: str, metric: Metric, slams: Sequence[str]) -> Table:
+    rows = [
+        [Cell(text=f"{level:g}"), *_values(study, scene, level, metric, slams)]
+        for level in study.levels
+    ]
     return Table(caption=metric.heading, head=[study.axis, *slams], rows=rows, slams=slams)
+
+
+def _of_slam(study: Study, scene: str, slam: str, metrics: Sequence[Metric]) -> Table:
+    rows = [
+        [
+            Cell(text=f"{level:g}"),
+            *(_values(study, scene, level, metric, [slam])[0] for metric in metrics),
+        ]
+        for level in study.levels
+    ]
+    return Table(caption=slam, head=[study.axis, *(m.heading for m in metrics)], rows=rows)
+
+
+def _at_one_level(
+    study: Study, scene: str, metrics: Sequence[Metric], slams: Sequence[str]
+) -> Table:
+    level = study.levels[0]
+    columns = [_values(study, scene, level, metric, slams) for metric in metrics]
+    rows = [[Cell(text=slam), *(column[k] for column in columns)] for k, slam in enumerate(slams)]
+    caption = f"{scene} at {study.axis} {level:g}"
+    return Table(caption=caption, head=["SLAM", *(m.heading for m in metrics)], rows=rows)
+
+
+def _values(
+    study: Study, scene: str, level: float, metric: Metric, slams: Sequence[str]
+) -> list[Cell]:
+    """Of one level and measure; the best is marked where there are runs enough."""
+    found = [study.level(scene, level, slam, metric.key) for slam in slams]
+    rated = [r for r, slam in zip(found, slams, strict=True) if not slam.startswith(ORACLE)]
+    best = None if study.few else _best(rated, metric)
+    return [
+        _value(row, metric, "best" if row in rated and row and row["value"] == best else "")
+        for row in found
+    ]
 
 
 def _best(rows: Sequence[Row | None], metric: Metric) -> float | None:
@@ -63,56 +121,105 @@ def _best(rows: Sequence[Row | None], metric: Metric) -> float | None:
 
 
 def _value(row: Row | None, metric: Metric, mark: str = "") -> Cell:
+    """With its interval; of too few runs without, and of shares the count."""
     if row is None:
         return Cell(text="–")
+    if row["n"] < LEAST_RUNS:
+        return _count(row) if metric.summary == "share" else Cell(text=metric.show(row["value"]))
     ends = (row["low"], row["high"])
     interval = "" if ends == (math.inf, math.inf) else " to ".join(map(metric.show, ends))
     return Cell(text=metric.show(row["value"]), small=interval, mark=mark)
 
 
-def of_pairs(study: Study, scene: str, metric: Metric) -> Table:
-    """Ours against each rival at each level: median difference, interval, wins-ties-losses."""
-    rows = []
-    for level in study.levels:
-        cells = [Cell(text=f"{level:g}")]
-        for rival in study.rivals:
-            row = study.pair(scene, level, metric.key, study.ours, rival)
-            cells.append(_difference(row, metric))
-        rows.append(cells)
-    return Table(
-        caption=f"{metric.heading}: {study.ours} minus …",
-        head=[study.axis, *study.rivals],
-        rows=rows,
-        slams=study.rivals,
-    )
+def _count(row: Row | None) -> Cell:
+    """Of a share how many of how many, with its interval."""
+    if row is None:
+        return Cell(text="–")
+    hits, runs = round(row["value"] * row["n"]), int(row["n"])
+    return Cell(text=f"{hits} of {runs}", small=percent(hits, runs))
+
+
+def of_pairs(study: Study, scene: str, metrics: Sequence[Metric]) -> list[Table]:
+    """The subject against each rival: median difference, its interval, wins-ties-losses.
+
+    A table for each measure: a row for each level, a column for each rival. One table for all
+    measures with a single rival, or a single level.
+    """
+    subject, rivals, levels = study.subject, study.rivals, study.levels
+
+    def cells(level: float, metric: Metric, rival: str) -> Cell:
+        return _difference(study.pair(scene, level, metric.key, subject, rival), metric)
+
+    if len(rivals) == 1:
+        rows = [
+            [Cell(text=f"{level:g}"), *(cells(level, metric, rivals[0]) for metric in metrics)]
+            for level in levels
+        ]
+        head = [study.axis, *(metric.heading for metric in metrics)]
+        return [Table(caption=f"{subject} minus {rivals[0]}", head=head, rows=rows)]
+    if len(levels) == 1:
+        rows = [
+            [Cell(text=rival), *(cells(levels[0], metric, rival) for metric in metrics)]
+            for rival in rivals
+        ]
+        head = [f"{subject} minus", *(metric.heading for metric in metrics)]
+        return [Table(caption=f"{scene} at {study.axis} {levels[0]:g}", head=head, rows=rows)]
+    return [
+        Table(
+            caption=f"{metric.heading}: {subject} minus …",
+            head=[study.axis, *rivals],
+            rows=[
+                [Cell(text=f"{level:g}"), *(cells(level, metric, rival) for rival in rivals)]
+                for level in levels
+            ],
+            slams=rivals,
+        )
+        for metric in metrics
+    ]
 
 
 def _difference(row: Row | None, metric: Metric) -> Cell:
     if row is None:
         return Cell(text="–")
     ends = [metric.show(row[end], sign=True) for end in ("low", "high")]
-    score = f"{row['wins']:g}–{row['ties']:g}–{row['losses']:g}"
+    interval = f"{ends[0]} to {ends[1]}\n" if row["n"] >= LEAST_RUNS else ""
     return Cell(
         text=metric.show(row["median_difference"], sign=True),
-        small=f"{ends[0]} to {ends[1]}\n{score}",
+        small=f"{interval}{row['wins']:g}–{row['ties']:g}–{row['losses']:g}",
         mark=_MARKS[verdict(row, bool(metric.less_is_better))],
     )
 
 
-def of_outcomes(study: Study, scene: str) -> Table:
-    """How the runs of each SLAM ended, a column for each level."""
+def of_outcomes(study: Study) -> list[Table]:
+    """How the runs of each SLAM ended: for each scene, a column for each level.
+
+    At one level it is one table with a column for each scene.
+    """
+    head = f"finished at {study.axis}"
+    if len(study.levels) == 1:
+        at = study.levels[0]
+        columns = [(scene, scene, at) for scene in study.scenes]
+        return [_outcomes(study, columns, f"{head} {at:g}", "finished")]
+    return [
+        _outcomes(study, [(f"{level:g}", scene, level) for level in study.levels], scene, head)
+        for scene in study.scenes
+    ]
+
+
+def _outcomes(
+    study: Study, columns: Sequence[tuple[str, str, float]], caption: str, head: str
+) -> Table:
+    """``columns``: heading, scene and level of each."""
     rows = []
     for slam in study.slams:
         cells = [Cell(text=slam)]
-        for level in study.levels:
+        for _, scene, level in columns:
             ended = Counter(row["outcome"] for row in study.runs(scene, level, slam))
-            fine = ended["finished"]
             rest = [f"{ended[word]} {word}" for word in OUTCOMES[1:] if ended[word]]
-            mark = "worse" if rest else ""
-            cells.append(Cell(text=f"{fine} of {ended.total()}", small=", ".join(rest), mark=mark))
+            text = f"{ended['finished']} of {ended.total()}"
+            cells.append(Cell(text=text, small=", ".join(rest), mark="worse" if rest else ""))
         rows.append(cells)
-    head = [f"finished at {study.axis}", *(f"{level:g}" for level in study.levels)]
-    return Table(caption=scene, head=head, rows=rows)
+    return Table(caption=caption, head=[head, *(name for name, _, _ in columns)], rows=rows)
 
 
 def growth(study: Study, scene: str) -> Table:
@@ -123,11 +230,8 @@ def growth(study: Study, scene: str) -> Table:
     for slam in study.slams:
         found = [study.level(scene, end, slam, ate.key) for end in ends]
         shares = [study.level(scene, end, slam, lost.key) for end in ends]
-        ratio = "–"
-        if found[0] and found[1] and 0.0 < found[0]["value"] < math.inf:
-            ratio = digits(found[1]["value"] / found[0]["value"]) + " ×"
         rows.append([
-            Cell(text=slam), *(_value(row, ate) for row in found), Cell(text=ratio),
+            Cell(text=slam), *(_value(row, ate) for row in found), _growth(study, scene, slam),
             *(_count(row) for row in shares),
         ])  # fmt: skip
     head = [f"{ate.name} at {end:g}, {ate.shown}" for end in ends]
@@ -136,15 +240,40 @@ def growth(study: Study, scene: str) -> Table:
     return Table(caption=caption, head=["SLAM", *head, "grows", *lost_head], rows=rows)
 
 
-def _count(row: Row | None) -> Cell:
-    if row is None:
+def _growth(study: Study, scene: str, slam: str) -> Cell:
+    """The ratio of the medians at both ends over the same seeds, with its interval."""
+    low, high = (
+        by_seed(study.runs(scene, end, slam), slam, "ate_unaligned_m")
+        for end in (study.levels[0], study.levels[-1])
+    )
+    seeds = sorted(low.keys() & high.keys())
+    before, after = [low[seed] for seed in seeds], [high[seed] for seed in seeds]
+    if len(seeds) < LEAST_RUNS or not 0.0 < quantile(before, 0.5) < math.inf:
         return Cell(text="–")
-    return Cell(text=f"{round(row['value'] * row['n'])} of {row['n']:g}")
+    interval = " to ".join(map(digits, ratio_interval(before, after)))
+    return Cell(text=digits(quantile(after, 0.5) / quantile(before, 0.5)) + " ×", small=interval)
+
+
+def worst(study: Study, scene: str) -> Table:
+    """The worst runs of the subject: how each ended, and how far it was from the truth."""
+    ate = METRICS["ate_unaligned_m"]
+    rows = []
+    for row in study.worst(scene, study.subject):
+        at = row["lost_at_s"]
+        cells = [f"{row['dynamism']:g}", f"{row['seed']:g}", str(row["outcome"])]
+        cells += [ate.show(number(row, ate.key)), "–" if at is None else f"{at:.1f}"]
+        rows.append([Cell(text=text) for text in cells])
+    head = [study.axis, "seed", "outcome", f"{ate.name}, {ate.shown}", "lost at, s"]
+    return Table(caption=f"Worst runs of {study.subject} in {scene}", head=head, rows=rows)
 
 
 def messages(study: Study) -> list[tuple[str, int]]:
-    """Error messages of SLAMs that failed, each with its number of runs, most frequent first."""
-    said = Counter(str(row["failure"]) for row in study.compared.runs if row["failure"])
+    """Error messages of SLAMs that failed, each with its number of runs, most frequent first.
+
+    The number of the scan is left out, so that one failure is one message.
+    """
+    found = (str(row["failure"]) for row in study.compared.runs if row["failure"])
+    said = Counter(re.sub(r", scan \d+,", ",", words) for words in found)
     return said.most_common(12)
 
 

@@ -1,22 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The summary in words: who wins where, by how much, and where ours is beaten."""
+"""The summary in words: who wins where, by how much, and where the subject is beaten."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import dataclass
 
-from scripts.comparison.tables import FAILED
 from scripts.metrics.row import Metric
 from scripts.metrics.table import EXPLAINED, METRICS
-from scripts.report.study import LEAST_RUNS, Study, verdict
+from scripts.report.study import Study, verdict
 
 ATE = METRICS["ate_unaligned_m"]
-_FAILURES = {
-    "raised": "raised or ended", "hung": "hung", "nan": "gave a pose that is not finite",
-    "bad": "gave no answer to the frame",
-}  # fmt: skip
 _JUDGED = tuple(metric for metric in EXPLAINED if metric.better)
 
 
@@ -33,11 +27,16 @@ def levels_text(levels: list[float], of: list[float], axis: str = "dynamism") ->
 
 
 def leaders(study: Study, scene: str) -> list[str]:
-    """Who has the lowest median position error at which levels."""
+    """Who has the lowest median position error at which levels; nothing of too few runs.
+
+    Oracles take no part: they are shown what nobody else is.
+    """
+    if study.few:
+        return []
     led: dict[str, list[float]] = {}
     for dynamism in study.levels:
         found = []
-        for slam in study.slams:
+        for slam in (study.subject, *study.contestants):
             row = study.level(scene, dynamism, slam, ATE.key)
             if row is not None and math.isfinite(row["value"]):
                 found.append((row["value"], slam))
@@ -52,8 +51,8 @@ def leaders(study: Study, scene: str) -> list[str]:
 
 def _clearly(study: Study, scene: str, slam: str, levels: list[float]) -> str:
     """Whether its lead is more than chance, against everybody and at all these levels."""
-    others = [other for other in study.slams if other != slam]
-    if not others or study.least_runs < LEAST_RUNS:
+    others = [other for other in (study.subject, *study.contestants) if other != slam]
+    if not others:
         return "."
     unclear = [
         other
@@ -77,10 +76,10 @@ class Against:
     measures: list[str]
 
 
-def against_ours(study: Study, side: int) -> list[Against]:
-    """Where ours is beaten (``side`` -1) or better (1), by rival and place."""
+def against_subject(study: Study, side: int) -> list[Against]:
+    """Where the subject is beaten (``side`` -1) or better (1), by rival and place."""
     found: dict[tuple[str, str], list[str]] = {}
-    for rival in study.rivals:
+    for rival in study.contestants:
         for metric in _JUDGED:
             where, most = _places(study, rival, metric, side)
             if where:
@@ -98,7 +97,7 @@ def _places(study: Study, rival: str, metric: Metric, side: int) -> tuple[str, f
     most = 0.0
     for scene in study.scenes:
         for level in study.levels:
-            row = study.pair(scene, level, metric.key, study.ours, rival)
+            row = study.pair(scene, level, metric.key, study.subject, rival)
             if row is None or verdict(row, bool(metric.less_is_better)) != side:
                 continue
             places.setdefault(scene, []).append(level)
@@ -107,14 +106,3 @@ def _places(study: Study, rival: str, metric: Metric, side: int) -> tuple[str, f
         return "everywhere", most
     said = [f"{scene} {levels_text(at, study.levels, study.axis)}" for scene, at in places.items()]
     return "; ".join(said), most
-
-
-def failures(study: Study) -> list[str]:
-    """Who failed, how and how often; nobody is a sentence too."""
-    said = []
-    for slam in study.slams:
-        counts = sum((study.outcomes(scene, slam) for scene in study.scenes), start=Counter())
-        failed = [f"{_FAILURES[word]} in {counts[word]}" for word in FAILED if counts[word]]
-        if failed:
-            said.append(f"{slam} {listed(failed)} of {counts.total()} runs.")
-    return said or ["No SLAM raised, hung or answered with what is no pose."]

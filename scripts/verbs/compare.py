@@ -6,13 +6,13 @@ from __future__ import annotations
 import re
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
 
 from scripts.checked import whole
-from scripts.console import console
+from scripts.console import console, fact
 from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels, chosen
 from scripts.names import check
 from scripts.oracle_option import Oracles, with_oracles
@@ -21,6 +21,9 @@ from scripts.verbs.generate import sweep
 from slam.errors import InvalidValueError
 from slam.guests.limits import Limits
 from slam.variants import ORACLE, PIPE
+
+if TYPE_CHECKING:
+    from scripts.comparison.plan import Plan
 
 BETWEEN = re.compile(r",(?![^{]*\}|[^(]*\))")  # a comma outside braces and brackets
 
@@ -62,6 +65,7 @@ def compare(
     """Run SLAMs on the same simulated runs; write tables of error against dynamism.
 
     With levels of --motion or --change instead, the other of the two is at 0 unless it is given.
+    It ends with a sentence about the SLAM named first: from which level on it is lost.
     If it is killed, the same command continues. With a SLAM added, only that SLAM runs.
 
     [bold]mobilia compare --slam shunting ekf odometry --scene arena --dynamism 0:1:0.5 --seeds 3
@@ -72,7 +76,7 @@ def compare(
     rooms = named(scene or ["arena", "office"])
     check(slams, *rooms)
     from scripts import workers
-    from scripts.comparison.make import carry_out, median_errors
+    from scripts.comparison.make import carry_out
     from scripts.comparison.plan import Plan
 
     workers.check_jobs(jobs)
@@ -93,12 +97,25 @@ def compare(
     started = time.perf_counter()
     rows = carry_out(plan, out, jobs=jobs, cluster=cluster)
     spent_s = time.perf_counter() - started
-    for name in plan.scenes:
-        console.print(median_errors(plan, name, rows))
+    tell(plan, rows)
     console.print(
         f"{escape(str(out))}: runs.csv, levels.csv, paired.csv, runs/ ({spent_s:.0f} s)",
         soft_wrap=True,
     )
+
+
+def tell(plan: Plan, rows: list[dict[str, Any]]) -> None:
+    """Print the table of each scene, who failed and where, and the answer about the first SLAM."""
+    from scripts.comparison.make import median_errors
+    from scripts.report.answer import answer, failed, standing
+
+    for name in plan.scenes:
+        console.print(median_errors(plan, name, rows))
+    for line in failed(rows, plan.axis):
+        fact(line, bad=True)
+    said = (answer(standing(rows, plan.slams[0], name, plan.axis)) for name in plan.scenes)
+    for line in dict.fromkeys(said):
+        fact(line)
 
 
 def named(values: list[str]) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from scripts.console import console
+from scripts.console import console, fact
 
 
 def report(
@@ -20,17 +20,32 @@ def report(
         list[Path] | None,
         typer.Option(help="Folders that mobilia drive wrote; DIR/drive* need not be named."),
     ] = None,
+    subject: Annotated[
+        str | None,
+        typer.Option(help="SLAM that the page is about; default the one named first."),
+    ] = None,
 ) -> None:
     """Write DIR/report.html: one page, self-contained, that opens from disk and prints.
 
-    [bold]mobilia report out/compare[/bold]
+    It begins with the answer, which is printed here too: from which level on the SLAM is lost.
+
+    [bold]mobilia report out/compare --subject ekf[/bold]
     """
     from scripts.report import page
+    from scripts.report.answer import failed
     from scripts.report.closed import driven
     from scripts.report.study import study
 
     found = [*(drive or []), *sorted(path for path in folder.glob("drive*") if path.is_dir())]
-    path = page.write(study(folder), [driven(one) for one in found])
+    about = study(folder, subject)
+    path = page.write(about, [driven(one) for one in found])
+    for line in failed(about.compared.runs, about.axis):
+        fact(line, bad=True)
+    for line in page.answers(about):
+        fact(line)
+    for line in page.blame_worst(about):
+        console.print(f"What misled it: [bold]{escape(line)}[/bold]", highlight=False,
+                      soft_wrap=True)  # fmt: skip
     console.print(
         f"Open [bold]{escape(str(path))}[/bold] ({path.stat().st_size / 1e6:.1f} MB).",
         soft_wrap=True,

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import scipy  # scipy.stats comes with its first use: a second that other verbs need not pay
+from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError
 
@@ -44,15 +45,47 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
     """Percentile-bootstrap 95 % interval of the median, infinite values allowed."""
     if not values:
         return math.nan, math.nan
+    return _middle(_drawn_medians(values, _draws(len(values))))
+
+
+def ratio_interval(before: Sequence[float], after: Sequence[float]) -> tuple[float, float]:
+    """Percentile-bootstrap 95 % interval of median(after) / median(before), pairs drawn together.
+
+    Infinite values are allowed; a draw with two infinite medians, or two of 0, counts as 1. NaN of
+    nothing. Raises ``InvalidValueError`` for lists of different lengths.
+    """
+    if len(before) != len(after):
+        raise InvalidValueError(f"{len(before)} values before must have as many after, "
+                                f"got {len(after)}")  # fmt: skip
+    if not before:
+        return math.nan, math.nan
+    draws = _draws(len(before))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = _drawn_medians(after, draws) / _drawn_medians(before, draws)
+    ratios[np.isnan(ratios)] = 1.0
+    return _middle(ratios)
+
+
+def _draws(n: int) -> NDArray[np.int64]:
+    """(RESAMPLES, n) indices of n values."""
+    return np.random.default_rng(SEED).integers(0, n, (RESAMPLES, n))
+
+
+def _drawn_medians(values: Sequence[float], draws: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(RESAMPLES,) medians of the values drawn."""
     n = len(values)
-    draws = np.random.default_rng(SEED).integers(0, n, (RESAMPLES, n))
     ranked = np.sort(np.array(values, dtype=np.float64)[draws], axis=1)
     low, high = ranked[:, (n - 1) // 2], ranked[:, n // 2]
     with np.errstate(invalid="ignore"):
         medians = np.where(np.isinf(low + high), low + high, low + 0.5 * (high - low))
     medians[np.isnan(low + high)] = 0.0  # as in _between
+    return medians
+
+
+def _middle(resampled: NDArray[np.float64]) -> tuple[float, float]:
+    """The ends of what lies in the middle, ``CONFIDENCE`` of it."""
     tail = 0.5 * (1.0 - CONFIDENCE)
-    listed = medians.tolist()
+    listed = resampled.tolist()
     return quantile(listed, tail), quantile(listed, 1.0 - tail)
 
 

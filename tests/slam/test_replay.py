@@ -129,6 +129,16 @@ def test_a_failing_guest_is_named_with_the_scan_and_how_it_failed(answer, says, 
     assert (str(copied), copied.outcome) == (str(got.value), outcome)
 
 
+def test_the_line_of_a_failure_is_the_guests_own():
+    def inverts(_frame: Frame) -> Estimate:
+        return np.linalg.inv(np.zeros((2, 2)))
+
+    with pytest.raises(SlamFailedError) as got:
+        list(Replay.of({"guest": Guest(inverts)}).run(frames()))
+    line = inverts.__code__.co_firstlineno + 1
+    assert str(got.value).endswith(f"LinAlgError: Singular matrix (test_replay.py:{line})")
+
+
 class Mapper(OdometrySlam):
     """One with the optional methods."""
 

@@ -145,6 +145,20 @@ def test_failures_are_scored_and_take_nothing_down(compared):
     assert (pair["wins"], pair["losses"]) == (1, 0)  # its errors count as infinite
 
 
+def test_who_failed_is_told_with_the_line_and_nothing_is_claimed_of_one_run(compared, capsys):
+    plan = Plan(slams=("raises", "odometry", "occupancy", "wheels", "drifts"), **PLAN)
+    verb.tell(plan, compared.runs)
+    told = " ".join(capsys.readouterr().out.split())
+    line = Raises.update.__code__.co_firstlineno + 2
+    failure = "`raises` raised or ended in 1 of 1 runs, first in arena at dynamism 1, seed 7: SLAM "
+    assert (
+        f"{failure}'raises', scan 3, raised RuntimeError: enough (test_compare.py:{line})" in told
+    )
+    assert "`drifts` gave a pose that is not finite in 1 of 1 runs" in told
+    assert "failed (1)" in told
+    assert "Too few runs to tell: `raises` has 1 at a level, and it takes 6" in told
+
+
 def without_timings(rows):
     return [{key: row[key] for key in row if key not in OF_THE_MACHINE} for row in rows]
 
@@ -222,7 +236,7 @@ def test_the_command_line_of_the_readme(monkeypatch):
         return []
 
     monkeypatch.setattr(make, "carry_out", carry_out)
-    monkeypatch.setattr(make, "median_errors", lambda *_: "")
+    monkeypatch.setattr(verb, "tell", lambda *_: None)
     line = (
         "--slam shunting ekf my_pkg:MySlam --scene arena office --dynamism 0:1:0.25 --seeds 10 "
         "--jobs 2 --out there"

@@ -22,7 +22,7 @@ from scripts.metrics.table import METRICS
 from scripts.report import closed, page, pictures, tables, words
 from scripts.report.closed import driven
 from scripts.report.study import study, verdict
-from slam.errors import LogFormatError
+from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.report import made
 from tests.scripts.report.browser import CHROMIUM, Browser
 
@@ -40,14 +40,14 @@ def written(folder: Path) -> Path:
     return folder / page.REPORT
 
 
-def test_ours_is_said_to_be_beaten_where_it_is(folder: Path):
+def test_the_subject_is_said_to_be_beaten_where_it_is(folder: Path):
     one = study(folder)
-    assert words.against_ours(one, -1) == [
+    assert words.against_subject(one, -1) == [
         words.Against(
             rival="ekf", where="room at dynamism 0", measures=["position error (ATE) (1.05 cm)"]
         )
     ]
-    better = {(item.rival, item.where): item.measures for item in words.against_ours(one, 1)}
+    better = {(item.rival, item.where): item.measures for item in words.against_subject(one, 1)}
     assert better["ekf", "room at dynamism 1"] == ["position error (ATE) (28.3 cm)"]
     assert better[made.OWN, "room at every level"] == ["position error (ATE) (∞ cm)"]
     assert "runs lost (100 %)" in better[made.OWN, "room at dynamism 1"]
@@ -58,15 +58,29 @@ def test_the_leaders_are_named_level_by_level(folder: Path):
         "ekf has the lowest median position error at dynamism 0, clearly before every other.",
         "shunting has the lowest median position error at dynamism 1, clearly before every other.",
     ]
-    assert words.failures(study(folder)) == ["own:Hanging hung in 6 of 12 runs."]
+    one = study(folder)
+    assert (one.subject, study(folder, "ekf").subject) == ("shunting", "ekf")
 
 
 def test_with_few_runs_nobody_wins(tmp_path: Path):
     few = study(made.make(tmp_path / "few", seeds=(100, 101, 102, 103, 104)))
-    assert words.against_ours(few, -1) == words.against_ours(few, 1) == []
-    assert (
-        words.leaders(few, "room")[0] == "ekf has the lowest median position error at dynamism 0."
-    )
+    assert words.against_subject(few, -1) == words.against_subject(few, 1) == []
+    assert words.leaders(few, "room") == []
+    cells = [
+        cell
+        for table in (
+            tables.growth(few, "room"),
+            *tables.of_levels(few, "room", [METRICS["ate_unaligned_m"], METRICS["lost"]]),
+            *tables.of_pairs(few, "room", [METRICS["ate_unaligned_m"]]),
+        )
+        for row in table.rows
+        for cell in row
+    ]
+    assert not any(" to " in cell.small or cell.mark for cell in cells)  # no interval, no winner
+    assert "5 of 5" in [cell.text for cell in cells]  # a count is no share
+    text = page.render(few)
+    assert text.index("Too few runs to tell") < text.index("<nav")
+    assert "95 %" not in text.partition("<dl>")[0]
 
 
 def test_a_pair_reads_the_same_from_both_sides(folder: Path):
@@ -102,18 +116,63 @@ def test_numbers_are_shown_with_three_digits(value, shown):
 
 def test_tables_show_units_intervals_and_failures(folder: Path):
     one = study(folder)
-    table = tables.of_levels(one, "room", METRICS["ate_unaligned_m"])
+    (table,) = tables.of_levels(one, "room", [METRICS["ate_unaligned_m"]])
     assert table.caption == "position error (ATE), cm"
     assert [cell.text for cell in table.rows[1]] == ["1", "3.15", "31.5", "∞"]
     assert [cell.mark for cell in table.rows[1]] == ["", "best", "", ""]
-    difference = tables.of_pairs(one, "room", METRICS["ate_unaligned_m"]).rows[0][1]
+    difference = tables.of_pairs(one, "room", [METRICS["ate_unaligned_m"]])[0].rows[0][1]
     assert (difference.text, difference.mark) == ("+1.05", "worse")
     assert difference.small.endswith("0–0–6")
-    outcomes = tables.of_outcomes(one, "room").rows[2]
+    outcomes = tables.of_outcomes(one)[0].rows[2]
     assert [(cell.text, cell.small) for cell in outcomes[1:]] == [
         ("6 of 6", ""),
         ("0 of 6", "6 hung"),
     ]
+
+
+def test_a_failure_at_several_scans_is_one_message(folder: Path):
+    assert tables.messages(study(folder)) == [
+        ("SLAM 'own:Hanging', hung: no answer within <10> s", 6)
+    ]
+
+
+def test_a_ratio_has_its_interval(folder: Path):
+    rows = {row[0].text: row for row in tables.growth(study(folder), "room").rows}
+    assert [(cell.text, cell.small) for cell in rows["ekf"][3:]] == [
+        ("30.0 ×", "30.0 to 30.0"),
+        ("0 of 6", "0 to 39 %"),
+        ("0 of 6", "0 to 39 %"),
+    ]
+    assert rows[made.OWN][3].text == "∞ ×"
+
+
+def kept(folder: Path, keep) -> None:
+    """Rewrite the tables of a comparison with some of its rows alone."""
+    rows = [row for row in files.read(folder).runs if keep(row)]
+    files.write_csv(folder / files.RUNS, rows, COLUMNS)
+    files.write_csv(folder / files.LEVELS, made.tables.levels(rows), made.tables.LEVEL_COLUMNS)
+    files.write_csv(folder / files.PAIRED, made.tables.pairs(rows), made.tables.PAIRED_COLUMNS)
+
+
+@pytest.mark.parametrize(
+    ("keep", "head", "first"),
+    [
+        (lambda row: row["slam"] == "ekf", ["dynamism"], ["0", "1"]),
+        (lambda row: row["dynamism"] == 1.0, ["SLAM"], [made.OURS, "ekf", made.OWN]),
+    ],
+)
+def test_tables_of_one_column_or_row_are_one_table(tmp_path: Path, keep, head, first):
+    folder = made.make(tmp_path / "compare")
+    kept(folder, keep)
+    one = study(folder)
+    shown = [METRICS[key] for key in ("rpe_m_per_m", "lost", "ate_unaligned_m")]
+    (table,) = tables.of_levels(one, "room", shown)
+    assert table.head == [head[0], *(metric.heading for metric in shown)]
+    assert [row[0].text for row in table.rows] == first
+    assert len(tables.of_outcomes(one)) == 1
+    if one.rivals:
+        (table,) = tables.of_pairs(one, "room", shown)
+        assert [row[0].text for row in table.rows] == one.rivals
 
 
 def test_the_moving_share_counts_beams_on_what_moves(folder: Path):
@@ -125,9 +184,11 @@ def test_a_drive_beside_the_comparison_is_told_too(folder: Path, tmp_path: Path)
     drive = driven(made.make_drive(tmp_path / "drive"))
     assert drive.levels == [0.0, 1.0]
     shown = [[(cell.text, cell.small) for cell in row] for row in closed.table(drive).rows]
-    assert shown[1][:4] == [("shunting", ""), ("1", ""), ("3 of 4", "30 to 95 %"), ("1", "")]
+    assert shown[1][:4] == [("shunting", ""), ("1", ""), ("6 of 8", "60 to 95 %"), ("1", "")]
     assert shown[1][6] == ("12.0", "10.0 to 20.0")
     assert shown[3][6] == ("–", "")  # another SLAM, which believed itself nowhere
+    few = closed.table(driven(made.make_drive(tmp_path / "few", reached=4))).rows[1]
+    assert (few[2].small, few[6].small) == ("40 to 95 %", "")  # five distances are no interval
     text = page.render(study(folder), [drive])
     assert text.count("<svg") == page.render(study(folder)).count("<svg") + 2
     assert "ways planned on the layout" in text
@@ -147,19 +208,33 @@ def test_what_is_no_drive_is_told(tmp_path: Path, name: str, content: str, says:
 
 
 @pytest.mark.parametrize(
-    "kept",
+    "keep",
     [
         lambda row: row["slam"] == "ekf",
         lambda row: row["dynamism"] == 1.0 and row["slam"] == made.OWN,  # every run failed
     ],
 )
-def test_little_is_enough_for_a_page(tmp_path: Path, kept):
+def test_little_is_enough_for_a_page(tmp_path: Path, keep):
     folder = made.make(tmp_path / "compare", seeds=(100,))
-    rows = [row for row in files.read(folder).runs if kept(row)]
-    files.write_csv(folder / files.RUNS, rows, COLUMNS)
-    files.write_csv(folder / files.LEVELS, made.tables.levels(rows), made.tables.LEVEL_COLUMNS)
-    files.write_csv(folder / files.PAIRED, [], made.tables.PAIRED_COLUMNS)
+    kept(folder, keep)
     assert "Where" not in page.render(study(folder))
+
+
+def test_the_page_is_about_whom_one_asks(written: Path, tmp_path: Path):
+    folder = made.make(tmp_path / "compare")
+    with pytest.raises(InvalidValueError, match="--subject must be one of shunting, ekf, own:Hang"):
+        study(folder, "karto")
+    done = CliRunner().invoke(cli.app, ["report", str(folder), "--subject", made.OWN])
+    ours, theirs = (path.read_text(encoding="utf-8") for path in (written, folder / page.REPORT))
+    for text, slam in ((ours, made.OURS), (theirs, made.OWN)):
+        assert f'<p class="answer"><code>{slam}</code>' in text
+    assert "mobilia blame FOLDER/runs/room_d1_s105.npz --slam shunting" in ours
+    assert (
+        "room_d1_s" not in theirs.partition('<section id="maps">')[0]
+    )  # it hung: nobody misled it
+    failure = "`own:Hanging` hung in 6 of 12 runs, first in room at dynamism 1, seed 100: SLAM "
+    assert failure in done.output
+    assert "`own:Hanging` fails half of the time at dynamism 1 in room" in done.output
 
 
 class Addresses(HTMLParser):
@@ -248,17 +323,27 @@ def test_what_is_no_comparison_is_told_in_a_line(tmp_path: Path, harm, says, mon
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here (apt-get install chromium)")
 def test_a_browser_shows_it_on_a_phone_and_on_a_desk(written: Path, tmp_path: Path):
     with Browser(tmp_path) as browser:
-        for width in (375, 1280):
+        for width in (390, 1280):
             browser.open(written, width)
             assert browser.evaluate("document.documentElement.scrollWidth") == width
             boxes = "[...document.querySelectorAll('.scroll, figure, p, h1, h2, h3, pre, dl')]"
             edge = f"Math.max(...{boxes}.map(box => box.getBoundingClientRect().right))"
             assert browser.evaluate(edge) <= width
             assert browser.evaluate("document.querySelectorAll('svg text').length") > 50
+            boxes = "[...document.querySelectorAll('.scroll')]"
+            hidden = f"{boxes}.filter(box => box.scrollWidth > box.clientWidth)"
+            layers = "getComputedStyle(box).backgroundImage.split('gradient').length - 1"
+            counts = browser.evaluate(f"{hidden}.map(box => {layers})")
+            assert set(counts) <= {4}  # what scrolls sideways has shadows that say so
+            assert counts or width > 390
         assert browser.console == []
         asked = {address for address in browser.requests if not address.startswith("data:")}
         assert asked == {written.as_uri()}
         assert browser.printed().startswith(b"%PDF")
+        browser.call("Emulation.setEmulatedMedia", media="print")
+        browser.open(written, 688)  # A4 without its margins
+        edge = edge.replace(".scroll, figure", "table, svg")
+        assert browser.evaluate(edge) <= 688
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here (apt-get install chromium)")

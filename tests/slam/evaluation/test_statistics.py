@@ -15,6 +15,7 @@ from slam.evaluation.statistics import (
     median_interval,
     paired,
     quantile,
+    ratio_interval,
     share_interval,
 )
 
@@ -42,6 +43,27 @@ def test_intervals_bear_infinities_as_quantiles_do():
     assert low == -INF
     assert high < 0.0
     assert median_interval([-v for v in always_better]) == (-high, INF)
+
+
+def test_the_interval_of_a_ratio_is_the_paired_bootstraps():
+    before = np.random.default_rng(3).lognormal(size=10)
+    after = 2.0 * before + 0.1 * np.random.default_rng(4).lognormal(size=10)
+    theirs = bootstrap(
+        (before, after), lambda a, b, axis: np.median(b, axis) / np.median(a, axis), paired=True,
+        n_resamples=20_000, method="percentile", rng=0,
+    ).confidence_interval  # fmt: skip
+    low, high = ratio_interval(before.tolist(), after.tolist())
+    spread = theirs.high - theirs.low
+    assert (low, high) == pytest.approx((theirs.low, theirs.high), abs=0.1 * spread)
+    assert ratio_interval(before.tolist(), (3.0 * before).tolist()) == pytest.approx((3.0, 3.0))
+
+
+def test_the_interval_of_a_ratio_bears_infinities_and_zeros():
+    assert ratio_interval([1.0] * 6, [INF] * 6) == (INF, INF)
+    assert ratio_interval([0.0] * 6, [0.0] * 6) == (1.0, 1.0)
+    assert all(map(math.isnan, ratio_interval([], [])))
+    with pytest.raises(InvalidValueError, match="2 values before must have as many after, got 1"):
+        ratio_interval([1.0, 2.0], [1.0])
 
 
 @pytest.mark.parametrize("n", [9, 10])

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The answer in a sentence: from which level on a SLAM is lost, and whether that is its own fault.
+
+``standing`` reads the rows of ``runs.csv``, ``answer`` says what they show, ``controls`` how far
+the room can be trusted, ``failed`` who raised, hung or gave no answer. All of them are pure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from scripts.comparison.tables import FAILED, by_seed, number
+from scripts.report.study import LEAST_RUNS, verdict
+from scripts.report.words import listed
+from slam.evaluation.statistics import paired, share_interval
+from slam.variants import ORACLE, oracle_of
+
+Row = dict[str, Any]
+ODOMETRY = "odometry"  # the control that looks at nothing
+_ATE = "ate_unaligned_m"
+_WORDS = {
+    "raised": "raised or ended", "hung": "hung", "nan": "gave a pose that is not finite",
+    "bad": "gave no answer to the frame",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lost:
+    """Of so many runs the lost ones, and those among them in which the SLAM failed."""
+
+    lost: int
+    runs: int
+    failed: int = 0
+
+    @property
+    def half(self) -> bool:
+        """Whether half of the runs or more are lost."""
+        return 2 * self.lost >= self.runs > 0
+
+    def __str__(self) -> str:
+        interval = percent(self.lost, self.runs)
+        return f"{self.lost} of {self.runs} runs" + (f", {interval}" if interval else "")
+
+
+def percent(hits: int, runs: int) -> str:
+    """The 95 % interval of a share in words; "" where the runs are too few for one."""
+    if runs < LEAST_RUNS:
+        return ""
+    low, high = share_interval(hits, runs)
+    return f"{100.0 * low:.0f} to {100.0 * high:.0f} %"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Level:
+    """One level of a room. A control is None where it did not run, or is the subject itself.
+
+    against  the subject against odometry, by the position error run by run: 1 nearer, -1 worse,
+             0 unclear
+    """
+
+    at: float
+    subject: Lost
+    odometry: Lost | None = None
+    against: int = 0
+    oracle: Lost | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """What the runs of a room tell of one SLAM. ``levels`` ascend.
+
+    own_oracle  the oracle is that SLAM's own: if it fails too, the room may be fair all the same
+    """
+
+    subject: str
+    scene: str
+    axis: str
+    levels: tuple[Level, ...]
+    own_oracle: bool = False
+
+    @property
+    def runs(self) -> int:
+        """At a level, at the fewest."""
+        return min(level.subject.runs for level in self.levels)
+
+    def place(self, levels: Sequence[float]) -> str:
+        """Such as "dynamism 0.5 and 1"."""
+        return f"{self.axis} " + listed([f"{level:g}" for level in levels])
+
+
+def _each(counts: Sequence[Lost]) -> str:
+    """Of levels at which nothing was lost. Not their sum: a seed draws the same room at each."""
+    least = min(counts, key=lambda one: one.runs)
+    if len(counts) == 1:
+        return str(least)
+    interval = percent(0, least.runs)
+    return f"0 of {least.runs} runs at each level" + (f", {interval}" if interval else "")
+
+
+def _worst(counts: Sequence[Lost]) -> Lost:
+    return max(counts, key=lambda one: one.lost / max(one.runs, 1))
+
+
+def standing(rows: Sequence[Row], subject: str, scene: str, axis: str = "dynamism") -> Standing:
+    """Of the rows of ``runs.csv``. The oracle is the one that is lost least."""
+    rows = [row for row in rows if row["scene"] == scene]
+    slams = list(dict.fromkeys(str(row["slam"]) for row in rows))
+    is_control = subject == ODOMETRY or subject.startswith(ORACLE)
+    oracles = [] if is_control else [slam for slam in slams if slam.startswith(ORACLE)]
+    oracle = min(oracles, key=lambda slam: _lost(rows, slam).lost, default=None)
+    odometry = ODOMETRY if ODOMETRY in slams and not is_control else None
+    levels = []
+    for at in sorted({float(row["dynamism"]) for row in rows}):
+        here = [row for row in rows if row["dynamism"] == at]
+        levels.append(
+            Level(
+                at=at,
+                subject=_lost(here, subject),
+                odometry=_lost(here, odometry) if odometry else None,
+                against=_against(here, subject, odometry) if odometry else 0,
+                oracle=_lost(here, oracle) if oracle else None,
+            )
+        )
+    own = oracle is not None and (oracle_of(oracle) or ("",))[0] == subject
+    return Standing(subject=subject, scene=scene, axis=axis, levels=tuple(levels), own_oracle=own)
+
+
+def _lost(rows: Sequence[Row], slam: str) -> Lost:
+    own = [row for row in rows if row["slam"] == slam]
+    return Lost(
+        lost=sum(bool(number(row, "lost")) for row in own),
+        runs=len(own),
+        failed=sum(row["outcome"] in FAILED for row in own),
+    )
+
+
+def _against(rows: Sequence[Row], a: str, b: str) -> int:
+    errors = by_seed(rows, a, _ATE), by_seed(rows, b, _ATE)
+    seeds = sorted(errors[0].keys() & errors[1].keys())
+    if not seeds:
+        return 0
+    of_a, of_b = ([error[seed] for seed in seeds] for error in errors)
+    return verdict(paired(of_a, of_b, less_is_better=True), less_is_better=True)
+
+
+def answer(of: Standing) -> str:
+    """One sentence in backticks and plain words; it claims nothing of fewer than ``LEAST_RUNS``."""
+    if of.runs < LEAST_RUNS:
+        return (
+            f"Too few runs to tell: `{of.subject}` has {of.runs} at a level, and it takes "
+            f"{LEAST_RUNS} (`--seeds {LEAST_RUNS}`)."
+        )
+    said = [f"`{of.subject}` {_loss(of)}", _first_level(of), _too_easy(of), _unfair(of)]
+    return "; ".join(part for part in said if part) + "."
+
+
+def _loss(of: Standing) -> str:
+    """Where it is lost half of the time."""
+    at = [level for level in of.levels if level.subject.half]
+    if not at:
+        return _rarely(of)
+    failed = sum(level.subject.failed for level in at)
+    lost = sum(level.subject.lost for level in at)
+    verb = "fails" if failed == lost else "fails or is lost" if failed else "is lost"
+    verb += " half of the time"
+    levels, first = [level.at for level in at], at[0]
+    if len(of.levels) == 1:
+        return f"{verb} at {of.place(levels)} in {of.scene} ({first.subject})"
+    if len(at) == len(of.levels):
+        return f"{verb} at every level in {of.scene} ({first.subject} at {of.place(levels[:1])})"
+    if at == list(of.levels[-len(at) :]):
+        where = "at" if len(at) == 1 else "from"
+        on = "" if len(at) == 1 else " on"
+        return f"{verb} {where} {of.place(levels[:1])}{on} in {of.scene} ({first.subject} there)"
+    fine = [level.at for level in of.levels if not level.subject.half and level.at > first.at]
+    return (
+        f"{verb} at {of.place(levels)} in {of.scene} ({first.subject} at {first.at:g}), but not at "
+        + listed([f"{level:g}" for level in fine])
+    )
+
+
+def _rarely(of: Standing) -> str:
+    """Of a SLAM that is lost half of the time nowhere."""
+    top = of.levels[-1].at
+    counts = [level.subject for level in of.levels]
+    if not any(one.lost for one in counts):
+        span = f"up to {of.place([top])}" if len(counts) > 1 else f"at {of.place([top])}"
+        return f"is never lost in {of.scene} {span} ({_each(counts)})"
+    most = of.levels[counts.index(_worst(counts))]
+    verb = "fails or is lost" if any(one.failed for one in counts) else "is lost"
+    verb += " in fewer than half of the runs"
+    if len(counts) == 1:
+        return f"{verb} at {of.place([top])} in {of.scene} ({most.subject})"
+    return (
+        f"{verb} at every level in {of.scene} (at the most {most.subject} at {of.place([most.at])})"
+    )
+
+
+def _first_level(of: Standing) -> str:
+    """What the lowest level tells: a SLAM that is bad there has another problem than the axis."""
+    low = of.levels[0]
+    so = f", so {of.axis} is not its problem" if low.at == 0.0 else ""
+    if low.against == -1:
+        return f"at {low.at:g} it is already worse than its own odometry{so}"
+    if low.subject.half and so:
+        return f"this begins at 0{so}"
+    return ""
+
+
+def _too_easy(of: Standing) -> str:
+    """Whether a SLAM that is never lost has been tried at all."""
+    alone = [level.odometry for level in of.levels if level.odometry is not None]
+    lost = any(level.subject.lost for level in of.levels) or any(one.lost for one in alone)
+    if lost or not alone:
+        return ""
+    return "but odometry alone is not lost either, so these runs are too easy to tell"
+
+
+def _unfair(of: Standing) -> str:
+    """Where the oracle is lost too, and how often at the worst."""
+    at = [level for level in of.levels if level.oracle is not None and level.oracle.lost]
+    if not at:
+        return ""
+    worst = max(at, key=lambda level: level.oracle.lost if level.oracle else 0)
+    where = "there" if len(of.levels) == 1 else f"at {of.place([level.at for level in at])}"
+    most = "" if len(at) == 1 else f" at {worst.at:g}"
+    if of.own_oracle:
+        return (
+            f"without the returns of movers it is lost too {where} ({worst.oracle}{most}), so they "
+            "are not its only problem, or the room is unfair"
+        )
+    return f"the oracle fails too {where} ({worst.oracle}{most}): the room is unfair there"
+
+
+def controls(of: Standing) -> list[str]:
+    """What odometry and the oracle did on the same runs, or how to ask them."""
+    if of.subject == ODOMETRY or of.subject.startswith(ORACLE):
+        return []
+    top = of.levels[-1]
+    best = [level.oracle for level in of.levels if level.oracle is not None]
+    said = []
+    if top.odometry:
+        said.append(f"Odometry alone is lost in {top.odometry}, at {of.place([top.at])}.")
+    else:
+        said.append(
+            "Odometry, the control that looks at nothing, did not run: `--slam … odometry`."
+        )
+    if not best:
+        said.append("No oracle ran: `--oracle shunting` tells whether the room is fair.")
+    elif not any(one.lost for one in best):
+        said.append(f"The oracle is never lost ({_each(best)}), so the room is fair.")
+    else:
+        said.append(f"The oracle is lost in up to {_worst(best)}.")
+    return said
+
+
+def failed(rows: Sequence[Row], axis: str = "dynamism") -> list[str]:
+    """A line for each SLAM that failed and way of failing: how often, where first, what it said."""
+    found: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        if row["outcome"] in FAILED:
+            found.setdefault((str(row["slam"]), str(row["outcome"])), []).append(row)
+    said = []
+    for (slam, outcome), own in found.items():
+        runs = sum(row["slam"] == slam for row in rows)
+        first = own[0]
+        where = f"{first['scene']} at {axis} {first['dynamism']:g}, seed {first['seed']:g}"
+        line = f"`{slam}` {_WORDS[outcome]} in {len(own)} of {runs} runs, first in {where}"
+        said.append(f"{line}: {first['failure'] or 'no word of why'}")
+    return said

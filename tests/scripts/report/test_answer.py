@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sentence on top: what it says in each case, and that it claims nothing of few runs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from scripts.report.answer import Level, Lost, Standing, answer, controls, failed, standing
+
+MINE, ORACLE = "my_icp", "oracle(shunting)"
+
+
+def of(lost: list[int], *, runs: int = 10, levels=(0.0, 0.4, 1.0), failures=(), against=(),
+       odometry=(), oracle=(), own=False) -> Standing:  # fmt: skip
+    """A SLAM that lost so many runs at each level, beside controls that did so."""
+
+    def at(values, k, default):
+        return values[k] if values else default
+
+    return Standing(
+        subject=MINE,
+        scene="arena",
+        axis="dynamism",
+        own_oracle=own,
+        levels=tuple(
+            Level(
+                at=levels[k],
+                subject=Lost(lost=n, runs=runs, failed=at(failures, k, 0)),
+                against=at(against, k, 0),
+                odometry=Lost(lost=odometry[k], runs=runs) if odometry else None,
+                oracle=Lost(lost=oracle[k], runs=runs) if oracle else None,
+            )
+            for k, n in enumerate(lost)
+        ),
+    )
+
+
+@pytest.mark.parametrize(
+    ("case", "said"),
+    [
+        (
+            of([0, 6, 9], against=[-1, -1, -1]),
+            "is lost half of the time from dynamism 0.4 on in arena (6 of 10 runs, 31 to 83 % "
+            "there); at 0 it is already worse than its own odometry, so dynamism is not its "
+            "problem.",
+        ),
+        (
+            of([0, 0, 5]),
+            "is lost half of the time at dynamism 1 in arena (5 of 10 runs, 24 to 76 % there).",
+        ),
+        (
+            of([8, 6, 9]),
+            "is lost half of the time at every level in arena (8 of 10 runs, 49 to 94 % at "
+            "dynamism 0); this begins at 0, so dynamism is not its problem.",
+        ),
+        (
+            of([0, 6, 2]),
+            "is lost half of the time at dynamism 0.4 in arena (6 of 10 runs, 31 to 83 % at "
+            "0.4), but not at 1.",
+        ),
+        (
+            of([0, 0, 0], odometry=[9, 8, 9]),
+            "is never lost in arena up to dynamism 1 (0 of 10 runs at each level, 0 to 28 %).",
+        ),
+        (
+            of([0, 0, 0], odometry=[0, 0, 0]),
+            "is never lost in arena up to dynamism 1 (0 of 10 runs at each level, 0 to 28 %); "
+            "but odometry alone is not lost either, so these runs are too easy to tell.",
+        ),
+        (
+            of([0, 1, 4]),
+            "is lost in fewer than half of the runs at every level in arena (at the most 4 of "
+            "10 runs, 17 to 69 % at dynamism 1).",
+        ),
+        (
+            of([0, 6, 9], oracle=[0, 0, 3]),
+            "is lost half of the time from dynamism 0.4 on in arena (6 of 10 runs, 31 to 83 % "
+            "there); the oracle fails too at dynamism 1 (3 of 10 runs, 11 to 60 %): the room is"
+            " unfair there.",
+        ),
+        (
+            of([0, 6, 9], oracle=[0, 2, 3], own=True),
+            "is lost half of the time from dynamism 0.4 on in arena (6 of 10 runs, 31 to 83 % "
+            "there); without the returns of movers it is lost too at dynamism 0.4 and 1 (3 of "
+            "10 runs, 11 to 60 % at 1), so they are not its only problem, or the room is "
+            "unfair.",
+        ),
+        (
+            of([0, 6, 6], failures=[0, 6, 6]),
+            "fails half of the time from dynamism 0.4 on in arena (6 of 10 runs, 31 to 83 % "
+            "there).",
+        ),
+        (
+            of([9], levels=(0.5,), failures=[1]),
+            "fails or is lost half of the time at dynamism 0.5 in arena (9 of 10 runs, 60 to 98"
+            " %).",
+        ),
+        (
+            of([2], levels=(0.5,)),
+            "is lost in fewer than half of the runs at dynamism 0.5 in arena (2 of 10 runs, 6 "
+            "to 51 %).",
+        ),
+    ],
+)  # fmt: skip
+def test_the_sentence_of_each_case(case: Standing, said: str):
+    assert answer(case) == f"`{MINE}` {said}"
+
+
+def test_of_few_runs_nothing_is_claimed():
+    assert answer(of([5, 5, 5], runs=5, against=[-1, -1, -1])) == (
+        "Too few runs to tell: `my_icp` has 5 at a level, and it takes 6 (`--seeds 6`)."
+    )
+
+
+def test_a_level_above_zero_blames_nothing_on_dynamism():
+    assert "is not its problem" not in answer(of([9, 9], levels=(0.5, 1.0), against=[-1, -1]))
+
+
+@pytest.mark.parametrize(
+    ("case", "said"),
+    [
+        (
+            of([0, 6, 9], odometry=[5, 5, 5], oracle=[0, 0, 0]),
+            [
+                "Odometry alone is lost in 5 of 10 runs, 24 to 76 %, at dynamism 1.",
+                "The oracle is never lost (0 of 10 runs at each level, 0 to 28 %), so the room is "
+                "fair.",
+            ],
+        ),
+        (
+            of([0, 6, 9]),
+            [
+                "Odometry, the control that looks at nothing, did not run: `--slam … odometry`.",
+                "No oracle ran: `--oracle shunting` tells whether the room is fair.",
+            ],
+        ),
+    ],
+)
+def test_the_controls_are_told_or_asked_for(case: Standing, said: list[str]):
+    assert controls(case) == said
+
+
+def row(slam: str, level: float, seed: int, error_m: float, **more: Any) -> dict[str, Any]:
+    outcome = "lost" if error_m > 0.5 else "finished"
+    head = {"scene": "arena", "dynamism": level, "seed": seed, "slam": slam, "failure": None}
+    lost = int(error_m > 0.5)
+    return head | {"outcome": outcome, "lost": lost, "ate_unaligned_m": error_m} | more
+
+
+RAISED = {"outcome": "raised", "lost": 1, "ate_unaligned_m": None}
+
+
+def rows() -> list[dict[str, Any]]:
+    """At level 0 mine is further off than odometry, at level 1 lost; one oracle fails, one not."""
+    errors = {
+        MINE: (0.3, 0.9),
+        "odometry": (0.1, 0.8),
+        ORACLE: (0.01, 0.02),
+        "oracle(x)": (0.9, 0.9),
+    }
+    made = [
+        row(slam, float(level), seed, both[level] + 1e-3 * seed)
+        for slam, both in errors.items()
+        for level in (0, 1)
+        for seed in range(6)
+    ]
+    words = "SLAM 'my_icp', scan 9, raised ZeroDivisionError: by zero (my_icp.py:31)"
+    made[3] |= RAISED | {"failure": words}
+    return made
+
+
+def test_the_rows_of_a_comparison_are_read():
+    found = standing(rows(), MINE, "arena")
+    assert [level.at for level in found.levels] == [0.0, 1.0]
+    assert [level.subject for level in found.levels] == [
+        Lost(lost=1, runs=6, failed=1),
+        Lost(lost=6, runs=6),
+    ]
+    assert [level.against for level in found.levels] == [-1, -1]
+    assert [level.oracle for level in found.levels] == [Lost(lost=0, runs=6)] * 2
+    assert not found.own_oracle
+    assert standing(rows(), "x", "arena").levels[0].subject == Lost(lost=0, runs=0)
+    assert standing(rows(), "shunting", "arena").own_oracle
+    alone = standing(rows(), "odometry", "arena")  # a control has none itself
+    assert [(level.odometry, level.oracle) for level in alone.levels] == [(None, None)] * 2
+    assert controls(alone) == []
+
+
+def test_a_slam_that_raised_is_told_with_its_line():
+    assert failed(rows()) == [
+        "`my_icp` raised or ended in 1 of 12 runs, first in arena at dynamism 0, seed 3: SLAM "
+        "'my_icp', scan 9, raised ZeroDivisionError: by zero (my_icp.py:31)"
+    ]
+    assert failed([one for one in rows() if one["slam"] == "odometry"]) == []
