@@ -116,7 +116,9 @@ def follows_through(i: int, door: Float, crowd: Crowd) -> int:
 
 
 @njit
-def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:  # noqa: C901 (kernel)
+def give_turns(  # noqa: C901, PLR0912 (kernel)
+    ways: Doors, field: Field, crowd: Crowd
+) -> None:
     """Who may pass each door, and whether it shall open. Fills ``ways.sides``."""
     doors, passage, sides, discs = ways.doors, ways.passage, ways.sides, crowd.discs
     for d in range(doors.shape[0]):

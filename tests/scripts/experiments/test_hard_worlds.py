@@ -107,6 +107,24 @@ def test_what_is_seen_goes_into_the_results_and_the_page(tmp_path: Path):
     assert text.endswith("<!-- /share_seen -->\nend\n")
 
 
+@pytest.mark.parametrize("scene", ["arena", "corridor"])
+def test_what_is_seen_grows_in_a_line_with_the_motion(scene: str):
+    seen = []
+    for level in (0.5, 1.0):
+        cases = [
+            share_seen.Case(
+                scene=scene, level=level, seed=seed, axis="motion", seconds=16.0,
+                scanner="scanner(fov_deg=180,beams=61,rate_hz=2.5,sigma_m=0.01)", away_s=5.0,
+            )
+            for seed in (500, 501, 502)
+        ]  # fmt: skip
+        rows = [share_seen.measure(case) for case in cases]
+        seen.append(np.mean([row["moving"] for row in rows]))
+        assert np.mean([row["blocked"] for row in rows]) < 0.15
+    assert seen[1] > 0.3
+    assert abs(seen[0] - 0.5 * seen[1]) < 0.2 * seen[1]
+
+
 def test_a_page_without_the_mark_is_left_and_nothing_is_run(tmp_path: Path, capsys):
     (page := tmp_path / "page.md").write_text("nothing")
     words = ["--page", str(page), "--results", str(tmp_path / "r.json")]
