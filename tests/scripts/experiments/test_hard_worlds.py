@@ -28,11 +28,11 @@ N, S, SEMI, M = (int(kind) for kind in BeamClass)
 def test_a_level_sets_both_axes_or_one():
     at = Axis(name="motion").at(0.5)
     rates = Dynamism.of(**at)
-    assert (rates.crowd, rates.change) == (0.25, 0.0)
+    assert (rates.crowd, rates.change) == (0.5, 0.0)
     rates = Dynamism.of(**Axis(name="change").at(0.5))
     assert (rates.crowd, rates.change) == (0.0, 0.5)
     rates = Dynamism.of(**Axis().at(0.5))
-    assert (rates.crowd, rates.change) == (0.25, 0.5)
+    assert (rates.crowd, rates.change) == (0.5, 0.5)
     with pytest.raises(InvalidValueError, match="axis must be one of dynamism, motion, change"):
         Axis(name="speed")
     with pytest.raises(InvalidValueError, match="axis must be one of"):
