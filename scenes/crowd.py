@@ -78,11 +78,6 @@ class Crowd:
     def __bool__(self) -> bool:
         return str(self) != "none"
 
-    def part(self, share: float) -> Crowd:
-        """That share of each kind, to the nearest whole number."""
-        counts = {f.name: math.floor(share * getattr(self, f.name) + 0.5) for f in fields(self)}
-        return Crowd(**counts)
-
 
 def crowd_of(text: object) -> Crowd:
     """``"escorts:6,boards:2"`` or ``"none"``; ``InvalidValueError`` for anything else."""
@@ -101,25 +96,54 @@ def crowd_of(text: object) -> Crowd:
     return Crowd(**counts)
 
 
-MIXES = {
-    "apartment": Crowd(escorts=7),
-    "arena": Crowd(escorts=14, boards=3),
-    "classroom": Crowd(escorts=8, groups=8, boards=1),
-    "corridor": Crowd(escorts=5, streams=4, beds=1),
-    "gallery": Crowd(escorts=14, groups=12, boards=2),
-    "office": Crowd(escorts=8, streams=16, groups=12, boards=1, cleaners=1),
-    "random-rooms": Crowd(escorts=9, groups=4),
-    "station": Crowd(escorts=14, streams=36, queue=6, trains=2),
-    "warehouse": Crowd(escorts=8, trains=3, streams=6),
+LEVELS = (0.25, 0.5, 0.75, 1.0)
+"""Of motion, at which the crowds below are calibrated."""
+
+
+def _mixes(**counts: tuple[int, int, int, int]) -> tuple[Crowd, ...]:
+    """A crowd for each of ``LEVELS``, from the numbers of each kind at these."""
+    return tuple(
+        Crowd(**dict(zip(counts, each, strict=True))) for each in zip(*counts.values(), strict=True)
+    )
+
+
+BY_LEVEL = {
+    "apartment": _mixes(escorts=(1, 2, 4, 6)),
+    "arena": _mixes(escorts=(2, 4, 7, 14), boards=(0, 0, 1, 2)),
+    "classroom": _mixes(escorts=(1, 3, 6, 9), groups=(0, 0, 0, 4)),
+    "corridor": _mixes(escorts=(1, 2, 3, 7), streams=(0, 0, 2, 4)),
+    "gallery": _mixes(escorts=(1, 3, 6, 14), groups=(4, 4, 8, 12), boards=(0, 0, 1, 2)),
+    "office": _mixes(
+        escorts=(1, 3, 6, 12), streams=(0, 2, 2, 2), groups=(0, 0, 0, 4), cleaners=(0, 0, 0, 1)
+    ),
+    "random-rooms": _mixes(escorts=(1, 3, 5, 8)),
+    "station": _mixes(
+        escorts=(1, 3, 8, 14), streams=(2, 9, 20, 36), queue=(0, 2, 3, 6), trains=(0, 0, 1, 2)
+    ),
+    "warehouse": _mixes(escorts=(1, 2, 4, 9), streams=(0, 0, 2, 6), trains=(0, 0, 1, 2)),
 }
-"""The whole crowd of each scene, at motion 1; calibrated by ``scripts.experiments.share_seen``."""
-OTHERS = Crowd(escorts=10)
+"""The crowds of each scene at ``LEVELS``: so many that the share of returns from what moves grows
+in a line with the motion. Measured by ``scripts.experiments.share_seen`` on seeds below 8."""
+OTHERS_BY_LEVEL = _mixes(escorts=(1, 3, 5, 10))
+"""Those of a scene that has no row."""
+MIXES = {scene: crowds[-1] for scene, crowds in BY_LEVEL.items()}
+"""The whole crowd of each scene, at motion 1."""
+OTHERS = OTHERS_BY_LEVEL[-1]
 """That of a scene that has no row."""
 
 
 def mix(scene: str, level: float) -> Crowd:
-    """The crowd of a scene at a motion in [0, 1]."""
-    return MIXES.get(scene, OTHERS).part(level)
+    """The crowd of a scene at a motion in [0, 1]; of each kind a whole number."""
+    mixes = (Crowd(), *BY_LEVEL.get(scene, OTHERS_BY_LEVEL))
+    return Crowd(
+        **{
+            each.name: math.floor(
+                float(np.interp(level, (0.0, *LEVELS), [getattr(c, each.name) for c in mixes]))
+                + 0.5
+            )
+            for each in fields(Crowd)
+        }
+    )
 
 
 class _Filling:

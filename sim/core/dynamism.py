@@ -5,10 +5,10 @@ Two axes, both at ``d`` when one number ``dynamism`` is given:
 
 **motion**  what moves now. ``CURVES`` below are the rates of shoves, doors and trips, as they were
             in world 1; ``crowd`` brings people, boards and trains into the room besides, at 1 the
-            whole mix of the scene (``scenes.crowd.MIXES``), which is calibrated on the share of
-            returns that the scanner sees from what moves (``scripts.experiments.share_seen``).
-            People hide one another, so the share seen rises with about the root of their
-            number: at motion d a share d * d of the crowd is there.
+            whole mix of the scene (``scenes.crowd.MIXES``). Each scene has its own numbers at four
+            levels, so that the share of returns from what moves grows in a line with the motion
+            (``scripts.experiments.share_seen``). People hide one another, so their number grows
+            faster than that.
 **change**  of what can move, the share that stands elsewhere than when the robot last saw it
             (``sim.actors.rearranging``).
 
@@ -58,7 +58,7 @@ CURVES = (
         lambda d: 12.0 / d - 10.0 if d > 0.0 else math.inf,
     ),
     Rate("pace", "walking pace, times a person's own", "1", lambda d: 0.7 + 0.3 * d),
-    Rate("crowd", "share of the scene's whole crowd that is there", "1", lambda d: d * d),
+    Rate("crowd", "level of the scene's crowd", "1", lambda d: d),
 )  # fmt: skip
 
 
@@ -72,7 +72,7 @@ class Dynamism:
                      shoves unless it is None
     door_rate        1/s for each door           stay_mean      s, infinite: nobody ever leaves
     pace             factor on each person's preferred speed
-    crowd            in [0, 1]: share of the scene's whole crowd (``scenes.crowd``) that is there
+    crowd            in [0, 1]: level of the scene's crowd (``scenes.crowd.mix``)
     change           in [0, 1]: of what can move, elsewhere than when the robot last saw it
     push_speed_min/max  m/s a shove gives a chair
     kick_speed_min/max  m/s a kick gives a bin

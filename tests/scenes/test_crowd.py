@@ -3,11 +3,23 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
 from scenes import build
-from scenes.crowd import MIXES, ROW, Crowd, crowd_of, far_ends, mix, slots
+from scenes.crowd import (
+    BY_LEVEL,
+    MIXES,
+    OTHERS,
+    ROW,
+    Crowd,
+    crowd_of,
+    far_ends,
+    mix,
+    slots,
+)
 from scenes.kinds import kind_of
 from scenes.scene import Scene
 from slam.errors import InvalidValueError
@@ -45,13 +57,14 @@ def test_a_crowd_that_does_not_fit_is_refused():
 
 
 def test_counts_grow_with_the_level():
-    whole = Crowd(escorts=10, boards=2, cleaners=1)
-    assert whole.part(0.0) == Crowd()
-    assert whole.part(0.5) == Crowd(escorts=5, boards=1, cleaners=1)
-    assert whole.part(1.0) == whole
-    counts = [mix("arena", level / 10).escorts for level in range(11)]
-    assert counts == sorted(counts)
-    assert counts[-1] == MIXES["arena"].escorts
+    for scene in (*MIXES, "any other"):
+        crowds = [mix(scene, level / 20) for level in range(21)]
+        for kind in (field.name for field in fields(Crowd)):
+            counts = [getattr(crowd, kind) for crowd in crowds]
+            assert counts == sorted(counts), (scene, kind)
+        assert crowds[0] == Crowd()
+        assert crowds[-1] == MIXES.get(scene, OTHERS)
+    assert mix("arena", 0.5) == BY_LEVEL["arena"][1]
 
 
 def test_a_crowd_moves_nothing_else(pair: tuple[Scene, Scene]):

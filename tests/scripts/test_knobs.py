@@ -85,7 +85,7 @@ def test_levels_of_one_axis_leave_the_other_at_0_or_as_it_is_held():
     assert [(r.crowd, r.change) for r in rates] == [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]
     assert rates[1].door_rate > 0.0 == rates[2].door_rate
     held = Dynamism.of(**Axis(name="change", held=Held(motion=0.5)).at(1.0))
-    assert (held.crowd, held.change) == (0.25, 1.0)
+    assert (held.crowd, held.change) == (0.5, 1.0)
     for wrong in (lambda: Held(motion=1.5), lambda: Held(crowd="dragons:1")):
         with pytest.raises(InvalidValueError):
             wrong()
@@ -151,7 +151,7 @@ def test_an_environment_has_the_knobs_and_a_reset_may_replace_them():
     assert "escort1" in world.mover_names
     env.reset(seed=1, options={"crowd": "none", "motion": 0.5, "change": 0.0})
     world = env.simulation.world
-    assert (world.rates.crowd, world.rates.change) == (0.25, 0.0)
+    assert (world.rates.crowd, world.rates.change) == (0.5, 0.0)
     assert "escort0" not in world.mover_names
     assert env.observation_space == space
     for name, value in (("crowd", "dragons:2"), ("motion", 2.0), ("change", "much")):

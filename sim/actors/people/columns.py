@@ -17,6 +17,7 @@ SPOT_X, SPOT_Y = 20, 21  # m, where that place is now
 DENSE = 22  # weight of other people: less in a crowd
 FILE = 23  # m on the leader's way behind it, where one goes in file
 N_STATE = 24
+AIM_X, AIM_Y = ARRIVE, LUCK  # m; of one who follows and has no trips: the next place on the way
 
 # Their task, (n, 8) int64: what one does, where to, disc row of one's chair (-1 none), row of one's
 # leader (-1 none), disc row of what one holds (-1 nothing), row of one's hold (-1), which chair of

@@ -31,6 +31,7 @@ from sim.actors.people.following import (
     rests,
     spread_out,
     stand_in_line,
+    wait_behind,
 )
 from sim.actors.people.right_of_way import (
     OPEN,
@@ -41,6 +42,7 @@ from sim.actors.people.right_of_way import (
     Int,
     give_turns,
     hold_off,
+    round_leaf,
     wait_beside,
 )
 from sim.actors.people.sitting import Hulls, may_sit, on_chair, sit, to_chair
@@ -57,7 +59,9 @@ SIGHT_M = ACTORS.holding.sight_m
 NEAR, CROWD_NEAR = 24, 64  # discs around one that are looked at, without and with a crowd
 _S = ACTORS.steering
 LANE_HALF, LANE, LANE_SIDE, LANE_WALL = _S.lane_half_m, _S.lane, _S.lane_side_m, _S.lane_wall_m
-GIVES_UP, TURN_GAIN, TURN_MOST = _W.blocked_s, _W.turn_gain, _W.turn_most
+GIVES_UP, CROWD_GIVES_UP = _W.blocked_s, _W.crowd_blocked_s
+PATIENT, CROWD_PATIENT = _W.patient_s, _W.crowd_patient_s
+TURN_GAIN, TURN_MOST = _W.turn_gain, _W.turn_most
 
 
 class People(NamedTuple):
@@ -134,6 +138,15 @@ def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[
     wx, wy = speed * wx, speed * wy
     if state[i, columns.STAYS] == 0.0:
         wx, wy = keep_right(i, wx, wy, field, discs)
+    return at_doors(i, (wx, wy), ways, field, discs)
+
+
+@njit
+def at_doors(
+    i: int, wanted: tuple[float, float], ways: Doors, field: Field, discs: Float
+) -> tuple[float, float]:
+    """The wanted velocity, where it is others' turn to pass a door or the leaf is not open yet."""
+    wx, wy = wanted
     for d in range(ways.doors.shape[0]):
         side, turn = ways.sides[i, d], ways.passage[d, columns.TURN]
         if side == 0:
@@ -208,6 +221,7 @@ def plan(  # noqa: C901, PLR0913 (kernel)
         state[i, columns.BEST_AT] = time
         return
     left = way_left(i, field, crowd)
+    gives_up = CROWD_GIVES_UP if state[i, columns.DENSE] < 1.0 else GIVES_UP
     state[i, columns.WALKED_S] += tick
     if discs[i, columns.U] ** 2 + discs[i, columns.V] ** 2 < STILL * STILL:
         state[i, columns.BLOCKED] += tick
@@ -222,7 +236,7 @@ def plan(  # noqa: C901, PLR0913 (kernel)
         state[i, columns.LOOK_UNTIL] = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
         if task[i, columns.SEAT] < 0 and task[i, columns.HAND] < 0 and task[i, columns.HELD] < 0:
             may_sit(i, field, crowd)
-    elif state[i, columns.BLOCKED] > GIVES_UP or time - state[i, columns.BEST_AT] > NO_PROGRESS:
+    elif state[i, columns.BLOCKED] > gives_up or time - state[i, columns.BEST_AT] > NO_PROGRESS:
         new_trip(i, time, stay, field, crowd)
 
 
@@ -331,9 +345,11 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
 def patience(i: int, time: float, crowd: Crowd) -> float:
     """Respect of person ``i`` for chairs and leaves in the way: 1 at first, 0 when worn out.
 
-    It wears out after 0.8 to 1.6 s of standing, or 2 to 4 s of walking about without progress.
+    It wears out after 0.8 to 1.6 s of standing, or 2 to 4 s of walking about without progress; in a
+    crowd after 0.3 to 0.6 s of standing.
     """
-    stood = (crowd.state[i, columns.BLOCKED] - 0.8) / 0.8
+    patient = CROWD_PATIENT if crowd.state[i, columns.DENSE] < 1.0 else PATIENT
+    stood = (crowd.state[i, columns.BLOCKED] - patient) / patient
     lost = (
         (time - crowd.state[i, columns.BEST_AT] - 2.0) / 2.0
         if crowd.task[i, columns.WALKING] == columns.WALKS
@@ -352,21 +368,26 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
         return want(i, people.rates[1], people.ways, field, crowd)
     if doing == columns.FOLLOWS:
         state[i, columns.LOOK] = faces(i, people.leaders, crowd)
-        if rests(i, time, crowd):
+        if rests(i, time, people.leaders, crowd):
             return make_room(i, (0.0, 0.0), field, crowd)
         wx, wy = follow(i, field, people.leaders, crowd)
+        wx, wy = round_leaf(i, (wx, wy), people.ways, crowd.discs)
+        wx, wy = at_doors(i, (wx, wy), people.ways, field, crowd.discs)
+        wx, wy = wait_behind(i, (wx, wy), field, people.leaders, crowd)
         wx, wy = make_room(i, (wx, wy), field, crowd)
-        wx, wy = make_way(i, (wx, wy), people.leaders, crowd)
+        wx, wy = make_way(i, (wx, wy), field, people.leaders, crowd)
     elif doing == columns.QUEUES:
         wx, wy = stand_in_line(i, time, people.leaders, crowd)
     else:
         wx, wy = to_what_is_taken(i, field, people.leaders, crowd)
     if wx * wx + wy * wy > 0.09:
-        counts = 0.0 if doing == columns.FOLLOWS and near_place(i, crowd) else tick
-        state[i, columns.WALKED_S] += counts  # who is with the leader has nowhere to get on to
-        if crowd.discs[i, columns.U] ** 2 + crowd.discs[i, columns.V] ** 2 < STILL * STILL:
+        still = crowd.discs[i, columns.U] ** 2 + crowd.discs[i, columns.V] ** 2 < STILL * STILL
+        # Who stands still with the leader has nowhere to get on to.
+        waits = still and doing == columns.FOLLOWS and near_place(i, people.leaders, crowd)
+        state[i, columns.WALKED_S] += 0.0 if waits else tick
+        if still:
             state[i, columns.BLOCKED] += tick
-            state[i, columns.BLOCKED_S] += counts
+            state[i, columns.BLOCKED_S] += 0.0 if waits else tick
             return wx, wy
     state[i, columns.BLOCKED] = max(0.0, state[i, columns.BLOCKED] - 2.0 * tick)
     return wx, wy

@@ -31,6 +31,8 @@ NARROW, WAY_M, WAY_HALF, ASIDE = _F.narrow_m, _F.way_m, _F.way_half_m, _F.aside_
 TAKEN_M, CROSSING = _F.taken_m, _F.crossing_m2
 NARROW_SIDE, ASKED_S, ROOM_M = _F.narrow_side_m, _F.asked_s, _F.room_m
 ROOM_PUSH_M, ROOM_HALF = _F.room_push_m, _F.room_half_m
+STANDS_S, STANDS_M = _F.stands_s, _F.stands_m
+FILE_M, FILE_GAP, FILE_HALF = _F.file_m, _F.file_gap_m, _F.file_half
 TURN_MOST = ACTORS.walking.turn_most
 HELD_UP_S, NEAR_M, REST_S = _F.held_up_s, _F.near_m, _F.rest_s
 CRUMBS = 160  # remembered of each leader: 40 m
@@ -180,9 +182,12 @@ def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
 
 @njit
 def make_way(
-    i: int, wanted: tuple[float, float], leaders: Leaders, crowd: Crowd
+    i: int, wanted: tuple[float, float], field: Field, leaders: Leaders, crowd: Crowd
 ) -> tuple[float, float]:
-    """The velocity of person ``i``, sideways where the robot it accompanies would drive."""
+    """The velocity of person ``i``, sideways where the robot it accompanies would drive.
+
+    Where there is no room beside, it goes ahead.
+    """
     robot = crowd.discs[leaders.rows[crowd.task[i, columns.LEADER]]]
     if robot[columns.KIND] != columns.ROBOT:
         return wanted
@@ -194,7 +199,8 @@ def make_way(
     if ahead < 0.0 or ahead > WAY_M or abs(left) > WAY_HALF:
         return wanted
     side = 1.0 if left >= 0.0 else -1.0
-    along = max(wanted[0] * c + wanted[1] * s, 0.3)
+    narrow = clearance_at(field, crowd.discs[i, columns.X], crowd.discs[i, columns.Y]) < NARROW
+    along = max(wanted[0] * c + wanted[1] * s, ASIDE if narrow else 0.3)
     return along * c - side * ASIDE * s, along * s + side * ASIDE * c
 
 
@@ -232,20 +238,30 @@ def make_room(
 
 
 @njit
-def near_place(i: int, crowd: Crowd) -> bool:
-    """Whether person ``i`` is as good as at its place."""
+def near_place(i: int, leaders: Leaders, crowd: Crowd) -> bool:
+    """Whether person ``i`` is as good as at its place, or with its leader.
+
+    Farther off will do while the leader stands.
+    """
+    k = crowd.task[i, columns.LEADER]
+    reach = STANDS_M if leaders.course[k, STOOD] > STANDS_S else NEAR_M
+    leader = crowd.discs[leaders.rows[k]]
+    lx = leader[columns.X] - crowd.discs[i, columns.X]
+    ly = leader[columns.Y] - crowd.discs[i, columns.Y]
+    if lx * lx + ly * ly < reach * reach:
+        return True
     dx = crowd.state[i, columns.SPOT_X] - crowd.discs[i, columns.X]
     dy = crowd.state[i, columns.SPOT_Y] - crowd.discs[i, columns.Y]
-    return bool(dx * dx + dy * dy < NEAR_M * NEAR_M)
+    return bool(dx * dx + dy * dy < reach * reach)
 
 
 @njit
-def rests(i: int, time: float, crowd: Crowd) -> bool:
+def rests(i: int, time: float, leaders: Leaders, crowd: Crowd) -> bool:
     """Whether person ``i`` was held up near its place and lets it be for a while."""
     state = crowd.state[i]
     if time < state[columns.BEST_AT]:
         return True
-    if state[columns.BLOCKED] > HELD_UP_S and near_place(i, crowd):
+    if state[columns.BLOCKED] > HELD_UP_S and near_place(i, leaders, crowd):
         state[columns.BEST_AT], state[columns.BLOCKED] = time + REST_S, 0.0
         return True
     return False
@@ -297,6 +313,7 @@ def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float,
     if not in_sight(field, x, y, tx, ty) or through_door(field, x, y, tx, ty):
         u, v = 0.0, 0.0
         tx, ty = in_file(i, k, field, leaders, crowd)
+    crowd.state[i, columns.AIM_X], crowd.state[i, columns.AIM_Y] = tx, ty
     far = math.sqrt((tx - x) ** 2 + (ty - y) ** 2)
     if far < TAKEN_M and taken(i, tx, ty, crowd):  # as near as one gets
         return share_of(far) * u, share_of(far) * v
@@ -332,6 +349,42 @@ def to_place(dx: float, dy: float, u: float, v: float) -> tuple[float, float]:
     speed = math.sqrt(wx * wx + wy * wy)
     over = max(speed / FASTEST, 1.0)
     return wx / over + 0.0, wy / over + 0.0
+
+
+@njit
+def wait_behind(
+    i: int, wanted: tuple[float, float], field: Field, leaders: Leaders, crowd: Crowd
+) -> tuple[float, float]:
+    """The velocity of person ``i``, no faster than those of its company right before it.
+
+    So in a narrow place, and where the leader stands; only those nearer to the leader count, so
+    nobody waits for one who waits for it.
+    """
+    k, discs, task = crowd.task[i, columns.LEADER], crowd.discs, crowd.task
+    x, y = discs[i, columns.X], discs[i, columns.Y]
+    speed = math.sqrt(wanted[0] ** 2 + wanted[1] ** 2)
+    if speed < THERE or (
+        leaders.course[k, STOOD] < STANDS_S and clearance_at(field, x, y) > NARROW
+    ):
+        return wanted
+    c, s, most = wanted[0] / speed, wanted[1] / speed, speed
+    row = leaders.rows[k]
+    lx, ly = discs[row, columns.X], discs[row, columns.Y]
+    own = (x - lx) ** 2 + (y - ly) ** 2
+    for j in range(len(task) + 1):
+        other = row if j == len(task) else j
+        company = j == len(task) or (
+            task[j, columns.WALKING] == columns.FOLLOWS and task[j, columns.LEADER] == k
+        )
+        ox, oy = discs[other, columns.X], discs[other, columns.Y]
+        if not company or (ox - lx) ** 2 + (oy - ly) ** 2 >= own:
+            continue
+        ahead, left = c * (ox - x) + s * (oy - y), c * (oy - y) - s * (ox - x)
+        reach = discs[i, columns.R] + discs[other, columns.R]
+        if 0.0 < ahead < reach + FILE_M and abs(left) < FILE_HALF * reach:
+            before = max(discs[other, columns.U] * c + discs[other, columns.V] * s, 0.0)
+            most = min(most, before + GAIN * max(ahead - reach - FILE_GAP, 0.0))
+    return most * c, most * s
 
 
 @njit

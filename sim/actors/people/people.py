@@ -130,7 +130,7 @@ class People:
             role = _role(scene, name)
             state[i, [columns.STAYS, columns.SLOW]] = role.stay, role.slow
             state[i, [columns.AHEAD, columns.LEFT]] = role.slot
-            if name in scene.roles:
+            if scene.roles:
                 state[i, columns.DENSE] = ACTORS.steering.dense
             if role.goals:
                 self.crowd.allowed[i] = [goal in role.goals for goal in goals]

@@ -26,6 +26,7 @@ WANTS, IN_DOORWAY, ON_WAY, SWEPT = _R.wants_m, _R.in_doorway_m, _R.on_way, _R.sw
 CLEAR, IN_FRAME, KEPT = ACTORS.doors.clear_m, _R.in_frame_m, _R.kept_m
 PULL, PUSH, BESIDE, BACK = _R.pull_m, _R.push_m, _R.beside_m, _R.back_m
 WAIT_MPS, WAIT_GAIN, LEAF_M = _R.wait_mps, _R.wait_gain, _R.leaf_m
+ROUND, ROUND_END = _R.round_m, _R.round_end_m
 ASKS = ACTORS.following.asks_m
 PUSH_STOP, QUEUE, HOLD_GAIN, HOLD_MPS = _R.push_stop_m, _R.queue_m, _R.hold_gain, _R.hold_mps
 
@@ -91,7 +92,33 @@ def wants_through(i: int, door: Float, field: Field, crowd: Crowd) -> int:
 
 
 @njit
-def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:  # noqa: C901 (kernel)
+def follows_through(i: int, door: Float, crowd: Crowd) -> int:
+    """The same of person ``i`` who follows somebody, by the next place on its way."""
+    dx, dy = (
+        crowd.discs[i, columns.X] - door[columns.CX],
+        crowd.discs[i, columns.Y] - door[columns.CY],
+    )
+    if crowd.task[i, columns.WALKING] != columns.FOLLOWS or dx * dx + dy * dy > WANTS * WANTS:
+        return 0
+    tx = crowd.state[i, columns.AIM_X] - door[columns.CX]
+    ty = crowd.state[i, columns.AIM_Y] - door[columns.CY]
+    here = dx * door[columns.NX] + dy * door[columns.NY]
+    there = tx * door[columns.NX] + ty * door[columns.NY]
+    if here * there >= 0.0:
+        return 0
+    share = here / (here - there)
+    along = (dx + share * (tx - dx)) * door[columns.EX] + (dy + share * (ty - dy)) * door[
+        columns.EY
+    ]
+    if abs(along) > 0.5 * door[columns.WIDTH] + IN_FRAME:
+        return 0
+    return 1 if here > 0.0 else -1
+
+
+@njit
+def give_turns(  # noqa: C901, PLR0912 (kernel)
+    ways: Doors, field: Field, crowd: Crowd
+) -> None:
     """Who may pass each door, and whether it shall open. Fills ``ways.sides``."""
     doors, passage, sides, discs = ways.doors, ways.passage, ways.sides, crowd.discs
     for d in range(doors.shape[0]):
@@ -101,6 +128,8 @@ def give_turns(ways: Doors, field: Field, crowd: Crowd) -> None:  # noqa: C901 (
         passage[d, columns.INSIDE] = 0.0
         for i in range(sides.shape[0]):
             side = wants_through(i, door, field, crowd)
+            if side == 0:
+                side = follows_through(i, door, crowd)
             sides[i, d] = side
             dx, dy = discs[i, columns.X] - door[columns.CX], discs[i, columns.Y] - door[columns.CY]
             distance = math.sqrt(dx * dx + dy * dy)
@@ -190,3 +219,35 @@ def hold_off(
     excess = -(wanted[0] * rx + wanted[1] * ry) - HOLD_GAIN * (gap - stop - QUEUE * first)
     excess = min(max(excess, 0.0), HOLD_MPS)
     return wanted[0] + excess * rx, wanted[1] + excess * ry
+
+
+@njit
+def round_leaf(
+    i: int, wanted: tuple[float, float], ways: Doors, discs: Float
+) -> tuple[float, float]:
+    """The wanted velocity of one who follows, round the end of a leaf that stands in its way."""
+    wx, wy = wanted
+    speed = math.sqrt(wx * wx + wy * wy)
+    for d in range(len(ways.doors) if speed > 0.0 else 0):
+        door = ways.doors[d]
+        if door[columns.SLIDES] != 0.0:
+            continue
+        width = door[columns.WIDTH]
+        c, s = math.cos(door[columns.ANGLE]), math.sin(door[columns.ANGLE])
+        lx, ly = (
+            c * door[columns.EX] + s * door[columns.NX],
+            c * door[columns.EY] + s * door[columns.NY],
+        )
+        hx = discs[i, columns.X] - door[columns.CX] + 0.5 * width * door[columns.EX]
+        hy = discs[i, columns.Y] - door[columns.CY] + 0.5 * width * door[columns.EY]
+        off = lx * hy - ly * hx
+        towards = (ly * wx - lx * wy) / speed  # to the leaf, per m, where ``off`` is positive
+        if off * towards <= 0.0 or abs(off) > abs(towards) * ROUND:
+            continue
+        far = off / towards / speed
+        met = (hx + far * wx) * lx + (hy + far * wy) * ly
+        if 0.0 < met < width + BODY:
+            dx, dy = (width + ROUND_END) * lx - hx, (width + ROUND_END) * ly - hy
+            gap = max(math.sqrt(dx * dx + dy * dy), 1e-6)
+            wx, wy = speed * dx / gap, speed * dy / gap
+    return wx, wy

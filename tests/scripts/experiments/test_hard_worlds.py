@@ -28,11 +28,11 @@ N, S, SEMI, M = (int(kind) for kind in BeamClass)
 def test_a_level_sets_both_axes_or_one():
     at = Axis(name="motion").at(0.5)
     rates = Dynamism.of(**at)
-    assert (rates.crowd, rates.change) == (0.25, 0.0)
+    assert (rates.crowd, rates.change) == (0.5, 0.0)
     rates = Dynamism.of(**Axis(name="change").at(0.5))
     assert (rates.crowd, rates.change) == (0.0, 0.5)
     rates = Dynamism.of(**Axis().at(0.5))
-    assert (rates.crowd, rates.change) == (0.25, 0.5)
+    assert (rates.crowd, rates.change) == (0.5, 0.5)
     with pytest.raises(InvalidValueError, match="axis must be one of dynamism, motion, change"):
         Axis(name="speed")
     with pytest.raises(InvalidValueError, match="axis must be one of"):
@@ -105,6 +105,24 @@ def test_what_is_seen_goes_into_the_results_and_the_page(tmp_path: Path):
     text = page.read_text()
     assert "| arena | 0 | 0.0 (0.0) |" in text
     assert text.endswith("<!-- /share_seen -->\nend\n")
+
+
+@pytest.mark.parametrize("scene", ["arena", "corridor"])
+def test_what_is_seen_grows_in_a_line_with_the_motion(scene: str):
+    seen = []
+    for level in (0.5, 1.0):
+        cases = [
+            share_seen.Case(
+                scene=scene, level=level, seed=seed, axis="motion", seconds=16.0,
+                scanner="scanner(fov_deg=180,beams=61,rate_hz=2.5,sigma_m=0.01)", away_s=5.0,
+            )
+            for seed in (500, 501, 502)
+        ]  # fmt: skip
+        rows = [share_seen.measure(case) for case in cases]
+        seen.append(np.mean([row["moving"] for row in rows]))
+        assert np.mean([row["blocked"] for row in rows]) < 0.15
+    assert seen[1] > 0.3
+    assert abs(seen[0] - 0.5 * seen[1]) < 0.2 * seen[1]
 
 
 def test_a_page_without_the_mark_is_left_and_nothing_is_run(tmp_path: Path, capsys):
