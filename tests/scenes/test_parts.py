@@ -38,17 +38,32 @@ def test_a_planar_part_collides_with_one_sphere(kind):
 
 
 @pytest.mark.parametrize("kind", LONG)
-def test_a_long_part_collides_with_three_spheres_in_a_row(kind):
+def test_a_long_part_collides_with_three_spheres_in_a_row_and_its_corners(kind):
     model = mujoco.MjModel.from_xml_path(str(PARTS[0].parent / f"{kind}.xml"))
     solid = np.flatnonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))
-    assert [model.geom(int(g)).name for g in solid] == ["hull", "hull1", "hull2"]
+    names = [model.geom(int(g)).name for g in solid]
+    assert names == ["hull", *(f"hull{k}" for k in range(1, len(names)))]
     assert (model.geom_type[solid] == mujoco.mjtGeom.mjGEOM_SPHERE).all()
     assert set(model.geom_contype[solid]) == {2}
     assert set(model.geom_conaffinity[solid]) == {79}
     half = KINDS[kind].half_length_m
     centres = np.array([[0.0, 0.0, 0.3], [-half, 0.0, 0.3], [half, 0.0, 0.3]])
-    np.testing.assert_allclose(model.geom_pos[solid], centres)
-    assert len(set(model.geom_size[solid, 0])) == 1
+    np.testing.assert_allclose(model.geom_pos[solid[:3]], centres)
+    assert len(set(model.geom_size[solid[:3], 0])) == 1
+    for x, y, z in model.geom_pos[solid[3:]].tolist():
+        assert z == 0.3
+        assert [abs(x), abs(y)] in np.abs(model.geom_pos[solid[3:4], :2]).tolist()
+
+
+@pytest.mark.parametrize("kind", [kind for kind in LONG if kind != "couch"])
+def test_no_corner_of_a_long_part_sticks_out_of_its_hulls(kind):
+    model = mujoco.MjModel.from_xml_path(str(PARTS[0].parent / f"{kind}.xml"))
+    hulls = np.flatnonzero(model.geom_contype != 0)
+    boxes = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (model.geom_group == 1)
+    reach = np.abs(model.geom_pos[boxes, :2]) + model.geom_size[boxes, :2]
+    corners = np.array([(x, y) for x, y in reach.tolist()])
+    away = np.linalg.norm(corners[:, None] - model.geom_pos[hulls, :2], axis=2)
+    assert (away - model.geom_size[hulls, 0]).min(axis=1).max() < 0.06
 
 
 def test_long_things_are_put_where_all_their_hulls_have_room():

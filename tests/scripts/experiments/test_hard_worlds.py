@@ -8,14 +8,16 @@ import math
 from pathlib import Path
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 
 from scripts.comparison import folder
 from scripts.comparison.plan import Plan
-from scripts.experiments import breaking_point, share_seen
+from scripts.experiments import breaking_point, penetration, share_seen
 from scripts.knobs import Axis
 from sim.core.dynamism import Dynamism
+from sim.simulation import Simulation
 from slam import system
 from slam.errors import InvalidValueError
 from slam.estimate import Estimate
@@ -134,6 +136,22 @@ def test_a_page_without_the_mark_is_left_and_nothing_is_run(tmp_path: Path, caps
         assert script.main([*words[2:], "--page", str(tmp_path / "none.md")]) == 1
         assert "none.md" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["page.md"]
+
+
+def test_who_stands_in_whom_is_named_with_the_depth():
+    simulation = Simulation("arena", seed=1, dynamism=0.0, crowd="escorts:2", n_chairs=0)
+    world, depths = simulation.world, penetration.Depths(simulation)
+    depths.look()
+    assert depths.worst == {}
+    (one, two), _ = world.bodies.addresses(["escort0", "escort1"])
+    world.data.qpos[one : one + 2] = world.data.qpos[two : two + 2]
+    world.data.qpos[one] += 0.4
+    mujoco.mj_forward(world.model, world.data)
+    depths.look()
+    ((pair, (depth, at_s, *names)),) = depths.worst.items()
+    assert pair == ("person_coat", "person_coat")
+    assert depth == pytest.approx(0.1, abs=1e-6)  # two hulls of 0.25 m, 0.4 m apart
+    assert (at_s, sorted(names)) == (0.0, ["escort0", "escort1"])
 
 
 class Sure(OdometrySlam):
