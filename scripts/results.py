@@ -29,6 +29,7 @@ _ALWAYS = {
     "compare": (*_TABLES, "paired.csv"),
     "drive": (*_TABLES, "goals.csv", "closed_loop.png", "paths.png"),
     "blame": ("blame.json", "blame.png"),
+    "benchmark": ("leaderboard.json", "leaderboard.csv", "leaderboard.md"),
 }
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kidnapped robot: every so often it is carried elsewhere, and its odometry knows nothing of it.
+"""The kidnapped robot: now and then it is carried elsewhere, and its odometry does not know.
 
 It is put to where it stood earlier on its tour, at the same heading, so what it sees there has been
 mapped. It stands still at first, and its wheels have not rolled on the way.
