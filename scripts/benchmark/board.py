@@ -197,8 +197,8 @@ def _lost_from(row: Row) -> float:
 
 def _from(row: Row) -> str:
     low, high = row["lost_from_low"], row["lost_from_high"]
-    between = "" if math.isnan(low) else f" [{_level(low)}, {_level(high)}]"
-    return _level(row["lost_from"]) + between
+    sure = math.isnan(low) or low == high == row["lost_from"]
+    return _level(row["lost_from"]) + ("" if sure else f" [{_level(low)}, {_level(high)}]")
 
 
 def _level(value: float) -> str:

@@ -103,7 +103,7 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
         table.add_column(escape(name), justify="right", overflow="fold")
     for track in board.tracks:
         mark = "" if board.fair[track.name]["counts"] else " (does not count)"
-        cells = (lost_from_words(board.row(track.name, name)) for name in board.slams)
+        cells = (escape(lost_from_words(board.row(track.name, name))) for name in board.slams)
         table.add_row(track.name + mark, *cells)
     console.print(table)
     for name, why in board.missing.items():
