@@ -39,14 +39,6 @@ _METRICS = {
 }
 _ALSO = ("scans", "lost_at_s", "not_trusted_share", "moving_share_of_returns")
 NUMBERS = (*_METRICS, *_ALSO)  # none of them is below 0
-_WORDS = 1000, 2000  # of a file; characters of a name or failure
-SETS = ("test", "train")
-OUTCOMES = ("finished", "lost", *FAILURES)
-NUMBERS = (
-    "scans", "lost_at_s", "ate_unaligned_m", "error_tracking_m", "ate_final_m", "heading_rmse_rad",
-    "nees_over_3", "silent_share", "not_trusted_share", "ms_per_scan_p50", "ms_per_scan_p99",
-    "ms_per_scan_p999", "peak_memory_mb", "moving_share_of_returns",
-)  # fmt: skip
 _SHARES = ("_share", "_share_of_returns")  # at most 1
 _WORDS = {"level", "seed", "recording", "outcome", "failure", "lost", *NUMBERS}
 _NAME, _DIGEST = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}"), re.compile(r"[0-9a-f]{64}")
