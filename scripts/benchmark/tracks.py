@@ -45,7 +45,7 @@ class Track:
     sets: tuple[Sets, ...]
     oracle: str = "oracle(shunting)"
     scanner: str = "noise"
-    odometry: str = "pioneer3dx"
+    odometry: str = "probabilistic_robotics"
     seconds: float = 60.0
     every: int = 8
     drive: str = DRIVE
@@ -116,21 +116,25 @@ _ALL = (
     Track(
         name="tour-guide-v1",
         about="the robot leads visitors through a museum; they walk with it, all round it",
-        scene="gallery", axis="people who walk with the robot", says=_of("people", 0, 2, 4, 8, 16),
-        sets=_each(motion=1.0, change=0.0, crowd=_crowds("escorts", 0, 2, 4, 8, 16), **_QUIET),
+        scene="gallery", axis="people who walk with the robot", says=_of("people", 0, 2, 4, 8, 12),
+        sets=_each(motion=1.0, change=0.0, crowd=_crowds("escorts", 0, 2, 4, 8, 12), **_QUIET),
     ),
     Track(
         name="rush-hour-v1",
-        about="streams of people cross a station hall",
+        about="streams of people cross a station hall, seen by a scanner that reaches 8 m",
         scene="station", axis="people in the streams", says=_of("people", 0, 9, 18, 27, 36),
-        sets=_each(motion=LEVELS, change=0.0, crowd=_crowds("streams", 0, 9, 18, 27, 36)),
+        sets=_each(
+            motion=LEVELS, change=0.0, crowd=_crowds("streams", 0, 9, 18, 27, 36), range_mode="8m",
+        ),
     ),
     Track(
         name="busy-chairs-v1",
-        about="chairs roll about an open room and hardly rest",
-        scene="arena", axis="share of 24 chairs on the move at any time",
-        says=_of("% of 24 chairs", 0, 25, 50, 75, 100),
-        sets=_each(motion=0.0, change=0.0, crowd="none", n_chairs=24, moving_share=LEVELS),
+        about="chairs roll about in a flat and hardly rest",
+        scene="apartment", axis="share of 20 chairs on the move at any time",
+        says=_of("% of 20 chairs", 0, 25, 50, 75, 100), seconds=90.0,
+        sets=_each(
+            motion=0.0, change=0.0, crowd="none", n_people=0, n_chairs=20, moving_share=LEVELS,
+        ),
     ),
     Track(
         name="moving-boards-v1",
@@ -143,12 +147,12 @@ _ALL = (
         about="what the robot has seen stands elsewhere when it comes back, all day long",
         scene="warehouse", axis="share of things put elsewhere while out of sight",
         says=_of("% of things", 0, 25, 50, 75, 100), seconds=120.0,
-        sets=_each(motion=0.0, change=LEVELS, crowd="none", n_people=0),
+        sets=_each(motion=0.0, change=LEVELS, crowd="none", n_people=0, range_mode="8m"),
     ),
     Track(
         name="overnight-v1",
         about="two days in one stream: in the middle things out of sight are put elsewhere, once",
-        scene="office", axis="share of things put elsewhere at half time",
+        scene="apartment", axis="share of things put elsewhere at half time",
         says=_of("% of things", 0, 25, 50, 75, 100), seconds=120.0,
         sets=_each(motion=0.0, change=LEVELS, change_at_s=60.0, crowd="none", n_people=0),
     ),
@@ -164,7 +168,7 @@ _ALL = (
         scene="warehouse", axis="trains of two trolleys, four pickers for each",
         says=_of("trains", 0, 1, 2, 3, 4),
         sets=_each(
-            motion=LEVELS, change=LEVELS,
+            motion=LEVELS, change=LEVELS, range_mode="8m",
             crowd=("none", *(f"trains:{n},streams:{4 * n}" for n in (1, 2, 3, 4))),
         ),
     ),
@@ -190,12 +194,12 @@ _ALL = (
     ),
     Track(
         name="kidnapped-in-a-crowd-v1",
-        about="among people the robot is carried away, and its wheels do not know",
-        scene="office", axis="times it is carried away", says=_of("times", 0, 1, 2, 3, 4),
-        seconds=120.0,
+        about="among people the robot is carried away, once, and its wheels do not know",
+        scene="apartment", axis="people who walk about", says=_of("people", 0, 2, 4, 6, 8),
+        seconds=90.0,
         sets=_each(
-            motion=0.5, change=0.0, crowd="escorts:3,streams:4",
-            kidnap_every_s=(None, 70.0, 45.0, 35.0, 28.0),
+            motion=LEVELS, change=0.0, n_people=0, kidnap_every_s=60.0,
+            crowd=("none", *(f"escorts:{n},streams:{n}" for n in (1, 2, 3, 4))),
         ),
     ),
     Track(
