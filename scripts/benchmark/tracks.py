@@ -139,22 +139,27 @@ _ALL = (
     Track(
         name="moving-boards-v1",
         about="partitions of 1.6 m are pushed about: walls that walk",
-        scene="gallery", axis="boards on castors", says=_of("boards", 0, 2, 4, 6, 8),
-        sets=_each(motion=1.0, change=0.0, crowd=_crowds("boards", 0, 2, 4, 6, 8), **_QUIET),
+        scene="gallery", axis="boards on castors", says=_of("boards", 0, 2, 4, 7, 10),
+        sets=_each(motion=1.0, change=0.0, crowd=_crowds("boards", 0, 2, 4, 7, 10), **_QUIET),
     ),
     Track(
         name="moving-day-v1",
         about="what the robot has seen stands elsewhere when it comes back, all day long",
-        scene="warehouse", axis="share of things put elsewhere while out of sight",
+        scene="random-rooms", axis="share of things put elsewhere while out of sight",
         says=_of("% of things", 0, 25, 50, 75, 100), seconds=120.0,
-        sets=_each(motion=0.0, change=LEVELS, crowd="none", n_people=0, range_mode="8m"),
+        sets=_each(
+            motion=0.0, change=LEVELS, crowd="none", n_people=0, n_chairs=30, range_mode="8m",
+        ),
     ),
     Track(
         name="overnight-v1",
         about="two days in one stream: in the middle things out of sight are put elsewhere, once",
-        scene="apartment", axis="share of things put elsewhere at half time",
+        scene="random-rooms", axis="share of things put elsewhere at half time",
         says=_of("% of things", 0, 25, 50, 75, 100), seconds=120.0,
-        sets=_each(motion=0.0, change=LEVELS, change_at_s=60.0, crowd="none", n_people=0),
+        sets=_each(
+            motion=0.0, change=LEVELS, change_at_s=60.0, crowd="none", n_people=0, n_chairs=30,
+            range_mode="8m",
+        ),
     ),
     Track(
         name="classroom-break-v1",
@@ -165,11 +170,11 @@ _ALL = (
     Track(
         name="warehouse-shift-v1",
         about="trains of trolleys, pickers on foot, pallets that are gone when the robot is back",
-        scene="warehouse", axis="trains of two trolleys, four pickers for each",
-        says=_of("trains", 0, 1, 2, 3, 4),
+        scene="warehouse", axis="trains of two trolleys, two pickers for each",
+        says=_of("trains", 0, 2, 4, 6, 8),
         sets=_each(
             motion=LEVELS, change=LEVELS, range_mode="8m",
-            crowd=("none", *(f"trains:{n},streams:{4 * n}" for n in (1, 2, 3, 4))),
+            crowd=("none", *(f"trains:{n},streams:{2 * n}" for n in (2, 4, 6, 8))),
         ),
     ),
     Track(
@@ -186,7 +191,7 @@ _ALL = (
         name="slow-scans-v1",
         about="two scans a second, 35 cm of way between them, among people",
         scene="office", axis="people, half of them walk with the robot",
-        says=_of("people", 0, 4, 8, 12, 16), every=19,
+        says=_of("people", 0, 4, 8, 12, 16), seconds=90.0, every=19,
         sets=_each(
             motion=LEVELS, change=0.0,
             crowd=("none", *(f"escorts:{n},streams:{n}" for n in (2, 4, 6, 8))),
