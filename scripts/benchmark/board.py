@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -40,17 +41,19 @@ class Board:
     runs: Mapping[str, Sequence[Row]]
     missing: Mapping[str, str] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        fair: dict[str, Row] = {}
-        rows: list[Row] = []
-        for track in self.tracks:
-            fair[track.name], own = scores(track, self.runs[track.name])
-            rows += own
-        object.__setattr__(self, "fair", fair)
-        object.__setattr__(self, "rows", rows)
+    @cached_property
+    def _scores(self) -> dict[str, tuple[Row, list[Row]]]:
+        return {track.name: scores(track, self.runs[track.name]) for track in self.tracks}
 
-    fair: Mapping[str, Row] = field(init=False)
-    rows: Sequence[Row] = field(init=False)
+    @property
+    def fair(self) -> Mapping[str, Row]:
+        """By track: whether it counts, and why."""
+        return {name: fair for name, (fair, _) in self._scores.items()}
+
+    @property
+    def rows(self) -> list[Row]:
+        """One for each track and SLAM."""
+        return [row for _, rows in self._scores.values() for row in rows]
 
     @property
     def slams(self) -> list[str]:
@@ -77,24 +80,27 @@ class Board:
 
     def said(self) -> list[str]:
         """What the reader asked: from which level the subject is lost, on which track."""
-        own = [row for row in self.rows if row["slam"] == self.subject]
-        few = min((row["seeds"] for row in own), default=0)
+        every = self._of(self.subject)
+        few = min((row["seeds"] for row in every), default=0)
+        own = [row for row in every if row["counts"]]
         out = []
         if few < ENOUGH:
             out.append(f"Too few runs to tell: {few} at each level, {ENOUGH} are needed.")
         lost = sorted((r for r in own if math.isfinite(r["lost_from"])), key=_lost_from)
-        kept = [row["track"] for row in own if math.isinf(row["lost_from"])]
         if lost:
             listed = "; ".join(f"{r['track']} from level {_from(r)} on" for r in lost)
             out.append(f"`{self.subject}` is lost half of the time in {listed}.")
-        if kept:
-            out.append(f"Not within the levels of {', '.join(kept)}.")
-        worse = [t.name for t in self.tracks if self._worse_than_wheels(t.name)]
+        if kept := [row["track"] for row in own if math.isinf(row["lost_from"])]:
+            so = "It is" if lost else f"`{self.subject}` is"
+            out.append(f"{so} not lost half of the time at any level of {', '.join(kept)}.")
+        worse = [row["track"] for row in own if self._worse_than_wheels(row["track"])]
         if worse and self.subject != ODOMETRY:
             out.append(
                 f"At level 0 it is already worse than its own odometry in {', '.join(worse)}: "
                 "what moves is not its problem there."
             )
+        if unfair := [row["track"] for row in every if not row["counts"]]:
+            out.append(f"Left out, because the oracle fails there too: {', '.join(unfair)}.")
         return out
 
     def _worse_than_wheels(self, track: str) -> bool:

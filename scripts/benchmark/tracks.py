@@ -99,16 +99,13 @@ def _each(**values: Iterable[Any] | Any) -> tuple[Sets, ...]:
     return tuple({k: v[level] for k, v in rows.items()} for level in range(len(LEVELS)))
 
 
-def _crowds(kind: str, *counts: int, also: str = "") -> tuple[str, ...]:
-    """So many of a kind at each level, ``also`` wherever there are some; "none" for none."""
-    words = ((f"{kind}:{n}", also) for n in counts)
-    return tuple(
-        ",".join(filter(None, pair)) if n else "none" for n, pair in zip(counts, words, strict=True)
-    )
+def _crowds(kind: str, *counts: int) -> tuple[str, ...]:
+    """So many of a kind at each level; "none" for none."""
+    return tuple(f"{kind}:{n}" if n else "none" for n in counts)
 
 
 def _of(unit: str, *counts: float) -> tuple[str, ...]:
-    return tuple(f"{n:g} {unit}".strip() for n in counts)
+    return tuple(f"{n:g} {unit}" for n in counts)
 
 
 _QUIET = {"n_chairs": 0, "n_people": 0}  # nobody but the crowd

@@ -96,9 +96,12 @@ def test_the_sentence_says_where_the_subject_is_lost():
         "`mine` is lost half of the time in tour-guide-v1 from level 0.5 [0.4, 0.6] on."
     ]
     (never,) = board(runs("mine", KEPT)).said()
-    assert never == "Not within the levels of tour-guide-v1."
+    assert never == "`mine` is not lost half of the time at any level of tour-guide-v1."
     worse = board(runs("mine", HALF, error_m=0.3)).said()
     assert "worse than its own odometry in tour-guide-v1" in worse[-1]
+    unfair = [*runs("mine", HALF), *runs(ORACLE, HALF)]
+    (left_out,) = Board(subject="mine", head={}, tracks=[TRACK], runs={TRACK.name: unfair}).said()
+    assert left_out == "Left out, because the oracle fails there too: tour-guide-v1."
     assert board(runs("mine", HALF[:2])).said()[0].startswith("Too few runs to tell: 2")
 
 

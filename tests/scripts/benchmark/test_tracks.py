@@ -14,6 +14,26 @@ from slam.errors import InvalidValueError, UnknownNameError
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "benchmark.md"
 
+PUBLISHED = {
+    "tour-guide-v1": "21d5e4752197",
+    "rush-hour-v1": "468d1883e648",
+    "busy-chairs-v1": "365d7508d942",
+    "moving-boards-v1": "f82412f6ac33",
+    "moving-day-v1": "17d57e56dd01",
+    "overnight-v1": "d01784f84b75",
+    "classroom-break-v1": "e6d09731d9a4",
+    "warehouse-shift-v1": "20e5fb033e79",
+    "ward-round-v1": "11d3c2d8c968",
+    "slow-scans-v1": "fd61112ebd12",
+    "kidnapped-in-a-crowd-v1": "9021973a89e8",
+    "no-walls-v1": "5dffd4132bb7",
+}
+
+
+def test_a_track_never_changes():
+    """One that must gets a new version, or its numbers would have two meanings."""
+    assert {name: track.sha256[:12] for name, track in TRACKS.items()} == PUBLISHED
+
 
 def test_there_are_twelve_and_tuning_has_seeds_of_its_own():
     assert len(TRACKS) == 12
