@@ -15,6 +15,7 @@ from scripts import interrupt
 from scripts.console import console, fail, note
 from scripts.many import ManyValues
 from scripts.verbs.bench import bench
+from scripts.verbs.benchmark import benchmark
 from scripts.verbs.blame import blame
 from scripts.verbs.compare import compare
 from scripts.verbs.config import config
@@ -57,6 +58,7 @@ app.command("bench")(bench)
 app.command("sensor-card")(sensor_card)
 app.command("reproduce")(reproduce)
 app.command("compare", cls=ManyValues)(compare)
+app.command("benchmark", cls=ManyValues)(benchmark)
 app.command("drive", cls=ManyValues)(drive)
 app.command("blame", cls=ManyValues)(blame)
 app.command("report")(report)

@@ -41,8 +41,11 @@ from slam.names import NameFromFile
 from slam.system import config_of
 
 RECIPE = "recipe.json"
-# What comparisons and drives consist of: all else in their folders is somebody else's.
-GROWING = ("*.npz", "*.npz.sha256", "*.csv", "*.png", "runs.json", RECIPE, "report.html")
+# What comparisons, drives and benchmarks consist of: all else in their folders is somebody else's.
+GROWING = (
+    "*.npz", "*.npz.sha256", "*.csv", "*.png", "runs.json", RECIPE, "report.html",
+    "leaderboard.json", "leaderboard.md", "submission_*.json",
+)  # fmt: skip
 OLD = ".old"  # of the earlier run, while a new one takes its place
 STAGED, READY = ".tables.part", ".tables.ready"  # of ``together``, before and after it counts
 MAX_RECIPE_BYTES = 1 << 20

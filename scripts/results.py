@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from scripts.benchmark import submission
 from scripts.comparison import folder as compared
 from scripts.comparison.plan import Run
 from scripts.names import file_name, is_run
@@ -29,6 +30,7 @@ _ALWAYS = {
     "compare": (*_TABLES, "paired.csv"),
     "drive": (*_TABLES, "goals.csv", "closed_loop.png", "paths.png"),
     "blame": ("blame.json", "blame.png"),
+    "benchmark": ("leaderboard.json", "leaderboard.csv", "leaderboard.md"),
 }
 
 
@@ -107,17 +109,19 @@ def _wanted(folder: Path) -> list[str]:
 
 
 def _check_file(path: Path) -> Finding:
-    """A map, or a run of a comparison."""
+    """A map, a run of a comparison, or a submission to the benchmark."""
     try:
         if path.suffix in (".yaml", ".pgm"):
             return _check_map(path.with_suffix(".yaml"))
         if is_run(path):
             compared.RunFile(path)
+        elif path.suffix == ".json":
+            submission.read(path)
         elif path.suffix == ".npz":
             check_vouched(path)
             memory.check(path)
         else:
-            raise LogFormatError(path, "no dataset, episode, run, comparison or map")
+            raise LogFormatError(path, "no dataset, episode, run, comparison, submission or map")
     except LogFormatError as error:
         return finding(path.name, [Fault(kind="damaged", name=path.name, why=str(error))])
     return finding(path.name, [])

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from sim.actors.rearranging import Rearrangement
+from sim.actors.rearranging import PERIOD_S, Rearrangement
 from sim.actors.robot import DriveConfig
 from sim.core import state
+from sim.core.checks import number
 from sim.core.contacts import Contact
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
@@ -26,6 +27,7 @@ from sim.sensors.lidar.schedule import Window
 from sim.sensors.odometry.encoders import WheelOdometry
 from sim.sensors.scan_timing import ScanTiming
 from sim.sensors.tag_cameras import TagCameras, TagReading
+from sim.world.kidnapping import Kidnapping
 from sim.world.labels import BeamLabeller
 from sim.world.substeps import plain
 from sim.world.world import SUBSTEPS_PER_S, World
@@ -54,7 +56,10 @@ class Simulation:
     moving_share  in [0, 1]: of the chairs, on the move at any time (``sim.actors.rolling``)
     change     in [0, 1]: of what is out of sight, the share that is found elsewhere later
                (``sim.actors.rearranging``)
+    change_at_s  the one moment at which that happens, s; None: all along
     session    number of a session of the same building (``sim.world.sessions``)
+    kidnap_every_s  s after which the robot is carried elsewhere, again and again
+               (``sim.world.kidnapping``); None: never
     laser      a scanner by name ("utm30lx", "lms221:noise"; ``sim.sensors.lidar.registry``), a
                ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
@@ -81,7 +86,9 @@ class Simulation:
         moving_share: float | None = None,
         motion: float | None = None,
         change: float | None = None,
+        change_at_s: float | None = None,
         session: int | None = None,
+        kidnap_every_s: float | None = None,
         laser: ScannerConfig | str | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
@@ -99,6 +106,10 @@ class Simulation:
         )  # fmt: skip
         self.odometry_preset, self.session = odometry, session
         seeds = self.world.seeds
+        self._change_at_s = checked_moment(change_at_s)
+        self._kidnapping: Kidnapping | None = None
+        if kidnap_every_s is not None:
+            self._kidnapping = Kidnapping(kidnap_every_s, seeds)
         self.laser = LaserScanner(self.world.model, laser, seeds.generator("lidar"))
         self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=drive.track)
         self._labeller = BeamLabeller(self.world) if labels else None
@@ -149,12 +160,15 @@ class Simulation:
     def _advance(self) -> None:
         """Let the time of one scan pass."""
         world, tags = self.world, self._tags
-        self.rearranged = world.rearrange(self.spec)
+        carried = self._kidnapping is not None and self._kidnapping.carried(world)
+        self.rearranged = world.rearrange(self.spec) if self._may_change() else []
         noted = self.laser.begin(world.data)
         window = self.laser.window
         if window.before:  # the scan begins within the step that the one before ended with
             for rows, own in zip(self._rows, (self.path, self._travel), strict=True):
                 rows[0] = own[-2]
+            if carried:
+                self._rows[0][0] = world.robot_pose()
         world.read_robot(self._rows[0][window.before], self._rows[1][window.before])
         if self.laser.carried:
             self._rows[0][0] = self._rows[0][1]
@@ -173,6 +187,13 @@ class Simulation:
             if tags is not None:
                 tags.note(world.time_ns, world.data)
             first = stop
+
+    def _may_change(self) -> bool:
+        """Whether things out of sight may be put elsewhere before this scan."""
+        if self._change_at_s is None:
+            return True
+        moment = int(self.world.time_ns / NS_PER_S / PERIOD_S)
+        return moment == int(self._change_at_s / PERIOD_S)
 
     def observe(self) -> Frame:
         """Let one scan's worth of time pass under the present command; the frame it gives.
@@ -223,14 +244,17 @@ class Simulation:
         between, scan = self.laser.save()
         if scan:  # the next scan begins within the last step
             between |= {"path": self.path[-2:], "travel": self._travel[-2:]}
+        kidnapping = self._kidnapping
+        places, kidnaps = ({}, None) if kidnapping is None else kidnapping.save()
         return state.pack(
             {
-                **arrays, **seen_by, "world": world, "seen": seen,
+                **arrays, **seen_by, **places, "world": world, "seen": seen,
                 **{f"scan.{name}": values for name, values in between.items()},
             },
             {
                 "encoders": words, "lasers": lasers, "tags": tags, "scan": scan,
                 "scanner": self.laser.scanner.name,
+                **({} if kidnaps is None else {"kidnaps": kidnaps}),
             },
         )  # fmt: skip
 
@@ -248,6 +272,10 @@ class Simulation:
             )
         if (words.get("tags") is None) != (self._tags is None):
             raise InvalidValueError("ceiling cameras are in the state or in the simulation only")
+        if (words.get("kidnaps") is None) != (self._kidnapping is None):
+            raise InvalidValueError("kidnaps are in the state or in the simulation only")
+        if self._kidnapping is not None:
+            self._kidnapping.load(arrays, words["kidnaps"])
         own = {k.removeprefix("scan."): v for k, v in arrays.items() if k.startswith("scan.")}
         self.laser.load(own, words.get("scan", {}))
         self.world.load_state(arrays["world"].tobytes())
@@ -290,6 +318,15 @@ def tour(
     for _ in range(n_frames(seconds, simulation.scan_period_s)):
         simulation.world.set_command(*pilot.command(simulation.scan_period_s))
         yield simulation.observe()
+
+
+def checked_moment(change_at_s: float | None) -> float | None:
+    """``change_at_s``, s; ``InvalidValueError`` where it is neither None nor a time >= 0."""
+    if change_at_s is not None:
+        number("change_at_s", change_at_s)
+        if not 0.0 <= change_at_s < math.inf:
+            raise InvalidValueError(f"change_at_s must be >= 0 and finite, got {change_at_s}")
+    return change_at_s
 
 
 def n_frames(seconds: float, period_s: float) -> int:

@@ -36,7 +36,8 @@ class Oracle:
     """``slam`` behind the protocol; a frame without labels raises ``NeedsLabelsError``.
 
     takes_out  "movable": returns from whatever can move, resting or not; "moving": from what moves
-               now. They become "no return" (infinite range, intensity 0)
+               now. They become "no measurement" (NaN, intensity 0): not "no return", by which a
+               beam says that nothing was there
 
     What ``slam`` can do beyond the protocol, this can. Raises ``InvalidValueError`` for any other
     ``takes_out``.
@@ -79,7 +80,7 @@ class Oracle:
 
 
 def without(scan: Scan, kind: NDArray[np.uint8], takes_out: str) -> Scan:
-    """The scan with "no return" on the beams of those kinds; itself where there are none.
+    """The scan with "no measurement" on the beams of those kinds; itself where there are none.
 
     kind       (n_beams,) ``BeamClass`` of each beam
     takes_out  a key of ``KINDS``
@@ -87,7 +88,7 @@ def without(scan: Scan, kind: NDArray[np.uint8], takes_out: str) -> Scan:
     out = np.isin(kind, KINDS[takes_out])
     if not out.any():
         return scan
-    ranges = np.where(out, np.float32(np.inf), scan.ranges)
+    ranges = np.where(out, np.float32(np.nan), scan.ranges)
     strength = scan.intensities
     return Scan(
         stamp_ns=scan.stamp_ns,

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from scripts.metrics import table
-from scripts.metrics.judged import Judged
+from scripts.metrics.judged import Judged, lost_s
 from slam.errors import SlamFailedError
-from slam.evaluation import lost, metrics
+from slam.evaluation import metrics
 from slam.frames import NS_PER_S
 from slam.replay import Track
 from slam.trajectory import Trajectory
@@ -53,9 +53,7 @@ def lost_at(online: Trajectory, truth: Trajectory) -> float | None:
     """Seconds from the start to the loss (``slam.evaluation.lost``); None if it never was lost."""
     if len(online) == 0:
         return None
-    pairs = metrics.pose_errors(online, truth)
-    seconds = (pairs.stamps_ns - truth.stamps_ns[0]) / NS_PER_S
-    return lost.lost_at(seconds, pairs.distances, pairs.errors[:, 2])
+    return lost_s(metrics.pose_errors(online, truth), truth)
 
 
 def _failed_at_s(track: Track, truth: Trajectory) -> float:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scripts.comparison.columns import COLUMNS
-from scripts.comparison.plan import Run
+from scripts.comparison.plan import LEVEL, Run
 from scripts.knobs import AXES
 from scripts.output import check_whole
 from sim.recording.sums import check_vouched
@@ -196,7 +196,7 @@ class Compared:
 
     @cached_property
     def axis(self) -> str:
-        """What the levels are of, one of ``scripts.knobs.AXES``; rows call it "dynamism"."""
+        """What the levels are of, of ``scripts.knobs.AXES`` or ``LEVEL``; rows say "dynamism"."""
         return axis_in(self.recipe.get("settings"), self.folder / "recipe.json")
 
     @cached_property
@@ -238,8 +238,9 @@ _WORDS = frozenset(
 def axis_in(settings: object, path: Path) -> str:
     """What the levels are of by the settings in the recipe ``path``; before, always dynamism."""
     axis = settings.get("axis", AXES[0]) if isinstance(settings, dict) else AXES[0]
-    if axis not in AXES:
-        raise LogFormatError(path, f"axis must be one of {', '.join(AXES)}, got {axis!r:.80}")
+    if axis not in (*AXES, LEVEL):
+        known = ", ".join((*AXES, LEVEL))
+        raise LogFormatError(path, f"axis must be one of {known}, got {axis!r:.80}")
     return str(axis)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -29,6 +29,11 @@ from slam.variants import PIPE, inside
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
+LEVEL = "level"  # the axis of ``Plan.sets``
+# What a level may set of a recipe; whatever else it sets are options of the scene.
+_OF_RECIPE = (
+    "dynamism", "motion", "change", "moving_share", "change_at_s", "kidnap_every_s", "range_mode",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +64,9 @@ class Plan:
     seconds   of driving
     every     one scan in so many is kept
     scanner   by name (``sim.sensors.lidar.registry``)
+    odometry  preset of the wheel encoders
     motion, change, crowd  the same in every run; None: as ``scripts.knobs.Axis`` says
+    sets      of axis "level": what each level sets, fields of ``Recipe`` and options of the scene
     scan_limit_s  that module:Class and pipe:COMMAND may take for a scan before they count as hung
     """
 
@@ -75,10 +82,12 @@ class Plan:
     motion: float | None = None
     change: float | None = None
     crowd: str | None = None
+    odometry: str = "pioneer3dx"
+    sets: tuple[Mapping[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
         Limits(scan_s=self.scan_limit_s)
-        axis_of(asdict(self))
+        self._check_axis()
         for name in ("slams", "scenes", "levels", "seeds"):
             values = getattr(self, name)
             if not values or len(set(values)) != len(values):
@@ -95,6 +104,17 @@ class Plan:
                 f"{self.every} of {float(1 / period_s):g} a second has 1"
             )
 
+    def _check_axis(self) -> None:
+        if self.axis != LEVEL:
+            axis_of(asdict(self))
+        elif (self.motion, self.change, self.crowd) != (None, None, None):
+            raise InvalidValueError("Plan: with axis 'level' the levels set motion, change, crowd")
+        fits = len(self.sets) == (len(self.levels) if self.axis == LEVEL else 0)
+        if not fits or not all(isinstance(one, Mapping) for one in self.sets):
+            raise InvalidValueError(
+                f"Plan.sets must have a mapping a level of axis 'level', got {self.sets!r:.80}"
+            )
+
     def runs(self) -> list[Run]:
         """Every simulated run, scene by scene, level by level."""
         return [
@@ -106,9 +126,15 @@ class Plan:
 
     def recipe(self, run: Run) -> Recipe:
         """Of a run's simulation."""
+        if self.axis == LEVEL:
+            given = self.sets[self.levels.index(run.dynamism)]
+            own = {"dynamism": 0.0, **{k: v for k, v in given.items() if k in _OF_RECIPE}}
+            options = {k: v for k, v in given.items() if k not in _OF_RECIPE}
+        else:
+            own, options = axis_of(asdict(self)).at(run.dynamism), options_with(self.crowd)
         return Recipe(
-            scene=run.scene, seed=run.seed, **axis_of(asdict(self)).at(run.dynamism),
-            seconds=self.seconds, scanner=self.scanner, options=options_with(self.crowd),
+            scene=run.scene, seed=run.seed, **own, seconds=self.seconds, scanner=self.scanner,
+            odometry=self.odometry, options=options,
         )  # fmt: skip
 
     def recordings(self) -> dict[str, Job]:

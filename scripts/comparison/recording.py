@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -131,6 +132,24 @@ def load(path: Path) -> Recording:
         raise LogFormatError(path, f"no recording of a comparison: it lacks {error}") from error
     except (ValueError, TypeError, IndexError, OverflowError, InvalidValueError) as error:
         raise LogFormatError(path, f"no recording of a comparison: {error}") from error
+
+
+_SEEN = (
+    "stamps_ns", "ranges", "T_odom_robot", "increment_covariances", "twists", "truth",
+    "label_kinds",
+)  # fmt: skip
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of what the SLAMs get of a recording, and of the truth that scores them.
+
+    Not of the file: how it is packed differs between versions of zlib.
+    """
+    whole = hashlib.sha256()
+    for name, array in sorted(read_arrays(path, _SEEN).items()):
+        whole.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        whole.update(np.ascontiguousarray(array).tobytes())
+    return whole.hexdigest()
 
 
 def _labels(kind: NDArray[np.uint8], hit: NDArray[np.int16]) -> BeamLabels:

@@ -11,12 +11,13 @@ from functools import cached_property
 import numpy as np
 
 from slam.errors import InvalidValueError
-from slam.evaluation import metrics
+from slam.evaluation import lost, metrics
 from slam.frames import NS_PER_S, Float, Frame
 from slam.replay import Track
 from slam.system import Estimate
 from slam.trajectory import Trajectory
 
+SILENT_M, SILENT_SIGMAS = 0.1, 3.0  # an error beyond both, and the SLAM trusts itself
 SETTLED_S = 5.0  # NEES counts after this: before, the covariance is that of the known first pose
 
 
@@ -26,6 +27,14 @@ def world_truth(frames: Sequence[Frame]) -> Trajectory:
         stamps_ns=np.array([frame.stamp_ns for frame in frames]),
         poses=np.array([frame.truth for frame in frames]),
     )
+
+
+def lost_s(pairs: metrics.PoseErrors, truth: Trajectory) -> float | None:
+    """Seconds from the start of the truth to the loss (``slam.evaluation.lost``); None for none."""
+    seconds = (pairs.stamps_ns - truth.stamps_ns[0]) / NS_PER_S
+    spared = lost.excused(seconds, pairs.truth[:, :2])
+    distances, headings = (np.where(spared, 0.0, e) for e in (pairs.distances, pairs.errors[:, 2]))
+    return lost.lost_at(seconds, distances, headings)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,6 +96,36 @@ class Judged:
             return metrics.rpe(self.estimate, self.known, per=per)[which].value
         except InvalidValueError:
             return None
+
+    def error_while_tracking(self) -> float | None:
+        """Root mean square position error, m, up to the loss; None where it was lost at once.
+
+        What follows a kidnapping is left out as long as it does not count for a loss.
+        """
+        seconds = (self.pairs.stamps_ns - self.known.stamps_ns[0]) / NS_PER_S
+        end_s = lost_s(self.pairs, self.known)
+        counts = ~lost.excused(seconds, self.pairs.truth[:, :2])
+        counts &= seconds < (math.inf if end_s is None else end_s)
+        off = self.pairs.distances[counts]
+        return math.sqrt(float((off * off).mean())) if len(off) else None
+
+    def silent_share(self) -> float | None:
+        """Of the scans, those ``SILENT_M`` off, beyond ``SILENT_SIGMAS`` of the covariance of
+        position, and trusted by the SLAM; None where it claims nothing, as guests.
+        """
+        if self.covariances is None or not self.covariances.any():
+            return None
+        trusted = np.array([e.converged for e in self.estimates], dtype=np.bool_)
+        off, P = self.pairs.errors[:, :2], self.covariances[:, :2, :2]
+        # e' P^-1 e > 9 by the adjugate: true of a P that is singular and denies the error, too
+        scaled = (
+            P[:, 1, 1] * off[:, 0] ** 2
+            - 2.0 * P[:, 0, 1] * off[:, 0] * off[:, 1]
+            + P[:, 0, 0] * off[:, 1] ** 2
+        )
+        determinants = P[:, 0, 0] * P[:, 1, 1] - P[:, 0, 1] ** 2
+        beyond = scaled >= SILENT_SIGMAS**2 * determinants
+        return float((trusted & beyond & (self.pairs.distances > SILENT_M)).mean())
 
     def nees_over_3(self) -> float | None:
         """Mean after ``SETTLED_S``; None where the SLAM claims nothing, as guests."""

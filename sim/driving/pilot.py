@@ -117,6 +117,8 @@ class Pilot:
         if before is None:
             return 0.0, 0.0
         x, y, turned = se2.between(before, here).tolist()
+        if math.hypot(x, y) > LEAP_MPS * dt:  # it was carried there
+            return 0.0, 0.0
         return math.copysign(math.hypot(x, y), x) / dt, turned / dt
 
 

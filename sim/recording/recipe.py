@@ -24,8 +24,9 @@ from sim.core.seeds import Seeds
 from sim.core.versions import WORLD, world_of
 from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from sim.sensors.odometry.config import PRESETS
-from sim.simulation import Simulation
+from sim.simulation import Simulation, checked_moment
 from sim.twins.twins import TWINS
+from sim.world.kidnapping import Kidnapping
 from sim.world.times_of_day import checked
 from sim.world.world import World
 from slam.bounded import text_of
@@ -38,6 +39,8 @@ SCHEMA = 1
 MAX_BYTES = 1 << 16
 MAX_SECONDS = 86_400.0
 _AXES = ("motion", "change")
+# Added since the first recipes: without a word where they are None.
+_LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s")
 _DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "rosbags")
 
 
@@ -61,6 +64,9 @@ class Recipe:
                 (``sim.actors.rearranging``); None: as the simulation has it
     session     number of a session of the same building (``sim.world.sessions``), ``change`` then
                 being the share that stands elsewhere than in the session before; None: no sessions
+    moving_share  in [0, 1]: of chairs and loads, on the move at any time; None: as motion says
+    change_at_s  the one moment, s, at which things out of sight are put elsewhere; None: all along
+    kidnap_every_s  s after which the robot is carried elsewhere, again and again; None: never
     """
 
     scene: str
@@ -75,13 +81,17 @@ class Recipe:
     motion: float | None = None
     change: float | None = None
     session: int | None = None
+    moving_share: float | None = None
+    change_at_s: float | None = None
+    kidnap_every_s: float | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not isinstance(self.scene, str) or not self.scene:
             raise InvalidValueError(f"Recipe.scene must be a name, got {self.scene!r}")
         Seeds(self.seed)
-        Dynamism.of(Dynamism.at(self.dynamism), motion=self.motion, change=self.change)
+        rates = Dynamism.at(self.dynamism)
+        Dynamism.of(rates, self.moving_share, motion=self.motion, change=self.change)
         number("Recipe.seconds", self.seconds)
         if not 0.0 < self.seconds <= MAX_SECONDS:
             raise InvalidValueError(
@@ -108,6 +118,13 @@ class Recipe:
             number("Recipe.change", self.change)
             if not 0.0 <= self.change <= 1.0:
                 raise InvalidValueError(f"Recipe.change must lie in [0, 1], got {self.change}")
+        checked_moment(self.change_at_s)
+        if self.kidnap_every_s is not None:
+            Kidnapping(self.kidnap_every_s, Seeds(self.seed))
+            if self.twin:
+                raise InvalidValueError(
+                    f"Recipe.kidnap_every_s and twin exclude each other: {self.twin}"
+                )
         if self.session is not None:
             checked(self.session)
             if self.twin:
@@ -133,8 +150,7 @@ class Recipe:
 
     def simulation(self) -> dict[str, Any]:
         """Arguments of ``Simulation``."""
-        later = (*_AXES, "session")
-        more = {name: getattr(self, name) for name in later if getattr(self, name) is not None}
+        more = {name: getattr(self, name) for name in _LATER if getattr(self, name) is not None}
         return {
             "scene": self.scene,
             "seed": self.seed,
@@ -165,8 +181,7 @@ class Recipe:
 
     def words(self) -> dict[str, Any]:
         """As it is written; what was added since the first recipes has no word where it is None."""
-        later = (*_AXES, "session")
-        return {k: v for k, v in asdict(self).items() if k not in later or v is not None}
+        return {k: v for k, v in asdict(self).items() if k not in _LATER or v is not None}
 
     @property
     def sha256(self) -> str:

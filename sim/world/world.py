@@ -262,6 +262,13 @@ class World:
         """Ask the robot for a twist, m/s and rad/s; it is clipped and ramped (``DriveConfig``)."""
         self._drive.command(v, omega)
 
+    def carry(self, pose: Sequence[float] | Float) -> None:
+        """Put the robot at (x m, y m, heading rad), at rest; its wheels roll nothing on the way."""
+        if self.bodies.robot is None:
+            raise InvalidValueError(f"scene '{self.scene.name}' has no robot")
+        self.bodies.put(self.data, [self.bodies.robot], np.array([pose], dtype=np.float64))
+        self._drive.state[[2, 3, 6, 7]] = 0.0  # ramp and wheels; the command stays
+
     def robot_pose(self) -> Float:
         """(3,) ``T_world_robot``: x m, y m, heading rad (not wrapped)."""
         return self.bodies.robot_pose(self.data)

@@ -15,6 +15,8 @@ from slam.frames import Float
 LOST_M = 0.5  # m of position error
 LOST_RAD = math.radians(20.0)  # of heading error
 LOST_S = 1.0  # s on end of either
+LEAP_M, LEAP_MPS = 2.0, 4.0  # between two scans: no robot here drives so far and so fast
+EXCUSED_S = 10.0  # s after it was carried elsewhere, in which to find itself
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +47,19 @@ class LostRule:
 USUAL = LostRule()
 LOST_RULE = str(USUAL)
 FOUND_RULE = f"both errors below half of that for more than {LOST_S:g} s on end"
+
+
+def excused(seconds: Float, places: Float) -> NDArray[np.bool_]:
+    """(n,) scans that do not count for a loss: those of ``EXCUSED_S`` after the robot was carried.
+
+    (n,) times s and (n, 2) true positions m; it was carried where these leap.
+    """
+    steps = places[1:] - places[:-1]
+    ways, times = np.sqrt((steps * steps).sum(axis=1)), np.diff(seconds)
+    out = np.zeros(len(seconds), dtype=np.bool_)
+    for k in np.flatnonzero((ways > LEAP_M) & (ways > LEAP_MPS * times)).tolist():
+        out |= (seconds >= seconds[k + 1]) & (seconds < seconds[k + 1] + EXCUSED_S)
+    return out
 
 
 def lost_at(

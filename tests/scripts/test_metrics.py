@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +14,10 @@ import pytest
 from scripts.comparison import maps, tables
 from scripts.comparison.columns import COLUMNS, scored
 from scripts.metrics import table
+from scripts.metrics.judged import Judged, lost_s
 from scripts.metrics.table import METRICS
 from scripts.single_run.score import scores
-from slam import Trajectory, create
+from slam import Estimate, Trajectory, create
 from slam.replay import Track
 from tests.world2d import Drive, World2D, arena, frames, laser
 
@@ -101,3 +103,55 @@ def test_no_second_list_of_metrics():
 
 def _strings(nodes: list[ast.expr | None]) -> set[str]:
     return {n.value for n in nodes if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+
+
+def judged(errors_m, *, sigma_m: float = 0.01, trusted=None, leap_at: int | None = None) -> Judged:
+    """A robot that drives 0.1 m a scan, 5 a second, of which the SLAM is off by so much across."""
+    n = len(errors_m)
+    stamps = np.arange(n, dtype=np.int64) * 200_000_000
+    poses = np.column_stack([0.1 * np.arange(n), np.zeros(n), np.zeros(n)])
+    if leap_at is not None:
+        poses[leap_at:, 1] += 5.0
+    believed = poses + np.column_stack([np.zeros(n), errors_m, np.zeros(n)])
+    covariance = np.eye(3) * sigma_m**2
+    trusted = [True] * n if trusted is None else trusted
+    said = [
+        Estimate(stamp_ns=int(s), T_map_robot=p, covariance=covariance, converged=bool(t))
+        for s, p, t in zip(stamps, believed, trusted, strict=True)
+    ]
+    return Judged(
+        estimate=Trajectory(stamps_ns=stamps, poses=believed),
+        truth=Trajectory(stamps_ns=stamps, poses=poses),
+        estimates=said,
+        covariances=np.array([covariance] * n),
+        steady_s=np.linspace(0.001, 1.0, 1000),
+    )
+
+
+def test_silent_failures_are_far_beyond_what_is_claimed_and_trusted():
+    off = np.array([0.0, 0.05, 0.2, 0.2, 0.2])
+    share = METRICS["silent_share"].of
+    assert share(judged(off)) == pytest.approx(3 / 5)  # 0.05 m is near enough
+    assert share(judged(off, trusted=[1, 1, 1, 0, 1])) == pytest.approx(2 / 5)
+    assert share(judged(off, sigma_m=0.07)) == 0.0  # within 3 sigma
+    assert share(judged(off, sigma_m=0.0)) is None  # no claim
+
+
+def test_the_error_while_tracking_ends_with_the_loss():
+    off = np.array([0.0, *[0.1] * 9, *[3.0] * 10])
+    error = METRICS["error_tracking_m"].of
+    assert error(judged(off)) == pytest.approx(0.1 * math.sqrt(9 / 10))
+    assert error(judged(off[:10])) == pytest.approx(METRICS["ate_unaligned_m"].of(judged(off[:10])))
+    assert error(judged(np.zeros(5))) == 0.0
+    assert METRICS["ms_per_scan_p999"].of(judged(off)) == pytest.approx(999.0, rel=1e-3)
+
+
+def test_who_was_carried_away_has_ten_seconds_to_find_itself():
+    """50 scans at the wrong place are no loss; 58 of them are, from the end of the time on."""
+    found, late = (np.array([*[0.0] * 5, *[2.0] * n, *[0.0] * 20]) for n in (50, 58))
+    for off, lost_at_s in ((found, None), (late, pytest.approx(11.0))):
+        run = judged(off, leap_at=5)
+        assert lost_s(run.pairs, run.known) == lost_at_s
+        assert METRICS["error_tracking_m"].of(run) == 0.0
+    plain = judged(found)
+    assert lost_s(plain.pairs, plain.known) == pytest.approx(1.0)

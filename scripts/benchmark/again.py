@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Some runs of a submission simulated again: are its recordings those of its tracks?"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scripts.benchmark import submission
+from scripts.benchmark.tracks import ODOMETRY, TRACKS
+from scripts.comparison.recording import digest, record
+from scripts.output import machine, versions
+from sim.recording.verify import Finding
+
+
+def made_again(path: Path, count: int, seed: int = 0) -> Iterator[Finding]:
+    """One finding for each of ``count`` runs, drawn by ``seed``; raises as ``submission.read``.
+
+    "differs" is no proof of anything with other versions or on another processor: then it says so.
+    """
+    given = submission.read(path)
+    runs = [(track, run) for track, own in given.runs.items() for run in own]
+    drawn = np.random.default_rng(seed).choice(len(runs), min(count, len(runs)), replace=False)
+    for track, run in (runs[k] for k in sorted(drawn.tolist())):
+        level = float(run["level"])
+        plan = TRACKS[track].plan(
+            (ODOMETRY,), (run["seed"],), levels=(level,), seconds=given.seconds
+        )
+        (one,) = plan.runs()
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "again.npz"
+            record(file, every=plan.every, **asdict(plan.recipe(one)))
+            same = digest(file) == run["recording"]
+        name = f"{path.name}: {track}, level {level:g}, seed {run['seed']}"
+        if same:
+            yield Finding(episode=name, verdict="same bytes")
+            continue
+        yield Finding(episode=name, verdict="differs", why=_why(given.made_with))
+
+
+def _why(made_with: Mapping[str, Any]) -> str:
+    here = {"versions": versions(), "processor": machine()["processor"]}
+    told = made_with.get("machine")
+    there = {
+        "versions": made_with.get("versions"),
+        "processor": told.get("processor") if isinstance(told, Mapping) else None,
+    }
+    if here != there:
+        return f"its scans are others here: other CPU or version, {there!s:.300}"
+    return "its scans are others here, on the same CPU and versions"

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The benchmark as a whole: a comparison for each track, and the leaderboard of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from scripts.benchmark import submission
+from scripts.benchmark.board import Board
+from scripts.benchmark.submission import Submission
+from scripts.benchmark.systems import installed
+from scripts.benchmark.tracks import LEVELS, TRACKS, Track
+from scripts.comparison.make import carry_out as compare
+from scripts.comparison.plan import RECORDINGS, Plan
+from scripts.comparison.recording import digest
+from scripts.console import note
+from scripts.output import RECIPE, locked_folder, machine, together, versions, write_recipe
+from sim.core.versions import WORLD
+from slam.errors import InvalidValueError
+
+COMMAND = "benchmark"
+SEEDS, QUICK_SEEDS = 6, 1
+QUICK_LEVELS = (0.0, 0.5, 1.0)
+_ALIKE = ("seeds", "levels", "seconds")
+Digests = dict[str, dict[tuple[float, int], str]]  # of recordings, by track, level and seed
+Runs = dict[str, list[dict[str, Any]]]  # rows of runs.csv by track
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What is to be run.
+
+    slams    beside the controls of each track; the subject is one of them
+    train    on the seeds that are for tuning, not on those that count
+    seeds    how many
+    quick    three levels only: runs of the full benchmark, which goes on from there
+    seconds  of each run, instead of the track's own; such a board is for trying out
+    submit   name of a submission to write of the subject's runs
+    missing  SLAMs that would run too if they were installed, and how to get them
+    """
+
+    tracks: tuple[Track, ...]
+    slams: tuple[str, ...]
+    subject: str
+    train: bool = False
+    seeds: int = SEEDS
+    quick: bool = False
+    seconds: float | None = None
+    submit: str | None = None
+    missing: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.submit is not None:
+            submission.checked_name(self.submit)
+        if self.subject not in self.slams:
+            raise InvalidValueError(f"the subject {self.subject!r:.80} is none of the SLAMs")
+        most = min(len(self.seeds_of(track)) for track in self.tracks)
+        if not 1 <= self.seeds <= most:
+            raise InvalidValueError(f"--seeds must be 1 to {most}, got {self.seeds}")
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """Of every track."""
+        return QUICK_LEVELS if self.quick else LEVELS
+
+    def seeds_of(self, track: Track) -> tuple[int, ...]:
+        """All that there are of that kind."""
+        return track.train if self.train else track.test
+
+    def plan(self, track: Track) -> Plan:
+        """The comparison of a track."""
+        seeds = self.seeds_of(track)[: self.seeds]
+        return track.plan(self.slams, seeds, levels=self.levels, seconds=self.seconds)
+
+    def head(self) -> dict[str, Any]:
+        """What a leaderboard says of how it was made."""
+        seeds = self.seeds_of(self.tracks[0])[: self.seeds]
+        return {
+            "tracks_run": [track.name for track in self.tracks],
+            "seeds_of": submission.SETS[self.train],
+            "seeds": list(seeds),
+            "levels_run": list(self.levels),
+            "quick": self.quick,
+            "seconds": self.seconds,
+            "slams": list(self.slams),
+            "world": WORLD,
+        }
+
+
+def wanted_of(
+    tracks: tuple[Track, ...], slams: Sequence[str], subject: str | None, **settings: Any
+) -> Wanted:
+    """With the defaults filled in: all SLAMs that are installed where none is named.
+
+    The subject is the one given, else the first SLAM named, else "shunting". A quick run has no
+    others unless they are named.
+    """
+    named, missing = tuple(slams), dict[str, str]()
+    first = subject or (named[0] if named else "shunting")
+    if not named and not settings.get("quick"):
+        named, missing = installed()
+    every = tuple(dict.fromkeys((first, *named)))
+    return Wanted(tracks=tracks, slams=every, subject=first, missing=missing, **settings)
+
+
+def carry_out(
+    wanted: Wanted,
+    out: Path,
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+    merge: Sequence[Submission] = (),
+) -> Board:
+    """Make what is missing in ``out``, a folder of ``compare`` for each track; the leaderboard.
+
+    merge  submissions of others: they get rows beside those that ran here
+
+    Raises ``InvalidValueError`` for a submission that ran on other scans.
+    """
+    plans = {track.name: wanted.plan(track) for track in wanted.tracks}  # all, before any is made
+    _check_alike(merge, wanted, {name for plan in plans.values() for name in plan.slams})
+    out = out.absolute()
+    with locked_folder(out):
+        settings = {**wanted.head(), "machine": machine()}
+        if not (out / RECIPE).exists():
+            write_recipe(out, COMMAND, settings)
+        runs: Runs = {}
+        for name, plan in plans.items():
+            note(f"{name}: {TRACKS[name].about}")
+            runs[name] = compare(plan, out / name, jobs=jobs, cluster=cluster)
+        digests = {name: _digests(plan, out / name) for name, plan in plans.items()}
+        own = None if wanted.submit is None else _submission(wanted, runs, digests, wanted.submit)
+        for one in merge:
+            for name in plans:
+                runs[name] = runs[name] + _on_the_same_scans(one, name, digests[name])
+        with together(out) as staged:
+            made = _board(wanted, runs)
+            made.write(staged)
+            if own is not None:
+                submission.write(staged / submission.file_of(own.name), own)
+            write_recipe(staged, COMMAND, settings)
+    return made
+
+
+def _board(wanted: Wanted, runs: Runs) -> Board:
+    head = {**wanted.head(), "versions": versions(), "machine": machine()}
+    return Board(
+        subject=wanted.subject, head=head, tracks=wanted.tracks, runs=runs, missing=wanted.missing
+    )
+
+
+def _digests(plan: Plan, folder: Path) -> dict[tuple[float, int], str]:
+    """Of the recording of each level and seed."""
+    jobs = plan.recordings()
+    files = {run: folder / RECORDINGS / jobs[run.name].file_name() for run in plan.runs()}
+    return {(run.dynamism, run.seed): digest(file) for run, file in files.items()}
+
+
+def _submission(wanted: Wanted, runs: Runs, digests: Digests, name: str) -> Submission:
+    kept = {
+        track: [
+            submission.run_of(row, digests[track][row["dynamism"], row["seed"]])
+            for row in rows
+            if row["slam"] == wanted.subject
+        ]
+        for track, rows in runs.items()
+    }
+    head = wanted.head()
+    return Submission(
+        name=name, slam=wanted.subject, seeds_of=head["seeds_of"], seeds=tuple(head["seeds"]),
+        levels=wanted.levels, seconds=wanted.seconds, runs=kept,
+        made_with=submission.made_with(wanted.subject),
+    )  # fmt: skip
+
+
+def _check_alike(merge: Sequence[Submission], wanted: Wanted, taken: set[str]) -> None:
+    """``InvalidValueError`` for one that did not run what is to be run here, or is called alike."""
+    head = wanted.head()
+    ours = (head["seeds_of"], tuple(head["seeds"]), wanted.levels, wanted.seconds)
+    for one in merge:
+        theirs = (one.seeds_of, one.seeds, one.levels, one.seconds)
+        for what, a, b in zip(("kind of seeds", *_ALIKE), theirs, ours, strict=True):
+            if a != b:
+                raise InvalidValueError(
+                    f"submission {one.name!r}: its {what} must be those of the board, {b}, got {a}"
+                )
+        if one.name in taken:
+            raise InvalidValueError(f"submission {one.name!r}: the board has a SLAM of that name")
+        taken.add(one.name)
+
+
+def _on_the_same_scans(
+    one: Submission, track: str, digests: dict[tuple[float, int], str]
+) -> list[dict[str, Any]]:
+    rows = one.rows(track)
+    for row in rows:
+        if row["recording"] != digests[row["dynamism"], row["seed"]]:
+            raise InvalidValueError(
+                f"submission {one.name!r}: {track}, level {row['dynamism']:g}, seed {row['seed']} "
+                "is of other scans than here: made by another version of mobilia, MuJoCo or NumPy, "
+                "or on another kind of processor"
+            )
+    return rows

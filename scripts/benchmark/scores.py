@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the rows of runs to those of the leaderboard: one for each track and SLAM."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.optimize import isotonic_regression
+from scipy.stats import spearmanr
+
+from scripts.benchmark.tracks import Track
+from scripts.comparison.tables import FAILED, number
+from slam.evaluation.statistics import (
+    CONFIDENCE,
+    RESAMPLES,
+    SEED,
+    median_interval,
+    quantile,
+)
+from slam.frames import Float
+
+Row = dict[str, Any]
+ENOUGH = 6  # runs at a level; of fewer nothing is claimed
+FAIR_M = 0.02  # m of median error, up to which the oracle may be off at any level
+ATE, TRACKING, SILENT = "ate_unaligned_m", "error_tracking_m", "silent_share"
+COSTS = ("ms_per_scan_p50", "ms_per_scan_p999", "peak_memory_mb")
+COLUMNS = (
+    "track", "counts", "slam", "seeds", "runs", "lost_runs", "failed_runs",
+    "lost_from", "lost_from_low", "lost_from_high", "lost_at_top",
+    TRACKING, f"{TRACKING}_low", f"{TRACKING}_high", SILENT, "spearman", *COSTS,
+)  # fmt: skip
+
+
+def lost_from(levels: Sequence[float], shares: Sequence[float] | Float) -> float:
+    """The level from which at least half of the runs are lost; infinite where it never comes.
+
+    Shares (n,) are made to rise with the level by isotonic regression, and read off linearly
+    between the levels. No shape is assumed. A logistic curve would have none to fit where nobody is
+    lost at one level and everybody at the next, which is usual.
+    """
+    rising = isotonic_regression(np.asarray(shares, dtype=np.float64)).x
+    above = np.flatnonzero(rising >= 0.5 - 1e-12)
+    if not len(above):
+        return math.inf
+    k = int(above[0])
+    if k == 0:
+        return float(levels[0])
+    part = (0.5 - float(rising[k - 1])) / float(rising[k] - rising[k - 1])
+    return float(levels[k - 1] + part * (levels[k] - levels[k - 1]))
+
+
+def lost_from_interval(levels: Sequence[float], lost: Float) -> tuple[float, float]:
+    """95 % interval of ``lost_from``: percentile bootstrap over the seeds; NaN of fewer than two.
+
+    lost  (seeds, levels) of 0 and 1: a seed is the same room at every level, so it is drawn whole
+    """
+    n = len(lost)
+    if n < 2:
+        return math.nan, math.nan
+    draws = np.random.default_rng(SEED).integers(0, n, (RESAMPLES, n))
+    shares, times = np.unique(lost[draws].mean(axis=1), axis=0, return_counts=True)
+    found = np.repeat([lost_from(levels, row) for row in shares], times).tolist()
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    return quantile(found, tail), quantile(found, 1.0 - tail)
+
+
+def by_level(rows: Sequence[Row], metric: str) -> dict[float, float]:
+    """The median of each level that has one, infinite for failures as everywhere."""
+    found: dict[float, list[float]] = {}
+    for row in rows:
+        value = number(row, metric)
+        if value is not None:
+            found.setdefault(float(row["dynamism"]), []).append(value)
+    return {level: quantile(values, 0.5) for level, values in sorted(found.items())}
+
+
+def spearman(medians: Mapping[float, float]) -> float | None:
+    """Rank correlation of level and median; None of fewer than three, or where all are equal."""
+    if len(medians) < 3 or len(set(medians.values())) == 1:
+        return None
+    return float(spearmanr(list(medians), list(medians.values())).statistic)
+
+
+def score(track: Track, slam: str, rows: Sequence[Row]) -> Row:
+    """The row of one SLAM: ``rows`` are its runs on the track, each level with the same seeds."""
+    levels = sorted({float(row["dynamism"]) for row in rows})
+    seeds = sorted({int(row["seed"]) for row in rows})
+    table = np.zeros((len(seeds), len(levels)))
+    for row in rows:
+        table[seeds.index(int(row["seed"])), levels.index(float(row["dynamism"]))] = row["lost"]
+    low, high = lost_from_interval(levels, table)
+    errors = _values(rows, TRACKING)
+    between = median_interval(errors)
+    silent = _values(rows, SILENT)
+    return {
+        "track": track.name,
+        "slam": slam,
+        "seeds": len(seeds),
+        "runs": len(rows),
+        "lost_runs": int(table.sum()),
+        "failed_runs": sum(row["outcome"] in FAILED for row in rows),
+        "lost_from": lost_from(levels, table.mean(axis=0)),
+        "lost_from_low": low,
+        "lost_from_high": high,
+        "lost_at_top": float(table[:, -1].mean()),
+        TRACKING: quantile(errors, 0.5) if errors else None,
+        f"{TRACKING}_low": between[0],
+        f"{TRACKING}_high": between[1],
+        SILENT: sum(silent) / len(silent) if silent else None,
+        "spearman": spearman(by_level(rows, ATE)),
+        **{cost: _median(_values(rows, cost)) for cost in COSTS},
+    }
+
+
+def _values(rows: Sequence[Row], metric: str) -> list[float]:
+    """As they are, where they are: what failed has no error while it was not lost."""
+    values = (row.get(metric) for row in rows)
+    return [float(v) for v in values if v is not None and not math.isnan(v)]
+
+
+def _median(values: Sequence[float]) -> float | None:
+    return quantile(values, 0.5) if values else None
+
+
+def fairness(track: Track, rows: Sequence[Row]) -> Row:
+    """Whether the track counts, by the runs of its oracle: error at the worst level, runs lost."""
+    own = [row for row in rows if row["slam"] == track.oracle]
+    worst = max(by_level(own, TRACKING).values(), default=math.inf)
+    lost = sum(int(row["lost"]) for row in own)
+    return {
+        "oracle": track.oracle,
+        "oracle_runs": len(own),
+        "oracle_error_m": worst,
+        "oracle_lost": lost,
+        "counts": bool(own) and lost == 0 and worst <= FAIR_M,
+    }
+
+
+def scores(track: Track, rows: Sequence[Row]) -> tuple[Row, list[Row]]:
+    """``fairness`` of the track, and a row for each SLAM in the order of their first run."""
+    fair = fairness(track, rows)
+    slams = dict.fromkeys(row["slam"] for row in rows)
+    table = [score(track, s, [row for row in rows if row["slam"] == s]) for s in slams]
+    return fair, [row | {"counts": fair["counts"]} for row in table]

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The twelve tracks of the benchmark. A track never changes: what is new is a new version of it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from difflib import get_close_matches
+from typing import Any
+
+from scripts.comparison.plan import LEVEL, Plan
+from sim.core.versions import WORLD
+from slam.errors import InvalidValueError, UnknownNameError
+
+LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of every track, from nothing to all that it has
+TRAIN = tuple(range(20))  # seeds to tune on; those that the SLAMs here were tuned on
+TEST = tuple(range(700, 720))  # seeds that count
+ODOMETRY = "odometry"  # the control that looks at nothing
+DRIVE = "tour of the scene's goals, steered by the truth"
+Sets = Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Track:
+    """One track: a room, a drive through it, and five levels of one kind of trouble.
+
+    name     with its version at the end
+    about    one line
+    scene    by name
+    axis     what a level is, in words, and ``says`` what each of the five is
+    sets     what each of them sets: fields of ``sim.recording.recipe.Recipe``, options of the scene
+    oracle   the SLAM that is shown no returns from what moves: while it is not lost, and at most 2
+             cm off, the track is fair
+    every    one scan in so many is kept, of a scanner of 37.5 scans a second
+    train, test  seeds: those to tune on, those that count
+    """
+
+    name: str
+    about: str
+    scene: str
+    axis: str
+    says: tuple[str, ...]
+    sets: tuple[Sets, ...]
+    oracle: str = "oracle(shunting)"
+    scanner: str = "noise"
+    odometry: str = "probabilistic_robotics"
+    seconds: float = 60.0
+    every: int = 8
+    drive: str = DRIVE
+    train: tuple[int, ...] = field(default=TRAIN, repr=False)
+    test: tuple[int, ...] = field(default=TEST, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("says", "sets"):
+            if len(getattr(self, name)) != len(LEVELS):
+                raise InvalidValueError(f"Track.{name} must have {len(LEVELS)} levels: {self.name}")
+        if set(self.train) & set(self.test):
+            raise InvalidValueError(f"Track.train and test must be apart: {self.name}")
+
+    @property
+    def controls(self) -> tuple[str, ...]:
+        """The SLAMs that are in every table."""
+        return (ODOMETRY, self.oracle)
+
+    @property
+    def sha256(self) -> str:
+        """Of all that it says and of the version of the world."""
+        text = json.dumps({"world": WORLD, **asdict(self)}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def plan(
+        self,
+        slams: Iterable[str],
+        seeds: tuple[int, ...],
+        *,
+        levels: tuple[float, ...] = LEVELS,
+        seconds: float | None = None,
+    ) -> Plan:
+        """The comparison of these SLAMs and the controls; ``seconds`` as the track has them."""
+        return Plan(
+            slams=tuple(dict.fromkeys((*slams, *self.controls))),
+            scenes=(self.scene,),
+            axis=LEVEL,
+            levels=levels,
+            sets=tuple(self.sets[LEVELS.index(level)] for level in levels),
+            seeds=seeds,
+            seconds=self.seconds if seconds is None else seconds,
+            every=self.every,
+            scanner=self.scanner,
+            odometry=self.odometry,
+        )
+
+
+def _each(**values: Iterable[Any] | Any) -> tuple[Sets, ...]:
+    """Five levels: of what is given as five values each its own, of the rest the same."""
+    rows = {k: v if isinstance(v, tuple) else (v,) * len(LEVELS) for k, v in values.items()}
+    return tuple({k: v[level] for k, v in rows.items()} for level in range(len(LEVELS)))
+
+
+def _crowds(kind: str, *counts: int) -> tuple[str, ...]:
+    """So many of a kind at each level; "none" for none."""
+    return tuple(f"{kind}:{n}" if n else "none" for n in counts)
+
+
+def _of(unit: str, *counts: float) -> tuple[str, ...]:
+    return tuple(f"{n:g} {unit}" for n in counts)
+
+
+_QUIET = {"n_chairs": 0, "n_people": 0}  # nobody but the crowd
+_ALL = (
+    Track(
+        name="tour-guide-v1",
+        about="the robot leads visitors through a museum; they walk with it, all round it",
+        scene="gallery", axis="people who walk with the robot", says=_of("people", 0, 2, 4, 8, 12),
+        sets=_each(motion=1.0, change=0.0, crowd=_crowds("escorts", 0, 2, 4, 8, 12), **_QUIET),
+    ),
+    Track(
+        name="rush-hour-v1",
+        about="streams of people cross a station hall, seen by a scanner that reaches 8 m",
+        scene="station", axis="people in the streams", says=_of("people", 0, 9, 18, 27, 36),
+        sets=_each(
+            motion=LEVELS, change=0.0, crowd=_crowds("streams", 0, 9, 18, 27, 36), range_mode="8m",
+        ),
+    ),
+    Track(
+        name="busy-chairs-v1",
+        about="chairs roll about in a flat and hardly rest",
+        scene="apartment", axis="share of 20 chairs on the move at any time",
+        says=_of("% of 20 chairs", 0, 25, 50, 75, 100), seconds=90.0,
+        sets=_each(
+            motion=0.0, change=0.0, crowd="none", n_people=0, n_chairs=20, moving_share=LEVELS,
+        ),
+    ),
+    Track(
+        name="moving-boards-v1",
+        about="partitions of 1.6 m are pushed about: walls that walk",
+        scene="gallery", axis="boards on castors", says=_of("boards", 0, 2, 4, 7, 10),
+        sets=_each(motion=1.0, change=0.0, crowd=_crowds("boards", 0, 2, 4, 7, 10), **_QUIET),
+    ),
+    Track(
+        name="moving-day-v1",
+        about="what the robot has seen stands elsewhere when it comes back, all day long",
+        scene="random-rooms", axis="share of things put elsewhere while out of sight",
+        says=_of("% of things", 0, 25, 50, 75, 100), seconds=120.0,
+        sets=_each(
+            motion=0.0, change=LEVELS, crowd="none", n_people=0, n_chairs=30, range_mode="8m",
+        ),
+    ),
+    Track(
+        name="overnight-v1",
+        about="two days in one stream: in the middle things out of sight are put elsewhere, once",
+        scene="random-rooms", axis="share of things put elsewhere at half time",
+        says=_of("% of things", 0, 25, 50, 75, 100), seconds=120.0,
+        sets=_each(
+            motion=0.0, change=LEVELS, change_at_s=60.0, crowd="none", n_people=0, n_chairs=30,
+            range_mode="8m",
+        ),
+    ),
+    Track(
+        name="classroom-break-v1",
+        about="the lesson is over: pupils in groups, chairs pushed back",
+        scene="classroom", axis="pupils in groups", says=_of("pupils", 0, 4, 8, 12, 16),
+        sets=_each(motion=LEVELS, change=0.0, crowd=_crowds("groups", 0, 4, 8, 12, 16)),
+    ),
+    Track(
+        name="warehouse-shift-v1",
+        about="trains of trolleys, pickers on foot, pallets that are gone when the robot is back",
+        scene="warehouse", axis="trains of two trolleys, two pickers for each",
+        says=_of("trains", 0, 2, 4, 6, 8),
+        sets=_each(
+            motion=LEVELS, change=LEVELS, range_mode="8m",
+            crowd=("none", *(f"trains:{n},streams:{2 * n}" for n in (2, 4, 6, 8))),
+        ),
+    ),
+    Track(
+        name="ward-round-v1",
+        about="doctors walk with the robot from bed to bed, and beds are pushed past them",
+        scene="gallery", axis="beds on the move, three doctors for each",
+        says=_of("beds", 0, 1, 2, 3, 4),
+        sets=_each(
+            motion=1.0, change=0.0, **_QUIET,
+            crowd=("none", *(f"beds:{n},escorts:{3 * n}" for n in (1, 2, 3, 4))),
+        ),
+    ),
+    Track(
+        name="slow-scans-v1",
+        about="two scans a second, 35 cm of way between them, among people",
+        scene="office", axis="people, half of them walk with the robot",
+        says=_of("people", 0, 4, 8, 12, 16), seconds=90.0, every=19,
+        sets=_each(
+            motion=LEVELS, change=0.0,
+            crowd=("none", *(f"escorts:{n},streams:{n}" for n in (2, 4, 6, 8))),
+        ),
+    ),
+    Track(
+        name="kidnapped-in-a-crowd-v1",
+        about="among people the robot is carried away, once, and its wheels do not know",
+        scene="apartment", axis="people who walk about", says=_of("people", 0, 2, 4, 6, 8),
+        seconds=90.0,
+        sets=_each(
+            motion=LEVELS, change=0.0, n_people=0, kidnap_every_s=60.0,
+            crowd=("none", *(f"escorts:{n},streams:{n}" for n in (1, 2, 3, 4))),
+        ),
+    ),
+    Track(
+        name="no-walls-v1",
+        about="walls that no beam meets: chairs at rest are all there is, and people walk between",
+        scene="arena", axis="people who walk with the robot", says=_of("people", 0, 2, 4, 6, 8),
+        oracle="oracle(shunting,moving)",
+        sets=_each(
+            motion=0.0, change=0.0, walls="none", crowd=_crowds("escorts", 0, 2, 4, 6, 8),
+        ),
+    ),
+)  # fmt: skip
+
+TRACKS: Mapping[str, Track] = {track.name: track for track in _ALL}
+
+
+def chosen(names: Iterable[str] | None) -> tuple[Track, ...]:
+    """The tracks of these names, with or without ``-v1``; all without any.
+
+    Raises ``UnknownNameError`` with the nearest name.
+    """
+    found: dict[str, Track] = {}
+    for name in names or TRACKS:
+        track = TRACKS.get(name) or TRACKS.get(f"{name}-v1")
+        if track is None:
+            near = get_close_matches(name, TRACKS, n=1)
+            hint = f" Did you mean '{near[0]}'?" if near else ""
+            raise UnknownNameError(f"no track is called '{name}'.{hint} Known: {', '.join(TRACKS)}")
+        found[track.name] = track
+    return tuple(found.values())

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia benchmark``: twelve tracks, every SLAM, one leaderboard."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+from rich.table import Table
+
+from scripts.console import console, note
+from scripts.names import check
+from scripts.verbs.compare import named
+from slam.set_numbers import with_set
+
+if TYPE_CHECKING:
+    from scripts.benchmark.board import Board
+
+
+def benchmark(
+    out: Annotated[Path, typer.Option(help="Folder of the benchmark.")] = Path("out/benchmark"),
+    slam: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="SLAMs, by name, module:Class or pipe:COMMAND: --slam A B C; default all that are "
+            "installed. odometry and an oracle are always there."
+        ),
+    ] = None,
+    subject: Annotated[
+        str | None,
+        typer.Option(help="The SLAM that the sentence on top is about; default the first."),
+    ] = None,
+    tracks: Annotated[
+        list[str] | None, typer.Option(help="Tracks, by name: --tracks A B C; default all.")
+    ] = None,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="Three levels, one seed, the subject alone: minutes, not a night."
+        ),
+    ] = False,
+    train: Annotated[
+        bool, typer.Option("--train", help="On the seeds for tuning, not on those that count.")
+    ] = False,
+    seeds: Annotated[
+        int | None, typer.Option(help="Seeds at every level; default 6, with --quick 1.")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Length of a run, s, to try out; default the track's own.")
+    ] = None,
+    submit: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Also write OUT/submission_NAME.json of the subject."),
+    ] = None,
+    merge: Annotated[
+        list[Path] | None, typer.Option(help="Submissions of others to put into the leaderboard.")
+    ] = None,
+    jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
+    cluster: Annotated[
+        str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
+    ] = None,
+) -> None:
+    """Find out on which track, and from which level on, a SLAM gets lost.
+
+    Writes leaderboard.json, leaderboard.csv and leaderboard.md, and a folder of mobilia compare for
+    each track, which mobilia report, render and blame take. If it is killed, the same command
+    continues. With a SLAM added, only that SLAM runs.
+
+    [bold]mobilia benchmark --quick --slam my_package:MySlam --jobs 2[/bold]
+    """
+    slams = named(slam or [])
+    check((*slams, *([subject] if subject else [])))
+    from scripts import workers
+    from scripts.benchmark import submission
+    from scripts.benchmark.make import QUICK_SEEDS, SEEDS, carry_out, wanted_of
+    from scripts.benchmark.tracks import chosen
+
+    workers.check_jobs(jobs)
+    others = [submission.read(path) for path in merge or ()]
+    count = seeds if seeds is not None else QUICK_SEEDS if quick else SEEDS
+    wanted = wanted_of(
+        chosen(named(tracks or [])), with_set(slams, set_ or []), subject,
+        train=train, seeds=count, quick=quick, seconds=seconds, submit=submit,
+    )  # fmt: skip
+    started = time.perf_counter()
+    board = carry_out(wanted, out, jobs=jobs, cluster=cluster, merge=others)
+    _tell(board, out, time.perf_counter() - started)
+
+
+def _tell(board: Board, out: Path, spent_s: float) -> None:
+    from scripts.benchmark.board import lost_from_words
+
+    table = Table(title="level from which half of the runs are lost", title_justify="left")
+    table.add_column("track")
+    for name in board.slams:
+        table.add_column(escape(name), justify="right", overflow="fold")
+    for track in board.tracks:
+        mark = "" if board.fair[track.name]["counts"] else " (does not count)"
+        cells = (escape(lost_from_words(board.row(track.name, name))) for name in board.slams)
+        table.add_row(track.name + mark, *cells)
+    console.print(table)
+    for name, why in board.missing.items():
+        note(f"{name} is not installed: {why}")
+    for failure in board.failures():
+        note(failure)
+    for line in board.said():
+        console.print(escape(line), soft_wrap=True)
+    console.print(
+        f"{escape(str(out))}: leaderboard.md, leaderboard.csv, leaderboard.json ({spent_s:.0f} s)",
+        soft_wrap=True,
+    )

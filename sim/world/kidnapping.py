@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The kidnapped robot: now and then it is carried elsewhere, and its odometry does not know.
+
+It is put to where it stood earlier on its tour, at the same heading, so what it sees there has been
+mapped. It stands still at first, and its wheels have not rolled on the way.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.core.checks import number
+from sim.core.seeds import Seeds
+from sim.world.world import World
+from slam.errors import InvalidValueError
+from slam.frames import NS_PER_S
+
+Float = NDArray[np.float64]
+FAR_M = 3.0  # m from where it is taken to where it is put, at least
+FREE_M = 0.35  # m between its hull and that of anything that moves, where it is put
+LEAST_S = 1.0  # s from one time to the next, at least
+_NOTED_NS = NS_PER_S // 2  # between two places that are kept in mind
+
+
+class Kidnapping:
+    """Who carries one robot away.
+
+    every_s  s from one time to the next, the first after so long; where no earlier place is far and
+             free, it is put off to the next scan
+    seeds    of the run: the "driving" stream decides, which the tour does not notice
+    """
+
+    def __init__(self, every_s: float, seeds: Seeds) -> None:
+        number("kidnap_every_s", every_s)
+        if not LEAST_S <= every_s < math.inf:
+            raise InvalidValueError(
+                f"kidnap_every_s must be >= {LEAST_S:g} and finite, got {every_s}"
+            )
+        self._every_ns, self._seed = round(every_s * NS_PER_S), seeds.integer("driving")
+        self._noted_ns, self._done = 0, 0
+        self._visited: list[Float] = []
+
+    def carried(self, world: World) -> bool:
+        """Call it before each scan: whether the robot was put elsewhere just now."""
+        now_ns = world.time_ns
+        if now_ns >= self._noted_ns:
+            self._visited.append(world.robot_pose())
+            self._noted_ns = now_ns + _NOTED_NS
+        if now_ns // self._every_ns <= self._done:
+            return False
+        places = self._free(world)
+        if not len(places):
+            return False
+        self._done = now_ns // self._every_ns
+        draws = np.random.default_rng([self._seed, self._done])
+        world.carry(places[int(draws.integers(len(places)))])
+        return True
+
+    def _free(self, world: World) -> Float:
+        """(k, 3) earlier poses that are far from the robot and free of everything that moves."""
+        places, movers = np.array(self._visited), world.mover_poses()
+        radii, robot = world.bodies.radius, world.bodies.robot
+        assert robot is not None
+        apart = places[:, None, :2] - movers[None, :, :2]
+        gaps = np.sqrt((apart * apart).sum(axis=2)) - radii - radii[robot] - FREE_M
+        far = np.sqrt((apart[:, robot] ** 2).sum(axis=1)) >= FAR_M
+        gaps[:, robot] = math.inf
+        free: Float = places[far & (gaps > 0.0).all(axis=1)]
+        return free
+
+    def save(self) -> tuple[dict[str, NDArray[Any]], dict[str, int]]:
+        """Arrays and words from which ``load`` goes on."""
+        visited = np.array(self._visited).reshape(-1, 3)
+        return {"kidnap.visited": visited}, {"noted_ns": self._noted_ns, "done": self._done}
+
+    def load(self, arrays: dict[str, NDArray[Any]], words: dict[str, int]) -> None:
+        """Inverse of ``save``."""
+        self._visited = list(arrays["kidnap.visited"].reshape(-1, 3))
+        self._noted_ns, self._done = int(words["noted_ns"]), int(words["done"])

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/benchmark.md does what it says, followed from a folder outside, with a SLAM of one's own."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from scripts.cli import app
+from scripts.comparison import again
+from scripts.comparison.folder import read
+
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+SHORT = "--tracks busy-chairs --quick --seconds 1.2"  # the same words, but minutes less
+MOST_LINES = 15
+
+
+@pytest.fixture
+def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder with nothing in it but the class of docs/bring_your_own.md."""
+    page = (DOCS / "bring_your_own.md").read_text()
+    block = next(b for b in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "MySlam:" in b)
+    (tmp_path / "my_slam.py").write_text(block)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
+    yield tmp_path
+    sys.modules.pop("my_slam", None)
+
+
+def call(line: str) -> str:
+    done = CliRunner().invoke(app, shlex.split(line)[1:])
+    assert done.exit_code == 0, (done.output, done.exception)
+    return " ".join(done.output.split())
+
+
+def test_submit_verify_and_merge(outside: Path):
+    section = (DOCS / "benchmark.md").read_text().split("## Submit a result")[1]
+    assert len(section.strip().splitlines()) <= MOST_LINES
+    (block,) = re.findall(r"```sh\n(.*?)```", section, re.DOTALL)
+    submit, verify, merge = block.strip().splitlines()
+
+    printed = call(f"{submit} {SHORT}")
+    assert "Too few runs to tell: 1 at each level" in printed
+    file = outside / "out/benchmark/submission_my_slam.json"
+    data = json.loads(file.read_text())
+    assert data["slam"] == "my_slam:MySlam"
+    assert len(data["tracks"]["busy-chairs-v1"]["runs"]) == 3
+
+    assert "same bytes" in call(verify)
+    assert "all well" in call("mobilia verify out/benchmark")
+
+    printed = call(f"{merge} {SHORT}")
+    table = json.loads((outside / "out/board/leaderboard.json").read_text())["leaderboard"]
+    mine, wheels = (table[f"busy-chairs-v1 {name}"] for name in ("my_slam", "odometry"))
+    assert mine["error_tracking_m"] == pytest.approx(wheels["error_tracking_m"], abs=1e-6)
+    assert mine["silent_share"] is None  # it claims no covariance, and the page says so
+    assert "without a covariance: `my_slam`" in (outside / "out/board/leaderboard.md").read_text()
+
+    compared = read(outside / "out/benchmark/busy-chairs-v1")
+    assert compared.axis == "level"
+    run = again.run_of(compared.folder / "runs" / "apartment_l0.5_s700.npz")
+    assert run.recipe.moving_share == 0.5
+
+    wrong = json.loads(file.read_text().replace(data["sha256"], "0" * 64))
+    file.write_text(json.dumps(wrong))
+    done = CliRunner().invoke(app, ["verify", str(file)])
+    assert done.exit_code == 1
+    assert "damaged" in done.output
+
+
+def test_a_second_call_makes_nothing_again(outside: Path):
+    line = f"mobilia benchmark --slam odometry {SHORT}"
+    call(line)
+    files = {f: f.stat().st_mtime_ns for f in outside.rglob("[re]*s/*.npz") if "runs" not in str(f)}
+    assert len(files) == 9  # three recordings; the control and the oracle on each
+    call(line)
+    assert {f: f.stat().st_mtime_ns for f in files} == files
+
+
+def test_what_cannot_be_is_told(outside: Path):
+    for words, told in (
+        ("--tracks nowhere", "no track is called 'nowhere'"),
+        ("--seeds 21", "--seeds must be 1 to 20"),
+        ("--slam odometri", "Did you mean 'odometry'?"),
+        ("--submit a/b", "up to 40 letters"),
+        ("--merge nothing.json", "nothing.json: cannot be read"),
+    ):
+        done = CliRunner().invoke(app, ["benchmark", *words.split()])
+        assert done.exit_code != 0
+        assert told in str(done.exception), words
+    assert not (outside / "out").exists()

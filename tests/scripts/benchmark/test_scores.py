@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the leaderboard says of hand-made runs."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scripts.benchmark import scores
+from scripts.benchmark.board import Board
+from scripts.benchmark.tracks import LEVELS, TRACKS
+
+TRACK = TRACKS["tour-guide-v1"]
+ORACLE = TRACK.oracle
+
+
+def runs(slam: str, lost: list[list[int]], *, error_m: float = 0.01, **more) -> list[dict]:
+    """``lost`` is seed by seed, level by level; the error grows with the level."""
+    return [
+        {
+            "slam": slam, "dynamism": level, "seed": 700 + k, "lost": is_lost, "failure": None,
+            "outcome": "lost" if is_lost else "finished", "ate_unaligned_m": error_m + 0.1 * level,
+            "error_tracking_m": error_m, "silent_share": 0.25 * is_lost, "ms_per_scan_p50": 2.0,
+            "ms_per_scan_p999": 9.0, "peak_memory_mb": 10.0, **more,
+        }
+        for k, seed in enumerate(lost)
+        for level, is_lost in zip(LEVELS, seed, strict=True)
+    ]  # fmt: skip
+
+
+KEPT = [[0, 0, 0, 0, 0]] * 6
+HALF = [[0, 0, 1, 1, 1]] * 3 + [[0, 0, 0, 1, 1]] * 3
+
+
+@pytest.mark.parametrize(
+    ("shares", "level"),
+    [
+        ([0, 0, 0, 0, 0], math.inf),
+        ([0, 0, 0, 0.25, 0.49], math.inf),
+        ([0.5, 1, 1, 1, 1], 0.0),
+        ([0, 0, 1, 1, 1], 0.375),  # halfway between the last level without and the first with all
+        ([0, 0, 0.5, 1, 1], 0.5),
+        ([0, 1, 0, 1, 1], 0.25),  # 1 and 0 in the wrong order are one half each
+        ([0, 0.4, 0.2, 0.7, 1], 0.625),  # 0.3, 0.3, then 0.7
+    ],
+)
+def test_the_level_at_which_half_are_lost(shares: list[float], level: float):
+    assert scores.lost_from(LEVELS, shares) == pytest.approx(level)
+
+
+def test_its_interval_holds_it_and_repeats():
+    lost = np.array(HALF, dtype=float)
+    low, high = scores.lost_from_interval(LEVELS, lost)
+    assert 0.375 <= low < scores.lost_from(LEVELS, lost.mean(axis=0)) <= high <= 0.625
+    assert scores.lost_from_interval(LEVELS, lost) == (low, high)
+    assert all(math.isnan(value) for value in scores.lost_from_interval(LEVELS, lost[:1]))
+    assert scores.lost_from_interval(LEVELS, np.zeros((4, 5))) == (math.inf, math.inf)
+
+
+def test_a_row_sums_up_its_runs():
+    row = scores.score(TRACK, "mine", runs("mine", HALF))
+    assert (row["seeds"], row["runs"], row["lost_runs"], row["failed_runs"]) == (6, 30, 15, 0)
+    assert row["lost_at_top"] == 1.0
+    assert row["spearman"] == pytest.approx(1.0)
+    assert row["silent_share"] == pytest.approx(0.25 * 15 / 30)
+    assert row["error_tracking_m"] == 0.01
+    assert (row["ms_per_scan_p50"], row["ms_per_scan_p999"]) == (2.0, 9.0)
+    claims_nothing = scores.score(TRACK, "mine", runs("mine", HALF, silent_share=None))
+    assert claims_nothing["silent_share"] is None
+
+
+def test_a_track_counts_while_its_oracle_is_near_and_never_lost():
+    good = runs(ORACLE, KEPT, error_m=0.019)
+    assert scores.fairness(TRACK, good)["counts"]
+    assert not scores.fairness(TRACK, runs(ORACLE, [*KEPT[:5], [0, 0, 0, 0, 1]]))["counts"]
+    assert not scores.fairness(TRACK, [])["counts"]
+    far = [r | {"error_tracking_m": 0.021} if r["dynamism"] == 0.75 else r for r in good]
+    assert not scores.fairness(TRACK, far)["counts"]  # at one level is enough
+    assert scores.fairness(TRACK, far)["oracle_error_m"] == 0.021
+
+
+def board(mine: list[dict]) -> Board:
+    rows = [*mine, *runs("odometry", KEPT, error_m=0.2), *runs(ORACLE, KEPT)]
+    return Board(subject="mine", head={"seeds": [700]}, tracks=[TRACK], runs={TRACK.name: rows})
+
+
+def test_the_sentence_says_where_the_subject_is_lost():
+    made = board(runs("mine", HALF))
+    assert made.slams == ["mine", "odometry", ORACLE]
+    assert made.said() == [
+        "`mine` is lost half of the time in tour-guide-v1 from level 0.5 [0.4, 0.6] on."
+    ]
+    (never,) = board(runs("mine", KEPT)).said()
+    assert never == "`mine` is not lost half of the time at any level of tour-guide-v1."
+    worse = board(runs("mine", HALF, error_m=0.3)).said()
+    assert "worse than its own odometry in tour-guide-v1" in worse[-1]
+    unfair = [*runs("mine", HALF), *runs(ORACLE, HALF)]
+    (left_out,) = Board(subject="mine", head={}, tracks=[TRACK], runs={TRACK.name: unfair}).said()
+    assert left_out == "Left out, because the oracle fails there too: tour-guide-v1."
+    assert board(runs("mine", HALF[:2])).said()[0].startswith("Too few runs to tell: 2")
+
+
+def test_what_failed_is_told_with_its_line(tmp_path: Path):
+    raised = runs("mine", KEPT)
+    raised[3] |= {"outcome": "raised", "failure": "scan 2: ValueError (my.py:7)", "lost": 1}
+    made = board(raised)
+    told = "mine failed in 1 runs of tour-guide-v1: scan 2: ValueError (my.py:7)"
+    assert made.failures() == [told]
+    made.write(tmp_path)
+    assert told in (tmp_path / "leaderboard.md").read_text()
+    data = json.loads((tmp_path / "leaderboard.json").read_text())
+    assert data["subject"] == "mine"
+    assert data["tracks"][TRACK.name]["counts"] is True
+    assert data["leaderboard"]["tour-guide-v1 mine"]["failed_runs"] == 1
+    assert data["leaderboard"]["tour-guide-v1 odometry"]["lost_from"] == "inf"
+    assert data["lost_shares"]["tour-guide-v1 odometry"] == {
+        "levels": list(LEVELS), "lost": [0.0] * 5,
+    }  # fmt: skip
+    header, *lines = (tmp_path / "leaderboard.csv").read_text().splitlines()
+    assert header.split(",") == list(scores.COLUMNS)
+    assert len(lines) == 3
+
+
+def test_a_track_of_another_digest_is_another_track():
+    assert replace(TRACK, seconds=61.0).sha256 != TRACK.sha256

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A submission comes back as it was written; anything else is refused by name."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scripts.benchmark import make, submission
+from scripts.benchmark.make import Wanted
+from scripts.benchmark.submission import Submission
+from scripts.benchmark.tracks import LEVELS, TRACKS
+from sim.core.versions import WorldVersionError
+from slam.errors import InvalidValueError, LogFormatError
+
+TRACK = "tour-guide-v1"
+ROW = {
+    "outcome": "finished", "failure": None, "lost": 0, "scans": 282.0, "lost_at_s": None,
+    "ate_unaligned_m": 0.01, "silent_share": float("nan"), "peak_memory_mb": 12.0,
+}  # fmt: skip
+
+
+def made() -> Submission:
+    runs = [
+        submission.run_of({**ROW, "dynamism": level, "seed": seed}, f"{seed:064x}")
+        for level in LEVELS
+        for seed in (700, 701)
+    ]
+    return Submission(
+        name="mine", slam="my_slam:MySlam", seeds_of="test", seeds=(700, 701), levels=LEVELS,
+        seconds=None, runs={TRACK: runs}, made_with=submission.made_with("odometry"),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / submission.file_of("mine")
+    submission.write(path, made())
+    return path
+
+
+def test_it_comes_back(file: Path):
+    found, wanted = submission.read(file), made()
+    for name in ("name", "slam", "seeds_of", "seeds", "levels", "seconds", "runs"):
+        assert getattr(found, name) == getattr(wanted, name)
+    row = found.rows(TRACK)[0]
+    assert (row["slam"], row["dynamism"], row["silent_share"]) == ("mine", 0.0, None)
+    assert found.rows("no-walls-v1") == []
+
+
+def first_run(data: dict[str, Any], **values: Any) -> None:
+    data["tracks"][TRACK]["runs"][0].update(values)
+
+
+WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
+    "schema": (lambda d: d.update(schema=2), "of schema 1"),
+    "what": (lambda d: d.update(what="a recipe"), "no submission"),
+    "name": (lambda d: d.update(name="../x"), "name must be up to 40"),
+    "slam": (lambda d: d.update(slam="a\nb"), "slam must be"),
+    "seeds_of": (lambda d: d.update(seeds_of="best"), "test or train"),
+    "seeds": (lambda d: d.update(seeds=[700, 700]), "seeds must be whole"),
+    "one seed": (lambda d: d.update(seeds=[700]), "expected 5 runs"),
+    "levels": (lambda d: d.update(levels=[0.0, 0.3]), "levels must be of"),
+    "seconds": (lambda d: d.update(seconds=-1), "seconds must be"),
+    "no tracks": (lambda d: d.update(tracks={}), "one or more"),
+    "track": (lambda d: d["tracks"].update(x={"sha256": "", "runs": []}), "track 'x'"),
+    "other track": (lambda d: d["tracks"][TRACK].update(sha256="0" * 64), "none of this version"),
+    "run twice": (lambda d: first_run(d, seed=701), "each level and seed once"),
+    "run of words": (lambda d: d["tracks"][TRACK]["runs"].__setitem__(0, "x"), "a run must have"),
+    "more in a run": (lambda d: first_run(d, more=1), "a run must have"),
+    "recording": (lambda d: first_run(d, recording="0"), "recording must be a SHA-256"),
+    "outcome": (lambda d: first_run(d, outcome="won"), "outcome must be"),
+    "lost": (lambda d: first_run(d, lost=1), "lost must be"),
+    "error": (lambda d: first_run(d, ate_unaligned_m=-0.1), "ate_unaligned_m must be"),
+    "error of words": (lambda d: first_run(d, ate_unaligned_m="0"), "ate_unaligned_m must be"),
+    "share": (lambda d: first_run(d, silent_share=1.5), "silent_share must be"),
+    "no made_with": (lambda d: d.pop("made_with"), "made_with"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_is_wrong_is_named(file: Path, what: str):
+    data = json.loads(file.read_text())
+    change, words = WRONG[what]
+    change(data)
+    data.pop("sha256")
+    data["sha256"] = submission._sha256(data)
+    file.write_text(json.dumps(data))
+    with pytest.raises(LogFormatError, match=words) as told:
+        submission.read(file)
+    assert str(file) in str(told.value)
+
+
+def test_damage_and_other_files_are_refused(file: Path):
+    text = file.read_text()
+    for wrong in (
+        text.replace("0.01", "0.02", 1), text[:-40], "[]", "{}", "[" * 100_000, '{"a": NaN}', "\0",
+    ):  # fmt: skip
+        file.write_text(wrong)
+        with pytest.raises(LogFormatError):
+            submission.read(file)
+    file.write_text(text.replace('"world": 2', '"world": 1'))
+    with pytest.raises(WorldVersionError):
+        submission.read(file)
+    with pytest.raises(LogFormatError):
+        submission.read(file.parent)
+    with file.open("wb") as big:
+        big.truncate(submission.MAX_BYTES + 1)
+    with pytest.raises(LogFormatError, match="at most"):
+        submission.read(file)
+
+
+def test_only_what_is_alike_is_merged():
+    track = TRACKS[TRACK]
+    plain: dict[str, Any] = {"tracks": (track,), "slams": ("ekf",), "subject": "ekf", "seeds": 2}
+    make._check_alike([made()], Wanted(**plain), set())
+    for other in ({"seeds": 3}, {"quick": True}, {"seconds": 5.0}, {"train": True}):
+        with pytest.raises(InvalidValueError, match="those of the board"):
+            make._check_alike([made()], Wanted(**plain | other), set())
+    with pytest.raises(InvalidValueError, match="of that name"):
+        make._check_alike([made(), made()], Wanted(**plain), set())
+    there = {(level, seed): f"{seed:064x}" for level in LEVELS for seed in (700, 701)}
+    assert len(make._on_the_same_scans(made(), TRACK, there)) == 10
+    with pytest.raises(InvalidValueError, match=r"level 0\.5, seed 701 is of other scans"):
+        make._on_the_same_scans(made(), TRACK, there | {(0.5, 701): "f" * 64})

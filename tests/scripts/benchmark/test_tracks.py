@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tracks: twelve, each as it was published, each possible."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import scenes
+from scenes.crowd import crowd_of
+from scripts.benchmark.tracks import LEVELS, TEST, TRACKS, TRAIN, Track, chosen
+from slam.errors import InvalidValueError, UnknownNameError
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "benchmark.md"
+
+PUBLISHED = {
+    "tour-guide-v1": "21d5e4752197",
+    "rush-hour-v1": "468d1883e648",
+    "busy-chairs-v1": "365d7508d942",
+    "moving-boards-v1": "f82412f6ac33",
+    "moving-day-v1": "17d57e56dd01",
+    "overnight-v1": "d01784f84b75",
+    "classroom-break-v1": "e6d09731d9a4",
+    "warehouse-shift-v1": "20e5fb033e79",
+    "ward-round-v1": "11d3c2d8c968",
+    "slow-scans-v1": "fd61112ebd12",
+    "kidnapped-in-a-crowd-v1": "9021973a89e8",
+    "no-walls-v1": "5dffd4132bb7",
+}
+
+
+def test_a_track_never_changes():
+    """One that must gets a new version, or its numbers would have two meanings."""
+    assert {name: track.sha256[:12] for name, track in TRACKS.items()} == PUBLISHED
+
+
+def test_there_are_twelve_and_tuning_has_seeds_of_its_own():
+    assert len(TRACKS) == 12
+    assert all(name.endswith("-v1") and track.name == name for name, track in TRACKS.items())
+    assert not set(TRAIN) & set(TEST)
+    for track in TRACKS.values():
+        assert track.scanner == "noise"
+        assert track.controls[0] == "odometry"
+        assert track.controls[1].startswith("oracle(shunting")
+
+
+@pytest.mark.parametrize("name", TRACKS)
+def test_every_level_sets_something_else_and_the_top_one_has_room(name: str):
+    plan = TRACKS[name].plan(("ekf",), (TEST[0],))
+    assert plan.levels == LEVELS
+    assert plan.slams == ("ekf", *TRACKS[name].controls)
+    recipes = [plan.recipe(run) for run in plan.runs()]
+    assert len({recipe.sha256 for recipe in recipes}) == len(LEVELS)
+    assert recipes[0].motion in (0.0, 0.5, 1.0)
+    top = recipes[-1]
+    built = scenes.build(top.scene, top.seed, **top.options)
+    wanted = crowd_of(top.options["crowd"])
+    assert crowd_of(built.options.get("crowd", "none")) == wanted
+
+
+def test_the_page_has_every_track_with_its_levels():
+    rows = [line for line in PAGE.read_text().splitlines() if line.startswith("| `")]
+    for track in TRACKS.values():
+        (row,) = (row for row in rows if f"`{track.name}`" in row)
+        counts = ", ".join(word.split(" ", 1)[0] for word in track.says)
+        for words in (track.about, f"{track.axis}: {counts}", track.scene, f"{track.seconds:g}"):
+            assert words in row
+
+
+def test_names_may_leave_out_the_version_and_a_wrong_one_is_told():
+    assert chosen(["tour-guide", "no-walls-v1"]) == (TRACKS["tour-guide-v1"], TRACKS["no-walls-v1"])
+    assert chosen(None) == tuple(TRACKS.values())
+    with pytest.raises(UnknownNameError, match=r"'tour-giude'.*tour-guide-v1"):
+        chosen(["tour-giude"])
+
+
+def test_a_track_that_cannot_be_is_refused():
+    one = TRACKS["tour-guide-v1"]
+    told = {"name": "x", "about": "x", "scene": "arena", "axis": "x", "says": one.says}
+    with pytest.raises(InvalidValueError, match=r"Track\.sets must have 5 levels"):
+        Track(**told, sets=one.sets[:4])
+    with pytest.raises(InvalidValueError, match="must be apart"):
+        Track(**told, sets=one.sets, train=(700,))
