@@ -110,7 +110,7 @@ def _mixes(**counts: tuple[int, int, int, int]) -> tuple[Crowd, ...]:
 BY_LEVEL = {
     "apartment": _mixes(escorts=(1, 2, 4, 6)),
     "arena": _mixes(escorts=(2, 4, 7, 14), boards=(0, 0, 1, 2)),
-    "classroom": _mixes(escorts=(1, 3, 6, 9), groups=(0, 0, 0, 4)),
+    "classroom": _mixes(escorts=(1, 1, 3, 9), groups=(0, 0, 0, 4)),
     "corridor": _mixes(escorts=(1, 2, 3, 7), streams=(0, 0, 2, 4)),
     "gallery": _mixes(escorts=(1, 3, 6, 14), groups=(4, 4, 8, 12), boards=(0, 0, 1, 2)),
     "office": _mixes(

@@ -14,7 +14,7 @@ from scripts.benchmark.scores import ATE, COLUMNS, ENOUGH, SILENT, TRACKING, Row
 from scripts.benchmark.tracks import LEVELS, ODOMETRY, Track
 from scripts.comparison.folder import write_csv
 from scripts.comparison.tables import FAILED
-from scripts.metrics.metric import digits
+from scripts.metrics.row import digits
 from scripts.result_files import write as write_results
 from slam.evaluation.lost import EXCUSED_S, LOST_RULE
 from slam.files import write_text
