@@ -53,7 +53,7 @@ OF_THE_MACHINE = (
 )  # columns of runs.csv
 LATER = ("error_tracking_m", "silent_share")  # columns that are younger than the digests
 WORLD_1: dict[str, Any] = {"change": 0.0, "options": {"crowd": "none"}}  # of a recipe
-CROWDED: tuple[tuple[str, float], ...] = ()  # rows of this world: (("0.5 of world 2", 0.5),)
+CROWDED = (("0.5 of world 2", 0.5),)  # rows of this world, with its crowd
 Golden = dict[str, Any]
 
 
