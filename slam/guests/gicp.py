@@ -25,7 +25,7 @@ BASE, NEAR_M = 20, 8.0  # kept scans matched against, and how far from the predi
 CELL_M = 0.05  # one point in each such cell
 APART_M = 0.1  # of the three layers
 NEIGHBOURS = 10  # points that a covariance is of; its default for pre-processing
-REACH_M = 0.5  # points farther apart are no pair
+REACH_M = 0.15  # points farther apart are no pair; 0.25 and 0.5 m are pulled along by movers
 ITERATIONS = 30
 
 

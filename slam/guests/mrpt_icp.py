@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MRPT's icp-slam (Blanco 2.5.8): ICP of each scan against one map of points."""
+"""MRPT's icp-slam (version 2.5): ICP of each scan against one map of points.
+
+The config is that of MRPT's own demo, but for what the training seeds asked for (20 s of office,
+arena and station, still and at motion 0.5): every scan is matched, by every point, with pairs up to
+0.15 m apart, and goes into the map each 0.5 m or 20 degrees.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +50,7 @@ ICP_algorithm = icpClassic
 maxIterations = 80
 minAbsStep_trans = 1e-6
 minAbsStep_rot = 1e-6
-thresholdDist = 0.3
+thresholdDist = 0.15
 thresholdAng_DEG = 5
 ALFA = 0.8
 smallestThresholdDist = 0.05
@@ -67,7 +72,7 @@ class IcpSlam(MrptSlam):
     )  # fmt: skip
 
     def config(self, folder: str) -> str:
-        """The demo's, but that every scan is matched, and by every point."""
+        """``CONFIG``."""
         return CONFIG.format(folder=folder)
 
     def poses(self, rows: Float) -> Float:

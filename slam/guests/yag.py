@@ -31,7 +31,7 @@ RANGE_M = 20.0
 MOST_BEAMS = 4000  # its matcher takes seconds a scan for as many
 NOTHING_M = 1e3  # a range that its matcher takes for no return
 MATCHER = {
-    "search_size": 0.5,  # m across
+    "search_size": 0.3,  # m across
     "resolution": 0.01,  # m
     "smear_deviation": 0.05,  # m
     "coarse_search_angle_offset": 0.35,  # rad either way
