@@ -4,7 +4,8 @@
 It weighs point-to-plane against point-to-point pairs by how many of each a scan has. It is made for
 3D scanners: the scan is stacked in three layers, and the pose that it finds is laid flat. Its own
 odometry starts from constant velocity; here its registration, its voxel map and its threshold are
-called one by one, so that the pose predicted by odometry is the start.
+called one by one, so that the pose predicted by odometry is the start. It sums on several threads,
+in no fixed order: two runs agree to about 1e-14 m a scan, not to the bit.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from slam.system import register
 
 SPACING_AT_M = 10.0  # a voxel is as wide as the beams' spacing there,
 LEAST_M, MOST_M = 0.10, 0.30  # within this
-KEPT_SHARE = 1.0  # of a voxel: edge of the cells of which the map and the match take one point each
+KEPT_SHARE = 0.5  # of a voxel: edge of the cells of which map and match take one point each; at
+# 1.0 the layers fall together now and then, and the match diverges in small rooms
 POINTS = 1  # in a voxel of its map; its default
 PLANARITY = 0.2  # least eigenvalue by their sum, up to which a patch is a plane; its default
 MAP_M = 100.0  # structure farther from the robot is dropped from its map
