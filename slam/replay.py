@@ -22,7 +22,16 @@ from slam.errors import (
 from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame
 from slam.oracle import shown
-from slam.system import CanSave, HasChanges, HasLandmarks, SaysCells, SlamSystem, create, told
+from slam.system import (
+    CanSave,
+    HasChanges,
+    HasLandmarks,
+    RunsAtTheEnd,
+    SaysCells,
+    SlamSystem,
+    create,
+    told,
+)
 from slam.trajectory import Trajectory
 
 
@@ -89,6 +98,24 @@ def asked_trajectory(system: SlamSystem, stamps_ns: NDArray[np.int64]) -> Trajec
     return final
 
 
+def asked_finish(
+    system: RunsAtTheEnd, stamps_ns: NDArray[np.int64]
+) -> tuple[list[Estimate], list[float]]:
+    """Its estimates for ``stamps_ns`` and their processor times, s; ``SlamFailedError`` if not."""
+    with judged():
+        answers = list(system.finish())
+        estimates = [estimate for estimate, _ in answers]
+        spent_s = [float(seconds) for _, seconds in answers]
+        stamps = [estimate.stamp_ns for estimate in estimates]
+    if stamps != stamps_ns.tolist():
+        raise SlamFailedError(
+            f"returned {len(stamps)} estimates; it must return one for each of the "
+            f"{len(stamps_ns)} updates, in order",
+            "bad",
+        )
+    return estimates, spent_s
+
+
 @contextmanager
 def judged() -> Iterator[None]:
     """Whatever somebody's SLAM raises becomes a ``SlamFailedError`` with its outcome.
@@ -121,13 +148,34 @@ class Track:
     system: SlamSystem
     estimates: list[Estimate] = field(default_factory=list)
     durations_s: list[float] = field(default_factory=list)
+    _finished: int = 0  # estimates of which ``finish`` was asked
 
     def online(self) -> Trajectory:
-        """The poses as they were reported at the time."""
+        """The poses as they were reported at the time; of a program over files, its own.
+
+        Raises ``SlamFailedError`` when ``finish`` does, and not a second time.
+        """
+        self.finish()
         return Trajectory(
-            stamps_ns=np.array([e.stamp_ns for e in self.estimates], dtype=np.int64),
+            stamps_ns=self._stamps(),
             poses=np.array([e.T_map_robot for e in self.estimates]).reshape(-1, 3),
         )
+
+    def _stamps(self) -> NDArray[np.int64]:
+        return np.array([e.stamp_ns for e in self.estimates], dtype=np.int64)
+
+    def finish(self) -> None:
+        """Let a system that ``RunsAtTheEnd`` run over the frames so far, once; nothing for others.
+
+        Its estimates take the place of those it gave at the time. Raises ``SlamFailedError``.
+        """
+        if not isinstance(self.system, RunsAtTheEnd) or self._finished == len(self.estimates):
+            return
+        self._finished = len(self.estimates)
+        with self._named("finish()"):
+            estimates, spent_s = asked_finish(self.system, self._stamps())
+        self.estimates[:] = estimates
+        self.durations_s[:] = [a + b for a, b in zip(self.durations_s, spent_s, strict=True)]
 
     def final(self) -> Trajectory | None:
         """The poses as the system sees them now, None where they are the online ones."""
@@ -207,6 +255,10 @@ class Track:
                 self.take(shown(self.system, frame))
             except SlamFailedError as error:
                 return error
+        try:
+            self.finish()
+        except SlamFailedError as error:
+            return error
         return None
 
 

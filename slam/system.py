@@ -7,7 +7,8 @@
         def map(self) -> Raster | None: ...
         def trajectory(self) -> Trajectory: ...
 
-A SLAM may have more: ``HasLandmarks``, ``HasChanges``, ``CanSave`` and ``SaysCells`` are optional.
+A SLAM may have more: ``HasLandmarks``, ``HasChanges``, ``CanSave``, ``SaysCells`` and
+``RunsAtTheEnd`` are optional.
 Who wants one of these asks whether it is there (``slam.replay.Track``), never for a class.
 
 ``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class,
@@ -24,7 +25,7 @@ import inspect
 import os
 import sysconfig
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
@@ -39,8 +40,8 @@ from slam.variants import inside, oracle_of, parsed
 
 __all__ = [
     "CanSave", "Changes", "Estimate", "HasChanges", "HasLandmarks", "Landmarks", "Raster",
-    "SaysCells", "SlamSystem", "config_of", "create", "describe", "names", "register",
-    "register_prefix", "told",
+    "RunsAtTheEnd", "SaysCells", "SlamSystem", "config_of", "create", "describe", "names",
+    "register", "register_prefix", "told",
 ]  # fmt: skip
 
 
@@ -96,17 +97,33 @@ class SaysCells(Protocol):
     cells_hold: str
 
 
+@runtime_checkable
+class RunsAtTheEnd(Protocol):
+    """Optional: a program over files. ``update`` reports odometry's pose, ``finish`` its own."""
+
+    def finish(self) -> Sequence[tuple[Estimate, float]]:
+        """Of each frame so far, in order: the estimate, and the processor time it took, s.
+
+        Each estimate must be of its frame and those before it: it is scored as an online one.
+        """
+
+
 Factory = Callable[..., object]
 F = TypeVar("F", bound=Callable[..., Any])
 _registry: dict[str, Factory] = {}
 OWN = {
     "ekf": "slam.ekf.slam:EkfSlam",
+    "genz-icp": "slam.guests.genz:GenzIcpSlam",
+    "icp-slam": "slam.guests.mrpt_icp:IcpSlam",
     "karto": "slam.guests.karto:KartoSlam",
     "kiss-icp": "slam.guests.kiss:KissIcpSlam",
     "occupancy": "slam.grid.occupancy:OccupancySlam",
     "odometry": "slam.odometry:OdometrySlam",
+    "rbpf-slam": "slam.guests.mrpt_rbpf:RbpfSlam",
     "shunting": "slam.shunting.slam:ShuntingSlam",
     "shunting-features": "slam.shunting.featured:FeaturedShuntingSlam",
+    "small-gicp": "slam.guests.gicp:SmallGicpSlam",
+    "yag-slam": "slam.guests.yag:YagSlam",
 }
 """This project's SLAMs by name, as ``module:Class``: imported when one is asked for."""
 OWN_PREFIXES = {"pipe:": "slam.guests.pipe:PipeSlam"}

@@ -37,13 +37,13 @@ class _Grain:
 _GRAIN = _Grain()
 
 
-def needed(module: str, package: str) -> ModuleType:
+def needed(module: str, package: str, extra: str = "guests") -> ModuleType:
     """The guest's module; raises ``MissingDependencyError`` that says how to get it."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
         raise MissingDependencyError(
-            f"'{package}' cannot be imported ({error}): pip install 'mobilia[guests]'"
+            f"'{package}' cannot be imported ({error}): pip install 'mobilia[{extra}]'"
         ) from error
 
 

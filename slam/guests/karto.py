@@ -17,6 +17,7 @@ from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
+from slam.guests.beams import ranges_of
 from slam.guests.guest import Guest, needed
 from slam.system import register
 
@@ -97,12 +98,7 @@ class KartoSlam(Guest):
     def _scan(self, points_robot: Float, T_map_laser: Float) -> Any:
         """Karto's own type: a range for each beam, here of the de-skewed end points."""
         spec = self._spec
-        x, y = se2.transform(se2.inverse(spec.T_robot_laser), points_robot).T
-        ranges = np.full(spec.n_beams, NOTHING_M)
-        turned = np.array([math.atan2(b, a) for a, b in zip(x.tolist(), y.tolist(), strict=True)])
-        beams = np.floor((turned - spec.angle_min) / spec.angle_increment + 0.5).astype(np.int64)
-        inside = (beams >= 0) & (beams < spec.n_beams)
-        np.minimum.at(ranges, beams[inside], np.sqrt(x * x + y * y)[inside])
+        ranges = ranges_of(points_robot, spec, NOTHING_M)
         pose = self._module.Pose2(*T_map_laser.tolist())
         number = len(self._path)
         return self._module.LocalizedRangeScan(

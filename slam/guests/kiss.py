@@ -8,7 +8,6 @@ predicted by odometry goes in through ``last_delta`` in place of its constant ve
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -16,21 +15,13 @@ import numpy as np
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, needed
+from slam.guests.layers import flattened, lifted
 from slam.system import register
 
 SPACING_AT_M = 10.0  # a voxel is as wide as the beams' spacing there,
 LEAST_M, MOST_M = 0.10, 0.30  # within this
 MAP_M = 100.0  # structure farther from the robot is dropped from its map
 FIRST_M, STILL_M = 0.3, 0.02  # correspondence threshold at the start; motion below it is not learnt
-
-
-def _lifted(pose: Float) -> Float:
-    """(4, 4) of a planar pose."""
-    c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
-    out = np.eye(4)
-    out[:2, :2] = [[c, -s], [s, c]]
-    out[:2, 3] = pose[:2]
-    return out
 
 
 @register("kiss-icp")
@@ -57,8 +48,7 @@ class KissIcpSlam(Guest):
         """ICP from the predicted pose."""
         points = np.zeros((len(points_robot), 3))
         points[:, :2] = points_robot
-        self._icp.last_delta = _lifted(prediction.increment)
+        self._icp.last_delta = lifted(prediction.increment)
         self._icp.register_frame(points, np.zeros(len(points)))
-        T = self._icp.last_pose
-        pose = np.array([T[0, 3], T[1, 3], math.atan2(T[1, 0], T[0, 0])])
+        pose = flattened(self._icp.last_pose)
         return pose, {"threshold_m": float(self._icp.adaptive_threshold.get_threshold())}

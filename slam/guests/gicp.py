@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""small_gicp (Koide 2024): generalised ICP against kept scans, with odometry as its guess.
+
+The package brings the matcher, not a SLAM: as for Karto's, scans are kept after some way or turn,
+stay where they were matched, and each scan is matched to those kept nearest to its predicted place.
+It is made for 3D scanners: scans are stacked in three layers, and the pose found is laid flat.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float, LaserSpec
+from slam.frontend.odometry_prior import Prediction
+from slam.guests.guest import Guest, needed
+from slam.guests.layers import flattened, lifted, stacked
+from slam.system import register
+
+KEEP_M, KEEP_RAD = 0.2, math.radians(10.0)
+BASE, NEAR_M = 20, 8.0  # kept scans matched against, and how far from the predicted place
+CELL_M = 0.05  # one point in each such cell
+APART_M = 0.1  # of the three layers
+NEIGHBOURS = 10  # points that a covariance is of; its default for pre-processing
+REACH_M = 0.15  # points farther apart are no pair; 0.25 and 0.5 m are pulled along by movers
+ITERATIONS = 30
+
+
+@register("small-gicp")
+class SmallGicpSlam(Guest):
+    """small_gicp's matcher, a guest: generalised ICP to nearby kept scans, no graph."""
+
+    def __init__(self) -> None:
+        self._gicp: Any = needed("small_gicp", "small-gicp")
+        super().__init__()
+
+    def begin(self, spec: LaserSpec) -> None:
+        """No scans kept."""
+        self._kept: list[Float] = []
+        self._places: list[Float] = []
+        self._near: tuple[int, ...] = ()
+        self._target: Any = None
+
+    def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
+        """Generalised ICP from the predicted pose."""
+        if not len(points_robot):
+            return prediction.T_map_robot, {"inliers": 0.0}
+        pose, share = prediction.T_map_robot, 1.0
+        if self._kept:
+            cloud, tree = self._goal(pose)
+            source, _ = self._prepared(points_robot)
+            result = self._gicp.align(
+                cloud, source, tree, lifted(pose), "GICP", REACH_M, 1, ITERATIONS
+            )
+            pose = flattened(result.T_target_source)
+            share = result.num_inliers / max(source.size(), 1)
+        moved = se2.between(self._places[-1], pose) if self._kept else np.full(3, np.inf)
+        if math.hypot(float(moved[0]), float(moved[1])) > KEEP_M or abs(moved[2]) > KEEP_RAD:
+            self._kept.append(se2.transform(pose, points_robot))
+            self._places.append(pose)
+        return pose, {"inliers": float(share)}
+
+    def _goal(self, pose: Float) -> Any:
+        """Cloud and tree of the kept scans nearby, made anew when these change."""
+        apart = np.array(self._places)[:, :2] - pose[:2]
+        squares = (apart * apart).sum(axis=1)
+        nearest = np.argsort(squares, kind="stable")[:BASE]
+        near = sorted(int(k) for k in nearest if squares[k] < NEAR_M**2) or [len(self._kept) - 1]
+        if tuple(near) != self._near:
+            self._near = tuple(near)
+            self._target = self._prepared(np.concatenate([self._kept[k] for k in near]))
+        return self._target
+
+    def _prepared(self, points: Float) -> Any:
+        return self._gicp.preprocess_points(stacked(points, APART_M), CELL_M, NEIGHBOURS, 1)

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MRPT's SLAM programs, which read a file and end: what ``icp-slam`` and ``rbpf-slam`` share."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from abc import abstractmethod
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import ClassVar
+
+import numpy as np
+
+from slam import se2
+from slam.errors import InvalidValueError, MissingDependencyError, SlamFailedError
+from slam.estimate import Estimate
+from slam.frames import Float, LaserSpec
+from slam.frontend.odometry_prior import Prediction
+from slam.guests import program, rawlog
+from slam.guests.beams import ranges_of
+from slam.guests.guest import Guest
+from slam.guests.limits import Limits
+from slam.trajectory import Trajectory
+
+MOST_BEAMS = 100_000
+
+
+class MrptSlam(Guest):
+    """A program of MRPT over all frames at once.
+
+    ``update`` keeps the frame and reports odometry's pose. ``finish`` writes the frames so far as
+    a rawlog, runs the program, and returns what it logged: its pose after each scan, which it
+    found from that scan and those before it. So its error is an online error like any other's.
+    Only who wants a pose while the robot still drives (a closed loop, an environment) gets
+    odometry's. Each run begins at the first frame. Raises ``MissingDependencyError`` where the
+    program is not installed.
+    """
+
+    command: ClassVar[str]
+    motion: ClassVar[rawlog.MotionModel]
+
+    def __init__(self) -> None:
+        found = shutil.which(self.command)
+        if found is None:
+            raise MissingDependencyError(
+                f"the program '{self.command}' is not there: apt-get install mrpt-apps "
+                "(Debian, Ubuntu)"
+            )
+        self._program = found
+        super().__init__()
+
+    def reset(self) -> None:
+        """Forget everything; the next frame is the origin of the map."""
+        super().reset()
+        self._frames: list[tuple[Float, Float]] = []
+        self._found: list[tuple[Estimate, float]] = []
+        self._growth_bytes: int | None = None
+
+    def begin(self, spec: LaserSpec) -> None:
+        """Note the scanner; the rawlog has one."""
+        if spec.n_beams > MOST_BEAMS:
+            raise InvalidValueError(
+                f"{type(self).__name__} takes scanners of up to {MOST_BEAMS} beams, "
+                f"got {spec.n_beams}"
+            )
+        self._spec = spec
+
+    def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
+        """Keep the scan; the pose is odometry's until ``finish``."""
+        ranges = ranges_of(points_robot, self._spec, math.inf)
+        self._frames.append((prediction.increment, ranges))
+        return prediction.T_map_robot, {}
+
+    def finish(self) -> list[tuple[Estimate, float]]:
+        """Of each frame so far: the program's estimate, and the processor time it took, s.
+
+        Raises ``SlamFailedError`` where the program fails.
+        """
+        if len(self._found) != len(self._frames):
+            with TemporaryDirectory(prefix="mobilia-") as folder:
+                self._found = self._run(Path(folder).resolve())
+        return self._found
+
+    def trajectory(self) -> Trajectory:
+        """The program's poses, as ``finish`` has them: it moves none later."""
+        return self._path.trajectory(
+            np.array([e.T_map_robot for e, _ in self.finish()]).reshape(-1, 3)
+        )
+
+    def memory_growth_bytes(self) -> int | None:
+        """How far the program's memory grew over the scans, of its last run."""
+        return self._growth_bytes
+
+    @abstractmethod
+    def config(self, folder: str) -> str:
+        """The text of its config file; its logs are to go to ``folder``."""
+
+    @abstractmethod
+    def poses(self, rows: Float) -> Float:
+        """(n, 3) m, m, rad of the rows of its log of the path."""
+
+    @abstractmethod
+    def spent(self, rows: Float) -> Float:
+        """(n,) ms of the rows of its log of times."""
+
+    def _run(self, folder: Path) -> list[tuple[Estimate, float]]:
+        stamps = self._path.trajectory().stamps_ns.tolist()
+        with (folder / "frames.rawlog").open("wb") as file:
+            for stamp_ns, (increment, ranges) in zip(stamps, self._frames, strict=True):
+                file.write(rawlog.action(stamp_ns, increment, self.motion))
+                file.write(rawlog.sensed(stamp_ns, ranges, self._spec))
+        (folder / "config.ini").write_text(self.config(f"{folder}/log"))
+        words = [self._program, f"{folder}/config.ini", f"{folder}/frames.rawlog"]
+        processor_s = program.run(words, Limits.first_s + len(stamps) * Limits.scan_s)
+        path = self.poses(self._log(folder / "log" / "log_estimated_path.txt"))
+        if not np.isfinite(path).all():
+            raise SlamFailedError(f"{type(self).__name__} logged a pose that is not finite", "nan")
+        wall_ms = np.maximum(self.spent(self._log(folder / "log" / "log_times.txt")), 1e-6)
+        memory = self._log(folder / "log" / "log_MemoryUsage.txt")[:, 1]
+        self._growth_bytes = int(memory.max() - memory[0])
+        shares = (processor_s * wall_ms / wall_ms.sum()).tolist()
+        return [
+            (self._estimate(stamp_ns, se2.between(path[0], pose)), share)
+            for stamp_ns, pose, share in zip(stamps, path, shares, strict=True)
+        ]
+
+    def _log(self, path: Path) -> Float:
+        """(frames, k) numbers of a log, a row each frame."""
+        try:
+            rows: Float = np.loadtxt(path, comments="%", ndmin=2)
+        except OSError as error:
+            raise SlamFailedError(f"{type(self).__name__} wrote no {path.name}", "bad") from error
+        except ValueError as error:
+            raise SlamFailedError(f"{type(self).__name__}: {path.name}: {error}", "bad") from error
+        if len(rows) != len(self._frames):
+            raise SlamFailedError(
+                f"{type(self).__name__} logged {len(rows)} rows of {path.name} for "
+                f"{len(self._frames)} scans",
+                "bad",
+            )
+        return rows
+
+    def _estimate(self, stamp_ns: int, T_map_robot: Float) -> Estimate:
+        return Estimate(stamp_ns=stamp_ns, T_map_robot=T_map_robot, covariance=np.zeros((3, 3)))
