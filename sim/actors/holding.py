@@ -62,11 +62,10 @@ def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:
             continue
         c, s = math.cos(qpos[qa + 2]), math.sin(qpos[qa + 2])
         arm, bx, by = held.pose[k, 0], 0.0, 0.0
-        if held.hinged[k]:
-            # The hand is where holder and thing meet, half way; the thing's end of it turns along.
-            arm *= 0.5
-            bx, by = -math.cos(qpos[qb + 2]) * arm, -math.sin(qpos[qb + 2]) * arm
         rx, ry = c * arm - s * held.pose[k, 1], s * arm + c * held.pose[k, 1]
+        if held.hinged[k]:  # it turns about the middle of the holder, who turns as freely
+            rx = ry = 0.0
+            bx, by = -math.cos(qpos[qb + 2]) * arm, -math.sin(qpos[qb + 2]) * arm
         ex, ey = qpos[qa] + rx - qpos[qb] - bx, qpos[qa + 1] + ry - qpos[qb + 1] - by
         if ex * ex + ey * ey > LOST * LOST:
             continue

@@ -175,8 +175,8 @@ def keep_hold(
         ey = me[columns.Y] - thing[columns.Y] + s * px + c * py
         if held.hinged[k]:
             ct, st = math.cos(crowd.yaws[row]), math.sin(crowd.yaws[row])
-            ex -= 0.5 * px * (c - ct)
-            ey -= 0.5 * px * (s - st)
+            ex -= px * (c - ct)
+            ey -= px * (s - st)
         far = math.sqrt(ex * ex + ey * ey)
         if far < SLACK:
             continue
