@@ -22,7 +22,7 @@ from sim.core.versions import WORLD
 from slam.errors import InvalidValueError
 
 COMMAND = "benchmark"
-SEEDS, QUICK_SEEDS = 6, 1
+SEEDS, QUICK_SEEDS = 6, 2
 QUICK_LEVELS = (0.0, 0.5, 1.0)
 _ALIKE = ("seeds", "levels", "seconds")
 Digests = dict[str, dict[tuple[float, int], str]]  # of recordings, by track, level and seed

@@ -18,6 +18,7 @@ LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of every track, from nothing to all that
 TRAIN = tuple(range(20))  # seeds to tune on; those that the SLAMs here were tuned on
 TEST = tuple(range(700, 720))  # seeds that count
 ODOMETRY = "odometry"  # the control that looks at nothing
+GOOD_ODOMETRY = "pioneer3dx"  # in large halls, where with the poor one even an oracle drifts
 DRIVE = "tour of the scene's goals, steered by the truth"
 Sets = Mapping[str, Any]
 
@@ -118,25 +119,27 @@ _ALL = (
     ),
     Track(
         name="rush-hour-v1",
-        about="streams of people cross a station hall, seen by a scanner that reaches 8 m",
+        about="streams of people cross a station hall",
         scene="station", axis="people in the streams", says=_of("people", 0, 9, 18, 27, 36),
+        seconds=90.0, odometry=GOOD_ODOMETRY,
         sets=_each(
-            motion=LEVELS, change=0.0, crowd=_crowds("streams", 0, 9, 18, 27, 36), range_mode="8m",
+            motion=LEVELS, change=0.0, crowd=_crowds("streams", 0, 9, 18, 27, 36),
         ),
     ),
     Track(
         name="busy-chairs-v1",
         about="chairs roll about in a flat and hardly rest",
-        scene="apartment", axis="share of 20 chairs on the move at any time",
-        says=_of("% of 20 chairs", 0, 25, 50, 75, 100), seconds=90.0,
+        scene="apartment", axis="share of 36 chairs on the move at any time",
+        says=_of("% of 36 chairs", 0, 25, 50, 75, 100), seconds=120.0,
         sets=_each(
-            motion=0.0, change=0.0, crowd="none", n_people=0, n_chairs=20, moving_share=LEVELS,
+            motion=0.0, change=0.0, crowd="none", n_people=0, n_chairs=36, moving_share=LEVELS,
         ),
     ),
     Track(
         name="moving-boards-v1",
         about="partitions of 1.6 m are pushed about: walls that walk",
         scene="gallery", axis="boards on castors", says=_of("boards", 0, 2, 4, 7, 10),
+        seconds=120.0,
         sets=_each(motion=1.0, change=0.0, crowd=_crowds("boards", 0, 2, 4, 7, 10), **_QUIET),
     ),
     Track(
@@ -145,7 +148,8 @@ _ALL = (
         scene="random-rooms", axis="share of things put elsewhere while out of sight",
         says=_of("% of things", 0, 25, 50, 75, 100), seconds=120.0,
         sets=_each(
-            motion=0.0, change=LEVELS, crowd="none", n_people=0, n_chairs=30, range_mode="8m",
+            motion=0.0, change=LEVELS, crowd="none", n_people=0, n_chairs=60, clutter=0.1,
+            range_mode="8m",
         ),
     ),
     Track(
@@ -154,8 +158,8 @@ _ALL = (
         scene="random-rooms", axis="share of things put elsewhere at half time",
         says=_of("% of things", 0, 25, 50, 75, 100), seconds=120.0,
         sets=_each(
-            motion=0.0, change=LEVELS, change_at_s=60.0, crowd="none", n_people=0, n_chairs=30,
-            range_mode="8m",
+            motion=0.0, change=LEVELS, change_at_s=60.0, crowd="none", n_people=0, n_chairs=60,
+            clutter=0.1, range_mode="8m",
         ),
     ),
     Track(
@@ -168,30 +172,30 @@ _ALL = (
         name="warehouse-shift-v1",
         about="trains of trolleys, pickers on foot, pallets that are gone when the robot is back",
         scene="warehouse", axis="trains of two trolleys, two pickers for each",
-        says=_of("trains", 0, 2, 4, 6, 8),
+        says=_of("trains", 0, 1, 2, 4, 6), odometry=GOOD_ODOMETRY,
         sets=_each(
-            motion=LEVELS, change=LEVELS, range_mode="8m",
-            crowd=("none", *(f"trains:{n},streams:{2 * n}" for n in (2, 4, 6, 8))),
+            motion=LEVELS, change=LEVELS,
+            crowd=("none", *(f"trains:{n},streams:{2 * n}" for n in (1, 2, 4, 6))),
         ),
     ),
     Track(
         name="ward-round-v1",
         about="doctors walk with the robot from bed to bed, and beds are pushed past them",
-        scene="gallery", axis="beds on the move, three doctors for each",
+        scene="gallery", axis="beds on the move, two doctors for each",
         says=_of("beds", 0, 1, 2, 3, 4),
         sets=_each(
             motion=1.0, change=0.0, **_QUIET,
-            crowd=("none", *(f"beds:{n},escorts:{3 * n}" for n in (1, 2, 3, 4))),
+            crowd=("none", *(f"beds:{n},escorts:{2 * n}" for n in (1, 2, 3, 4))),
         ),
     ),
     Track(
         name="slow-scans-v1",
         about="two scans a second, 35 cm of way between them, among people",
         scene="office", axis="people, half of them walk with the robot",
-        says=_of("people", 0, 4, 8, 12, 16), seconds=90.0, every=19,
+        says=_of("people", 0, 2, 4, 6, 8), seconds=90.0, every=19,
         sets=_each(
             motion=LEVELS, change=0.0,
-            crowd=("none", *(f"escorts:{n},streams:{n}" for n in (2, 4, 6, 8))),
+            crowd=("none", *(f"escorts:{n},streams:{n}" for n in (1, 2, 3, 4))),
         ),
     ),
     Track(
@@ -210,7 +214,8 @@ _ALL = (
         scene="arena", axis="people who walk with the robot", says=_of("people", 0, 2, 4, 6, 8),
         oracle="oracle(shunting,moving)",
         sets=_each(
-            motion=0.0, change=0.0, walls="none", crowd=_crowds("escorts", 0, 2, 4, 6, 8),
+            motion=1.0, change=0.0, moving_share=0.0, n_chairs=24, walls="none",
+            crowd=_crowds("escorts", 0, 2, 4, 6, 8),
         ),
     ),
 )  # fmt: skip

@@ -39,14 +39,14 @@ def benchmark(
     quick: Annotated[
         bool,
         typer.Option(
-            "--quick", help="Three levels, one seed, the subject alone: minutes, not a night."
+            "--quick", help="Three levels, two seeds, the subject alone: minutes, not a night."
         ),
     ] = False,
     train: Annotated[
         bool, typer.Option("--train", help="On the seeds for tuning, not on those that count.")
     ] = False,
     seeds: Annotated[
-        int | None, typer.Option(help="Seeds at every level; default 6, with --quick 1.")
+        int | None, typer.Option(help="Seeds at every level; default 6, with --quick 2.")
     ] = None,
     seconds: Annotated[
         float | None, typer.Option(help="Length of a run, s, to try out; default the track's own.")

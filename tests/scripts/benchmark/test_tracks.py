@@ -16,17 +16,17 @@ PAGE = Path(__file__).resolve().parents[3] / "docs" / "benchmark.md"
 
 PUBLISHED = {
     "tour-guide-v1": "21d5e4752197",
-    "rush-hour-v1": "468d1883e648",
-    "busy-chairs-v1": "365d7508d942",
-    "moving-boards-v1": "f82412f6ac33",
-    "moving-day-v1": "17d57e56dd01",
-    "overnight-v1": "d01784f84b75",
+    "rush-hour-v1": "ea5d621a84ba",
+    "busy-chairs-v1": "40f614eed78c",
+    "moving-boards-v1": "4371b8b00bb9",
+    "moving-day-v1": "27e20bd9c1fc",
+    "overnight-v1": "157e351418a9",
     "classroom-break-v1": "e6d09731d9a4",
-    "warehouse-shift-v1": "20e5fb033e79",
-    "ward-round-v1": "11d3c2d8c968",
-    "slow-scans-v1": "fd61112ebd12",
+    "warehouse-shift-v1": "0bcfe9099236",
+    "ward-round-v1": "1f8d8bdcb9ea",
+    "slow-scans-v1": "06725df150cf",
     "kidnapped-in-a-crowd-v1": "9021973a89e8",
-    "no-walls-v1": "5dffd4132bb7",
+    "no-walls-v1": "1f953f8aad1a",
 }
 
 
