@@ -97,12 +97,15 @@ def benchmark(
 def _tell(board: Board, out: Path, spent_s: float) -> None:
     from scripts.benchmark.board import lost_from_words
 
-    table = Table(title="level from which half of the runs are lost", title_justify="left")
-    table.add_column("track")
+    table = Table(
+        title="level from which half of the runs are lost", title_justify="left",
+        caption="* does not count: its oracle fails", caption_justify="left",
+    )  # fmt: skip
+    table.add_column("track", no_wrap=True)
     for name in board.slams:
         table.add_column(escape(name), justify="right", overflow="fold")
     for track in board.tracks:
-        mark = "" if board.fair[track.name]["counts"] else " (does not count)"
+        mark = "" if board.fair[track.name]["counts"] else " *"
         cells = (escape(lost_from_words(board.row(track.name, name))) for name in board.slams)
         table.add_row(track.name + mark, *cells)
     console.print(table)
