@@ -28,10 +28,10 @@ def made() -> Submission:
     runs = [
         submission.run_of({**ROW, "dynamism": level, "seed": seed}, f"{seed:064x}")
         for level in LEVELS
-        for seed in (700, 701)
+        for seed in (720, 721)
     ]
     return Submission(
-        name="mine", slam="my_slam:MySlam", seeds_of="test", seeds=(700, 701), levels=LEVELS,
+        name="mine", slam="my_slam:MySlam", seeds_of="test", seeds=(720, 721), levels=LEVELS,
         seconds=None, runs={TRACK: runs}, made_with=submission.made_with("odometry"),
     )  # fmt: skip
 
@@ -62,14 +62,14 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "name": (lambda d: d.update(name="../x"), "name must be up to 40"),
     "slam": (lambda d: d.update(slam="a\nb"), "slam must be"),
     "seeds_of": (lambda d: d.update(seeds_of="best"), "test or train"),
-    "seeds": (lambda d: d.update(seeds=[700, 700]), "seeds must be whole"),
-    "one seed": (lambda d: d.update(seeds=[700]), "expected 5 runs"),
+    "seeds": (lambda d: d.update(seeds=[720, 720]), "seeds must be whole"),
+    "one seed": (lambda d: d.update(seeds=[720]), "expected 5 runs"),
     "levels": (lambda d: d.update(levels=[0.0, 0.3]), "levels must be of"),
     "seconds": (lambda d: d.update(seconds=-1), "seconds must be"),
     "no tracks": (lambda d: d.update(tracks={}), "one or more"),
     "track": (lambda d: d["tracks"].update(x={"sha256": "", "runs": []}), "track 'x'"),
     "other track": (lambda d: d["tracks"][TRACK].update(sha256="0" * 64), "none of this version"),
-    "run twice": (lambda d: first_run(d, seed=701), "each level and seed once"),
+    "run twice": (lambda d: first_run(d, seed=721), "each level and seed once"),
     "run of words": (lambda d: d["tracks"][TRACK]["runs"].__setitem__(0, "x"), "a run must have"),
     "more in a run": (lambda d: first_run(d, more=1), "a run must have"),
     "recording": (lambda d: first_run(d, recording="0"), "recording must be a SHA-256"),
@@ -123,7 +123,7 @@ def test_only_what_is_alike_is_merged():
             make._check_alike([made()], Wanted(**plain | other), set())
     with pytest.raises(InvalidValueError, match="of that name"):
         make._check_alike([made(), made()], Wanted(**plain), set())
-    there = {(level, seed): f"{seed:064x}" for level in LEVELS for seed in (700, 701)}
+    there = {(level, seed): f"{seed:064x}" for level in LEVELS for seed in (720, 721)}
     assert len(make._on_the_same_scans(made(), TRACK, there)) == 10
-    with pytest.raises(InvalidValueError, match=r"level 0\.5, seed 701 is of other scans"):
-        make._on_the_same_scans(made(), TRACK, there | {(0.5, 701): "f" * 64})
+    with pytest.raises(InvalidValueError, match=r"level 0\.5, seed 721 is of other scans"):
+        make._on_the_same_scans(made(), TRACK, there | {(0.5, 721): "f" * 64})
