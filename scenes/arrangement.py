@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.assembly import room_of
 from scenes.kinds import kind_of
 from scenes.placement import gap_to_boxes
 from scenes.scene import Mover, Pose, Scene
@@ -92,7 +93,8 @@ class Places:
         """Places for a thing."""
         if mover.kind not in self._known:
             long = mover.group not in ("chair", "bin")
-            rows, walls = self._rows(mover.radius), self._at_walls(mover.radius, long=long)
+            radius = room_of(mover)
+            rows, walls = self._rows(radius), self._at_walls(radius, long=long)
             if long:  # its long side to the wall
                 rows[:, 2] += 0.5 * math.pi
             parts = [self._marked(mover), rows, walls]
@@ -124,7 +126,7 @@ class Places:
                     poses.append((x - back * c, y - back * s, yaw + turn))
             elif group != "chair" and kind == mover.kind:
                 poses.append((x, y, yaw))
-        return self._clear(np.array(poses).reshape(-1, 3), mover.radius, ways=False)
+        return self._clear(np.array(poses).reshape(-1, 3), room_of(mover), ways=False)
 
     def _rows(self, radius: float) -> Float:
         """Places side by side along the walls of each room, backs to the wall."""

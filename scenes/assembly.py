@@ -18,7 +18,7 @@ import mujoco
 from scenes.kinds import kind_of
 from scenes.marks import Mark, marks
 from scenes.mjcf import check_materials, parsed
-from scenes.scene import Pose
+from scenes.scene import Mover, Pose
 
 
 def moved(pose: Pose, local: Pose) -> Pose:
@@ -50,9 +50,33 @@ def hull_radius(name: str) -> float:
     return float(part(name).geom("hull").size[0])
 
 
+@cache
+def corners(name: str) -> tuple[tuple[float, float, float], ...]:
+    """(x, y, radius) m of a planar part's hulls beside the row along its x axis, in its frame."""
+    hulls = (geom for geom in part(name).geoms if geom.name.rstrip("0123456789") == "hull")
+    discs = [(float(g.pos[0]), float(g.pos[1]), float(g.size[0])) for g in hulls]
+    return tuple(disc for disc in discs if disc[1] != 0.0)
+
+
+def hulls(name: str) -> tuple[tuple[float, float, float], ...]:
+    """(x, y, radius) m of all hulls of a planar part, in its frame."""
+    half, radius = kind_of(name).half_length_m, hull_radius(name)
+    row = (0.0,) if half == 0.0 else (-half, 0.0, half)
+    return (*((x, 0.0, radius) for x in row), *corners(name))
+
+
 def reach_of(name: str) -> float:
     """Radius of the disc around a planar part that holds all its hulls, m."""
-    return hull_radius(name) + kind_of(name).half_length_m
+    return max(math.hypot(x, y) + radius for x, y, radius in hulls(name))
+
+
+def room_of(mover: Mover) -> float:
+    """Radius m of the disc that a thing is given where it is put elsewhere; of a door its leaf.
+
+    It holds all hulls of what has hulls at its corners, of everything else the middle one.
+    """
+    long = mover.group != "door" and corners(mover.kind)
+    return reach_of(mover.kind) if long else mover.radius
 
 
 class Assembly:

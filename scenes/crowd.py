@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from scenes import look
-from scenes.assembly import Assembly, hull_radius, moved
+from scenes.assembly import Assembly, hull_radius, hulls, moved
 from scenes.builder import stand
 from scenes.kinds import kind_of
 from scenes.placement import Floor
@@ -450,9 +450,7 @@ def _reach(kind: str) -> float:
 
 def _discs(kind: str, pose: Pose) -> list[tuple[float, float, float]]:
     """(x, y, radius) m of the hulls of a thing at a pose."""
-    half, radius = kind_of(kind).half_length_m, hull_radius(kind)
-    offsets = (0.0,) if half == 0.0 else (-half, 0.0, half)
-    return [(*moved(pose, (at, 0.0, 0.0))[:2], radius) for at in offsets]
+    return [(*moved(pose, (x, y, 0.0))[:2], radius) for x, y, radius in hulls(kind)]
 
 
 def _halls(scene: Scene) -> list[tuple[float, float, float, float]]:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.arrangement import IN_ROW, MARGIN_M, Candidates, fits, places_of
+from scenes.assembly import room_of
 from scenes.scene import Mover, Pose, Scene
 from sim.core.bodies import Bodies
 from sim.core.draws import uniform
@@ -85,7 +86,7 @@ def find_place(  # noqa: PLR0913 (kernel)
     """(sort, row of ``places``) of a free place out of view, (-1, -1) where none is found.
 
     start   in [0, 1): where along the rows to look first
-    thing   its row, where it stands x, y, and the radius of its hull, m
+    thing   its row, where it stands x, y, and the radius m of its disc
     sorts   how often each sort of place is tried
     around  discs of all movers and boxes
     """
@@ -143,6 +144,7 @@ class Rearranging:
         self._scene, self._bodies = scene, bodies
         self._places = places_of(scene)
         self._boxes = np.ascontiguousarray(self._places.boxes)
+        self._radius = np.array([room_of(m) for m in scene.movers])
         self._rows = [k for k, m in enumerate(scene.movers) if is_movable(m)]
         self._opaque = opaque_boxes(model, scene.scan_height_m, glass_geoms(model))
         self._eye: tuple[LaserSpec, Eye] | None = None
@@ -208,7 +210,7 @@ class Rearranging:
                     back.append(row)
                 continue
             x, y, _ = poses[row].tolist()
-            if self.marks[row, SEEN] and hidden(view, x, y, float(self._bodies.radius[row])):
+            if self.marks[row, SEEN] and hidden(view, x, y, float(self._radius[row])):
                 self.marks[row, SEEN] = 0
                 if uniform(self._luck(row), 0) < self.share:
                     drawn.append(row)
@@ -238,20 +240,19 @@ class Rearranging:
 
     def _exchange(self, one: int, two: int, poses: Float) -> bool:
         """Put each where the other stands; False, and nothing done, where one does not fit."""
-        radius = self._bodies.radius
         trial = poses.copy()
         trial[[one, two]] = poses[[two, one]]
         discs = self._discs(trial)
         for row in (one, two):
             x, y, _ = trial[row].tolist()
-            if not fits(x, y, float(radius[row]), row, discs, self._boxes):
+            if not fits(x, y, float(self._radius[row]), row, discs, self._boxes):
                 return False
         poses[...] = trial
         return True
 
     def _discs(self, poses: Float) -> Float:
         """(n, 3) x, y, radius m of all movers; doors, which are boxes, far away."""
-        discs = np.column_stack([poses[:, :2], self._bodies.radius])
+        discs = np.column_stack([poses[:, :2], self._radius])
         doors = [m.kind == "door" for m in self._scene.movers]
         discs[doors] = 2.0 * FAR_M, 2.0 * FAR_M, 0.0
         return discs
@@ -270,7 +271,7 @@ class Rearranging:
         """(sort, pose) of a place for a thing, None where none is found."""
         mover = self._scene.movers[row]
         start = uniform(_fresh(self._counters[0], int(self.moment[0])), 0)
-        thing = (row, float(poses[row, 0]), float(poses[row, 1]), float(mover.radius))
+        thing = (row, float(poses[row, 0]), float(poses[row, 1]), float(self._radius[row]))
         places = self._places.of(mover)
         around = (self._discs(poses), self._leaves(poses))
         sort, at = find_place(luck, start, thing, places, SORTS, around, view)

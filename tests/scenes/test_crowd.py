@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from dataclasses import fields
 
+import mujoco
 import numpy as np
 import pytest
 
 from scenes import build
+from scenes.assembly import room_of
 from scenes.crowd import (
     BY_LEVEL,
     MIXES,
@@ -117,3 +119,24 @@ def test_places_of_a_tour_are_apart():
 
 def test_streams_go_between_the_far_ends():
     assert set(far_ends(build("corridor", seed=1))) == {"west", "east"}
+
+
+@pytest.mark.parametrize("crowd", ["beds:4", "couches:3"])
+def test_no_corner_of_what_is_long_stands_in_a_wall(crowd: str):
+    for seed in range(1, 9):
+        scene = build("gallery", seed=seed, crowd=crowd)
+        model = scene.compile()
+        data = mujoco.MjData(model)
+        scene.place(model, data)
+        mujoco.mj_forward(model, data)
+        hull = [model.geom(g).name.partition("/")[2].startswith("hull") for g in range(model.ngeom)]
+        deep = [float(c.dist) for c in data.contact if hull[c.geom[0]] or hull[c.geom[1]]]
+        assert min(deep, default=0.0) >= 0.0, seed
+
+
+def test_what_is_put_elsewhere_keeps_clear_of_corners_too():
+    scene = build("gallery", seed=3, crowd="beds:1,boards:1")
+    room = {m.name: room_of(m) for m in scene.movers}
+    corners = np.array([(0.86, 0.33), (-0.86, -0.33)])
+    assert room["bed0"] == pytest.approx(np.linalg.norm(corners, axis=1).max() + 0.13)
+    assert all(room[m.name] == m.radius for m in scene.movers if m.name != "bed0")
