@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.actors.rearranging import PERIOD_S, Rearrangement
+from sim.actors.rearranging import Rearrangement
 from sim.actors.robot import DriveConfig
 from sim.core import state
 from sim.core.checks import number
@@ -43,6 +43,10 @@ from slam.frames import (
     StreamMetadata,
 )
 
+# Of a state, by their words in it.
+_PARTS = {
+    "tags": "ceiling cameras are", "kidnaps": "kidnaps are", "changed": "a moment of change is",
+}  # fmt: skip
 MOST_FRAMES = 1 << 31  # of one simulation: almost two years
 
 
@@ -56,7 +60,8 @@ class Simulation:
     moving_share  in [0, 1]: of the chairs, on the move at any time (``sim.actors.rolling``)
     change     in [0, 1]: of what is out of sight, the share that is found elsewhere later
                (``sim.actors.rearranging``)
-    change_at_s  the one moment at which that happens, s; None: all along
+    change_at_s  the one moment at which that happens, s, before the first scan from then on; None:
+               all along
     session    number of a session of the same building (``sim.world.sessions``)
     kidnap_every_s  s after which the robot is carried elsewhere, again and again
                (``sim.world.kidnapping``); None: never
@@ -106,7 +111,8 @@ class Simulation:
         )  # fmt: skip
         self.odometry_preset, self.session = odometry, session
         seeds = self.world.seeds
-        self._change_at_s = checked_moment(change_at_s)
+        self._change_at_s = checked_moment(change_at_s, session)
+        self._changed = False  # whether that moment has been
         self._kidnapping: Kidnapping | None = None
         if kidnap_every_s is not None:
             self._kidnapping = Kidnapping(kidnap_every_s, seeds)
@@ -160,15 +166,14 @@ class Simulation:
     def _advance(self) -> None:
         """Let the time of one scan pass."""
         world, tags = self.world, self._tags
-        carried = self._kidnapping is not None and self._kidnapping.carried(world)
-        self.rearranged = world.rearrange(self.spec) if self._may_change() else []
+        if self._kidnapping is not None:
+            self._kidnapping.carried(world)
+        self.rearranged = self._changed_out_of_sight()
         noted = self.laser.begin(world.data)
         window = self.laser.window
         if window.before:  # the scan begins within the step that the one before ended with
             for rows, own in zip(self._rows, (self.path, self._travel), strict=True):
                 rows[0] = own[-2]
-            if carried:
-                self._rows[0][0] = world.robot_pose()
         world.read_robot(self._rows[0][window.before], self._rows[1][window.before])
         if self.laser.carried:
             self._rows[0][0] = self._rows[0][1]
@@ -188,12 +193,14 @@ class Simulation:
                 tags.note(world.time_ns, world.data)
             first = stop
 
-    def _may_change(self) -> bool:
-        """Whether things out of sight may be put elsewhere before this scan."""
+    def _changed_out_of_sight(self) -> list[Rearrangement]:
+        """What is put elsewhere before this scan."""
         if self._change_at_s is None:
-            return True
-        moment = int(self.world.time_ns / NS_PER_S / PERIOD_S)
-        return moment == int(self._change_at_s / PERIOD_S)
+            return self.world.rearrange(self.spec)
+        if self._changed or self.world.time_ns < round(self._change_at_s * NS_PER_S):
+            return []
+        self._changed = True
+        return self.world.rearrange(self.spec, at_once=True)
 
     def observe(self) -> Frame:
         """Let one scan's worth of time pass under the present command; the frame it gives.
@@ -255,6 +262,7 @@ class Simulation:
                 "encoders": words, "lasers": lasers, "tags": tags, "scan": scan,
                 "scanner": self.laser.scanner.name,
                 **({} if kidnaps is None else {"kidnaps": kidnaps}),
+                **({} if self._change_at_s is None else {"changed": self._changed}),
             },
         )  # fmt: skip
 
@@ -270,10 +278,12 @@ class Simulation:
             raise InvalidValueError(
                 f"the state is of scanner '{words.get('scanner')}', expected '{own_name}'"
             )
-        if (words.get("tags") is None) != (self._tags is None):
-            raise InvalidValueError("ceiling cameras are in the state or in the simulation only")
-        if (words.get("kidnaps") is None) != (self._kidnapping is None):
-            raise InvalidValueError("kidnaps are in the state or in the simulation only")
+        for what, own_part in (
+            ("tags", self._tags), ("kidnaps", self._kidnapping), ("changed", self._change_at_s)
+        ):  # fmt: skip
+            if (words.get(what) is None) != (own_part is None):
+                raise InvalidValueError(f"{_PARTS[what]} in the state or in the simulation only")
+        self._changed = bool(words.get("changed", False))
         if self._kidnapping is not None:
             self._kidnapping.load(arrays, words["kidnaps"])
         own = {k.removeprefix("scan."): v for k, v in arrays.items() if k.startswith("scan.")}
@@ -320,12 +330,19 @@ def tour(
         yield simulation.observe()
 
 
-def checked_moment(change_at_s: float | None) -> float | None:
-    """``change_at_s``, s; ``InvalidValueError`` where it is neither None nor a time >= 0."""
+def checked_moment(change_at_s: float | None, session: int | None = None) -> float | None:
+    """``change_at_s``, s; ``InvalidValueError`` where it is neither None nor a time > 0.
+
+    So it is in a session, within which nothing changes out of sight.
+    """
     if change_at_s is not None:
         number("change_at_s", change_at_s)
-        if not 0.0 <= change_at_s < math.inf:
-            raise InvalidValueError(f"change_at_s must be >= 0 and finite, got {change_at_s}")
+        if not change_at_s > 0.0:
+            raise InvalidValueError(f"change_at_s must be > 0, got {change_at_s}")
+        if session is not None:
+            raise InvalidValueError(
+                f"change_at_s and session exclude each other: {change_at_s:g} and {session}"
+            )
     return change_at_s
 
 

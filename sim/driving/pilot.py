@@ -26,6 +26,7 @@ SIGHT_M, AJAR, REPLAN_S, DECIDE_S = _D.sight_m, _D.ajar_rad, _D.replan_s, _D.dec
 LEAF_DISCS, LEAF_M = _D.leaf_discs, _D.leaf_m
 BODY, DOOR, ROBOT = 0, 1, 2
 PARTS = 3  # discs of what is long: its middle and its two ends
+LEAP_M = 0.5  # m beyond what the wheels can do; a robot that got so far was carried
 LEAP_MPS = 10.0  # m/s; what is faster was put there by hand (``sim.actors.rearranging``)
 
 
@@ -117,7 +118,7 @@ class Pilot:
         if before is None:
             return 0.0, 0.0
         x, y, turned = se2.between(before, here).tolist()
-        if math.hypot(x, y) > LEAP_MPS * dt:  # it was carried there
+        if math.hypot(x, y) > self.world.drive_config.v_max * dt + LEAP_M:  # it was carried there
             return 0.0, 0.0
         return math.copysign(math.hypot(x, y), x) / dt, turned / dt
 

@@ -41,6 +41,8 @@ MAX_SECONDS = 86_400.0
 _AXES = ("motion", "change")
 # Added since the first recipes: without a word where they are None.
 _LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s")
+# Words for some of these in the name of an episode.
+_WORDS = {"share": "moving_share", "at": "change_at_s", "kidnap": "kidnap_every_s"}
 _DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "rosbags")
 
 
@@ -118,7 +120,7 @@ class Recipe:
             number("Recipe.change", self.change)
             if not 0.0 <= self.change <= 1.0:
                 raise InvalidValueError(f"Recipe.change must lie in [0, 1], got {self.change}")
-        checked_moment(self.change_at_s)
+        checked_moment(self.change_at_s, self.session)
         if self.kidnap_every_s is not None:
             Kidnapping(self.kidnap_every_s, Seeds(self.seed))
             if self.twin:
@@ -170,13 +172,16 @@ class Recipe:
     def name(self) -> str:
         """Of the episode's folder: ``office-d0.5-m0.2-c0-s0001``; at the end the twin's name.
 
-        ``-m`` is motion and ``-c`` change, where they are given.
+        ``-m`` is motion and ``-c`` change, where they are given; so are ``-share`` for
+        ``moving_share``, ``-at`` for ``change_at_s`` and ``-kidnap`` for ``kidnap_every_s``.
         """
         scene = re.sub(r"[^A-Za-z0-9_.]+", "-", self.scene).strip("-.")
         twin = f"-{self.twin}" if self.twin else ""
         session = "" if self.session is None else f"-session{self.session:02d}"
         levels = [(axis[0], getattr(self, axis)) for axis in ("dynamism", *_AXES)]
         level = "".join(f"-{letter}{at:.4g}" for letter, at in levels if at is not None)
+        more = [(word, getattr(self, field)) for word, field in _WORDS.items()]
+        level += "".join(f"-{word}{at:.9g}" for word, at in more if at is not None)
         return f"{scene}{level}-s{self.seed:04d}{session}{twin}"
 
     def words(self) -> dict[str, Any]:

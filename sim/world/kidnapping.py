@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.assembly import hulls, moved
+from scenes.kinds import kind_of
 from sim.core.checks import number
 from sim.core.seeds import Seeds
 from sim.world.world import World
@@ -31,7 +33,9 @@ class Kidnapping:
 
     every_s  s from one time to the next, the first after so long; where no earlier place is far and
              free, it is put off to the next scan
-    seeds    of the run: the "driving" stream decides, which the tour does not notice
+    seeds    of the run: the "driving" stream decides, which the tour does not notice. It ranks the
+             places without regard to what moves, and the first one that is far and free is taken:
+             without a mover that is the same one, unless the mover was in its way
     """
 
     def __init__(self, every_s: float, seeds: Seeds) -> None:
@@ -50,26 +54,30 @@ class Kidnapping:
         if now_ns >= self._noted_ns:
             self._visited.append(world.robot_pose())
             self._noted_ns = now_ns + _NOTED_NS
-        if now_ns // self._every_ns <= self._done:
+        turn = now_ns // self._every_ns
+        if turn <= self._done:
             return False
-        places = self._free(world)
+        places = self._free(world, turn)
         if not len(places):
             return False
-        self._done = now_ns // self._every_ns
-        draws = np.random.default_rng([self._seed, self._done])
-        world.carry(places[int(draws.integers(len(places)))])
+        self._done = turn
+        world.carry(places[0])
         return True
 
-    def _free(self, world: World) -> Float:
-        """(k, 3) earlier poses that are far from the robot and free of everything that moves."""
-        places, movers = np.array(self._visited), world.mover_poses()
-        radii, robot = world.bodies.radius, world.bodies.robot
+    def _free(self, world: World, turn: int) -> Float:
+        """(k, 3) earlier poses that are far from the robot and free of everything that moves.
+
+        In an order that is the same whoever moves there, and however many are visited later.
+        """
+        ranks = np.random.default_rng([self._seed, turn]).random(len(self._visited))
+        places = np.array(self._visited)[np.argsort(ranks, kind="stable")]
+        robot, discs = world.bodies.robot, _discs(world)
         assert robot is not None
-        apart = places[:, None, :2] - movers[None, :, :2]
-        gaps = np.sqrt((apart * apart).sum(axis=2)) - radii - radii[robot] - FREE_M
-        far = np.sqrt((apart[:, robot] ** 2).sum(axis=1)) >= FAR_M
-        gaps[:, robot] = math.inf
-        free: Float = places[far & (gaps > 0.0).all(axis=1)]
+        apart = places[:, None, :2] - discs[None, :, :2]
+        gaps = np.sqrt((apart * apart).sum(axis=2)) - discs[:, 2]
+        away = places[:, :2] - world.robot_pose()[:2]
+        far = np.sqrt((away * away).sum(axis=1)) >= FAR_M
+        free: Float = places[far & (gaps > world.bodies.radius[robot] + FREE_M).all(axis=1)]
         return free
 
     def save(self) -> tuple[dict[str, NDArray[Any]], dict[str, int]]:
@@ -81,3 +89,15 @@ class Kidnapping:
         """Inverse of ``save``."""
         self._visited = list(arrays["kidnap.visited"].reshape(-1, 3))
         self._noted_ns, self._done = int(words["noted_ns"]), int(words["done"])
+
+
+def _discs(world: World) -> Float:
+    """(k, 3) x, y, radius m of all hulls of what moves but the robot; of a door, all its swing."""
+    rows = []
+    for mover, pose in zip(world.scene.movers, world.mover_poses().tolist(), strict=True):
+        if mover.group == "robot":
+            continue
+        long = mover.group != "door" and kind_of(mover.kind).half_length_m > 0.0
+        for x, y, radius in hulls(mover.kind) if long else ((0.0, 0.0, mover.radius),):
+            rows.append((*moved(tuple(pose), (x, y, 0.0))[:2], radius))
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)

@@ -203,9 +203,14 @@ class World:
         found = self._rearranging
         return np.zeros(len(self.mover_names), bool) if found is None else found.seen()
 
-    def rearrange(self, spec: LaserSpec) -> list[Rearrangement]:
-        """Between two scans, at given moments: change what that scanner cannot see now."""
-        if self._rearranging is None or not self._rearranging.due(self.time_ns * 1e-9):
+    def rearrange(self, spec: LaserSpec, *, at_once: bool = False) -> list[Rearrangement]:
+        """Between two scans: change what that scanner cannot see now.
+
+        Every ``sim.actors.rearranging.PERIOD_S``; ``at_once``: whenever it is called.
+        """
+        if self._rearranging is None:
+            return []
+        if not self._rearranging.due(self.time_ns * 1e-9) and not at_once:
             return []
         poses, busy = self.mover_poses(), np.zeros(len(self.mover_names), dtype=np.bool_)
         busy[self.people.in_use(self.bodies)] = True
