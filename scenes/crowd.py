@@ -123,7 +123,7 @@ BY_LEVEL = {
     "warehouse": _mixes(escorts=(1, 2, 4, 9), streams=(0, 0, 2, 6), trains=(0, 0, 1, 2)),
 }
 """The crowds of each scene at ``LEVELS``: so many that the share of returns from what moves grows
-in a line with the motion. Measured by ``scripts.experiments.share_seen`` on seeds below 8."""
+about in a line with the motion. Measured by ``scripts.experiments.share_seen`` on seeds below 8."""
 OTHERS_BY_LEVEL = _mixes(escorts=(1, 3, 5, 10))
 """Those of a scene that has no row."""
 MIXES = {scene: crowds[-1] for scene, crowds in BY_LEVEL.items()}
@@ -133,17 +133,20 @@ OTHERS = OTHERS_BY_LEVEL[-1]
 
 
 def mix(scene: str, level: float) -> Crowd:
-    """The crowd of a scene at a motion in [0, 1]; of each kind a whole number."""
+    """The crowd of a scene at a motion in [0, 1]; of each kind a whole number.
+
+    People in groups are whole groups, and nobody queues alone.
+    """
     mixes = (Crowd(), *BY_LEVEL.get(scene, OTHERS_BY_LEVEL))
-    return Crowd(
-        **{
-            each.name: math.floor(
-                float(np.interp(level, (0.0, *LEVELS), [getattr(c, each.name) for c in mixes]))
-                + 0.5
-            )
-            for each in fields(Crowd)
-        }
-    )
+    counts = {}
+    for each in fields(Crowd):
+        own = [getattr(crowd, each.name) for crowd in mixes]
+        step = GROUP if each.name == "groups" else 1
+        n = float(np.interp(level, (0.0, *LEVELS), own))
+        counts[each.name] = step * math.floor(n / step + 0.5)
+    if counts["queue"] == 1:
+        counts["queue"] = 0
+    return Crowd(**counts)
 
 
 class _Filling:

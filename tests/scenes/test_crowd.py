@@ -13,8 +13,10 @@ from scenes import build
 from scenes.assembly import room_of
 from scenes.crowd import (
     BY_LEVEL,
+    GROUP,
     MIXES,
     OTHERS,
+    OTHERS_BY_LEVEL,
     ROW,
     Crowd,
     crowd_of,
@@ -64,6 +66,9 @@ def test_counts_grow_with_the_level():
         for kind in (field.name for field in fields(Crowd)):
             counts = [getattr(crowd, kind) for crowd in crowds]
             assert counts == sorted(counts), (scene, kind)
+        assert all(crowd.groups % GROUP == 0 and crowd.queue != 1 for crowd in crowds), scene
+        for k, crowd in enumerate(BY_LEVEL.get(scene, OTHERS_BY_LEVEL), 1):
+            assert crowds[5 * k] == crowd, (scene, k)
         assert crowds[0] == Crowd()
         assert crowds[-1] == MIXES.get(scene, OTHERS)
     assert mix("arena", 0.5) == BY_LEVEL["arena"][1]
