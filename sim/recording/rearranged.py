@@ -54,7 +54,7 @@ def read_rearranged(path: Path) -> list[Rearranged]:
         if found and time_s < found[-1].time_s:
             raise row.error(f"time_s must not go back from {found[-1].time_s:g}, got {time_s:g}")
         if (before is None) != (change == "brought in") or (after is None) != (change == "removed"):
-            raise row.error(f"{change!r} does not go with these poses: {row.words[3:]}")
+            raise row.error(f"{change!r} does not go with these poses: {row.words[3:]!r:.80}")
         found.append(
             Rearranged(time_s=time_s, name=row.word(1), change=change, before=before, after=after)
         )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from slam.errors import LogFormatError
 
 MAX_BYTES = 1 << 26  # of a table
 MAX_WORD = 200  # characters of a name
+MAX_NUMBER = 40  # characters of a number
+_DECIMAL = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][-+]?[0-9]+)?")
 MAX_M = 1e6  # of a coordinate, a thousand times as far as what is out of the building
 POSE = ("x_m", "y_m", "heading_rad")
 
@@ -71,12 +74,10 @@ class Row:
         return int(word)
 
     def number(self, column: int, least: float, most: float) -> float:
-        """A finite number in that range."""
+        """A plain decimal in that range, with a point and an exponent or without."""
         word = self.words[column]
-        try:
-            value = float(word)
-        except ValueError:
-            value = math.nan
+        plain = len(word) <= MAX_NUMBER and _DECIMAL.fullmatch(word)
+        value = float(word) if plain else math.nan
         if not least <= value <= most:  # neither is NaN
             wanted = f"a number from {least:g} to {most:g}"
             raise self.error(f"{self.columns[column]} must be {wanted}, got {word!r:.80}")

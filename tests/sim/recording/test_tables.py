@@ -24,7 +24,10 @@ BOUNDS = (0.0, 0.0, 8.0, 6.0)
 THING = ["0", "morning", "chair0", "chair_swivel", "1.5", "2.5", "-0.1"]
 CHANGE = ["2.0", "chair0", "moved", "1.5", "2.5", "-0.1", "3.5", "0.5", "1.0"]
 BAD_WORDS = ("", "chair\n0", "a\r\nb", "nul\0", "\x1b[2J", "x" * 201)
-BAD_NUMBERS = ("nan", "inf", "-inf", "1e308", "x", "1,5", "")
+BAD_NUMBERS = (
+    "nan", "inf", "-inf", "1e308", "x", "1,5", "",
+    "1_0", " 1.5 ", "+1", ".5", "1.", "0x1", "\u0663", "0" * 41,
+)  # fmt: skip
 
 
 def _things(folder: Path, *rows: list[str]) -> list[Thing]:
