@@ -19,6 +19,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.core.checks import number, numbers
 from sim.view import gl
 from slam.errors import InvalidValueError, MissingDependencyError
 
@@ -106,9 +107,19 @@ class Camera:
         """The same of what stands about (x, y) m, seen from ``far_m`` away.
 
         azimuth_deg  where it looks to, from the x axis on    down_deg  how steeply
+
+        Raises ``InvalidValueError`` for what is no finite number, and for a ``far_m`` not above 0.
         """
         if self._context is None:
             raise InvalidValueError("this Camera is closed")
+        for field, value in zip(("x", "y"), numbers("at", at, 2, "(x m, y m)"), strict=True):
+            number(f"at: {field}", value)
+        for field, value in (
+            ("far_m", far_m), ("azimuth_deg", azimuth_deg), ("down_deg", down_deg)
+        ):  # fmt: skip
+            number(field, value)
+        if not far_m > 0.0:
+            raise InvalidValueError(f"far_m must be > 0, got {far_m}")
         self._view.type = mujoco.mjtCamera.mjCAMERA_FREE
         self._view.lookat[:] = (*at, LOOK_AT_M)
         self._view.distance, self._view.azimuth = far_m, azimuth_deg

@@ -112,6 +112,16 @@ def test_a_camera_says_what_is_wrong(world):
         camera.render(data, "top")
     with pytest.raises(InvalidValueError, match="closed"):
         camera.close_up(data, (0.0, 0.0))
+    with Camera(model, 32, 32, samples=0) as camera:
+        for at in ((np.nan, 0.0), (0.0, np.inf), (1.0,), "ab", None):
+            with pytest.raises(InvalidValueError, match="at"):
+                camera.close_up(data, at)
+        for field, value in (
+            ("far_m", 0.0), ("far_m", -1.0), ("far_m", "5"), ("azimuth_deg", np.nan),
+            ("down_deg", np.inf),
+        ):  # fmt: skip
+            with pytest.raises(InvalidValueError, match=field):
+                camera.close_up(data, (0.0, 0.0), **{field: value})
     with pytest.raises(InvalidValueError, match="width"):
         Camera(model, 0, 32)
 
