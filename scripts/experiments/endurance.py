@@ -121,7 +121,9 @@ def _print(report: Report, depths: Depths, simulation: Simulation) -> None:
     print(f"  fastest joint {report.fastest:.1f} m/s or rad/s")
     walked, blocked = simulation.world.people.walked_s()
     if walked.sum() > 0.0:
-        print(f"  people blocked {100.0 * blocked.sum() / walked.sum():.1f} % of their way")
+        print(
+            f"  people blocked {100.0 * blocked.sum() / walked.sum():.1f} % of their walking time"
+        )
     for depth, at_s, one, two in sorted(depths.worst.values(), reverse=True)[:3]:
         print(f"  {one} and {two} were {1000.0 * depth:.0f} mm in each other at {at_s:.1f} s")
     peaks = ", ".join(f"{kind} {force:.0f} N" for kind, force in sorted(report.forces.items()))

@@ -4,7 +4,7 @@
 For each scene, at motion 1: how deep hulls were in each other at most, for each pair of kinds, and
 how hard the robot was touched. Depths are looked at once a scan. A force is the greatest of all
 substeps, each of which lasts 1/300 s: 300 N change the speed of a robot of 22 kg by 0.05 m/s. A
-hull is a cylinder around what is drawn, so two that overlap by a few centimetres do not yet show
+hull is a sphere around what is drawn, so two that overlap by a few centimetres do not yet show
 it. Of each pair the deepest moment is printed with its time, to be looked at.
 """
 

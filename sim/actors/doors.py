@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Doors with closers: opened for whoever comes, blown or pushed about at the dynamism rate.
 
-How often is said elsewhere: ``CURVES`` in ``sim.core.dynamism``.
+How often a door is opened: ``CURVES`` in ``sim.core.dynamism``.
 
 Sliding doors stay open while anybody stands in them; a lift's opens when the cabin has come.
 

@@ -34,7 +34,7 @@ class Held(NamedTuple):
     at      (h, 5) first qpos and dof of the holder, then of what is held, -1: an empty hand; first
             dof of what has just been put down, or -1
     pose    (h, 3) of what is held in the holder's frame: x m, y m, yaw rad
-    hinged  (h,) whether it turns freely about the hand
+    hinged  (h,) whether it turns freely about the middle of the holder
     bodies  (h, 2) mass kg and yaw inertia kg m2 of what is held
     """
 
