@@ -29,12 +29,11 @@ MOST_BEAMS = 100_000
 class MrptSlam(Guest):
     """A program of MRPT over all frames at once.
 
-    ``update`` keeps the frame and reports odometry's pose. ``finish`` writes the frames so far as
-    a rawlog, runs the program, and returns what it logged: its pose after each scan, which it
-    found from that scan and those before it. So its error is an online error like any other's.
-    Only who wants a pose while the robot still drives (a closed loop, an environment) gets
-    odometry's. Each run begins at the first frame. Raises ``MissingDependencyError`` where the
-    program is not installed.
+    ``update`` keeps the frame and reports odometry's pose. ``estimates_at_end`` writes the frames
+    so far as a rawlog, runs the program, and returns what it logged: its pose after each scan,
+    which it found from that scan and those before it. So its error is an online error like any
+    other's. A closed loop and an environment need poses before the end: they refuse it. Each run
+    begins at the first frame. Raises ``MissingDependencyError`` where the program is not installed.
     """
 
     command: ClassVar[str]
@@ -67,12 +66,12 @@ class MrptSlam(Guest):
         self._spec = spec
 
     def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
-        """Keep the scan; the pose is odometry's until ``finish``."""
+        """Keep the scan; the pose is odometry's until ``estimates_at_end``."""
         ranges = ranges_of(points_robot, self._spec, math.inf)
         self._frames.append((prediction.increment, ranges))
         return prediction.T_map_robot, {}
 
-    def finish(self) -> list[tuple[Estimate, float]]:
+    def estimates_at_end(self) -> list[tuple[Estimate, float]]:
         """Of each frame so far: the program's estimate, and the processor time it took, s.
 
         Raises ``SlamFailedError`` where the program fails.
@@ -83,9 +82,9 @@ class MrptSlam(Guest):
         return self._found
 
     def trajectory(self) -> Trajectory:
-        """The program's poses, as ``finish`` has them: it moves none later."""
+        """The program's poses, as ``estimates_at_end`` has them: it moves none later."""
         return self._path.trajectory(
-            np.array([e.T_map_robot for e, _ in self.finish()]).reshape(-1, 3)
+            np.array([e.T_map_robot for e, _ in self.estimates_at_end()]).reshape(-1, 3)
         )
 
     def memory_growth_bytes(self) -> int | None:
