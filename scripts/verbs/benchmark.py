@@ -99,7 +99,8 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
 
     table = Table(
         title="level from which half of the runs are lost", title_justify="left",
-        caption="* does not count: its oracle fails", caption_justify="left",
+        caption="* does not count: its oracle was lost or more than 2 cm off",
+        caption_justify="left",
     )  # fmt: skip
     table.add_column("track", no_wrap=True)
     for name in board.slams:
