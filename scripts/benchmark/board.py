@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -35,6 +35,7 @@ class Board:
     head     how it was made: command, seeds, versions, machine
     runs     by track: rows as of ``runs.csv``, of every SLAM and control
     missing  SLAMs that are not installed, and how to get them
+    merged   of each submission of others: its SLAM, and what it was made with
     """
 
     subject: str
@@ -42,6 +43,7 @@ class Board:
     tracks: Sequence[Track]
     runs: Mapping[str, Sequence[Row]]
     missing: Mapping[str, str] = field(default_factory=dict)
+    merged: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @cached_property
     def _scores(self) -> dict[str, tuple[Row, list[Row]]]:
@@ -71,14 +73,16 @@ class Board:
 
     def failures(self) -> list[str]:
         """One line for each SLAM and track where it raised, hung or answered nonsense."""
-        out = []
+        return [f"{head}: {told}" for head, told in self._failures()]
+
+    def _failures(self) -> Iterator[tuple[str, str]]:
+        """Who failed where, and what was told of the first."""
         for track, rows in self.runs.items():
             for slam in self.slams:
                 own = [r for r in rows if r["slam"] == slam and r["outcome"] in FAILED]
                 if own:
                     told = str(own[0]["failure"]).partition("\n")[0][:300]
-                    out.append(f"{slam} failed in {len(own)} runs of {track}: {told}")
-        return out
+                    yield f"{slam} failed in {len(own)} runs of {track}", told
 
     def said(self) -> list[str]:
         """What the reader asked: from which level the subject is lost, on which track."""
@@ -124,6 +128,7 @@ class Board:
         head = {
             "schema": SCHEMA, **self.head, "subject": self.subject, "said": self.said(),
             "lost_rule": LOST_RULE, "excused_s": EXCUSED_S, "missing": dict(self.missing),
+            "merged": dict(self.merged),
         }  # fmt: skip
         tracks = {
             t.name: {
@@ -171,7 +176,12 @@ class Board:
         if silent:
             named = ", ".join(f"`{name}`" for name in silent)
             lines.append(f"- no silent failures can be counted without a covariance: {named}")
-        lines += [f"- {told}" for told in self.failures()]
+        lines += [f"- {head}: {_code(told)}" for head, told in self._failures()]
+        lines += [
+            f"- `{name}` was submitted, as SLAM {_code(one['slam'])}, and its results are the "
+            f"submitter's word. Made with {_code(one['made_with'])}"
+            for name, one in self.merged.items()
+        ]
         return ["\n".join(lines)]
 
     def _of(self, slam: str) -> list[Row]:
@@ -195,6 +205,11 @@ class Board:
             " ".join(sentences),
             _table(["SLAM", *(name for name, _ in _CELLS)], lines, left=1),
         ]
+
+
+def _code(words: str) -> str:
+    """Somebody else's words in Markdown, as they are: nothing in them is a link, tag or picture."""
+    return "`" + " ".join(words.replace("`", "'").split()) + "`"
 
 
 _SHOWN = ("command", "seeds", "world", "quick", "seconds")

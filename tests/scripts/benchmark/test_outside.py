@@ -53,7 +53,10 @@ def test_submit_verify_and_merge(outside: Path):
     assert data["slam"] == "my_slam:MySlam"
     assert len(data["tracks"]["busy-chairs-v1"]["runs"]) == 3
 
-    assert "same bytes" in call(verify)
+    printed = call(verify)
+    assert "same bytes" in printed
+    assert "recordings of 1 of its runs are right; the results are the submitter's word" in printed
+    assert "all well" not in printed
     assert "all well" in call("mobilia verify out/benchmark")
 
     printed = call(f"{merge} {SHORT}")
@@ -62,6 +65,10 @@ def test_submit_verify_and_merge(outside: Path):
     assert mine["error_tracking_m"] == pytest.approx(wheels["error_tracking_m"], abs=1e-6)
     assert mine["silent_share"] is None  # it claims no covariance, and the page says so
     assert "without a covariance: `my_slam`" in (outside / "out/board/leaderboard.md").read_text()
+    assert mine["ms_per_scan_p50"] is None
+    assert wheels["ms_per_scan_p50"] is not None
+    board = json.loads((outside / "out/board/leaderboard.json").read_text())
+    assert board["merged"]["my_slam"]["slam"] == "my_slam:MySlam"
 
     compared = read(outside / "out/benchmark/busy-chairs-v1")
     assert compared.axis == "level"
@@ -90,6 +97,7 @@ def test_what_cannot_be_is_told(outside: Path):
         ("--seeds 21", "--seeds must be 1 to 20"),
         ("--slam odometri", "Did you mean 'odometry'?"),
         ("--submit a/b", "up to 40 letters"),
+        ("--slam ekf --submit karto", "the name of another SLAM"),
         ("--merge nothing.json", "nothing.json: cannot be read"),
     ):
         done = CliRunner().invoke(app, ["benchmark", *words.split()])

@@ -144,10 +144,10 @@ def test_what_failed_is_told_with_its_line(tmp_path: Path):
     raised = runs("mine", KEPT)
     raised[3] |= {"outcome": "raised", "failure": "scan 2: ValueError (my.py:7)", "lost": 1}
     made = board(raised)
-    told = "mine failed in 1 runs of tour-guide-v1: scan 2: ValueError (my.py:7)"
-    assert made.failures() == [told]
+    head = "mine failed in 1 runs of tour-guide-v1: "
+    assert made.failures() == [head + "scan 2: ValueError (my.py:7)"]
     made.write(tmp_path)
-    assert told in (tmp_path / "leaderboard.md").read_text()
+    assert f"{head}`scan 2: ValueError (my.py:7)`" in (tmp_path / "leaderboard.md").read_text()
     data = json.loads((tmp_path / "leaderboard.json").read_text())
     assert data["subject"] == "mine"
     assert data["tracks"][TRACK.name]["counts"] is True
@@ -159,6 +159,16 @@ def test_what_failed_is_told_with_its_line(tmp_path: Path):
     header, *lines = (tmp_path / "leaderboard.csv").read_text().splitlines()
     assert header.split(",") == list(scores.COLUMNS)
     assert len(lines) == 3
+
+
+def test_a_submitted_row_says_whose_word_it_is_and_nothing_in_it_is_markdown():
+    failed = runs("mine", KEPT)
+    failed[0] |= {"outcome": "raised", "failure": "`![x](http://x)` <img src=x>", "lost": 1}
+    origin = {"slam": "a`b:C", "made_with": "mujoco 3, a CPU"}
+    page = replace(board(failed), merged={"mine": origin}).markdown()
+    assert ": `'![x](http://x)' <img src=x>`\n" in page
+    told = "- `mine` was submitted, as SLAM `a'b:C`, and its results are the submitter's word."
+    assert f"{told} Made with `mujoco 3, a CPU`" in page
 
 
 def test_a_track_of_another_digest_is_another_track():
