@@ -38,6 +38,7 @@ class MrptSlam(Guest):
 
     command: ClassVar[str]
     motion: ClassVar[rawlog.MotionModel]
+    columns: ClassVar[tuple[int, int]]  # of its logs of the path and of times, in MRPT 2.5
 
     def __init__(self) -> None:
         found = shutil.which(self.command)
@@ -112,11 +113,15 @@ class MrptSlam(Guest):
         (folder / "config.ini").write_text(self.config(f"{folder}/log"))
         words = [self._program, f"{folder}/config.ini", f"{folder}/frames.rawlog"]
         processor_s = program.run(words, Limits.first_s + len(stamps) * Limits.scan_s)
-        path = self.poses(self._log(folder / "log" / "log_estimated_path.txt"))
+        path = self.poses(self._log(folder / "log" / "log_estimated_path.txt", self.columns[0]))
         if not np.isfinite(path).all():
             raise SlamFailedError(f"{type(self).__name__} logged a pose that is not finite", "nan")
-        wall_ms = np.maximum(self.spent(self._log(folder / "log" / "log_times.txt")), 1e-6)
-        memory = self._log(folder / "log" / "log_MemoryUsage.txt")[:, 1]
+        wall_ms = self.spent(self._log(folder / "log" / "log_times.txt", self.columns[1]))
+        memory = self._log(folder / "log" / "log_MemoryUsage.txt", 2)[:, 1]
+        if not np.isfinite([wall_ms, memory]).all():
+            raise SlamFailedError(f"{type(self).__name__} logged a time or memory that is not "
+                                  "finite", "bad")  # fmt: skip
+        wall_ms = np.maximum(wall_ms, 1e-6)
         self._growth_bytes = int(memory.max() - memory[0])
         shares = (processor_s * wall_ms / wall_ms.sum()).tolist()
         return [
@@ -124,8 +129,8 @@ class MrptSlam(Guest):
             for stamp_ns, pose, share in zip(stamps, path, shares, strict=True)
         ]
 
-    def _log(self, path: Path) -> Float:
-        """(frames, k) numbers of a log, a row each frame."""
+    def _log(self, path: Path, columns: int) -> Float:
+        """(frames, columns) numbers of a log, a row each frame."""
         try:
             rows: Float = np.loadtxt(path, comments="%", ndmin=2)
         except OSError as error:
@@ -136,6 +141,12 @@ class MrptSlam(Guest):
             raise SlamFailedError(
                 f"{type(self).__name__} logged {len(rows)} rows of {path.name} for "
                 f"{len(self._frames)} scans",
+                "bad",
+            )
+        if rows.shape[1] != columns:
+            raise SlamFailedError(
+                f"{type(self).__name__} logged {rows.shape[1]} columns of {path.name}, not "
+                f"{columns}: another version of MRPT?",
                 "bad",
             )
         return rows
