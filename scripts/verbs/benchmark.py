@@ -85,8 +85,11 @@ def benchmark(
     workers.check_jobs(jobs)
     others = [submission.read(path) for path in merge or ()]
     count = seeds if seeds is not None else QUICK_SEEDS if quick else SEEDS
+    runs = tuple(dict.fromkeys((*slams, *([subject] if subject else []))))
+    numbered = dict(zip(runs, with_set(runs, set_ or []), strict=True))
     wanted = wanted_of(
-        chosen(named(tracks or [])), with_set(slams, set_ or []), subject,
+        chosen(named(tracks or [])), [numbered[name] for name in slams],
+        None if subject is None else numbered[subject],
         train=train, seeds=count, quick=quick, seconds=seconds, submit=submit,
     )  # fmt: skip
     started = time.perf_counter()

@@ -13,9 +13,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from scripts.benchmark.make import Wanted
 from scripts.cli import app
 from scripts.comparison import again
 from scripts.comparison.folder import read
+from slam.errors import InvalidValueError
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 SHORT = "--tracks busy-chairs --quick --seeds 1 --seconds 1.2"  # the same words, but minutes less
@@ -89,6 +91,20 @@ def test_a_second_call_makes_nothing_again(outside: Path):
     assert len(files) == 9  # three recordings; the control and the oracle on each
     call(line)
     assert {f: f.stat().st_mtime_ns for f in files} == files
+
+
+def test_numbers_may_be_set_of_the_subject_alone(monkeypatch: pytest.MonkeyPatch):
+    asked = []
+
+    def stop(wanted: Wanted, *_: object, **__: object) -> None:
+        asked.append((wanted.subject, wanted.slams))
+        raise InvalidValueError("enough")
+
+    monkeypatch.setattr("scripts.benchmark.make.carry_out", stop)
+    line = "benchmark --quick --subject ekf --set noise_scale=2"
+    for more in ("", " --slam ekf"):
+        CliRunner().invoke(app, shlex.split(line + more))
+    assert asked == [("ekf{noise_scale=2}", ("ekf{noise_scale=2}",))] * 2
 
 
 def test_what_cannot_be_is_told(outside: Path):
