@@ -31,6 +31,7 @@ SCHEMA, WHAT = 1, "submission to the benchmark of mobilia"
 MAX_BYTES = 1 << 25
 MAX_SEEDS, MAX_WORDS = 1000, 2000  # of a file; characters of a name or failure
 MAX_SEED, MAX_SECONDS = 2**32 - 1, 86_400.0  # s of a run
+MAX_DEPTH = 16  # objects and lists within each other, in what it was made with
 MAX_NUMBER = 1e300  # of any metric; JSON has whole numbers that no double holds
 SETS = ("test", "train")
 OUTCOMES = ("finished", "lost", *FAILURES)
@@ -205,7 +206,8 @@ def _submission(path: Path, data: Row) -> Submission:
     _expect(path, "seconds", seconds, timed, f"null, or up to {MAX_SECONDS:g}")
     tracks, made = data["tracks"], data["made_with"]
     _expect(path, "tracks", tracks, isinstance(tracks, dict) and bool(tracks), "one or more")
-    _expect(path, "made_with", made, isinstance(made, dict), "an object")
+    shallow = isinstance(made, dict) and _is_shallow(made, MAX_DEPTH)
+    _expect(path, "made_with", made, shallow, f"an object, at most {MAX_DEPTH} deep")
     runs = {}
     for name, own in tracks.items():
         if name not in TRACKS or own["sha256"] != TRACKS[name].sha256:
@@ -264,6 +266,11 @@ def _is_seed(value: Any) -> bool:
     return type(value) is int and 0 <= value <= MAX_SEED
 
 
+def _is_shallow(value: Any, most: int) -> bool:
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return not inner or (most > 0 and all(_is_shallow(one, most - 1) for one in inner))
+
+
 def _is_words(value: Any) -> bool:
     return isinstance(value, str) and 0 < len(value) <= MAX_WORDS and value.isprintable()
 
@@ -272,6 +279,13 @@ def _in(value: Any, known: Sequence[Any]) -> bool:
     return isinstance(value, str | int | float) and type(value) is not bool and value in known
 
 
+def _shown(value: Any) -> str:
+    try:
+        return f"{value!r:.80}"
+    except RecursionError:
+        return "what is too deep to show"
+
+
 def _expect(path: Path, field: str, value: Any, fits: bool, wanted: str) -> None:
     if not fits:
-        raise LogFormatError(path, f"{field} must be {wanted}, got {value!r:.80}")
+        raise LogFormatError(path, f"{field} must be {wanted}, got {_shown(value)}")
