@@ -115,6 +115,8 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
     console.print(table)
     for name, why in board.missing.items():
         note(f"{name} is not installed: {why}")
+    for name, one in board.merged.items():
+        note(f"{name} was submitted, as SLAM {one['slam']}: its results are the submitter's word")
     for failure in board.failures():
         note(failure)
     for line in board.said():

@@ -62,6 +62,7 @@ def test_submit_verify_and_merge(outside: Path):
     assert "all well" in call("mobilia verify out/benchmark")
 
     printed = call(f"{merge} {SHORT}")
+    assert "my_slam was submitted, as SLAM my_slam:MySlam" in printed
     table = json.loads((outside / "out/board/leaderboard.json").read_text())["leaderboard"]
     mine, wheels = (table[f"busy-chairs-v1 {name}"] for name in ("my_slam", "odometry"))
     assert mine["error_tracking_m"] == pytest.approx(wheels["error_tracking_m"], abs=1e-6)
