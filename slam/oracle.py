@@ -28,7 +28,7 @@ KINDS = {
 }
 OPTIONAL = (
     "landmarks", "changes", "save", "cells_hold",  # the optional protocols of ``slam.system``
-    "finish",  # of a program over files
+    "estimates_at_end",  # of a program over files
     "processor_s", "memory_growth_bytes",  # of a system in a process of its own
 )  # fmt: skip
 

@@ -98,12 +98,12 @@ def asked_trajectory(system: SlamSystem, stamps_ns: NDArray[np.int64]) -> Trajec
     return final
 
 
-def asked_finish(
+def asked_at_end(
     system: RunsAtTheEnd, stamps_ns: NDArray[np.int64]
 ) -> tuple[list[Estimate], list[float]]:
     """Its estimates for ``stamps_ns`` and their processor times, s; ``SlamFailedError`` if not."""
     with judged():
-        answers = list(system.finish())
+        answers = list(system.estimates_at_end())
         estimates = [estimate for estimate, _ in answers]
         spent_s = [float(seconds) for _, seconds in answers]
         stamps = [estimate.stamp_ns for estimate in estimates]
@@ -148,12 +148,14 @@ class Track:
     system: SlamSystem
     estimates: list[Estimate] = field(default_factory=list)
     durations_s: list[float] = field(default_factory=list)
-    _finished: int = 0  # estimates of which ``finish`` was asked
+    _finished: int = 0  # estimates of which ``estimates_at_end`` was asked
+    _failed: bool = False  # a program over files; it is not asked again
 
     def online(self) -> Trajectory:
         """The poses as they were reported at the time; of a program over files, its own.
 
-        Raises ``SlamFailedError`` when ``finish`` does, and not a second time.
+        Raises ``SlamFailedError`` when ``finish`` does, and not a second time. A program over files
+        that failed has none.
         """
         self.finish()
         return Trajectory(
@@ -169,13 +171,28 @@ class Track:
 
         Its estimates take the place of those it gave at the time. Raises ``SlamFailedError``.
         """
-        if not isinstance(self.system, RunsAtTheEnd) or self._finished == len(self.estimates):
+        system = self.system
+        if not isinstance(system, RunsAtTheEnd) or self._failed:
             return
-        self._finished = len(self.estimates)
-        with self._named("finish()"):
-            estimates, spent_s = asked_finish(self.system, self._stamps())
+        if self._finished == len(self.estimates):
+            return
+        with self._named("estimates_at_end()"), self._none_if_it_fails():
+            estimates, spent_s = asked_at_end(system, self._stamps())
+        self._finished = len(estimates)
         self.estimates[:] = estimates
         self.durations_s[:] = [a + b for a, b in zip(self.durations_s, spent_s, strict=True)]
+
+    @contextmanager
+    def _none_if_it_fails(self) -> Iterator[None]:
+        """What a program over files said before its end was odometry: no result of its own."""
+        try:
+            yield
+        except SlamFailedError:
+            if isinstance(self.system, RunsAtTheEnd):
+                self._failed = True
+                self.estimates.clear()
+                self.durations_s.clear()
+            raise
 
     def final(self) -> Trajectory | None:
         """The poses as the system sees them now, None where they are the online ones."""
@@ -239,7 +256,7 @@ class Track:
         """One update, timed; raises ``SlamFailedError`` when the system does."""
         clock = getattr(self.system, "processor_s", time.process_time)
         start = clock()
-        with self._named(f"scan {len(self.estimates)},"):
+        with self._named(f"scan {len(self.estimates)},"), self._none_if_it_fails():
             estimate = asked(self.system, frame)
         self.durations_s.append(clock() - start)
         self.estimates.append(estimate)

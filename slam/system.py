@@ -41,7 +41,7 @@ from slam.variants import inside, oracle_of, parsed
 __all__ = [
     "CanSave", "Changes", "Estimate", "HasChanges", "HasLandmarks", "Landmarks", "Raster",
     "RunsAtTheEnd", "SaysCells", "SlamSystem", "config_of", "create", "describe", "names",
-    "register", "register_prefix", "told",
+    "refuse_at_the_end", "register", "register_prefix", "told",
 ]  # fmt: skip
 
 
@@ -99,9 +99,9 @@ class SaysCells(Protocol):
 
 @runtime_checkable
 class RunsAtTheEnd(Protocol):
-    """Optional: a program over files. ``update`` reports odometry's pose, ``finish`` its own."""
+    """Optional: a program over files. ``update`` reports odometry's pose until the last frame."""
 
-    def finish(self) -> Sequence[tuple[Estimate, float]]:
+    def estimates_at_end(self) -> Sequence[tuple[Estimate, float]]:
         """Of each frame so far, in order: the estimate, and the processor time it took, s.
 
         Each estimate must be of its frame and those before it: it is scored as an online one.
@@ -258,6 +258,15 @@ def _factory(name: str) -> Factory:
     registered = _registered(name)
     assert registered is not None
     return registered
+
+
+def refuse_at_the_end(system: object, name: str, what: str) -> None:
+    """``InvalidValueError`` for a SLAM that runs at the end, where ``what`` needs poses before."""
+    if isinstance(system, RunsAtTheEnd):
+        raise InvalidValueError(
+            f"SLAM '{name}' is a program over files: it has no pose before the last scan, "
+            f"and {what} needs one at every scan"
+        )
 
 
 def told(error: BaseException) -> str:

@@ -21,7 +21,8 @@ from sim.recording.verify import Finding
 def made_again(path: Path, count: int, seed: int = 0) -> Iterator[Finding]:
     """One finding for each of ``count`` runs, drawn by ``seed``; raises as ``submission.read``.
 
-    "differs" is no proof of anything with other versions or on another processor: then it says so.
+    A difference is no proof of anything with other versions or on another processor: then the
+    verdict is "cannot be checked here". Only recordings are checked: no SLAM runs.
     """
     given = submission.read(path)
     runs = [(track, run) for track, own in given.runs.items() for run in own]
@@ -40,16 +41,21 @@ def made_again(path: Path, count: int, seed: int = 0) -> Iterator[Finding]:
         if same:
             yield Finding(episode=name, verdict="same bytes")
             continue
-        yield Finding(episode=name, verdict="differs", why=_why(given.made_with))
+        there = _elsewhere(given.made_with)
+        if there:
+            why = f"its scans are others here, and it was made with {there}"
+            yield Finding(episode=name, verdict="cannot be checked here", why=why)
+            continue
+        why = "its scans are others here, on the same processor and versions"
+        yield Finding(episode=name, verdict="differs", why=why)
 
 
-def _why(made_with: Mapping[str, Any]) -> str:
+def _elsewhere(made_with: Mapping[str, Any]) -> str:
+    """Processor and versions that it was made with; "" where they are those of here."""
     here = {"versions": versions(), "processor": machine()["processor"]}
     told = made_with.get("machine")
     there = {
         "versions": made_with.get("versions"),
         "processor": told.get("processor") if isinstance(told, Mapping) else None,
     }
-    if here != there:
-        return f"its scans are others here: other CPU or version, {there!s:.300}"
-    return "its scans are others here, on the same CPU and versions"
+    return "" if here == there else f"{there!s:.300}"

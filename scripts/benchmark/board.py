@@ -4,24 +4,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark.scores import ATE, COLUMNS, ENOUGH, SILENT, TRACKING, Row, by_level, scores
+from scripts.benchmark.scores import ATE, COLUMNS, SILENT, TRACKING, Row, by_level, scores
 from scripts.benchmark.tracks import LEVELS, ODOMETRY, Track
 from scripts.comparison.folder import write_csv
 from scripts.comparison.tables import FAILED
 from scripts.metrics.row import digits
+from scripts.report.study import LEAST_RUNS
 from scripts.result_files import write as write_results
 from slam.evaluation.lost import EXCUSED_S, LOST_RULE
 from slam.files import write_text
 
 SCHEMA = 1
 NAMES = ("leaderboard.json", "leaderboard.csv", "leaderboard.md")
-NEVER = "never"
+NEVER = "never"  # not at any level, nor does the interval hold one
+ABOVE = f"> {LEVELS[-1]:g}"
 CM, PERCENT = 100.0, 100.0
 
 
@@ -33,6 +35,7 @@ class Board:
     head     how it was made: command, seeds, versions, machine
     runs     by track: rows as of ``runs.csv``, of every SLAM and control
     missing  SLAMs that are not installed, and how to get them
+    merged   of each submission of others: its SLAM, and what it was made with
     """
 
     subject: str
@@ -40,6 +43,7 @@ class Board:
     tracks: Sequence[Track]
     runs: Mapping[str, Sequence[Row]]
     missing: Mapping[str, str] = field(default_factory=dict)
+    merged: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @cached_property
     def _scores(self) -> dict[str, tuple[Row, list[Row]]]:
@@ -69,30 +73,36 @@ class Board:
 
     def failures(self) -> list[str]:
         """One line for each SLAM and track where it raised, hung or answered nonsense."""
-        out = []
+        return [f"{head}: {told}" for head, told in self._failures()]
+
+    def _failures(self) -> Iterator[tuple[str, str]]:
+        """Who failed where, and what was told of the first."""
         for track, rows in self.runs.items():
             for slam in self.slams:
                 own = [r for r in rows if r["slam"] == slam and r["outcome"] in FAILED]
                 if own:
                     told = str(own[0]["failure"]).partition("\n")[0][:300]
-                    out.append(f"{slam} failed in {len(own)} runs of {track}: {told}")
-        return out
+                    yield f"{slam} failed in {len(own)} runs of {track}", told
 
     def said(self) -> list[str]:
         """What the reader asked: from which level the subject is lost, on which track."""
         every = self._of(self.subject)
         few = min((row["seeds"] for row in every), default=0)
         own = [row for row in every if row["counts"]]
+        if few < LEAST_RUNS:
+            return [f"Too few runs to tell: {few} at each level, {LEAST_RUNS} are needed."]
         out = []
-        if few < ENOUGH:
-            out.append(f"Too few runs to tell: {few} at each level, {ENOUGH} are needed.")
         lost = sorted((r for r in own if math.isfinite(r["lost_from"])), key=_lost_from)
         if lost:
             listed = "; ".join(f"{r['track']} from level {_from(r)} on" for r in lost)
             out.append(f"`{self.subject}` is lost half of the time in {listed}.")
-        if kept := [row["track"] for row in own if math.isinf(row["lost_from"])]:
+        if kept := [row["track"] for row in own if math.isinf(row["lost_from_low"])]:
             so = "It is" if lost else f"`{self.subject}` is"
             out.append(f"{so} not lost half of the time at any level of {', '.join(kept)}.")
+        open_ = [r for r in own if math.isinf(r["lost_from"]) and math.isfinite(r["lost_from_low"])]
+        if open_:
+            listed = ", ".join(f"{r['track']} {_from(r)}" for r in open_)
+            out.append(f"Whether half of its runs are lost cannot be told in {listed}.")
         worse = [row["track"] for row in own if self._worse_than_wheels(row["track"])]
         if worse and self.subject != ODOMETRY:
             out.append(
@@ -100,7 +110,9 @@ class Board:
                 "what moves is not its problem there."
             )
         if unfair := [row["track"] for row in every if not row["counts"]]:
-            out.append(f"Left out, because the oracle fails there too: {', '.join(unfair)}.")
+            out.append(
+                f"Left out, because its oracle was lost or more than 2 cm off: {', '.join(unfair)}."
+            )
         return out
 
     def _worse_than_wheels(self, track: str) -> bool:
@@ -116,6 +128,7 @@ class Board:
         head = {
             "schema": SCHEMA, **self.head, "subject": self.subject, "said": self.said(),
             "lost_rule": LOST_RULE, "excused_s": EXCUSED_S, "missing": dict(self.missing),
+            "merged": dict(self.merged),
         }  # fmt: skip
         tracks = {
             t.name: {
@@ -163,7 +176,12 @@ class Board:
         if silent:
             named = ", ".join(f"`{name}`" for name in silent)
             lines.append(f"- no silent failures can be counted without a covariance: {named}")
-        lines += [f"- {told}" for told in self.failures()]
+        lines += [f"- {head}: {_code(told)}" for head, told in self._failures()]
+        lines += [
+            f"- `{name}` was submitted, as SLAM {_code(one['slam'])}, and its results are the "
+            f"submitter's word. Made with {_code(one['made_with'])}"
+            for name, one in self.merged.items()
+        ]
         return ["\n".join(lines)]
 
     def _of(self, slam: str) -> list[Row]:
@@ -189,11 +207,17 @@ class Board:
         ]
 
 
+def _code(words: str) -> str:
+    """Somebody else's words in Markdown, as they are: nothing in them is a link, tag or picture."""
+    return "`" + " ".join(words.replace("`", "'").split()) + "`"
+
+
 _SHOWN = ("command", "seeds", "world", "quick", "seconds")
 _LOST = (
     "The level from which half of the runs are lost, with its 95 % interval (bootstrap over the "
-    "seeds, isotonic regression); levels go from 0 to 1. A track counts while its oracle is never "
-    "lost, and at most 2 cm off."
+    "seeds, isotonic regression); levels go from 0 to 1. It is `never` where the whole interval is "
+    f"above 1, and has no interval with fewer than {LEAST_RUNS} seeds. A track "
+    "counts while its oracle is never lost, and at most 2 cm off."
 )
 
 
@@ -202,13 +226,18 @@ def _lost_from(row: Row) -> float:
 
 
 def _from(row: Row) -> str:
-    low, high = row["lost_from_low"], row["lost_from_high"]
-    sure = math.isnan(low) or low == high == row["lost_from"]
-    return _level(row["lost_from"]) + ("" if sure else f" [{_level(low)}, {_level(high)}]")
+    """The level with its interval; without where there are too few runs for one."""
+    value, low, high = row["lost_from"], row["lost_from_low"], row["lost_from_high"]
+    if row["seeds"] < LEAST_RUNS:
+        return _level(value)
+    if math.isinf(low):
+        return NEVER
+    sure = math.isnan(low) or low == high == value
+    return _level(value) + ("" if sure else f" [{_level(low)}, {_level(high)}]")
 
 
 def _level(value: float) -> str:
-    return NEVER if math.isinf(value) else f"{value:.2g}"
+    return ABOVE if math.isinf(value) else f"{value:.2g}"
 
 
 def _number(key: str, factor: float = 1.0) -> Callable[[Row], str]:
@@ -223,6 +252,7 @@ _CELLS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("lost from", _from),
     ("lost runs", lambda row: f"{row['lost_runs']} of {row['runs']}"),
     ("error while not lost, cm", _number(TRACKING, CM)),
+    ("of runs", lambda row: str(row[f"{TRACKING}_runs"])),
     ("silent failures, % of scans", _number(SILENT, PERCENT)),
     ("rank correlation", _number("spearman")),
     ("ms a scan, p50", _number("ms_per_scan_p50")),
@@ -232,7 +262,7 @@ _CELLS: tuple[tuple[str, Callable[[Row], str]], ...] = (
 
 
 def lost_from_words(row: Row | None) -> str:
-    """A cell of the first table: "0.43 [0.31, 0.6]", "never", or a dash."""
+    """A cell of the first table: "0.43 [0.31, 0.6]", "> 1 [0.9, > 1]", "never", or a dash."""
     return "–" if row is None else _from(row)
 
 

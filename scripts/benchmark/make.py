@@ -54,7 +54,7 @@ class Wanted:
 
     def __post_init__(self) -> None:
         if self.submit is not None:
-            submission.checked_name(self.submit)
+            submission.checked_name(self.submit, self.subject)
         if self.subject not in self.slams:
             raise InvalidValueError(f"the subject {self.subject!r:.80} is none of the SLAMs")
         most = min(len(self.seeds_of(track)) for track in self.tracks)
@@ -137,7 +137,7 @@ def carry_out(
             for name in plans:
                 runs[name] = runs[name] + _on_the_same_scans(one, name, digests[name])
         with together(out) as staged:
-            made = _board(wanted, runs)
+            made = _board(wanted, runs, merge)
             made.write(staged)
             if own is not None:
                 submission.write(staged / submission.file_of(own.name), own)
@@ -145,11 +145,12 @@ def carry_out(
     return made
 
 
-def _board(wanted: Wanted, runs: Runs) -> Board:
+def _board(wanted: Wanted, runs: Runs, merge: Sequence[Submission]) -> Board:
     head = {**wanted.head(), "versions": versions(), "machine": machine()}
     return Board(
-        subject=wanted.subject, head=head, tracks=wanted.tracks, runs=runs, missing=wanted.missing
-    )
+        subject=wanted.subject, head=head, tracks=wanted.tracks, runs=runs, missing=wanted.missing,
+        merged={one.name: one.origin() for one in merge},
+    )  # fmt: skip
 
 
 def _digests(plan: Plan, folder: Path) -> dict[tuple[float, int], str]:

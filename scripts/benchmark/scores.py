@@ -17,20 +17,18 @@ from slam.evaluation.statistics import (
     CONFIDENCE,
     RESAMPLES,
     SEED,
-    median_interval,
     quantile,
 )
 from slam.frames import Float
 
 Row = dict[str, Any]
-ENOUGH = 6  # runs at a level; of fewer nothing is claimed
 FAIR_M = 0.02  # m of median error, up to which the oracle may be off at any level
 ATE, TRACKING, SILENT = "ate_unaligned_m", "error_tracking_m", "silent_share"
 COSTS = ("ms_per_scan_p50", "ms_per_scan_p999", "peak_memory_mb")
 COLUMNS = (
     "track", "counts", "slam", "seeds", "runs", "lost_runs", "failed_runs",
     "lost_from", "lost_from_low", "lost_from_high", "lost_at_top",
-    TRACKING, f"{TRACKING}_low", f"{TRACKING}_high", SILENT, "spearman", *COSTS,
+    TRACKING, f"{TRACKING}_low", f"{TRACKING}_high", f"{TRACKING}_runs", SILENT, "spearman", *COSTS,
 )  # fmt: skip
 
 
@@ -41,19 +39,26 @@ def lost_from(levels: Sequence[float], shares: Sequence[float] | Float) -> float
     between the levels. No shape is assumed. A logistic curve would have none to fit where nobody is
     lost at one level and everybody at the next, which is usual.
     """
-    rising = isotonic_regression(np.asarray(shares, dtype=np.float64)).x
-    above = np.flatnonzero(rising >= 0.5 - 1e-12)
-    if not len(above):
+    rising, k = _crossing(shares)
+    if k is None:
         return math.inf
-    k = int(above[0])
     if k == 0:
         return float(levels[0])
     part = (0.5 - float(rising[k - 1])) / float(rising[k] - rising[k - 1])
     return float(levels[k - 1] + part * (levels[k] - levels[k - 1]))
 
 
+def _crossing(shares: Sequence[float] | Float) -> tuple[Float, int | None]:
+    """The shares (n,) made to rise, and the first of at least one half."""
+    rising: Float = isotonic_regression(np.asarray(shares, dtype=np.float64)).x
+    above = np.flatnonzero(rising >= 0.5 - 1e-12)
+    return rising, int(above[0]) if len(above) else None
+
+
 def lost_from_interval(levels: Sequence[float], lost: Float) -> tuple[float, float]:
     """95 % interval of ``lost_from``: percentile bootstrap over the seeds; NaN of fewer than two.
+
+    It holds at least the two levels between which ``lost_from`` is read off: nothing was run there.
 
     lost  (seeds, levels) of 0 and 1: a seed is the same room at every level, so it is drawn whole
     """
@@ -63,8 +68,32 @@ def lost_from_interval(levels: Sequence[float], lost: Float) -> tuple[float, flo
     draws = np.random.default_rng(SEED).integers(0, n, (RESAMPLES, n))
     shares, times = np.unique(lost[draws].mean(axis=1), axis=0, return_counts=True)
     found = np.repeat([lost_from(levels, row) for row in shares], times).tolist()
+    low, high = _ends(found)
+    _, k = _crossing(lost.mean(axis=0))
+    if k is None:
+        return low, high
+    return min(low, float(levels[max(k - 1, 0)])), max(high, float(levels[k]))
+
+
+def _ends(drawn: Sequence[float]) -> tuple[float, float]:
     tail = 0.5 * (1.0 - CONFIDENCE)
-    return quantile(found, tail), quantile(found, 1.0 - tail)
+    return quantile(drawn, tail), quantile(drawn, 1.0 - tail)
+
+
+def by_seed_interval(values: Sequence[tuple[int, float]]) -> tuple[float, float]:
+    """95 % interval of the median of (seed, value): seeds are drawn whole; NaN of fewer than two.
+
+    The runs of a seed are the same room at every level, so they are no samples of their own.
+    """
+    by_seed: dict[int, list[float]] = {}
+    for seed, value in values:
+        by_seed.setdefault(seed, []).append(value)
+    groups = [by_seed[seed] for seed in sorted(by_seed)]
+    n = len(groups)
+    if n < 2:
+        return math.nan, math.nan
+    draws = np.random.default_rng(SEED).integers(0, n, (RESAMPLES, n)).tolist()
+    return _ends([quantile([v for k in draw for v in groups[k]], 0.5) for draw in draws])
 
 
 def by_level(rows: Sequence[Row], metric: str) -> dict[float, float]:
@@ -93,7 +122,7 @@ def score(track: Track, slam: str, rows: Sequence[Row]) -> Row:
         table[seeds.index(int(row["seed"])), levels.index(float(row["dynamism"]))] = row["lost"]
     low, high = lost_from_interval(levels, table)
     errors = _values(rows, TRACKING)
-    between = median_interval(errors)
+    between = by_seed_interval(_by_seed(rows, TRACKING))
     silent = _values(rows, SILENT)
     return {
         "track": track.name,
@@ -109,6 +138,7 @@ def score(track: Track, slam: str, rows: Sequence[Row]) -> Row:
         TRACKING: quantile(errors, 0.5) if errors else None,
         f"{TRACKING}_low": between[0],
         f"{TRACKING}_high": between[1],
+        f"{TRACKING}_runs": len(errors),
         SILENT: sum(silent) / len(silent) if silent else None,
         "spearman": spearman(by_level(rows, ATE)),
         **{cost: _median(_values(rows, cost)) for cost in COSTS},
@@ -117,8 +147,12 @@ def score(track: Track, slam: str, rows: Sequence[Row]) -> Row:
 
 def _values(rows: Sequence[Row], metric: str) -> list[float]:
     """As they are, where they are: what failed has no error while it was not lost."""
-    values = (row.get(metric) for row in rows)
-    return [float(v) for v in values if v is not None and not math.isnan(v)]
+    return [value for _, value in _by_seed(rows, metric)]
+
+
+def _by_seed(rows: Sequence[Row], metric: str) -> list[tuple[int, float]]:
+    values = ((int(row["seed"]), row.get(metric)) for row in rows)
+    return [(seed, float(v)) for seed, v in values if v is not None and not math.isnan(v)]
 
 
 def _median(values: Sequence[float]) -> float | None:

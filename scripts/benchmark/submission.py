@@ -24,10 +24,15 @@ from sim.recording.sums import check_vouched
 from slam.bounded import text_of
 from slam.errors import FAILURES, InvalidValueError, LogFormatError
 from slam.files import write_text
+from slam.system import names as registered
+from slam.variants import ORACLE
 
 SCHEMA, WHAT = 1, "submission to the benchmark of mobilia"
 MAX_BYTES = 1 << 25
 MAX_SEEDS, MAX_WORDS = 1000, 2000  # of a file; characters of a name or failure
+MAX_SEED, MAX_SECONDS = 2**32 - 1, 86_400.0  # s of a run
+MAX_DEPTH = 16  # objects and lists within each other, in what it was made with
+MAX_NUMBER = 1e300  # of any metric; JSON has whole numbers that no double holds
 SETS = ("test", "train")
 OUTCOMES = ("finished", "lost", *FAILURES)
 _SECTIONS = ("errors", "honesty", "costs")
@@ -37,6 +42,8 @@ _METRICS = {
     for key, metric in METRICS.items()
     if metric.column and metric.better == "less" and metric.section in _SECTIONS and key != "lost"
 }
+_COSTS = tuple(key for key in _METRICS if METRICS[key].section == "costs")
+_FINISHED = ("ate_unaligned_m", "error_tracking_m")  # what every run that finished has
 _ALSO = ("scans", "lost_at_s", "not_trusted_share", "moving_share_of_returns")
 NUMBERS = (*_METRICS, *_ALSO)  # none of them is below 0
 _SHARES = ("_share", "_share_of_returns")  # at most 1
@@ -66,18 +73,34 @@ class Submission:
     made_with: Mapping[str, Any]
 
     def __post_init__(self) -> None:
-        checked_name(self.name)
+        checked_name(self.name, self.slam)
 
     def rows(self, track: str) -> list[Row]:
-        """Its runs on a track as rows of ``runs.csv`` have it; [] where it was not there."""
+        """Its runs on a track as rows of ``runs.csv`` have it; [] where it was not there.
+
+        Without costs: they are of another machine.
+        """
         return [
-            {"slam": self.name, "dynamism": run["level"]} | {k: run[k] for k in _WORDS - {"level"}}
+            {"slam": self.name, "dynamism": run["level"]}
+            | {k: None if k in _COSTS else run[k] for k in _WORDS - {"level"}}
             for run in self.runs.get(track, ())
         ]
 
+    def origin(self) -> Row:
+        """What a leaderboard says of where its rows come from: words, in one line each."""
+        return {"slam": self.slam, "made_with": _line(str(dict(self.made_with)))}
 
-def checked_name(name: str) -> str:
-    """``name``; ``InvalidValueError`` where no table could hold it."""
+
+def checked_name(name: str, slam: str) -> str:
+    """``name`` for the results of ``slam``.
+
+    ``InvalidValueError`` where no table could hold it, where it is another SLAM's, or ``slam`` is
+    an oracle: that is a control, which is shown labels.
+    """
+    if slam.startswith(ORACLE):
+        raise InvalidValueError(f"an oracle is a control and cannot be submitted: {slam!r:.80}")
+    if name in registered() and name != slam:
+        raise InvalidValueError(f"'{name}' is the name of another SLAM than {slam!r:.80}")
     if not _NAME.fullmatch(name):
         raise InvalidValueError(
             f"the name must be up to 40 letters, digits, '_', '-' and '.', got {name!r:.80}"
@@ -151,11 +174,11 @@ def read(path: Path) -> Submission:
         raise LogFormatError(path, f"no {WHAT} of schema {SCHEMA}")
     check_world(path, world_of(path, data))
     said = data.pop("sha256", None)
-    if said != _sha256(data):
-        raise LogFormatError(path, "damaged: sha256 is not that of what it holds")
     try:
+        if said != _sha256(data):
+            raise LogFormatError(path, "damaged: sha256 is not that of what it holds")
         return _submission(path, data)
-    except (KeyError, TypeError, AttributeError, InvalidValueError) as error:
+    except (KeyError, TypeError, AttributeError, RecursionError, InvalidValueError) as error:
         raise LogFormatError(path, f"no submission: {type(error).__name__}: {error}") from error
 
 
@@ -169,21 +192,30 @@ def _submission(path: Path, data: Row) -> Submission:
     _expect(path, "seeds_of", data["seeds_of"], data["seeds_of"] in SETS, " or ".join(SETS))
     seeds, levels, seconds = data["seeds"], data["levels"], data["seconds"]
     several = isinstance(seeds, list) and 0 < len(seeds) <= MAX_SEEDS
-    whole = several and all(type(seed) is int and seed >= 0 for seed in seeds)
-    _expect(path, "seeds", seeds, whole and len(set(seeds)) == len(seeds), "whole numbers >= 0")
+    whole = several and all(_is_seed(seed) for seed in seeds)
+    _expect(
+        path,
+        "seeds",
+        seeds,
+        whole and len(set(seeds)) == len(seeds),
+        f"whole numbers, 0 to {MAX_SEED}",
+    )
     known = isinstance(levels, list) and bool(levels) and all(_in(one, LEVELS) for one in levels)
     _expect(path, "levels", levels, known and levels == sorted(set(levels)), f"of {LEVELS}, rising")
-    timed = seconds is None or (_is_number(seconds) and seconds > 0)
-    _expect(path, "seconds", seconds, timed, "null or > 0")
-    _expect(path, "tracks", data["tracks"], bool(data["tracks"]), "one or more")
+    timed = seconds is None or (_is_number(seconds) and 0 < seconds <= MAX_SECONDS)
+    _expect(path, "seconds", seconds, timed, f"null, or up to {MAX_SECONDS:g}")
+    tracks, made = data["tracks"], data["made_with"]
+    _expect(path, "tracks", tracks, isinstance(tracks, dict) and bool(tracks), "one or more")
+    shallow = isinstance(made, dict) and _is_shallow(made, MAX_DEPTH)
+    _expect(path, "made_with", made, shallow, f"an object, at most {MAX_DEPTH} deep")
     runs = {}
-    for name, own in data["tracks"].items():
+    for name, own in tracks.items():
         if name not in TRACKS or own["sha256"] != TRACKS[name].sha256:
             raise LogFormatError(path, f"track {name!r:.80} is none of this version's")
         runs[name] = _runs(path, name, own["runs"], {(a, b) for a in levels for b in seeds})
     return Submission(
         name=data["name"], slam=data["slam"], seeds_of=data["seeds_of"], seeds=tuple(seeds),
-        levels=tuple(levels), seconds=seconds, runs=runs, made_with=dict(data["made_with"]),
+        levels=tuple(levels), seconds=seconds, runs=runs, made_with=made,
     )  # fmt: skip
 
 
@@ -201,6 +233,8 @@ def _check_run(path: Path, track: str, run: Any) -> None:
     if not isinstance(run, dict) or set(run) != _WORDS:
         raise LogFormatError(path, f"{track}: a run must have {', '.join(sorted(_WORDS))}")
     where = f"{track}, level {run['level']!r:.20}, seed {run['seed']!r:.20}: "
+    _expect(path, f"{where}level", run["level"], _in(run["level"], LEVELS), f"of {LEVELS}")
+    _expect(path, f"{where}seed", run["seed"], _is_seed(run["seed"]), "a whole number")
     digest = isinstance(run["recording"], str) and _DIGEST.fullmatch(run["recording"]) is not None
     told = run["failure"] is None or _is_words(run["failure"])
     lost, outcome = run["lost"], run["outcome"]
@@ -209,16 +243,32 @@ def _check_run(path: Path, track: str, run: Any) -> None:
     _expect(path, f"{where}failure", run["failure"], told, "null or words")
     fits = type(lost) is int and lost == int(outcome != "finished")
     _expect(path, f"{where}lost", lost, fits, "0 where it finished, else 1")
+    fits = (run["lost_at_s"] is None) == (outcome == "finished")
+    _expect(
+        path, f"{where}lost_at_s", run["lost_at_s"], fits, "null where it finished, and else not"
+    )
     for key in NUMBERS:
         value = run[key]
         most = 1.0 if key.endswith(_SHARES) else math.inf
-        fits = value is None or (_is_number(value) and 0.0 <= value <= most)
+        must = key in _FINISHED and outcome == "finished"
+        fits = not must if value is None else _is_number(value) and 0.0 <= value <= most
         unit = METRICS[key].unit if key in METRICS else ""
-        _expect(path, where + key, value, fits, f"null or a number >= 0 {unit}".strip())
+        null = "" if must else "null or "
+        _expect(path, where + key, value, fits, f"{null}a number >= 0 {unit}".strip())
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    known = isinstance(value, int | float) and not isinstance(value, bool)
+    return known and -MAX_NUMBER <= value <= MAX_NUMBER
+
+
+def _is_seed(value: Any) -> bool:
+    return type(value) is int and 0 <= value <= MAX_SEED
+
+
+def _is_shallow(value: Any, most: int) -> bool:
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return not inner or (most > 0 and all(_is_shallow(one, most - 1) for one in inner))
 
 
 def _is_words(value: Any) -> bool:
@@ -226,9 +276,16 @@ def _is_words(value: Any) -> bool:
 
 
 def _in(value: Any, known: Sequence[Any]) -> bool:
-    return isinstance(value, str | int | float) and value in known
+    return isinstance(value, str | int | float) and type(value) is not bool and value in known
+
+
+def _shown(value: Any) -> str:
+    try:
+        return f"{value!r:.80}"
+    except RecursionError:
+        return "what is too deep to show"
 
 
 def _expect(path: Path, field: str, value: Any, fits: bool, wanted: str) -> None:
     if not fits:
-        raise LogFormatError(path, f"{field} must be {wanted}, got {value!r:.80}")
+        raise LogFormatError(path, f"{field} must be {wanted}, got {_shown(value)}")

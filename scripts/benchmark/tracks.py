@@ -137,7 +137,7 @@ _ALL = (
     ),
     Track(
         name="moving-boards-v1",
-        about="partitions of 1.6 m are pushed about: walls that walk",
+        about="partitions of 1.6 m are pushed about",
         scene="gallery", axis="boards on castors", says=_of("boards", 0, 2, 4, 7, 10),
         seconds=120.0,
         sets=_each(motion=1.0, change=0.0, crowd=_crowds("boards", 0, 2, 4, 7, 10), **_QUIET),

@@ -85,8 +85,11 @@ def benchmark(
     workers.check_jobs(jobs)
     others = [submission.read(path) for path in merge or ()]
     count = seeds if seeds is not None else QUICK_SEEDS if quick else SEEDS
+    runs = tuple(dict.fromkeys((*slams, *([subject] if subject else []))))
+    numbered = dict(zip(runs, with_set(runs, set_ or []), strict=True))
     wanted = wanted_of(
-        chosen(named(tracks or [])), with_set(slams, set_ or []), subject,
+        chosen(named(tracks or [])), [numbered[name] for name in slams],
+        None if subject is None else numbered[subject],
         train=train, seeds=count, quick=quick, seconds=seconds, submit=submit,
     )  # fmt: skip
     started = time.perf_counter()
@@ -99,7 +102,8 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
 
     table = Table(
         title="level from which half of the runs are lost", title_justify="left",
-        caption="* does not count: its oracle fails", caption_justify="left",
+        caption="* does not count: its oracle was lost or more than 2 cm off",
+        caption_justify="left",
     )  # fmt: skip
     table.add_column("track", no_wrap=True)
     for name in board.slams:
@@ -111,6 +115,8 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
     console.print(table)
     for name, why in board.missing.items():
         note(f"{name} is not installed: {why}")
+    for name, one in board.merged.items():
+        note(f"{name} was submitted, as SLAM {one['slam']}: its results are the submitter's word")
     for failure in board.failures():
         note(failure)
     for line in board.said():

@@ -12,7 +12,7 @@ from slam import se2
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Float, Frame
 from slam.replay import Track, judged
-from slam.system import SlamSystem, create
+from slam.system import SlamSystem, create, refuse_at_the_end
 
 _FAR_M = 1e4  # poses are told up to here
 _NO_GOAL: Float = np.zeros(2)
@@ -21,7 +21,8 @@ _NO_GOAL: Float = np.zeros(2)
 class PoseSource:
     """``source``: "truth", a SLAM's name or ``module:Class`` (each source has its own), or one.
 
-    Raises ``InvalidValueError`` or ``UnknownNameError`` for anything else.
+    Raises ``InvalidValueError`` or ``UnknownNameError`` for anything else, and for a SLAM that runs
+    at the end only.
     """
 
     def __init__(self, source: str | SlamSystem) -> None:
@@ -36,6 +37,7 @@ class PoseSource:
                 "pose_source must be 'truth', the name of a SLAM, module:Class or a SlamSystem, "
                 f"got {source!r}"
             )
+        refuse_at_the_end(self._system, self._name, "an environment")
         self._track: Track | None = None
         self._start: Float = np.zeros(3)
         self._pose: Float = np.zeros(3)

@@ -21,7 +21,7 @@ from slam.evaluation import lost
 from slam.frames import NS_PER_S, Float, Frame
 from slam.frontend.odometry_sum import MotionSum
 from slam.replay import Track, judged
-from slam.system import SlamSystem
+from slam.system import SlamSystem, refuse_at_the_end
 
 OUTCOMES = ("reached", "wrong", "given up", "failed")
 
@@ -102,8 +102,10 @@ def closed_loop(
     """Drive to each goal in turn, steered by ``system`` alone; it is reset first.
 
     A SLAM that raises, or returns what is no estimate, ends the run: its goals are "failed". Raises
-    ``UnknownNameError`` for a goal that the scene does not have.
+    ``UnknownNameError`` for a goal that the scene does not have, and ``InvalidValueError`` for a
+    SLAM that runs at the end only.
     """
+    refuse_at_the_end(system, name, "a closed loop")
     ride = _Ride(simulation, system, config or LoopConfig(), name)
     results = [ride.to(goal) for goal in goal_order(simulation.world, goals)]
     return ride.result(results)

@@ -22,12 +22,12 @@ from slam.logs.bag_topics import Bag
 
 Verdict = Literal[
     "whole", "damaged", "incomplete", "foreign", "same bytes", "same messages", "differs",
-    "other world",
+    "other world", "cannot be checked here",
 ]  # fmt: skip
 # Exit status of each; of several the first in this order counts.
 STATUS: dict[str, int] = {
     "damaged": 1, "differs": 1, "incomplete": 3, "foreign": 4, "same messages": 5,
-    "whole": 0, "same bytes": 0, "other world": 0,
+    "cannot be checked here": 6, "whole": 0, "same bytes": 0, "other world": 0,
 }  # fmt: skip
 METADATA = "metadata.yaml"
 _FILES = ("map.pgm", "map.yaml", METADATA, RECIPE, "relations.txt", "trajectory.tum")
@@ -52,7 +52,7 @@ class Finding:
 
     @property
     def status(self) -> int:
-        """Exit status: 1 damaged, 3 incomplete, 4 foreign files, 5 other bytes, 0 for the rest."""
+        """Exit status, as ``STATUS`` has it; 0 for a difference that another machine explains."""
         explained = self.verdict in ("differs", "same messages") and "CPU or version" in self.why
         return 0 if explained else STATUS[self.verdict]
 

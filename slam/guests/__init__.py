@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """SLAMs from outside, behind the same protocol: to compare with on the same frames.
 
-KISS-ICP and Karto are optional: ``pip install 'mobilia[guests]'``. Any other joins over a pipe.
-``Guest``, the base of the two, is imported when it is first asked for: it loads a compiler.
+The registered ones are optional (docs/bring_your_own.md: how to get each). Any other joins over a
+pipe. ``Guest``, the base of those in Python, is imported when first asked for: it loads a compiler.
 """
 
 from typing import TYPE_CHECKING, Any

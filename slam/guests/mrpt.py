@@ -29,16 +29,16 @@ MOST_BEAMS = 100_000
 class MrptSlam(Guest):
     """A program of MRPT over all frames at once.
 
-    ``update`` keeps the frame and reports odometry's pose. ``finish`` writes the frames so far as
-    a rawlog, runs the program, and returns what it logged: its pose after each scan, which it
-    found from that scan and those before it. So its error is an online error like any other's.
-    Only who wants a pose while the robot still drives (a closed loop, an environment) gets
-    odometry's. Each run begins at the first frame. Raises ``MissingDependencyError`` where the
-    program is not installed.
+    ``update`` keeps the frame and reports odometry's pose. ``estimates_at_end`` writes the frames
+    so far as a rawlog, runs the program, and returns what it logged: its pose after each scan,
+    which it found from that scan and those before it. So its error is an online error like any
+    other's. A closed loop and an environment need poses before the end: they refuse it. Each run
+    begins at the first frame. Raises ``MissingDependencyError`` where the program is not installed.
     """
 
     command: ClassVar[str]
     motion: ClassVar[rawlog.MotionModel]
+    columns: ClassVar[tuple[int, int]]  # of its logs of the path and of times, in MRPT 2.5
 
     def __init__(self) -> None:
         found = shutil.which(self.command)
@@ -67,12 +67,12 @@ class MrptSlam(Guest):
         self._spec = spec
 
     def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
-        """Keep the scan; the pose is odometry's until ``finish``."""
+        """Keep the scan; the pose is odometry's until ``estimates_at_end``."""
         ranges = ranges_of(points_robot, self._spec, math.inf)
         self._frames.append((prediction.increment, ranges))
         return prediction.T_map_robot, {}
 
-    def finish(self) -> list[tuple[Estimate, float]]:
+    def estimates_at_end(self) -> list[tuple[Estimate, float]]:
         """Of each frame so far: the program's estimate, and the processor time it took, s.
 
         Raises ``SlamFailedError`` where the program fails.
@@ -83,9 +83,9 @@ class MrptSlam(Guest):
         return self._found
 
     def trajectory(self) -> Trajectory:
-        """The program's poses, as ``finish`` has them: it moves none later."""
+        """The program's poses, as ``estimates_at_end`` has them: it moves none later."""
         return self._path.trajectory(
-            np.array([e.T_map_robot for e, _ in self.finish()]).reshape(-1, 3)
+            np.array([e.T_map_robot for e, _ in self.estimates_at_end()]).reshape(-1, 3)
         )
 
     def memory_growth_bytes(self) -> int | None:
@@ -113,11 +113,15 @@ class MrptSlam(Guest):
         (folder / "config.ini").write_text(self.config(f"{folder}/log"))
         words = [self._program, f"{folder}/config.ini", f"{folder}/frames.rawlog"]
         processor_s = program.run(words, Limits.first_s + len(stamps) * Limits.scan_s)
-        path = self.poses(self._log(folder / "log" / "log_estimated_path.txt"))
+        path = self.poses(self._log(folder / "log" / "log_estimated_path.txt", self.columns[0]))
         if not np.isfinite(path).all():
             raise SlamFailedError(f"{type(self).__name__} logged a pose that is not finite", "nan")
-        wall_ms = np.maximum(self.spent(self._log(folder / "log" / "log_times.txt")), 1e-6)
-        memory = self._log(folder / "log" / "log_MemoryUsage.txt")[:, 1]
+        wall_ms = self.spent(self._log(folder / "log" / "log_times.txt", self.columns[1]))
+        memory = self._log(folder / "log" / "log_MemoryUsage.txt", 2)[:, 1]
+        if not np.isfinite([wall_ms, memory]).all():
+            raise SlamFailedError(f"{type(self).__name__} logged a time or memory that is not "
+                                  "finite", "bad")  # fmt: skip
+        wall_ms = np.maximum(wall_ms, 1e-6)
         self._growth_bytes = int(memory.max() - memory[0])
         shares = (processor_s * wall_ms / wall_ms.sum()).tolist()
         return [
@@ -125,8 +129,8 @@ class MrptSlam(Guest):
             for stamp_ns, pose, share in zip(stamps, path, shares, strict=True)
         ]
 
-    def _log(self, path: Path) -> Float:
-        """(frames, k) numbers of a log, a row each frame."""
+    def _log(self, path: Path, columns: int) -> Float:
+        """(frames, columns) numbers of a log, a row each frame."""
         try:
             rows: Float = np.loadtxt(path, comments="%", ndmin=2)
         except OSError as error:
@@ -137,6 +141,12 @@ class MrptSlam(Guest):
             raise SlamFailedError(
                 f"{type(self).__name__} logged {len(rows)} rows of {path.name} for "
                 f"{len(self._frames)} scans",
+                "bad",
+            )
+        if rows.shape[1] != columns:
+            raise SlamFailedError(
+                f"{type(self).__name__} logged {rows.shape[1]} columns of {path.name}, not "
+                f"{columns}: another version of MRPT?",
                 "bad",
             )
         return rows

@@ -65,6 +65,7 @@ class IcpSlam(MrptSlam):
     """MRPT's icp-slam, a guest over files: ICP to a map of points, run when the last scan is in."""
 
     command = "icp-slam"
+    columns = (4, 2)
     # not used: it takes odometry's step as the start of its ICP, however sure
     motion = MotionModel(
         m_per_m=0.05, m_per_rad=0.05, rad_per_m=0.05, rad_per_rad=0.05, least_m=0.005,

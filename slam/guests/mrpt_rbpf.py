@@ -87,6 +87,7 @@ class RbpfSlam(MrptSlam):
     """MRPT's rbpf-slam, a guest over files: particles with grids, run when the last scan is in."""
 
     command = "rbpf-slam"
+    columns = (8, 4)
     # about three times a Pioneer's own errors
     motion = MotionModel(
         m_per_m=0.05, m_per_rad=0.05, rad_per_m=0.08, rad_per_rad=0.08, least_m=0.01,

@@ -14,7 +14,9 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
+from weakref import ReferenceType, ref
 
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Frame, LaserSpec
@@ -32,6 +34,8 @@ from slam.variants import PIPE, oracle_of
 @register_prefix(PIPE)
 class PipeSlam:
     """The system behind a command. After a failure it is over; ``reset`` starts it anew.
+
+    It has ``estimates_at_end`` (``slam.system.RunsAtTheEnd``) where its hello promises that.
 
     command      a line as a shell would split it (no shell runs it), or its words
     scan_limit_s, first_limit_s  see ``Limits``
@@ -64,6 +68,8 @@ class PipeSlam:
         self._has_map, self._has_trajectory = (
             said.get(key) is True for key in ("map", "trajectory")
         )
+        if said.get("estimates_at_end") is True:
+            self.estimates_at_end = partial(_at_end, ref(self))  # a cycle would keep the process
         self._forget()
 
     def _forget(self) -> None:
@@ -131,6 +137,15 @@ class PipeSlam:
             return protocol.trajectory_of(self._ask("trajectory", request, self.limits.first_s))
         return self._path.trajectory()
 
+    def asked_at_end(self) -> list[tuple[Estimate, float]]:
+        """Its estimate of each frame so far, and the processor time each took, s."""
+        stamps = self._path.trajectory().stamps_ns.tolist()
+        limit_s = self.limits.first_s + len(stamps) * self.limits.scan_s
+        request = protocol.line({"type": "estimates_at_end"})
+        message = self._ask("estimates_at_end", request, limit_s)
+        with self._over_if_it_fails():
+            return protocol.at_end_of(message, stamps)
+
     def processor_s(self) -> float:
         """Processor time its process has used, s; wall-clock time where no system says it."""
         spent = self._wire.processor_s()
@@ -144,6 +159,12 @@ class PipeSlam:
     def close(self) -> None:
         """End its process; happens by itself when the object goes."""
         self._wire.close()
+
+
+def _at_end(of: ReferenceType[PipeSlam]) -> list[tuple[Estimate, float]]:
+    slam = of()
+    assert slam is not None
+    return slam.asked_at_end()
 
 
 def _words(command: str | Sequence[str]) -> list[str]:

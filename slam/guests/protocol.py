@@ -302,3 +302,28 @@ def trajectory_of(message: Message) -> Trajectory:
     except (InvalidValueError, OverflowError) as error:
         outcome = "nan" if isinstance(error, NotFiniteError) else "bad"
         raise SlamFailedError(f"answered: {error}", outcome) from error
+
+
+def at_end_message(estimates: Sequence[Estimate], spent_s: Sequence[float]) -> dict[str, Any]:
+    """The answer to "estimates_at_end": an estimate of each frame, and what each took, s."""
+    return {
+        "type": "estimates_at_end",
+        "estimates": [estimate_message(estimate) for estimate in estimates],
+        "processor_s": list(spent_s),
+    }
+
+
+def at_end_of(message: Message, stamps_ns: Sequence[int]) -> list[tuple[Estimate, float]]:
+    """The estimates of an answer, one for each of ``stamps_ns`` in order, and their times, s."""
+    estimates = message.get("estimates")
+    if not isinstance(estimates, list) or len(estimates) != len(stamps_ns):
+        raise SlamFailedError(
+            f"answered 'estimates' that are no list of {len(stamps_ns)}, one for each frame", "bad"
+        )
+    if not all(isinstance(one, dict) for one in estimates):
+        raise SlamFailedError("answered 'estimates' that are no objects", "bad")
+    spent_s = _numbers(message, "processor_s", len(stamps_ns))
+    if not (np.isfinite(spent_s) & (spent_s >= 0.0)).all():
+        raise SlamFailedError("answered 'processor_s' that are no times, finite and >= 0", "bad")
+    read = [estimate_of(one, at) for one, at in zip(estimates, stamps_ns, strict=True)]
+    return list(zip(read, spent_s.tolist(), strict=True))

@@ -12,14 +12,25 @@ from contextlib import contextmanager
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Nothing reaches this process's standard output meanwhile, whoever writes to it."""
+    """Nothing reaches this process's standard output meanwhile, whoever writes to it.
+
+    What was written before it does, and later output does again, whatever is raised.
+    """
+    libc = ctypes.CDLL(None)
     sys.stdout.flush()
-    kept, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, 1)
+    libc.fflush(None)  # what C has kept so far is not to be dropped
+    kept = os.dup(1)
     try:
-        yield
-    finally:
-        ctypes.CDLL(None).fflush(None)
-        os.dup2(kept, 1)
-        os.close(kept)
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, 1)
         os.close(nothing)
+        try:
+            yield
+        finally:
+            try:
+                sys.stdout.flush()
+                libc.fflush(None)
+            finally:
+                os.dup2(kept, 1)
+    finally:
+        os.close(kept)

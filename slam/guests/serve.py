@@ -18,8 +18,8 @@ from slam.errors import MobiliaError, SlamFailedError
 from slam.frames import LaserSpec
 from slam.guests import protocol
 from slam.names import OURS, SAFE_PATH, look_in
-from slam.replay import asked, asked_map, asked_trajectory, judged
-from slam.system import SlamSystem, create, told
+from slam.replay import asked, asked_at_end, asked_map, asked_trajectory, judged
+from slam.system import RunsAtTheEnd, SlamSystem, create, told
 
 
 class Server:
@@ -49,7 +49,8 @@ class Server:
         if kind == "hello":
             protocol.check_hello(message)
             self._system = create(self._name, **self._options)
-            promises = {"name": self._name, "map": True, "trajectory": True}
+            promises: dict[str, Any] = {"name": self._name, "map": True, "trajectory": True}
+            promises["estimates_at_end"] = isinstance(self._system, RunsAtTheEnd)
             return protocol.line({**protocol.hello_message(), **promises})
         if self._system is None:
             raise SlamFailedError("hello comes first", "bad")
@@ -62,6 +63,9 @@ class Server:
             return protocol.line({"type": "reset"})
         if kind == "map":
             return protocol.map_message(asked_map(self._system))
+        if kind == "estimates_at_end" and isinstance(self._system, RunsAtTheEnd):
+            answers = asked_at_end(self._system, np.array(self._stamps, dtype=np.int64))
+            return protocol.line(protocol.at_end_message(*answers))
         if kind == "trajectory":
             stamps = np.array(self._stamps, dtype=np.int64)
             final = asked_trajectory(self._system, stamps)

@@ -26,7 +26,7 @@ from slam.trajectory import Trajectory
 KEEP_M, KEEP_RAD = 0.2, math.radians(10.0)  # Karto's minimum travel distance and heading
 BUFFER = 20  # latest vertices matched against
 LOOP_M, CHAIN = 3.0, 10  # how far a loop may be away, and of how many vertices; its defaults
-COARSE, FINE = 0.35, 0.45  # least response of a loop; its defaults
+COARSE, FINE = 0.35, 0.45  # least response of a loop; its defaults. See ``begin``
 RANGE_M = 20.0
 MOST_BEAMS = 4000  # its matcher takes seconds a scan for as many
 NOTHING_M = 1e3  # a range that its matcher takes for no return
@@ -73,6 +73,7 @@ class YagSlam(Guest):
             loop_search_min_chain_size=CHAIN,
             min_response_coarse=COARSE,
             min_response_fine=FINE,
+            verbose=True,  # version 0.3 does not look at the fine response without it
         )
         self._places: list[tuple[int, Float]] = []  # of each frame: its vertex, T_vertex_robot
 
@@ -92,7 +93,7 @@ class YagSlam(Guest):
         if math.hypot(float(moved[0]), float(moved[1])) > KEEP_M or abs(moved[2]) > KEEP_RAD:
             # it starts from odometry since the last vertex: here from the match
             last.odom_pose, scan.odom_pose = last.corrected_pose, scan.corrected_pose
-            with redirect_stdout(io.StringIO()):  # it warns there
+            with redirect_stdout(io.StringIO()):  # it says a line for each loop it tries
                 self._slam.process_scan(scan)
             last = scan
         return self._placed(last, scan), {

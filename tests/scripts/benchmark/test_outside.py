@@ -13,9 +13,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from scripts.benchmark.make import Wanted
 from scripts.cli import app
 from scripts.comparison import again
 from scripts.comparison.folder import read
+from slam.errors import InvalidValueError
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 SHORT = "--tracks busy-chairs --quick --seeds 1 --seconds 1.2"  # the same words, but minutes less
@@ -53,15 +55,23 @@ def test_submit_verify_and_merge(outside: Path):
     assert data["slam"] == "my_slam:MySlam"
     assert len(data["tracks"]["busy-chairs-v1"]["runs"]) == 3
 
-    assert "same bytes" in call(verify)
+    printed = call(verify)
+    assert "same bytes" in printed
+    assert "recordings of 1 of its runs are right; the results are the submitter's word" in printed
+    assert "all well" not in printed
     assert "all well" in call("mobilia verify out/benchmark")
 
     printed = call(f"{merge} {SHORT}")
+    assert "my_slam was submitted, as SLAM my_slam:MySlam" in printed
     table = json.loads((outside / "out/board/leaderboard.json").read_text())["leaderboard"]
     mine, wheels = (table[f"busy-chairs-v1 {name}"] for name in ("my_slam", "odometry"))
     assert mine["error_tracking_m"] == pytest.approx(wheels["error_tracking_m"], abs=1e-6)
     assert mine["silent_share"] is None  # it claims no covariance, and the page says so
     assert "without a covariance: `my_slam`" in (outside / "out/board/leaderboard.md").read_text()
+    assert mine["ms_per_scan_p50"] is None
+    assert wheels["ms_per_scan_p50"] is not None
+    board = json.loads((outside / "out/board/leaderboard.json").read_text())
+    assert board["merged"]["my_slam"]["slam"] == "my_slam:MySlam"
 
     compared = read(outside / "out/benchmark/busy-chairs-v1")
     assert compared.axis == "level"
@@ -84,12 +94,27 @@ def test_a_second_call_makes_nothing_again(outside: Path):
     assert {f: f.stat().st_mtime_ns for f in files} == files
 
 
+def test_numbers_may_be_set_of_the_subject_alone(monkeypatch: pytest.MonkeyPatch):
+    asked = []
+
+    def stop(wanted: Wanted, *_: object, **__: object) -> None:
+        asked.append((wanted.subject, wanted.slams))
+        raise InvalidValueError("enough")
+
+    monkeypatch.setattr("scripts.benchmark.make.carry_out", stop)
+    line = "benchmark --quick --subject ekf --set noise_scale=2"
+    for more in ("", " --slam ekf"):
+        CliRunner().invoke(app, shlex.split(line + more))
+    assert asked == [("ekf{noise_scale=2}", ("ekf{noise_scale=2}",))] * 2
+
+
 def test_what_cannot_be_is_told(outside: Path):
     for words, told in (
         ("--tracks nowhere", "no track is called 'nowhere'"),
         ("--seeds 21", "--seeds must be 1 to 20"),
         ("--slam odometri", "Did you mean 'odometry'?"),
         ("--submit a/b", "up to 40 letters"),
+        ("--slam ekf --submit karto", "the name of another SLAM"),
         ("--merge nothing.json", "nothing.json: cannot be read"),
     ):
         done = CliRunner().invoke(app, ["benchmark", *words.split()])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from scripts.benchmark import scores
-from scripts.benchmark.board import Board
+from scripts.benchmark.board import Board, lost_from_words
 from scripts.benchmark.tracks import LEVELS, TRACKS
 
 TRACK = TRACKS["tour-guide-v1"]
@@ -56,10 +56,25 @@ def test_the_level_at_which_half_are_lost(shares: list[float], level: float):
 def test_its_interval_holds_it_and_repeats():
     lost = np.array(HALF, dtype=float)
     low, high = scores.lost_from_interval(LEVELS, lost)
-    assert 0.375 <= low < scores.lost_from(LEVELS, lost.mean(axis=0)) <= high <= 0.625
+    assert low == 0.25  # the level before the crossing at 0.5
+    assert scores.lost_from(LEVELS, lost.mean(axis=0)) == 0.5
+    assert 0.5 < high <= 0.625
     assert scores.lost_from_interval(LEVELS, lost) == (low, high)
     assert all(math.isnan(value) for value in scores.lost_from_interval(LEVELS, lost[:1]))
     assert scores.lost_from_interval(LEVELS, np.zeros((4, 5))) == (math.inf, math.inf)
+    alike = np.array([[0, 0, 1, 1, 1]] * 6, dtype=float)  # nothing was run between 0.25 and 0.5
+    assert scores.lost_from_interval(LEVELS, alike) == (0.25, 0.5)
+    assert scores.lost_from_interval(LEVELS, np.ones((6, 5))) == (0.0, 0.0)
+
+
+def test_the_interval_of_the_error_draws_seeds_whole():
+    """Ten runs of one room are no ten rooms: the same values, and an interval as of two."""
+    near, far = [(720, 0.01)] * 5, [(721, 0.03)] * 5
+    assert scores.by_seed_interval([*near, *far]) == (0.01, 0.03)
+    apart = [(k, value) for k, (_, value) in enumerate([*near, *far] * 4)]
+    low, high = scores.by_seed_interval(apart)
+    assert high - low <= 0.02
+    assert all(math.isnan(value) for value in scores.by_seed_interval(near))
 
 
 def test_a_row_sums_up_its_runs():
@@ -68,7 +83,7 @@ def test_a_row_sums_up_its_runs():
     assert row["lost_at_top"] == 1.0
     assert row["spearman"] == pytest.approx(1.0)
     assert row["silent_share"] == pytest.approx(0.25 * 15 / 30)
-    assert row["error_tracking_m"] == 0.01
+    assert (row["error_tracking_m"], row["error_tracking_m_runs"]) == (0.01, 30)
     assert (row["ms_per_scan_p50"], row["ms_per_scan_p999"]) == (2.0, 9.0)
     claims_nothing = scores.score(TRACK, "mine", runs("mine", HALF, silent_share=None))
     assert claims_nothing["silent_share"] is None
@@ -93,7 +108,7 @@ def test_the_sentence_says_where_the_subject_is_lost():
     made = board(runs("mine", HALF))
     assert made.slams == ["mine", "odometry", ORACLE]
     assert made.said() == [
-        "`mine` is lost half of the time in tour-guide-v1 from level 0.5 [0.4, 0.6] on."
+        "`mine` is lost half of the time in tour-guide-v1 from level 0.5 [0.25, 0.6] on."
     ]
     (never,) = board(runs("mine", KEPT)).said()
     assert never == "`mine` is not lost half of the time at any level of tour-guide-v1."
@@ -101,18 +116,38 @@ def test_the_sentence_says_where_the_subject_is_lost():
     assert "worse than its own odometry in tour-guide-v1" in worse[-1]
     unfair = [*runs("mine", HALF), *runs(ORACLE, HALF)]
     (left_out,) = Board(subject="mine", head={}, tracks=[TRACK], runs={TRACK.name: unfair}).said()
-    assert left_out == "Left out, because the oracle fails there too: tour-guide-v1."
-    assert board(runs("mine", HALF[:2])).said()[0].startswith("Too few runs to tell: 2")
+    assert left_out == (
+        "Left out, because its oracle was lost or more than 2 cm off: tour-guide-v1."
+    )
+
+
+def test_nothing_is_claimed_of_too_few_runs():
+    made = board(runs("mine", HALF[:5], error_m=0.3))
+    assert made.said() == ["Too few runs to tell: 5 at each level, 6 are needed."]
+    row = made.row(TRACK.name, "mine")
+    assert math.isfinite(row["lost_from_low"])
+    assert lost_from_words(row) == "0.46"  # no interval
+    assert lost_from_words(board(runs("mine", KEPT[:5])).row(TRACK.name, "mine")) == "> 1"
+
+
+def test_never_is_said_where_the_whole_interval_is_above_the_top():
+    assert lost_from_words(board(runs("mine", KEPT)).row(TRACK.name, "mine")) == "never"
+    some = [[0, 0, 0, 0, 1]] * 2 + [[0, 0, 0, 0, 0]] * 4
+    made = board(runs("mine", some))
+    words = lost_from_words(made.row(TRACK.name, "mine"))
+    assert words == "> 1 [0.94, > 1]"
+    told = f"Whether half of its runs are lost cannot be told in tour-guide-v1 {words}."
+    assert made.said() == [told]
 
 
 def test_what_failed_is_told_with_its_line(tmp_path: Path):
     raised = runs("mine", KEPT)
     raised[3] |= {"outcome": "raised", "failure": "scan 2: ValueError (my.py:7)", "lost": 1}
     made = board(raised)
-    told = "mine failed in 1 runs of tour-guide-v1: scan 2: ValueError (my.py:7)"
-    assert made.failures() == [told]
+    head = "mine failed in 1 runs of tour-guide-v1: "
+    assert made.failures() == [head + "scan 2: ValueError (my.py:7)"]
     made.write(tmp_path)
-    assert told in (tmp_path / "leaderboard.md").read_text()
+    assert f"{head}`scan 2: ValueError (my.py:7)`" in (tmp_path / "leaderboard.md").read_text()
     data = json.loads((tmp_path / "leaderboard.json").read_text())
     assert data["subject"] == "mine"
     assert data["tracks"][TRACK.name]["counts"] is True
@@ -124,6 +159,16 @@ def test_what_failed_is_told_with_its_line(tmp_path: Path):
     header, *lines = (tmp_path / "leaderboard.csv").read_text().splitlines()
     assert header.split(",") == list(scores.COLUMNS)
     assert len(lines) == 3
+
+
+def test_a_submitted_row_says_whose_word_it_is_and_nothing_in_it_is_markdown():
+    failed = runs("mine", KEPT)
+    failed[0] |= {"outcome": "raised", "failure": "`![x](http://x)` <img src=x>", "lost": 1}
+    origin = {"slam": "a`b:C", "made_with": "mujoco 3, a CPU"}
+    page = replace(board(failed), merged={"mine": origin}).markdown()
+    assert ": `'![x](http://x)' <img src=x>`\n" in page
+    told = "- `mine` was submitted, as SLAM `a'b:C`, and its results are the submitter's word."
+    assert f"{told} Made with `mujoco 3, a CPU`" in page
 
 
 def test_a_track_of_another_digest_is_another_track():

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from scripts.benchmark import make, submission
+from scripts.benchmark import again, make, submission
 from scripts.benchmark.make import Wanted
 from scripts.benchmark.submission import Submission
 from scripts.benchmark.tracks import LEVELS, TRACKS
@@ -20,7 +20,8 @@ from slam.errors import InvalidValueError, LogFormatError
 TRACK = "tour-guide-v1"
 ROW = {
     "outcome": "finished", "failure": None, "lost": 0, "scans": 282.0, "lost_at_s": None,
-    "ate_unaligned_m": 0.01, "silent_share": float("nan"), "peak_memory_mb": 12.0,
+    "ate_unaligned_m": 0.01, "error_tracking_m": 0.01, "silent_share": float("nan"),
+    "peak_memory_mb": 12.0,
 }  # fmt: skip
 
 
@@ -49,13 +50,18 @@ def test_it_comes_back(file: Path):
         assert getattr(found, name) == getattr(wanted, name)
     row = found.rows(TRACK)[0]
     assert (row["slam"], row["dynamism"], row["silent_share"]) == ("mine", 0.0, None)
+    assert row["peak_memory_mb"] is None  # of another machine
+    assert found.runs[TRACK][0]["peak_memory_mb"] == 12.0
     assert found.rows("no-walls-v1") == []
+    assert found.origin()["slam"] == "my_slam:MySlam"
+    assert "mujoco" in found.origin()["made_with"]
 
 
 def first_run(data: dict[str, Any], **values: Any) -> None:
     data["tracks"][TRACK]["runs"][0].update(values)
 
 
+HUGE = 10**400  # JSON has it, no double holds it
 WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "schema": (lambda d: d.update(schema=2), "of schema 1"),
     "what": (lambda d: d.update(what="a recipe"), "no submission"),
@@ -78,6 +84,22 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "error": (lambda d: first_run(d, ate_unaligned_m=-0.1), "ate_unaligned_m must be"),
     "error of words": (lambda d: first_run(d, ate_unaligned_m="0"), "ate_unaligned_m must be"),
     "share": (lambda d: first_run(d, silent_share=1.5), "silent_share must be"),
+    "huge scans": (lambda d: first_run(d, scans=HUGE), "scans must be"),
+    "huge seconds": (lambda d: d.update(seconds=HUGE), "seconds must be"),
+    "huge seed": (lambda d: d.update(seeds=[HUGE, 721]), "seeds must be"),
+    "huge seed of a run": (lambda d: first_run(d, seed=HUGE), "seed must be"),
+    "seed with a point": (lambda d: first_run(d, seed=720.0), "seed must be"),
+    "level of truth": (lambda d: first_run(d, level=False), "level must be"),
+    "level of a list": (lambda d: first_run(d, level=[0.0]), "level must be"),
+    "no error": (lambda d: first_run(d, ate_unaligned_m=None), "ate_unaligned_m must be a number"),
+    "no tracking": (lambda d: first_run(d, error_tracking_m=None), "error_tracking_m must be a n"),
+    "lost, finished": (lambda d: first_run(d, lost_at_s=3.0), "lost_at_s must be null where it"),
+    "never lost": (lambda d: first_run(d, outcome="lost", lost=1), "lost_at_s must be null where"),
+    "made_with of words": (lambda d: d.update(made_with="me"), "made_with must be an object"),
+    "made_with of pairs": (lambda d: d.update(made_with=[["a", 1]]), "made_with must be an obj"),
+    "tracks of a list": (lambda d: d.update(tracks=[1]), "tracks must be"),
+    "another SLAM's name": (lambda d: d.update(name="shunting"), "the name of another SLAM"),
+    "oracle": (lambda d: d.update(slam="oracle(ekf,movable)"), "an oracle is a control"),
     "no made_with": (lambda d: d.pop("made_with"), "made_with"),
 }
 
@@ -93,6 +115,44 @@ def test_what_is_wrong_is_named(file: Path, what: str):
     with pytest.raises(LogFormatError, match=words) as told:
         submission.read(file)
     assert str(file) in str(told.value)
+
+
+def test_an_object_as_deep_as_can_be_read_is_refused(file: Path):
+    text = file.read_text()
+    for depth in range(20, 2000, 60):  # what can be read but not written again, wherever that is
+        deep = '{"a":' * depth + "1" + "}" * depth
+        data = json.loads(text)
+        try:
+            data["made_with"] = json.loads(deep)
+            data["sha256"] = submission._sha256({k: v for k, v in data.items() if k != "sha256"})
+        except RecursionError:
+            data["made_with"] = {}
+        file.write_text(json.dumps(data).replace('"made_with": {}', f'"made_with": {deep}'))
+        with pytest.raises(LogFormatError):
+            submission.read(file)
+
+
+def test_a_slam_may_be_submitted_by_its_own_name_only():
+    assert submission.checked_name("ekf", "ekf") == "ekf"
+    for slam in ("my_slam:MySlam", "ekf{x=1}", "shunting"):
+        with pytest.raises(InvalidValueError, match="'ekf' is the name of another SLAM"):
+            submission.checked_name("ekf", slam)
+
+
+def test_only_recordings_are_checked_and_only_by_the_machine_that_made_them(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(again, "record", lambda path, **_: path.write_bytes(b""))
+    monkeypatch.setattr(again, "digest", lambda _: "0" * 64)
+    (other,) = again.made_again(file, 1)
+    assert (other.verdict, other.status) == ("differs", 1)
+    monkeypatch.setattr(again, "versions", lambda: {"mujoco": "0"})
+    (other,) = again.made_again(file, 1)
+    assert (other.verdict, other.ok, other.status) == ("cannot be checked here", False, 6)
+    monkeypatch.setattr(again, "digest", lambda _: f"{720:064x}")
+    assert {one.verdict for one in again.made_again(file, 10)} == {
+        "same bytes", "cannot be checked here",
+    }  # fmt: skip
 
 
 def test_damage_and_other_files_are_refused(file: Path):

@@ -18,7 +18,7 @@ PUBLISHED = {
     "tour-guide-v1": "9413d6fa1b07",
     "rush-hour-v1": "43b9ce334791",
     "busy-chairs-v1": "a630c1dc724d",
-    "moving-boards-v1": "177cd407d871",
+    "moving-boards-v1": "fba6c6317518",
     "moving-day-v1": "de8e6a517036",
     "overnight-v1": "a63017b41fe3",
     "classroom-break-v1": "7f0509657fe3",

@@ -46,6 +46,29 @@ def test_one_that_cannot_start_has_lost_at_once():
     assert (row["outcome"], row["scans"], row["lost_at_s"]) == ("hung", 0, 0.0)
 
 
+OVER_FILES = """
+from slam.odometry import OdometrySlam
+
+class Fails(OdometrySlam):
+    def estimates_at_end(self):
+        raise RuntimeError("no such file")
+"""
+
+
+def test_a_program_over_files_that_fails_is_not_scored_by_odometry(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / "over_files.py").write_text(OVER_FILES)
+    monkeypatch.syspath_prepend(tmp_path)
+    drive = recording([(2.0, 1.0)] * 8)
+    entry = Entry("over_files:Fails", drive, Limits())
+    entry.over([frame.without_truth() for frame in drive.frames])
+    row = json.loads(entry.arrays()["row"])
+    assert (row["outcome"], row["scans"], row["lost_at_s"]) == ("raised", 0, 0.0)
+    assert row.get("ate_unaligned_m") is None
+    assert row.get("ms_per_scan_p50") is None
+
+
 def test_a_program_that_changed_is_run_again(tmp_path: Path):
     (program := tmp_path / "mine.py").write_text("")
     assert source_of(f"pipe:python3 {program} --fast") == (program,)
@@ -143,7 +166,7 @@ def test_rows_are_scored_again_when_what_scores_them_changes():
     plan = Plan(slams=("odometry",), scenes=("arena",), levels=(0.0,), seeds=(1,))
     ((_, _, job),) = plan.entries()
     scoring = {"columns.py", "entry.py", "maps.py", "memory.py", "places.py", "sight.py"}
-    scoring |= {"judged.py", "metric.py", "table.py"}
+    scoring |= {"judged.py", "row.py", "table.py"}
     assert scoring | {"slam"} <= {path.name for path in job.code}
     assert not {"tables.py", "verb.py", "plan.py"} & {path.name for path in job.code}
 

@@ -11,6 +11,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 import sim  # noqa: F401  (registers the environments)
 from slam import create, se2
 from slam.errors import InvalidValueError, SlamFailedError, UnknownNameError
+from slam.odometry import OdometrySlam
 
 GOAL = (3.0, 2.0)
 ENTRY = "slam.odometry:OdometrySlam"
@@ -91,6 +92,16 @@ def test_what_is_no_source_is_refused():
     for wrong in (7, object(), [1.0, 2.0]):
         with pytest.raises(InvalidValueError, match="pose_source must be"):
             make(wrong)
+
+
+class OverFiles(OdometrySlam):
+    def estimates_at_end(self):
+        return []
+
+
+def test_a_slam_that_runs_at_the_end_only_is_refused():
+    with pytest.raises(InvalidValueError, match="no pose before the last scan, and an environment"):
+        make(OverFiles())
 
 
 def many(source, n=2):

@@ -15,6 +15,7 @@ from sim.loop.run import goal_order
 from sim.simulation import Simulation
 from slam import Estimate, create, se2
 from slam.errors import InvalidValueError, UnknownNameError
+from slam.odometry import OdometrySlam
 
 NEAR = ["north_east"]
 
@@ -213,3 +214,12 @@ def test_goals_are_all_so_many_or_the_named_ones():
 def test_rules_that_cannot_be_are_refused_by_name(wrong):
     with pytest.raises(InvalidValueError, match=f"LoopConfig.{next(iter(wrong))}"):
         LoopConfig(**wrong)
+
+
+def test_a_slam_that_runs_at_the_end_only_is_refused():
+    class OverFiles(OdometrySlam):
+        def estimates_at_end(self):
+            return []
+
+    with pytest.raises(InvalidValueError, match=r"'slam' is a program over files.*a closed loop"):
+        drive(arena(), OverFiles())

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 import shutil
 import sys
 from dataclasses import replace
@@ -96,6 +97,35 @@ def test_a_guest_bears_a_dark_scan_and_refuses_one_out_of_order(
     assert track.online().stamps_ns.tolist() == [frame.stamp_ns for frame in frames]
     final = track.final()
     assert final is None or len(final) == len(frames)
+
+
+def closed_loops(monkeypatch: pytest.MonkeyPatch, stream: list[Frame], fine: float) -> int:
+    """Of YAG SLAM, where every chain near is tried, and ``fine`` is the least response."""
+    for name, value in {
+        "COARSE": 0.0,
+        "FINE": fine,
+        "CHAIN": 1,
+        "BUFFER": 3,
+        "KEEP_M": 0.05,
+    }.items():
+        monkeypatch.setattr(f"slam.guests.yag.{name}", value)
+    graph = importlib.import_module("yag_slam.graph_slam").GraphSlam
+    closed: list[object] = []
+    optimise = graph.run_opt
+    monkeypatch.setattr(graph, "run_opt", lambda self: (closed.append(self), optimise(self)))
+    system = create("yag-slam")
+    for frame in stream:
+        system.update(frame.without_truth())
+    return len(closed)
+
+
+def test_yag_slam_closes_no_loop_below_its_fine_response(
+    monkeypatch: pytest.MonkeyPatch, stream: list[Frame], capfd: pytest.CaptureFixture[str]
+) -> None:
+    needs("yag-slam")
+    assert closed_loops(monkeypatch, stream, 0.0) > 0
+    assert closed_loops(monkeypatch, stream, 2.0) == 0
+    assert capfd.readouterr().out == ""
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -75,7 +75,7 @@ def test_an_oracle_over_a_program_runs_it_too(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     stand_in(monkeypatch, tmp_path, STAND_IN)
-    assert hasattr(Oracle(create("icp-slam")), "finish")
+    assert hasattr(Oracle(create("icp-slam")), "estimates_at_end")
 
 
 @pytest.mark.parametrize(
@@ -85,6 +85,14 @@ def test_an_oracle_over_a_program_runs_it_too(
         ("#!/bin/sh\nexit 0\n", "bad", "no log_estimated_path.txt"),
         (STAND_IN.replace("[ $k -lt $scans ]", "[ $k -lt 2 ]"), "bad", "2 rows"),
         (STAND_IN.replace(" 2.0 ", " nan "), "nan", "not finite"),
+        (
+            STAND_IN.replace(" 2.0 ", " 2.0 0.0 "),
+            "bad",
+            "5 columns of log_estimated_path.txt, not 4",
+        ),
+        (STAND_IN.replace(".0 7", ".0"), "bad", "1 columns of log_times.txt, not 2"),
+        (STAND_IN.replace(").0 7", ")e999 7"), "bad", "a time or memory that is not finite"),
+        (STAND_IN.replace("$((1000 + $k * 10))", "nan"), "bad", "a time or memory that is not"),
     ],
 )
 def test_a_program_that_fails_has_lost_the_run(
@@ -102,7 +110,8 @@ def test_a_program_that_fails_has_lost_the_run(
     with pytest.raises(SlamFailedError, match=words) as caught:
         track.online()
     assert caught.value.outcome == outcome
-    assert len(track.online()) == len(stream)  # asked again, it does not run again
+    assert len(track.online()) == 0  # odometry's poses are not its own; it does not run again
+    assert track.durations_s == []
     assert track.survive([]) is None
 
 

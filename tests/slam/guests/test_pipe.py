@@ -20,6 +20,7 @@ from slam.frames import Frame
 from slam.guests import Limits, PipeSlam, guarded, limited, protocol
 from slam.guests.serve import Server
 from slam.replay import Track
+from slam.system import RunsAtTheEnd
 from tests.world2d import World2D, arena, frames, laser, wander
 
 CLIENT = Path(__file__).with_name("misbehaving.py")
@@ -187,6 +188,8 @@ def test_limits_are_checked(value):
 
 SYSTEMS = '''
 import sys
+import numpy as np
+from slam import Estimate
 from slam.odometry import OdometrySlam
 
 class Looping(OdometrySlam):
@@ -198,6 +201,22 @@ class Looping(OdometrySlam):
         print(self.word, sys.stdin.read(), flush=True)
         while len(self._path) == 6: pass
         return super().update(frame)
+
+class OverFiles(OdometrySlam):
+    """Says at the end that it was all at x = 7, or fails."""
+    def __init__(self, fails=False):
+        super().__init__()
+        self.fails = fails
+    def finish(self):
+        raise RuntimeError("a method of mine that is nobody's business")
+    def estimates_at_end(self):
+        if self.fails: raise RuntimeError("no such file")
+        stamps = self.trajectory().stamps_ns.tolist()
+        return [(Estimate(stamp_ns=t, T_map_robot=[7.0, 0.0, 0.0], covariance=np.eye(3)), 0.25)
+                for t in stamps]
+
+def fails():
+    return OverFiles(fails=True)
 '''
 
 
@@ -226,6 +245,55 @@ def test_a_class_behind_the_pipe_says_the_same_as_here_and_its_loop_is_not_ours(
     np.testing.assert_array_equal(child.covariances(), here.covariances())
     assert sum(child.durations_s) > 0.0
     assert gone(child.system._wire.pid)
+
+
+def test_a_program_over_files_runs_at_the_end_behind_the_pipe_too(own, stream, monkeypatch):
+    monkeypatch.syspath_prepend(own)
+    track = Track("files", limited("own_systems:OverFiles", Limits()))
+    assert isinstance(track.system, PipeSlam)
+    assert isinstance(track.system, RunsAtTheEnd)
+    assert not isinstance(piped("none"), RunsAtTheEnd)  # its hello promises none
+    assert track.survive(stream) is None
+    np.testing.assert_array_equal(track.online().poses, [[7.0, 0.0, 0.0]] * len(stream))
+    np.testing.assert_array_equal(track.covariances()[0], np.eye(3))
+    assert sum(track.durations_s) > 0.25 * len(stream)
+    pid = track.system._wire.pid
+    del track
+    assert gone(pid)
+
+
+def test_a_program_over_files_that_fails_has_no_poses(own, stream, monkeypatch):
+    monkeypatch.syspath_prepend(own)
+    track = Track("files", limited("own_systems:fails", Limits()))
+    failure = track.survive(stream)
+    assert "estimates_at_end() raised RuntimeError: no such file" in str(failure)
+    assert (len(track.online()), track.durations_s) == (0, [])  # odometry's are not its own
+
+
+def test_a_program_over_files_that_failed_at_a_scan_is_not_run(own, stream, monkeypatch):
+    monkeypatch.syspath_prepend(own)
+    track = Track("files", limited("own_systems:OverFiles", Limits()))
+    assert track.survive(stream[:3]) is None
+    with pytest.raises(InvalidValueError):
+        track.system.update(stream[0])
+    track.system.close()
+    assert track.survive(stream[3:]) is not None
+    assert (len(track.online()), track.durations_s) == (0, [])
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        ({"estimates": [], "processor_s": []}, "no list of 1"),
+        ({"estimates": [7], "processor_s": [0.0]}, "no objects"),
+        ({"estimates": [{"stamp_ns": 5}], "processor_s": [-1.0]}, "no times"),
+        ({"estimates": [{"stamp_ns": 6}], "processor_s": [0.0]}, "answered for 6 ns"),
+    ],
+)
+def test_what_a_program_says_at_the_end_is_judged(answer, words):
+    with pytest.raises(SlamFailedError, match=words) as caught:
+        protocol.at_end_of(answer, [5])
+    assert caught.value.outcome == "bad"
 
 
 def test_only_what_is_not_ours_is_put_behind_a_pipe():
