@@ -246,8 +246,8 @@ def nearby(i: int, crowd: Crowd, sides: Int, near: Int) -> int:
 
     Who holds something looks farther.
 
-    The leaf of a door one wants to pass is no obstacle: ``at_door`` deals with it; nor is the chair
-    that one sits down on, nor what one holds.
+    The leaf of a door one wants to pass is no obstacle: ``at_doors`` deals with it; nor is the
+    chair that one sits down on, nor what one holds.
     """
     discs, count = crowd.discs, 0
     seat, held = crowd.task[i, columns.SEAT], crowd.task[i, columns.HELD]
