@@ -27,6 +27,8 @@ from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
+from slam.tracker.standing.agreement import Agreement
+from slam.tracker.standing.recent import Standing
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.quality import TrackingQuality
 from slam.tracker.tracking.relocalise import Relocalisation, coarse, slip, slipped
@@ -66,6 +68,10 @@ class Tracker(abc.ABC):
         self._quality = TrackingQuality(self.config.freeze_below, self._numbers.quality)
         self._relocalisation: Relocalisation | None = None
         self._loops = Loops(self.config, self._matcher, self._new_submap)
+        self._standing = Standing(self.config.standing)
+        self._agreement = Agreement(self.config.standing)
+        self._share = 1.0
+        self._trust = 1.0
         self._trusted = True  # the pose of the frame before
         self._path = PosePath()
 
@@ -88,6 +94,11 @@ class Tracker(abc.ABC):
         self._path.check_order(frame.stamp_ns)
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
+        votes = self._standing.votes(
+            frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
+        )
+        observations = replace(observations, votes=votes)
+        self._trust = float(votes.mean()) if len(votes) else 1.0
         prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
         evidence = self._compare(observations, match, prediction, state)  # 4 residuals
         state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
@@ -95,6 +106,14 @@ class Tracker(abc.ABC):
             observations, prediction, match, evidence, state
         )  # 6 pose, odometry noise
         self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
+        if state == "tracking" and not match.slipped:
+            self._agreement.take(prediction, match.T_map_robot)
+        else:
+            self._agreement.reset()
+        if state == "tracking":
+            self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
+        elif state != "blind":
+            self._standing.reset()
         return self._report(frame, match, state)
 
     def _first(self, frame: Frame) -> Estimate:
@@ -107,6 +126,7 @@ class Tracker(abc.ABC):
         self.cell_map.integrate(observations.view, T_map_laser, first_s, write=True)
         match = unmatched(np.zeros(3), matched=1.0, score=0.0)
         self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
+        self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
         return self._report(frame, match, "tracking" if len(observations.points_robot) else "blind")
 
     def _predict(self, odometry: Odometry) -> Prediction:
@@ -136,10 +156,30 @@ class Tracker(abc.ABC):
         if self._relocalisation is not None:
             match, state = self._recover(self._relocalisation, observations, prediction)
             return prediction, match, state
+        self._share = 1.0
         match = _near(self._match(observations, prediction), prediction)
+        match = self._agreed(match, observations, prediction)
         if match.slipped:
             prediction = replace(prediction, covariance=slip(self._numbers.relocalise))
         return prediction, match, "tracking"
+
+    def _agreed(self, match: Match, observations: Observations, prediction: Prediction) -> Match:
+        """The match, or one with fewer votes of the young where odometry has long denied it."""
+        numbers, agreement = self.config.standing, self._agreement
+        if numbers.disagreed == 0.0 or match.slipped or observations.votes is None:
+            return match
+        share = 1.0
+        for _ in range(numbers.rounds):
+            found = agreement.share(agreement.ratio(prediction, match.T_map_robot))
+            if found > 0.8 * share:
+                break
+            share = found
+            fewer = replace(observations, votes=share * observations.votes)
+            match = _near(self._match(fewer, prediction), prediction)
+            if match.slipped:
+                break
+        self._share = share
+        return match
 
     def _match(self, observations: Observations, prediction: Prediction) -> Match:
         """Climb from the prediction; search around it when that is vague or finds too little."""
@@ -269,6 +309,8 @@ class Tracker(abc.ABC):
                 "unobservable": self._pose_covariance.unobservable,
                 "unobservable_rad": self._pose_covariance.along_rad,
                 "nis": self._odometry_noise.nis,
+                "trust": self._trust,
+                "share": self._share,
             },
         )
 

@@ -38,7 +38,14 @@ def seen_by(observations: Observations) -> Seen:
         observations.weights,
         observations.tangents,
         observations.facings,
+        votes_of(observations),
     )
+
+
+def votes_of(observations: Observations) -> Float:
+    """(n,) the votes of ``observations``: all 1 where nothing is known of them."""
+    votes = observations.votes
+    return np.ones(len(observations.points_robot)) if votes is None else votes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,6 +95,7 @@ class Matcher:
             log_floor=config.matching.log_floor,
             tail=config.matching.tail,
             tail_cells=config.matching.tail_cells,
+            young_trace=config.standing.young_trace,
         )
         self.numbers = config.matching
         steps = self.numbers.climb
@@ -166,6 +174,7 @@ class Matcher:
                 np.ascontiguousarray(observations.weights[::every]) * every,
                 np.ascontiguousarray(observations.tangents[::every]),
                 np.ascontiguousarray(observations.facings[::every]),
+                np.ascontiguousarray(votes_of(observations)[::every]),
             ),
             pose,
             prediction,

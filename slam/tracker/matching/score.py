@@ -20,7 +20,7 @@ from slam.tracker.cells import MASK, SHIFT, Cells
 
 
 class Reward(NamedTuple):
-    """How overlaps are rewarded; the last four as in ``MatchingConfig``.
+    """How overlaps are rewarded; four as in ``MatchingConfig``, the last as in ``StandingConfig``.
 
     cell        m
     short_term  weight of x in v = y + (1 - y) * short_term * x
@@ -34,6 +34,7 @@ class Reward(NamedTuple):
     log_floor: float
     tail: float
     tail_cells: float
+    young_trace: float
 
 
 class Climb(NamedTuple):
@@ -57,6 +58,7 @@ class Seen(NamedTuple):
     weights: NDArray[np.float64]
     tangents: NDArray[np.float64]
     facings: NDArray[np.uint8]
+    votes: NDArray[np.float64]
 
 
 class Field(NamedTuple):
@@ -72,7 +74,7 @@ class Field(NamedTuple):
 @inner
 def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
     field: Field,
-    reach: tuple[float, float, float],
+    reach: tuple[float, float, float, float],
     u: float,
     v: float,
     cov: tuple[float, float, float],
@@ -83,10 +85,11 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
 
     (u, v) and ``cov`` (xx, xy, yy) are in cells, cell (i, j) lies at (i, j). f is the sum over
     cells of Gaussian times activity, divided so that a lone landmark scores 1 on itself. Cells
-    of a surface that faces away from the observed one (``faced``) do not count.
+    of a surface that faces away from the observed one (``faced``) do not count. ``reach``: weight
+    of x, the bounds of the Gaussian, and what is closed of a faint trace y: y (1 - closed (1 - y)).
     ``out``: f, df/du, df/dv, -d2f/du2, -d2f/dudv, -d2f/dv2.
     """
-    short_term, tail, tail_cells = reach
+    short_term, tail, tail_cells, closed = reach
     a, b, d = cov
     det = a * d - b * b
     if det <= 0.0:  # rounding has left nothing across
@@ -121,7 +124,7 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
                     slot = field.directory[row, column] if 0 <= column < columns else -1
                 if slot >= 0:
                     x, y = field.x[slot, j & MASK, i & MASK], field.y[slot, j & MASK, i & MASK]
-                    value = kernel * (y + (1.0 - y) * short_term * x)
+                    value = kernel * (y * (1.0 - closed * (1.0 - y)) + (1.0 - y) * short_term * x)
                     if opposite(faced, field.facing[slot, j & MASK, i & MASK]):
                         value = 0.0
                     s0 += value
@@ -174,7 +177,6 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     out = np.empty(6)
     scale = 1.0 / reward.cell
     field = Field(cells.directory, cells.corner, cells.x, cells.y, cells.facing)
-    reach = reward.short_term, reward.tail, reward.tail_cells
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(len(seen.points)):
         rx = c * seen.points[k, 0] - s * seen.points[k, 1]
@@ -186,6 +188,9 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
             (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale * scale,
         )
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
+        vote = seen.votes[k]
+        closed = reward.young_trace * (1.0 - vote)
+        reach = reward.short_term * vote, reward.tail, reward.tail_cells, closed
         _overlap(field, reach, u, v, cov, turned_face(seen.facings[k], pose[2]), out)
         f = out[0]
         if f > reward.matched_overlap:

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The scans of the last seconds, kept to say which present returns come from what stands."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from slam import se2
+from slam.frames import NS_PER_S, Float
+from slam.frontend.observations import Observations
+from slam.tracker.standing.config import StandingConfig
+from slam.tracker.standing.kernels import along, emptied, left
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Look:
+    """One kept scan.
+
+    T_map_laser (3,), points_map (n, 2), limit (bins,) as in ``View``
+    """
+
+    stamp_ns: int
+    T_map_laser: Float
+    points_map: Float
+    limit: Float
+    step: float
+
+
+class Standing:
+    """Gives each return its vote, by how long its place was not seen empty."""
+
+    def __init__(self, config: StandingConfig) -> None:
+        self._config = config
+        self._looks: deque[Look] = deque()
+        self._ages_s = [
+            config.spacing_s * config.ages_grow**k for k in range(config.views)
+        ]
+
+    def reset(self) -> None:
+        """Forget all scans: the robot is elsewhere."""
+        self._looks.clear()
+
+    def add(self, stamp_ns: int, T_map_robot: Float, seen: Observations) -> None:
+        """Keep a scan that was tracked."""
+        if self._config.settled_s == 0.0 or not len(seen.points_robot):
+            return
+        looks, config = self._looks, self._config
+        if len(looks) > 1 and stamp_ns - looks[-2].stamp_ns < config.spacing_s * NS_PER_S:
+            looks.pop()  # the newest is always there
+        looks.append(
+            Look(
+                stamp_ns=stamp_ns,
+                T_map_laser=se2.compose(T_map_robot, seen.T_robot_laser),
+                points_map=se2.transform(T_map_robot, seen.points_robot),
+                limit=seen.view.limit,
+                step=seen.view.step,
+            )
+        )
+        oldest = stamp_ns - round(1.5 * self._ages_s[-1] * NS_PER_S)
+        while looks[0].stamp_ns < oldest:
+            looks.popleft()
+
+    def _asked(self, stamp_ns: int, step: float) -> list[Look]:
+        """The newest, and of the others about one of each age."""
+        chosen: list[Look] = []
+        least = -math.inf
+        for look in reversed(self._looks):
+            age = (stamp_ns - look.stamp_ns) / NS_PER_S
+            if age >= least and look.step == step:
+                chosen.append(look)
+                bigger = [a for a in self._ages_s if a > age * 1.001]
+                if not bigger:
+                    break
+                least = 0.95 * bigger[0] if len(chosen) > 0 else 0.0
+        return chosen
+
+    def votes(
+        self, stamp_ns: int, T_map_robot: Float, prior: Float, seen: Observations
+    ) -> Float:
+        """(n,) vote of each return in [0, 1], seen from a pose predicted with a (3, 3) prior."""
+        config, points = self._config, seen.points_robot
+        asked = self._asked(stamp_ns, seen.view.step) if config.settled_s > 0.0 else []
+        if not asked or not len(points):
+            return np.ones(len(points))
+        ages = np.array([(stamp_ns - look.stamp_ns) / NS_PER_S for look in asked])
+        stood, step = np.empty(len(points)), seen.view.step
+        place, heading = max(float(prior[0, 0]), float(prior[1, 1])), float(prior[2, 2])
+        margin = config.margin_m + config.sigmas * math.sqrt(place)
+        spread = math.radians(config.spread_deg) + config.sigmas * math.sqrt(heading)
+        spread = min(spread, 0.5 * math.pi)
+        emptied(
+            points, T_map_robot, np.array([look.T_map_laser for look in asked]),
+            np.array([look.limit for look in asked]), ages, step, margin, spread, stood,
+        )  # fmt: skip
+        for look, age in zip(asked, ages.tolist(), strict=True):
+            if age <= config.left_s:
+                left(
+                    look.points_map, age, points, T_map_robot, seen.T_robot_laser,
+                    seen.view.limit, step, margin, spread, config.left_m, stood,
+                )  # fmt: skip
+        votes = 1.0 / (1.0 + (config.settled_s / stood) ** 2)
+        out = np.empty(len(points))
+        along(points, seen.joined, votes, config.along_m, out)
+        return out
