@@ -201,8 +201,9 @@ class Tracker(abc.ABC):
                 match = found
         if match.matched >= poor or not self._quality.is_worth_searching():
             return match
-        usual = self._quality.usual_support()
-        shoved = slipped(self.cell_map, self._matcher, observations, prediction, usual)
+        everyone = replace(observations, votes=None)
+        usual = self._quality.usual_whole()
+        shoved = slipped(self.cell_map, self._matcher, everyone, prediction, usual)
         return match if shoved is None else shoved
 
     def _recover(
@@ -211,8 +212,9 @@ class Tracker(abc.ABC):
         """Dead reckoning, until one hypothesis alone explains what is seen."""
         predicted = prediction.T_map_robot
         precision = inverted(prediction.prior)
+        observations = replace(observations, votes=None)  # they are of another place
         here = self._matcher.climb(self.cell_map, observations, predicted, predicted, precision)
-        match = recovery.step(observations, prediction, here, self._quality.usual_support())
+        match = recovery.step(observations, prediction, here, self._quality.usual_whole())
         if match is not None:
             self._relocalisation = None
             self._quality.count(False)
@@ -263,7 +265,8 @@ class Tracker(abc.ABC):
         if len(observations.points_robot) == 0:
             return "lost" if denied else "blind"  # odometry alone
         if not denied:
-            quality.learn(match.matched, confirmed, contradicted, prediction.elapsed)
+            elapsed = prediction.elapsed
+            quality.learn(match.matched, confirmed, contradicted, elapsed, match.overlapped)
         return "lost" if denied else "tracking"
 
     def _update_uncertainty(
@@ -290,7 +293,8 @@ class Tracker(abc.ABC):
             motion, covariance = prediction.increment, prediction.covariance
         self._trusted = state in ("tracking", "relocated")
         covariance = turned(covariance, -float(self._T_map_robot[2]))
-        self._loops.add(len(self._path), match.T_map_robot, motion, covariance, observations)
+        everyone = replace(observations, votes=None)
+        self._loops.add(len(self._path), match.T_map_robot, motion, covariance, everyone)
 
     def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
         self._before = frame.odometry

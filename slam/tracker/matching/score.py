@@ -163,8 +163,9 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     gradient: NDArray[np.float64],
     along: NDArray[np.float64],
     information: NDArray[np.float64],
-) -> tuple[float, float]:
-    """Sum of rewards of the observations seen from ``pose``, and the weight of those matched.
+) -> tuple[float, float, float]:
+    """Sum of rewards of the observations seen from ``pose``, the weight of those matched, and that
+    of those unmatched without a vote.
 
     Fills the gradient (3,) by (x, y, theta), the part of it ``along`` the observed surfaces, and
     the information (3, 3): the negative curvature, of each observation only where it is positive,
@@ -173,7 +174,7 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     gradient[:] = 0.0
     along[:] = 0.0
     information[:] = 0.0
-    score, matched = 0.0, 0.0
+    score, matched, absent = 0.0, 0.0, 0.0
     out = np.empty(6)
     scale = 1.0 / reward.cell
     field = Field(cells.directory, cells.corner, cells.x, cells.y, cells.facing)
@@ -195,6 +196,8 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
         f = out[0]
         if f > reward.matched_overlap:
             matched += seen.weights[k]
+        else:
+            absent += seen.weights[k] * (1.0 - vote)
         gx, gy = out[1] * scale, out[2] * scale
         a, b, d = out[3] * scale * scale, out[4] * scale * scale, out[5] * scale * scale
         if reward.logarithm:
@@ -233,7 +236,7 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     information[1, 0] = information[0, 1]
     information[2, 0] = information[0, 2]
     information[2, 1] = information[1, 2]
-    return score, matched
+    return score, matched, absent
 
 
 @inner
@@ -282,19 +285,19 @@ def refine(  # noqa: C901, PLR0913 (kernel)
     precision: NDArray[np.float64],
     tau: float,
     information: NDArray[np.float64],
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, float]:
     """Climb to the maximum of tau * reward - 1/2 Mahalanobis^2 from ``pose`` (changed in place).
 
     Newton's method with Levenberg damping; a step is taken only if it rises, but for the last, tiny
     one. The slope of the reward along observed surfaces is left out of it: there it only says where
-    the map is older, which would hold a robot back in a corridor. Returns reward, prior and the
-    weight of matched observations, and leaves the data's information (without tau and prior) in
+    the map is older, which would hold a robot back in a corridor. Returns reward, prior, the
+    weight of matched observations and that of unmatched ones without a vote, and leaves the data's information (without tau and prior) in
     ``information``, all as before the last step.
     """
     gradient, along, slope, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     trial, trial_gradient, trial_along = np.empty(3), np.empty(3), np.empty(3)
     trial_information, H = np.empty((3, 3)), np.empty((3, 3))
-    rewarded, matched = evaluate(cells, reward, seen, pose, gradient, along, information)
+    rewarded, matched, absent = evaluate(cells, reward, seen, pose, gradient, along, information)
     prior = _prior(pose, prediction, precision, slope)
     damping = climb.damping
     for _ in range(climb.steps):
@@ -309,13 +312,14 @@ def refine(  # noqa: C901, PLR0913 (kernel)
             break
         for a in range(3):
             trial[a] = pose[a] + step[a]
-        trial_rewarded, trial_matched = evaluate(
+        trial_rewarded, trial_matched, trial_absent = evaluate(
             cells, reward, seen, trial, trial_gradient, trial_along, trial_information,
         )  # fmt: skip
         older = along[0] * step[0] + along[1] * step[1] + along[2] * step[2]
         trial_prior = _prior(trial, prediction, precision, step)
         if tau * (trial_rewarded - rewarded - older) + trial_prior > prior:
-            rewarded, prior, matched = trial_rewarded, trial_prior, trial_matched
+            rewarded, prior = trial_rewarded, trial_prior
+            matched, absent = trial_matched, trial_absent
             for a in range(3):  # element by element: array assignment triples the compile time
                 pose[a], gradient[a], along[a] = trial[a], trial_gradient[a], trial_along[a]
                 for b in range(3):
@@ -326,4 +330,4 @@ def refine(  # noqa: C901, PLR0913 (kernel)
             if damping > climb.damping_most:
                 break
         _prior(pose, prediction, precision, slope)
-    return rewarded, prior, matched
+    return rewarded, prior, matched, absent

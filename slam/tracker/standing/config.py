@@ -13,7 +13,7 @@ class StandingConfig(Settings):
     """For how long the place of a return was not seen empty, and what vote it has by that."""
 
     settled_s: float = number(
-        2.0, "s", "a return whose place was empty so long ago has half a vote; 0: all vote"
+        5.0, "s", "a return whose place was empty so long ago has half a vote; 0: all vote"
     )
     young_trace: float = number(
         1.0, "share", "of a faint trace (1 - y) that is closed to who has no vote", high=1.0
@@ -21,7 +21,7 @@ class StandingConfig(Settings):
     views: int = number(7, "views", "earlier scans that are asked", low=1, high=64)
     spacing_s: float = number(0.2, "s", "least time between two kept scans", low=1e-3)
     ages_grow: float = number(1.8, "ratio", "of the ages of the scans asked", low=1.0)
-    margin_m: float = number(0.1, "m", "an earlier beam went on by so much more: seen empty")
+    margin_m: float = number(0.05, "m", "an earlier beam went on by so much more: seen empty")
     spread_deg: float = number(1.0, "deg", "to either side of it, all beams did")
     left_s: float = number(2.0, "s", "things that left a place within it are looked for")
     left_m: float = number(0.25, "m", "returns this near to such a place belong to what left")
