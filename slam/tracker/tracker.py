@@ -112,8 +112,6 @@ class Tracker(abc.ABC):
             self._agreement.reset()
         if state == "tracking":
             self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
-        elif state != "blind":
-            self._standing.reset()
         return self._report(frame, match, state)
 
     def _first(self, frame: Frame) -> Estimate:
@@ -199,7 +197,7 @@ class Tracker(abc.ABC):
             found = self._matcher.search(self.cell_map, observations, predicted, precision, window)
             if found.score > match.score:
                 match = found
-        if match.matched >= poor or not self._quality.is_worth_searching():
+        if match.matched >= poor or not self._quality.is_worth_searching_near():
             return match
         everyone = replace(observations, votes=None)
         usual = self._quality.usual_whole()

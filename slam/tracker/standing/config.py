@@ -27,10 +27,7 @@ class StandingConfig(Settings):
     left_m: float = number(0.25, "m", "returns this near to such a place belong to what left")
     along_m: float = number(0.3, "m", "votes are averaged along a surface so far each way")
     sigmas: float = number(1.0, "σ", "of the prediction, added to margin_m and spread_deg")
-    disagreed: float = number(
-        6.0, "ratio", "matches off odometry by so much more than it may be: the young have half a "
-        "vote; 0: never asked",
-    )  # fmt: skip
+    disagreed: float = number(0.0, "ratio", "x")
     window_s: float = number(2.0, "s", "odometry is compared over it", low=1e-3)
     long_window_s: float = number(8.0, "s", "and over it", low=1e-3)
     match_m: float = number(0.005, "m", "what a match itself may be off", low=1e-6)

@@ -58,9 +58,15 @@ class TrackingQuality:
 
     def is_worth_searching(self, share: float = 1.0) -> bool:
         """Grown (or to that share), and explains what is seen: else it cannot deny it either."""
+        return self._grown(share) and self.usual_whole() >= self.config.worth_searching
+
+    def is_worth_searching_near(self) -> bool:
+        """The same around where the robot is: what moves need not be explained there."""
+        return self._grown(1.0) and self.usual_support() >= self.config.worth_searching
+
+    def _grown(self, share: float) -> bool:
         config = self.config
-        grown = self.tracked_s >= share * config.grown_s and self.tracked >= config.grown_scans
-        return grown and self.usual_support() >= config.worth_searching
+        return self.tracked_s >= share * config.grown_s and self.tracked >= config.grown_scans
 
     @property
     def suspicious(self) -> bool:
