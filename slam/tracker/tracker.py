@@ -70,8 +70,7 @@ class Tracker(abc.ABC):
         self._loops = Loops(self.config, self._matcher, self._new_submap)
         self._standing = Standing(self.config.standing)
         self._agreement = Agreement(self.config.standing)
-        self._share = 1.0
-        self._trust = 1.0
+        self._vote, self._dragged = 1.0, 0.0
         self._trusted = True  # the pose of the frame before
         self._path = PosePath()
 
@@ -98,7 +97,7 @@ class Tracker(abc.ABC):
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
         )
         observations = replace(observations, votes=votes)
-        self._trust = float(votes.mean()) if len(votes) else 1.0
+        self._vote = float(votes.mean()) if len(votes) else 1.0
         prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
         evidence = self._compare(observations, match, prediction, state)  # 4 residuals
         state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
@@ -106,10 +105,6 @@ class Tracker(abc.ABC):
             observations, prediction, match, evidence, state
         )  # 6 pose, odometry noise
         self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
-        if state == "tracking" and not match.slipped:
-            self._agreement.take(prediction, match.T_map_robot)
-        else:
-            self._agreement.reset()
         if state == "tracking":
             self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
         return self._report(frame, match, state)
@@ -154,30 +149,10 @@ class Tracker(abc.ABC):
         if self._relocalisation is not None:
             match, state = self._recover(self._relocalisation, observations, prediction)
             return prediction, match, state
-        self._share = 1.0
         match = _near(self._match(observations, prediction), prediction)
-        match = self._agreed(match, observations, prediction)
         if match.slipped:
             prediction = replace(prediction, covariance=slip(self._numbers.relocalise))
         return prediction, match, "tracking"
-
-    def _agreed(self, match: Match, observations: Observations, prediction: Prediction) -> Match:
-        """The match, or one with fewer votes of the young where odometry has long denied it."""
-        numbers, agreement = self.config.standing, self._agreement
-        if numbers.disagreed == 0.0 or match.slipped or observations.votes is None:
-            return match
-        share = 1.0
-        for _ in range(numbers.rounds):
-            found = agreement.share(agreement.ratio(prediction, match.T_map_robot))
-            if found > 0.8 * share:
-                break
-            share = found
-            fewer = replace(observations, votes=share * observations.votes)
-            match = _near(self._match(fewer, prediction), prediction)
-            if match.slipped:
-                break
-        self._share = share
-        return match
 
     def _match(self, observations: Observations, prediction: Prediction) -> Match:
         """Climb from the prediction; search around it when that is vague or finds too little."""
@@ -276,6 +251,13 @@ class Tracker(abc.ABC):
         state: str,
     ) -> None:
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
+        self._dragged = 0.0
+        if state == "tracking" and not match.slipped:
+            self._agreement.take(prediction, match.T_map_robot)
+            self._dragged = self._agreement.dragged(self._vote)
+            self._pose_covariance.dragged(self._agreement.covariance(self._dragged))
+        else:
+            self._agreement.forget()
         if state == "tracking" and not match.slipped:
             self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m)
         else:
@@ -302,7 +284,7 @@ class Tracker(abc.ABC):
             stamp_ns=frame.stamp_ns,
             T_map_robot=match.T_map_robot,
             covariance=self._pose_covariance.covariance,
-            converged=state in ("tracking", "relocated"),
+            converged=state in ("tracking", "relocated") and not self._doubtful(),
             diagnostics={
                 "state": state,
                 "matched": match.matched,
@@ -311,10 +293,15 @@ class Tracker(abc.ABC):
                 "unobservable": self._pose_covariance.unobservable,
                 "unobservable_rad": self._pose_covariance.along_rad,
                 "nis": self._odometry_noise.nis,
-                "trust": self._trust,
-                "share": self._share,
+                "trust": self._vote * (1.0 - self._dragged),
+                "dragged": self._dragged, "ratio": self._agreement.ratio,
             },
         )
+
+    def _doubtful(self) -> bool:
+        """Whether the crowd may have carried the robot far."""
+        doubtful_m = self.config.standing.doubtful_m
+        return 0.0 < doubtful_m < self._agreement.off_m(self._dragged)
 
     def window(
         self, xmin: float, ymin: float, xmax: float, ymax: float

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from slam.settings import Settings, number
 
+SEEDS = "training seeds of crowds, and real logs (docs/trust_in_returns.md)"
+
 
 @dataclass(frozen=True, kw_only=True)
 class StandingConfig(Settings):
@@ -26,10 +28,13 @@ class StandingConfig(Settings):
     left_s: float = number(2.0, "s", "things that left a place within it are looked for")
     left_m: float = number(0.25, "m", "returns this near to such a place belong to what left")
     along_m: float = number(0.3, "m", "votes are averaged along a surface so far each way")
-    sigmas: float = number(1.0, "σ", "of the prediction, added to margin_m and spread_deg")
-    disagreed: float = number(0.0, "ratio", "x")
-    window_s: float = number(2.0, "s", "odometry is compared over it", low=1e-3)
-    long_window_s: float = number(8.0, "s", "and over it", low=1e-3)
-    match_m: float = number(0.005, "m", "what a match itself may be off", low=1e-6)
-    match_deg: float = number(0.2, "deg", "the same of its heading", low=1e-6)
-    rounds: int = number(2, "matches", "more at most, with fewer votes", low=0, high=10)
+    sigmas: float = number(1.0, "σ", "of the prediction, added to margin_m and spread_deg", SEEDS)
+    disagreed: float = number(
+        6.0, "ratio", "corrections beyond what odometry may be off, squared: half believed; 0: all",
+        SEEDS,
+    )  # fmt: skip
+    window_s: float = number(2.0, "s", "corrections are summed over it", SEEDS, low=1e-3)
+    long_window_s: float = number(8.0, "s", "and over it", SEEDS, low=1e-3)
+    match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
+    match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
+    doubtful_m: float = number(0.15, "m", "off by so much: not converged; 0: never", SEEDS)
