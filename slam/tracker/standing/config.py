@@ -28,6 +28,9 @@ class StandingConfig(Settings):
     left_s: float = number(2.0, "s", "things that left a place within it are looked for")
     left_m: float = number(0.25, "m", "returns this near to such a place belong to what left")
     along_m: float = number(0.3, "m", "votes are averaged along a surface so far each way")
+    thin_m: float = number(
+        0.1, "m", "narrower things vote: earlier beams may have missed them", SEEDS
+    )
     sigmas: float = number(1.0, "σ", "of the prediction, added to margin_m and spread_deg", SEEDS)
     disagreed: float = number(
         6.0, "ratio", "corrections beyond what odometry may be off, squared: half believed; 0: all",

@@ -117,9 +117,13 @@ def along(
     joined: NDArray[np.bool_],
     votes: NDArray[np.float64],
     reach: float,
+    thin: float,
     out: NDArray[np.float64],
 ) -> None:
-    """Mean of ``votes`` along the surface of each point, up to ``reach`` m each way."""
+    """Mean of ``votes`` along the surface of each point, up to ``reach`` m each way.
+
+    1 where that stretch is shorter than ``thin`` m: earlier beams may have gone by such a thing.
+    """
     n = len(points)
     for k in range(n):
         total, count = votes[k], 1.0
@@ -128,12 +132,13 @@ def along(
             m += 1
             total += votes[m]
             count += 1.0
+        last = m
         m = k
         while m > 0 and joined[m - 1] and _apart(points, k, m - 1) < reach:
             m -= 1
             total += votes[m]
             count += 1.0
-        out[k] = total / count
+        out[k] = total / count if _apart(points, m, last) >= thin else 1.0
 
 
 @inner

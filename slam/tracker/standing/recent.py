@@ -104,5 +104,5 @@ class Standing:
                 )  # fmt: skip
         votes = 1.0 / (1.0 + (config.settled_s / stood) ** 2)
         out = np.empty(len(points))
-        along(points, seen.joined, votes, config.along_m, out)
+        along(points, seen.joined, votes, config.along_m, config.thin_m, out)
         return out
