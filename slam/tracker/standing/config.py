@@ -31,6 +31,9 @@ class StandingConfig(Settings):
     thin_m: float = number(
         0.1, "m", "narrower things vote: earlier beams may have missed them", SEEDS
     )
+    vague_m: float = number(
+        0.05, "m", "deviation of the prediction at which emptiness counts half", SEEDS, low=1e-4
+    )
     sigmas: float = number(1.0, "σ", "of the prediction, added to margin_m and spread_deg", SEEDS)
     disagreed: float = number(
         6.0, "ratio", "corrections beyond what odometry may be off, squared: half believed; 0: all",

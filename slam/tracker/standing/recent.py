@@ -102,7 +102,8 @@ class Standing:
                     look.points_map, age, points, T_map_robot, seen.T_robot_laser,
                     seen.view.limit, step, margin, spread, config.left_m, stood,
                 )  # fmt: skip
-        votes = 1.0 / (1.0 + (config.settled_s / stood) ** 2)
+        sure = 1.0 / (1.0 + place / config.vague_m**2)  # else the prediction may be what is off
+        votes = 1.0 - sure + sure / (1.0 + (config.settled_s / stood) ** 2)
         out = np.empty(len(points))
         along(points, seen.joined, votes, config.along_m, config.thin_m, out)
         return out
