@@ -44,3 +44,6 @@ class StandingConfig(Settings):
     match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
     match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
     doubtful_m: float = number(0.15, "m", "off by so much: not converged; 0: never", SEEDS)
+
+
+ALL_VOTE = StandingConfig(settled_s=0.0, disagreed=0.0)  # every return, and odometry is not asked
