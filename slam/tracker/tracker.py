@@ -258,6 +258,9 @@ class Tracker(abc.ABC):
             self._pose_covariance.dragged(self._agreement.covariance(self._dragged))
         else:
             self._agreement.forget()
+            if match.slipped:  # found by a search, among what does not fit there
+                found = (1.0 - match.overlapped) * coarse(self._numbers.relocalise)
+                self._pose_covariance.dragged(found)
         if state == "tracking" and not match.slipped:
             self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m)
         else:
@@ -294,7 +297,7 @@ class Tracker(abc.ABC):
                 "unobservable_rad": self._pose_covariance.along_rad,
                 "nis": self._odometry_noise.nis,
                 "trust": self._vote * (1.0 - self._dragged),
-                "dragged": self._dragged, "ratio": self._agreement.ratio,
+                "odometry_ratio": self._agreement.ratio,
             },
         )
 

@@ -124,7 +124,10 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
                     slot = field.directory[row, column] if 0 <= column < columns else -1
                 if slot >= 0:
                     x, y = field.x[slot, j & MASK, i & MASK], field.y[slot, j & MASK, i & MASK]
-                    value = kernel * (y * (1.0 - closed * (1.0 - y)) + (1.0 - y) * short_term * x)
+                    value = y + (1.0 - y) * short_term * x
+                    if closed > 0.0:
+                        value -= closed * y * (1.0 - y)
+                    value *= kernel
                     if opposite(faced, field.facing[slot, j & MASK, i & MASK]):
                         value = 0.0
                     s0 += value
@@ -290,9 +293,9 @@ def refine(  # noqa: C901, PLR0913 (kernel)
 
     Newton's method with Levenberg damping; a step is taken only if it rises, but for the last, tiny
     one. The slope of the reward along observed surfaces is left out of it: there it only says where
-    the map is older, which would hold a robot back in a corridor. Returns reward, prior, the
-    weight of matched observations and that of unmatched ones without a vote, and leaves the data's information (without tau and prior) in
-    ``information``, all as before the last step.
+    the map is older, which would hold a robot back in a corridor. Returns reward, prior, the weight
+    of matched observations and that of unmatched ones without a vote, and leaves the data's
+    information (without tau and prior) in ``information``, all as before the last step.
     """
     gradient, along, slope, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     trial, trial_gradient, trial_along = np.empty(3), np.empty(3), np.empty(3)

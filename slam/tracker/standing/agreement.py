@@ -87,5 +87,7 @@ def _form(v: Float, m: Float) -> float:
     """v' m v in a fixed order of operations."""
     (x, y, t), (a, b, c) = v.tolist(), m.tolist()
     return float(
-        x * (a[0] * x + 2.0 * (a[1] * y + a[2] * t)) + y * (b[1] * y + 2.0 * b[2] * t) + c[2] * t * t
+        x * (a[0] * x + 2.0 * (a[1] * y + a[2] * t))
+        + y * (b[1] * y + 2.0 * b[2] * t)
+        + c[2] * t * t
     )

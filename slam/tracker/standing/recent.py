@@ -13,7 +13,7 @@ from slam import se2
 from slam.frames import NS_PER_S, Float
 from slam.frontend.observations import Observations
 from slam.tracker.standing.config import StandingConfig
-from slam.tracker.standing.kernels import along, emptied, left
+from slam.tracker.standing.kernels import along, emptied, indexed, left
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,9 +36,7 @@ class Standing:
     def __init__(self, config: StandingConfig) -> None:
         self._config = config
         self._looks: deque[Look] = deque()
-        self._ages_s = [
-            config.spacing_s * config.ages_grow**k for k in range(config.views)
-        ]
+        self._ages_s = [config.spacing_s * config.ages_grow**k for k in range(config.views)]
 
     def reset(self) -> None:
         """Forget all scans: the robot is elsewhere."""
@@ -78,32 +76,45 @@ class Standing:
                 least = 0.95 * bigger[0] if len(chosen) > 0 else 0.0
         return chosen
 
-    def votes(
-        self, stamp_ns: int, T_map_robot: Float, prior: Float, seen: Observations
-    ) -> Float:
+    def votes(self, stamp_ns: int, T_map_robot: Float, prior: Float, seen: Observations) -> Float:
         """(n,) vote of each return in [0, 1], seen from a pose predicted with a (3, 3) prior."""
         config, points = self._config, seen.points_robot
         asked = self._asked(stamp_ns, seen.view.step) if config.settled_s > 0.0 else []
         if not asked or not len(points):
             return np.ones(len(points))
         ages = np.array([(stamp_ns - look.stamp_ns) / NS_PER_S for look in asked])
-        stood, step = np.empty(len(points)), seen.view.step
         place, heading = max(float(prior[0, 0]), float(prior[1, 1])), float(prior[2, 2])
         margin = config.margin_m + config.sigmas * math.sqrt(place)
         spread = math.radians(config.spread_deg) + config.sigmas * math.sqrt(heading)
         spread = min(spread, 0.5 * math.pi)
+        stood = np.empty(len(points))
         emptied(
             points, T_map_robot, np.array([look.T_map_laser for look in asked]),
-            np.array([look.limit for look in asked]), ages, step, margin, spread, stood,
+            np.array([look.limit for look in asked]), ages, seen.view.step, margin, spread, stood,
         )  # fmt: skip
-        for look, age in zip(asked, ages.tolist(), strict=True):
-            if age <= config.left_s:
-                left(
-                    look.points_map, age, points, T_map_robot, seen.T_robot_laser,
-                    seen.view.limit, step, margin, spread, config.left_m, stood,
-                )  # fmt: skip
+        self._look_for_what_left(asked, ages, seen, T_map_robot, (margin, spread), stood)
         sure = 1.0 / (1.0 + place / config.vague_m**2)  # else the prediction may be what is off
-        votes = 1.0 - sure + sure / (1.0 + (config.settled_s / stood) ** 2)
+        votes = 1.0 - sure * (1.0 - 1.0 / (1.0 + (config.settled_s / stood) ** 2))
         out = np.empty(len(points))
         along(points, seen.joined, votes, config.along_m, config.thin_m, out)
         return out
+
+    def _look_for_what_left(
+        self,
+        asked: list[Look],
+        ages: Float,
+        seen: Observations,
+        T_map_robot: Float,
+        passing: tuple[float, float],
+        stood: Float,
+    ) -> None:
+        config, view, points = self._config, seen.view, seen.points_robot
+        first, last = np.empty(len(view.limit), np.int64), np.empty(len(view.limit), np.int64)
+        indexed(points, seen.T_robot_laser, view.step, first, last)
+        T_map_laser = se2.compose(T_map_robot, seen.T_robot_laser)
+        for look, age in zip(asked, ages.tolist(), strict=True):
+            if age <= config.left_s:
+                left(
+                    look.points_map, age, points, T_map_laser, seen.T_robot_laser, view.limit,
+                    view.step, (*passing, config.left_m), first, last, stood,
+                )  # fmt: skip

@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("62a97314ae0f", "f3c61868886e")),
-        (OccupancyConfig, ["grid"], ("f8d3d3a06c8e", "1554aaf26d61")),
+        (ShuntingConfig, [], ("f6b603b1350a", "0c351a022f36")),
+        (OccupancyConfig, ["grid"], ("a7170eecc047", "a5de9a6f7bbf")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
