@@ -36,11 +36,9 @@ class Standing:
     def __init__(self, config: StandingConfig) -> None:
         self._config = config
         self._looks: deque[Look] = deque()
-        self._ages_s = [config.spacing_s * config.ages_grow**k for k in range(config.views)]
-
-    def reset(self) -> None:
-        """Forget all scans: the robot is elsewhere."""
-        self._looks.clear()
+        # a little less, as scans come when they come
+        first_s = 0.95 * config.spacing_s
+        self._ages_s = [first_s * config.ages_grow**k for k in range(config.views)]
 
     def add(self, stamp_ns: int, T_map_robot: Float, seen: Observations) -> None:
         """Keep a scan that was tracked."""
@@ -70,10 +68,10 @@ class Standing:
             age = (stamp_ns - look.stamp_ns) / NS_PER_S
             if age >= least and look.step == step:
                 chosen.append(look)
-                bigger = [a for a in self._ages_s if a > age * 1.001]
-                if not bigger:
+                older = [least_s for least_s in self._ages_s if least_s > age]
+                if not older:
                     break
-                least = 0.95 * bigger[0] if len(chosen) > 0 else 0.0
+                least = older[0]
         return chosen
 
     def votes(self, stamp_ns: int, T_map_robot: Float, prior: Float, seen: Observations) -> Float:
