@@ -34,6 +34,10 @@ class StandingConfig(Settings):
     vague_m: float = number(
         0.05, "m", "deviation of the prediction at which emptiness counts half", SEEDS, low=1e-4
     )
+    came_s: float = number(
+        12.0, "s", "places that were seen empty within it are looked for; 12: in all scans asked",
+        SEEDS,
+    )  # fmt: skip
     left_s: float = number(1.5, "s", "things that left a place within it are looked for", SEEDS)
     left_m: float = number(
         0.25, "m", "returns this near to such a place belong to what left it", SEEDS

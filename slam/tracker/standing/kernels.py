@@ -43,7 +43,7 @@ def emptied(  # noqa: PLR0913 (kernel)
     lasers  (J, 3) in the map, ``limits`` (J, bins) free ranges as in ``View``, newest first
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    views = len(ages)
+    views = len(lasers)
     cosines, sines = np.empty(views), np.empty(views)
     for j in range(views):
         cosines[j], sines[j] = math.cos(lasers[j, 2]), math.sin(lasers[j, 2])

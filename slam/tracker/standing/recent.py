@@ -85,11 +85,14 @@ class Standing:
         margin = config.margin_m + config.sigmas * math.sqrt(place)
         spread = math.radians(config.spread_deg) + config.sigmas * math.sqrt(heading)
         spread = min(spread, 0.5 * math.pi)
-        stood = np.empty(len(points))
-        emptied(
-            points, T_map_robot, np.array([look.T_map_laser for look in asked]),
-            np.array([look.limit for look in asked]), ages, seen.view.step, margin, spread, stood,
-        )  # fmt: skip
+        recent = [look for look, age in zip(asked, ages, strict=True) if age <= config.came_s]
+        stood = np.full(len(points), np.inf)
+        if recent:
+            emptied(
+                points, T_map_robot, np.array([look.T_map_laser for look in recent]),
+                np.array([look.limit for look in recent]), ages, seen.view.step, margin, spread,
+                stood,
+            )  # fmt: skip
         self._look_for_what_left(asked, ages, seen, T_map_robot, (margin, spread), stood)
         sure = 1.0 / (1.0 + place / config.vague_m**2)  # else the prediction may be what is off
         votes = 1.0 - sure * (1.0 - 1.0 / (1.0 + (config.settled_s / stood) ** 2))

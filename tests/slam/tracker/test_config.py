@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("f6b603b1350a", "0c351a022f36")),
-        (OccupancyConfig, ["grid"], ("a7170eecc047", "a5de9a6f7bbf")),
+        (ShuntingConfig, [], ("6a6b85d26cc9", "21d5ed1d8e93")),
+        (OccupancyConfig, ["grid"], ("d1cf5d066f58", "98d785d5e92b")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
