@@ -61,6 +61,7 @@ class Observations:
     view          what is seen to be empty
     T_robot_laser (3,) origin of ``view``
     sensor_sigma_m  standard deviation of a range: the scanner's own, or that of the config
+    votes         (n,) in [0, 1] on what is young in the map, see ``tracker.standing``; None: all 1
     """
 
     points_robot: Float
@@ -72,6 +73,7 @@ class Observations:
     view: View
     T_robot_laser: Float
     sensor_sigma_m: float = FRONTEND.sensor_sigma_m
+    votes: Float | None = None
 
 
 @njit

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from slam.settings import Settings, number
 from slam.tracker.config import TrackerConfig
+from slam.tracker.standing.config import ALL_VOTE, StandingConfig
 
 OCTOMAP = "Hornung et al. 2013"
 
@@ -27,6 +28,10 @@ class GridConfig(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class OccupancyConfig(TrackerConfig):
-    """As ``TrackerConfig``, of whose map only ``cell_m`` counts here, and the grid's own."""
+    """As ``TrackerConfig``, of whose map only ``cell_m`` counts here, and the grid's own.
 
+    Every return votes: the grid stays what it is elsewhere.
+    """
+
+    standing: StandingConfig = field(default=ALL_VOTE)
     grid: GridConfig = field(default=GridConfig())

@@ -125,7 +125,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
         pulling = dataclasses.replace(observations, weights=agreed.accepted.astype(np.float64))
         if self.config.objective == "log":
             return self._climbed(pulling, agreed, prediction)
-        score, _ = evaluate(
+        score, *_ = evaluate(
             self.network.cells, self._matcher.reward, seen_by(pulling), agreed.T_map_robot,
             np.zeros(3), np.zeros(3), np.zeros((3, 3)),
         )  # fmt: skip
@@ -133,6 +133,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
             T_map_robot=agreed.T_map_robot,
             information=agreed.information,
             matched=float(agreed.accepted.mean()),
+            overlapped=float(agreed.accepted.mean()),
             score=self.config.reward * score,
             tau=1.0,
             searched=True,
@@ -145,7 +146,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
             inverted(prediction.prior),
         )  # fmt: skip
         matched = match.matched * float(agreed.accepted.mean())
-        return dataclasses.replace(match, matched=matched, searched=True)
+        return dataclasses.replace(match, matched=matched, overlapped=matched, searched=True)
 
     def _agreed(self, observations: Observations, prediction: Prediction) -> _Agreed:
         """IPJC between features and peaks, those looked at more than once first, as in a filter

@@ -18,6 +18,7 @@ from slam.landmarks.hypotheses import Gates
 from slam.settings import Settings, number, word
 from slam.tracker.map_config import MapConfig
 from slam.tracker.matching.config import MatchingConfig
+from slam.tracker.standing.config import ALL_VOTE, StandingConfig
 from slam.tracker.tracking.config import LoopsConfig, TrackingConfig
 from slam.tracker.uncertainty.config import UncertaintyConfig
 
@@ -113,6 +114,7 @@ class TrackerConfig(Settings):
     loops: LoopsConfig = field(default=LoopsConfig())
     uncertainty: UncertaintyConfig = field(default=UncertaintyConfig())
     features: FeaturesConfig = field(default=FeaturesConfig())
+    standing: StandingConfig = field(default=StandingConfig())
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -149,6 +151,7 @@ class TrackerConfig(Settings):
             "reward_exponent": 0.0,
             "objective": "log",
             "freeze_below": 0.0,
+            "standing": ALL_VOTE,
         }
         return cls(**(printed | changes))
 

@@ -27,6 +27,8 @@ from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
+from slam.tracker.standing.agreement import Agreement
+from slam.tracker.standing.recent import Standing
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.quality import TrackingQuality
 from slam.tracker.tracking.relocalise import Relocalisation, coarse, slip, slipped
@@ -66,6 +68,9 @@ class Tracker(abc.ABC):
         self._quality = TrackingQuality(self.config.freeze_below, self._numbers.quality)
         self._relocalisation: Relocalisation | None = None
         self._loops = Loops(self.config, self._matcher, self._new_submap)
+        self._standing = Standing(self.config.standing)
+        self._agreement = Agreement(self.config.standing)
+        self._vote, self._dragged = 1.0, 0.0
         self._trusted = True  # the pose of the frame before
         self._path = PosePath()
 
@@ -88,6 +93,11 @@ class Tracker(abc.ABC):
         self._path.check_order(frame.stamp_ns)
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
+        votes = self._standing.votes(
+            frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
+        )
+        observations = replace(observations, votes=votes)
+        self._vote = float(votes.mean()) if len(votes) else 1.0
         prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
         evidence = self._compare(observations, match, prediction, state)  # 4 residuals
         state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
@@ -95,6 +105,8 @@ class Tracker(abc.ABC):
             observations, prediction, match, evidence, state
         )  # 6 pose, odometry noise
         self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
+        if state == "tracking":
+            self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
         return self._report(frame, match, state)
 
     def _first(self, frame: Frame) -> Estimate:
@@ -107,6 +119,7 @@ class Tracker(abc.ABC):
         self.cell_map.integrate(observations.view, T_map_laser, first_s, write=True)
         match = unmatched(np.zeros(3), matched=1.0, score=0.0)
         self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
+        self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
         return self._report(frame, match, "tracking" if len(observations.points_robot) else "blind")
 
     def _predict(self, odometry: Odometry) -> Prediction:
@@ -159,10 +172,11 @@ class Tracker(abc.ABC):
             found = self._matcher.search(self.cell_map, observations, predicted, precision, window)
             if found.score > match.score:
                 match = found
-        if match.matched >= poor or not self._quality.is_worth_searching():
+        if match.matched >= poor or not self._quality.is_worth_searching_near():
             return match
-        usual = self._quality.usual_support()
-        shoved = slipped(self.cell_map, self._matcher, observations, prediction, usual)
+        everyone = replace(observations, votes=None)
+        usual = self._quality.usual_whole()
+        shoved = slipped(self.cell_map, self._matcher, everyone, prediction, usual)
         return match if shoved is None else shoved
 
     def _recover(
@@ -171,8 +185,9 @@ class Tracker(abc.ABC):
         """Dead reckoning, until one hypothesis alone explains what is seen."""
         predicted = prediction.T_map_robot
         precision = inverted(prediction.prior)
+        observations = replace(observations, votes=None)  # they are of another place
         here = self._matcher.climb(self.cell_map, observations, predicted, predicted, precision)
-        match = recovery.step(observations, prediction, here, self._quality.usual_support())
+        match = recovery.step(observations, prediction, here, self._quality.usual_whole())
         if match is not None:
             self._relocalisation = None
             self._quality.count(False)
@@ -223,7 +238,8 @@ class Tracker(abc.ABC):
         if len(observations.points_robot) == 0:
             return "lost" if denied else "blind"  # odometry alone
         if not denied:
-            quality.learn(match.matched, confirmed, contradicted, prediction.elapsed)
+            elapsed = prediction.elapsed
+            quality.learn(match.matched, confirmed, contradicted, elapsed, match.overlapped)
         return "lost" if denied else "tracking"
 
     def _update_uncertainty(
@@ -235,6 +251,16 @@ class Tracker(abc.ABC):
         state: str,
     ) -> None:
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
+        self._dragged = 0.0
+        if state == "tracking" and not match.slipped:
+            self._agreement.take(prediction, match.T_map_robot)
+            self._dragged = self._agreement.dragged(self._vote)
+            self._pose_covariance.dragged(self._agreement.covariance(self._dragged))
+        else:
+            self._agreement.forget()
+            if match.slipped:  # found by a search, among what does not fit there
+                found = (1.0 - match.overlapped) * coarse(self._numbers.relocalise)
+                self._pose_covariance.dragged(found)
         if state == "tracking" and not match.slipped:
             self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m)
         else:
@@ -250,7 +276,8 @@ class Tracker(abc.ABC):
             motion, covariance = prediction.increment, prediction.covariance
         self._trusted = state in ("tracking", "relocated")
         covariance = turned(covariance, -float(self._T_map_robot[2]))
-        self._loops.add(len(self._path), match.T_map_robot, motion, covariance, observations)
+        everyone = replace(observations, votes=None)
+        self._loops.add(len(self._path), match.T_map_robot, motion, covariance, everyone)
 
     def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
         self._before = frame.odometry
@@ -260,7 +287,7 @@ class Tracker(abc.ABC):
             stamp_ns=frame.stamp_ns,
             T_map_robot=match.T_map_robot,
             covariance=self._pose_covariance.covariance,
-            converged=state in ("tracking", "relocated"),
+            converged=state in ("tracking", "relocated") and not self._doubtful(),
             diagnostics={
                 "state": state,
                 "matched": match.matched,
@@ -269,8 +296,15 @@ class Tracker(abc.ABC):
                 "unobservable": self._pose_covariance.unobservable,
                 "unobservable_rad": self._pose_covariance.along_rad,
                 "nis": self._odometry_noise.nis,
+                "trust": self._vote * (1.0 - self._dragged),
+                "odometry_ratio": self._agreement.ratio,
             },
         )
+
+    def _doubtful(self) -> bool:
+        """Whether the crowd may have carried the robot far."""
+        doubtful_m = self.config.standing.doubtful_m
+        return 0.0 < doubtful_m < self._agreement.off_m(self._dragged)
 
     def window(
         self, xmin: float, ymin: float, xmax: float, ymax: float

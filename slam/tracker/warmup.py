@@ -16,12 +16,14 @@ from typing import Any
 import numpy as np
 
 from slam.compiling import announced
-from slam.frames import LaserSpec, Scan
+from slam.frames import NS_PER_S, LaserSpec, Scan
 from slam.frontend.observations import from_scan
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.rasterise import rasterise
+from slam.tracker.standing.config import StandingConfig
+from slam.tracker.standing.recent import Standing
 from slam.tracker.uncertainty.covariances import advance, carried, innovation, observable
 from slam.tracker.uncertainty.residuals import look
 
@@ -61,6 +63,9 @@ def _run_all(config: TrackerConfig, new_map: Callable[[Any], CellMap]) -> None:
     for write in (False, True):
         rasterise(cell_map, seen, origin)
         cell_map.integrate(seen.view, origin, 1.0, write=write)
+    standing = Standing(StandingConfig(thin_m=0.0))
+    standing.add(0, origin, seen)
+    standing.votes(NS_PER_S // 2, origin, covariance, seen)
     start = matcher.approach(cell_map, seen, origin, covariance)
     matcher.climb(cell_map, seen, start, origin, np.linalg.inv(covariance))
     cell_map.window(0.0, 0.0, 1.0, 1.0)

@@ -38,7 +38,14 @@ def seen_by(observations: Observations) -> Seen:
         observations.weights,
         observations.tangents,
         observations.facings,
+        votes_of(observations),
     )
+
+
+def votes_of(observations: Observations) -> Float:
+    """(n,) the votes of ``observations``: all 1 where nothing is known of them."""
+    votes = observations.votes
+    return np.ones(len(observations.points_robot)) if votes is None else votes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +54,9 @@ class Match:
 
     T_map_robot  (3,) best pose
     information  (3, 3) of the data alone, by (x, y, theta) in the map frame
-    matched      share of the observations that overlap the map, 0 without observations
+    matched      share of the observations that overlap the map, 0 without observations; what does
+                 not, and has no vote (``tracker.standing``), is left out of it
+    overlapped   the same share of all observations
     score        reward at full weight - 1/2 Mahalanobis^2: comparable between matches of a frame
     tau          weight the reward had in the end
     searched     whether the wide search ran; ``evaluations`` candidate poses it scored
@@ -62,6 +71,7 @@ class Match:
     searched: bool = False
     evaluations: int = 0
     slipped: bool = False
+    overlapped: float = 0.0
 
 
 def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
@@ -72,6 +82,7 @@ def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
         matched=matched,
         score=score,
         tau=0.0,
+        overlapped=matched,
     )
 
 
@@ -88,6 +99,7 @@ class Matcher:
             log_floor=config.matching.log_floor,
             tail=config.matching.tail,
             tail_cells=config.matching.tail_cells,
+            young_trace=config.standing.young_trace,
         )
         self.numbers = config.matching
         steps = self.numbers.climb
@@ -106,9 +118,9 @@ class Matcher:
         full = float(observations.weights.sum())
         pose = np.array(start, dtype=np.float64)
         information = np.zeros((3, 3))
-        tau, matched, score = self.config.reward, 0.0, -math.inf
+        tau, matched, overlapped, score = self.config.reward, 0.0, 0.0, -math.inf
         while full > 0.0:
-            rewarded, prior, count = refine(
+            rewarded, prior, count, absent = refine(
                 cell_map.cells,
                 self.reward,
                 self._climb,
@@ -119,7 +131,8 @@ class Matcher:
                 tau,
                 information,
             )
-            matched = count / full
+            overlapped = count / full
+            matched = count / (full - absent) if count > 0.0 else 0.0
             score = self.config.reward * rewarded + prior
             tempered = self.config.reward * matched**self.config.reward_exponent
             tempered = max(tempered, self.numbers.climb.least_weight)
@@ -128,8 +141,9 @@ class Matcher:
             tau = tempered
         pose[2] = se2.wrap(float(pose[2]))
         return Match(
-            T_map_robot=pose, information=information, matched=matched, score=score, tau=tau
-        )
+            T_map_robot=pose, information=information, matched=matched, score=score, tau=tau,
+            overlapped=overlapped,
+        )  # fmt: skip
 
     def approach(
         self, cell_map: CellMap, observations: Observations, prediction: Float, covariance: Float
@@ -166,6 +180,7 @@ class Matcher:
                 np.ascontiguousarray(observations.weights[::every]) * every,
                 np.ascontiguousarray(observations.tangents[::every]),
                 np.ascontiguousarray(observations.facings[::every]),
+                np.ascontiguousarray(votes_of(observations)[::every]),
             ),
             pose,
             prediction,

@@ -20,7 +20,7 @@ from slam.tracker.cells import MASK, SHIFT, Cells
 
 
 class Reward(NamedTuple):
-    """How overlaps are rewarded; the last four as in ``MatchingConfig``.
+    """How overlaps are rewarded; four as in ``MatchingConfig``, the last as in ``StandingConfig``.
 
     cell        m
     short_term  weight of x in v = y + (1 - y) * short_term * x
@@ -34,6 +34,7 @@ class Reward(NamedTuple):
     log_floor: float
     tail: float
     tail_cells: float
+    young_trace: float
 
 
 class Climb(NamedTuple):
@@ -57,6 +58,7 @@ class Seen(NamedTuple):
     weights: NDArray[np.float64]
     tangents: NDArray[np.float64]
     facings: NDArray[np.uint8]
+    votes: NDArray[np.float64]
 
 
 class Field(NamedTuple):
@@ -72,7 +74,7 @@ class Field(NamedTuple):
 @inner
 def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
     field: Field,
-    reach: tuple[float, float, float],
+    reach: tuple[float, float, float, float],
     u: float,
     v: float,
     cov: tuple[float, float, float],
@@ -83,10 +85,11 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
 
     (u, v) and ``cov`` (xx, xy, yy) are in cells, cell (i, j) lies at (i, j). f is the sum over
     cells of Gaussian times activity, divided so that a lone landmark scores 1 on itself. Cells
-    of a surface that faces away from the observed one (``faced``) do not count.
+    of a surface that faces away from the observed one (``faced``) do not count. ``reach``: weight
+    of x, the bounds of the Gaussian, and what is closed of a faint trace y: y (1 - closed (1 - y)).
     ``out``: f, df/du, df/dv, -d2f/du2, -d2f/dudv, -d2f/dv2.
     """
-    short_term, tail, tail_cells = reach
+    short_term, tail, tail_cells, closed = reach
     a, b, d = cov
     det = a * d - b * b
     if det <= 0.0:  # rounding has left nothing across
@@ -121,7 +124,10 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
                     slot = field.directory[row, column] if 0 <= column < columns else -1
                 if slot >= 0:
                     x, y = field.x[slot, j & MASK, i & MASK], field.y[slot, j & MASK, i & MASK]
-                    value = kernel * (y + (1.0 - y) * short_term * x)
+                    value = y + (1.0 - y) * short_term * x
+                    if closed > 0.0:
+                        value -= closed * y * (1.0 - y)
+                    value *= kernel
                     if opposite(faced, field.facing[slot, j & MASK, i & MASK]):
                         value = 0.0
                     s0 += value
@@ -160,8 +166,9 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     gradient: NDArray[np.float64],
     along: NDArray[np.float64],
     information: NDArray[np.float64],
-) -> tuple[float, float]:
-    """Sum of rewards of the observations seen from ``pose``, and the weight of those matched.
+) -> tuple[float, float, float]:
+    """Sum of rewards of the observations seen from ``pose``, the weight of those matched, and that
+    of those unmatched without a vote.
 
     Fills the gradient (3,) by (x, y, theta), the part of it ``along`` the observed surfaces, and
     the information (3, 3): the negative curvature, of each observation only where it is positive,
@@ -170,11 +177,10 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     gradient[:] = 0.0
     along[:] = 0.0
     information[:] = 0.0
-    score, matched = 0.0, 0.0
+    score, matched, absent = 0.0, 0.0, 0.0
     out = np.empty(6)
     scale = 1.0 / reward.cell
     field = Field(cells.directory, cells.corner, cells.x, cells.y, cells.facing)
-    reach = reward.short_term, reward.tail, reward.tail_cells
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(len(seen.points)):
         rx = c * seen.points[k, 0] - s * seen.points[k, 1]
@@ -186,10 +192,15 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
             (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale * scale,
         )
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
+        vote = seen.votes[k]
+        closed = reward.young_trace * (1.0 - vote)
+        reach = reward.short_term * vote, reward.tail, reward.tail_cells, closed
         _overlap(field, reach, u, v, cov, turned_face(seen.facings[k], pose[2]), out)
         f = out[0]
         if f > reward.matched_overlap:
             matched += seen.weights[k]
+        else:
+            absent += seen.weights[k] * (1.0 - vote)
         gx, gy = out[1] * scale, out[2] * scale
         a, b, d = out[3] * scale * scale, out[4] * scale * scale, out[5] * scale * scale
         if reward.logarithm:
@@ -228,7 +239,7 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     information[1, 0] = information[0, 1]
     information[2, 0] = information[0, 2]
     information[2, 1] = information[1, 2]
-    return score, matched
+    return score, matched, absent
 
 
 @inner
@@ -277,19 +288,19 @@ def refine(  # noqa: C901, PLR0913 (kernel)
     precision: NDArray[np.float64],
     tau: float,
     information: NDArray[np.float64],
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, float]:
     """Climb to the maximum of tau * reward - 1/2 Mahalanobis^2 from ``pose`` (changed in place).
 
     Newton's method with Levenberg damping; a step is taken only if it rises, but for the last, tiny
     one. The slope of the reward along observed surfaces is left out of it: there it only says where
-    the map is older, which would hold a robot back in a corridor. Returns reward, prior and the
-    weight of matched observations, and leaves the data's information (without tau and prior) in
-    ``information``, all as before the last step.
+    the map is older, which would hold a robot back in a corridor. Returns reward, prior, the weight
+    of matched observations and that of unmatched ones without a vote, and leaves the data's
+    information (without tau and prior) in ``information``, all as before the last step.
     """
     gradient, along, slope, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     trial, trial_gradient, trial_along = np.empty(3), np.empty(3), np.empty(3)
     trial_information, H = np.empty((3, 3)), np.empty((3, 3))
-    rewarded, matched = evaluate(cells, reward, seen, pose, gradient, along, information)
+    rewarded, matched, absent = evaluate(cells, reward, seen, pose, gradient, along, information)
     prior = _prior(pose, prediction, precision, slope)
     damping = climb.damping
     for _ in range(climb.steps):
@@ -304,13 +315,14 @@ def refine(  # noqa: C901, PLR0913 (kernel)
             break
         for a in range(3):
             trial[a] = pose[a] + step[a]
-        trial_rewarded, trial_matched = evaluate(
+        trial_rewarded, trial_matched, trial_absent = evaluate(
             cells, reward, seen, trial, trial_gradient, trial_along, trial_information,
         )  # fmt: skip
         older = along[0] * step[0] + along[1] * step[1] + along[2] * step[2]
         trial_prior = _prior(trial, prediction, precision, step)
         if tau * (trial_rewarded - rewarded - older) + trial_prior > prior:
-            rewarded, prior, matched = trial_rewarded, trial_prior, trial_matched
+            rewarded, prior = trial_rewarded, trial_prior
+            matched, absent = trial_matched, trial_absent
             for a in range(3):  # element by element: array assignment triples the compile time
                 pose[a], gradient[a], along[a] = trial[a], trial_gradient[a], trial_along[a]
                 for b in range(3):
@@ -321,4 +333,4 @@ def refine(  # noqa: C901, PLR0913 (kernel)
             if damping > climb.damping_most:
                 break
         _prior(pose, prediction, precision, slope)
-    return rewarded, prior, matched
+    return rewarded, prior, matched, absent

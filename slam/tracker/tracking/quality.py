@@ -23,6 +23,7 @@ class TrackingQuality:
 
     freeze_below  share of the usual match, see ``TrackerConfig``; 0: never denied
     matches       latest matched fractions; ``supports`` the same times the share of map confirmed
+    wholes        as ``supports``, of the overlapped share of all returns: those of movers too
     tracked_s     s of tracking on this map, in ``tracked`` scans
     scans         frames denied in a row
     """
@@ -31,6 +32,7 @@ class TrackingQuality:
         self.freeze_below, self.config = freeze_below, config
         self.matches: deque[float] = deque(maxlen=config.remembered)
         self.supports: deque[float] = deque(maxlen=config.remembered)
+        self.wholes: deque[float] = deque(maxlen=config.remembered)
         self.tracked_s, self.tracked, self.scans = 0.0, 0, 0
 
     def resume(
@@ -39,6 +41,7 @@ class TrackingQuality:
         """Go on with what a saved map had."""
         self.matches.extend(matches)
         self.supports.extend(supports)
+        self.wholes.extend(supports)
         self.tracked_s, self.tracked = tracked_s, tracked
 
     def usual_match(self) -> float:
@@ -49,11 +52,21 @@ class TrackingQuality:
         """Median of it times the share of the map in view that is confirmed."""
         return median(self.supports) if self.supports else 1.0
 
+    def usual_whole(self) -> float:
+        """As ``usual_support``, of all returns: what a place must explain to be the right one."""
+        return median(self.wholes) if self.wholes else 1.0
+
     def is_worth_searching(self, share: float = 1.0) -> bool:
         """Grown (or to that share), and explains what is seen: else it cannot deny it either."""
+        return self._grown(share) and self.usual_whole() >= self.config.worth_searching
+
+    def is_worth_searching_near(self) -> bool:
+        """The same around where the robot is: what moves need not be explained there."""
+        return self._grown(1.0) and self.usual_support() >= self.config.worth_searching
+
+    def _grown(self, share: float) -> bool:
         config = self.config
-        grown = self.tracked_s >= share * config.grown_s and self.tracked >= config.grown_scans
-        return grown and self.usual_support() >= config.worth_searching
+        return self.tracked_s >= share * config.grown_s and self.tracked >= config.grown_scans
 
     @property
     def suspicious(self) -> bool:
@@ -87,12 +100,24 @@ class TrackingQuality:
         """Another frame that is denied, or one that is not."""
         self.scans = self.scans + 1 if denied else 0
 
-    def learn(self, matched: float, confirmed: float, contradicted: float, elapsed: float) -> None:
-        """From a frame that was tracked, ``elapsed`` s after the one before."""
+    def learn(
+        self,
+        matched: float,
+        confirmed: float,
+        contradicted: float,
+        elapsed: float,
+        overlapped: float | None = None,
+    ) -> None:
+        """From a frame that was tracked, ``elapsed`` s after the one before.
+
+        ``overlapped``: of all returns; None: as ``matched``.
+        """
         self.matches.append(matched)
         self.tracked_s, self.tracked = self.tracked_s + elapsed, self.tracked + 1
         if confirmed + contradicted > 0.0:
+            confirming = confirmed / (confirmed + contradicted)
             self.supports.append(matched * confirmed / (confirmed + contradicted))
+            self.wholes.append((matched if overlapped is None else overlapped) * confirming)
 
     def give_up(self) -> None:
         """The next frame is written, as the first on this map."""

@@ -127,6 +127,12 @@ class PoseCovariance:
         )
         self.covariance = self._drift + self._blind + self._shared
 
+    def dragged(self, covariance: Float) -> None:
+        """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot."""
+        self._drift = self._drift + covariance
+        self.newest_drift = self.newest_drift + covariance
+        self.covariance = self.covariance + covariance
+
     def _fewer(self) -> float:
         """By how much the shared errors of surfaces average out less than in a whole room."""
         config = self._config

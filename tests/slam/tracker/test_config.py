@@ -12,15 +12,15 @@ from slam.tracker.config import TrackerConfig
 TOP = [
     "cell_m", "decay_per_s", "lateral_sum", "lateral_reach_cells", "threshold", "trace_s",
     "short_term_weight", "reward", "reward_exponent", "objective", "range_m", "freeze_below",
-    "frontend", "map", "matching", "tracking", "loops", "uncertainty", "features",
+    "frontend", "map", "matching", "tracking", "loops", "uncertainty", "features", "standing",
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("2c273be77656", "0aae92258607")),
-        (OccupancyConfig, ["grid"], ("b4127ba3154f", "e59d4bf8a29e")),
+        (ShuntingConfig, [], ("6a6b85d26cc9", "21d5ed1d8e93")),
+        (OccupancyConfig, ["grid"], ("d1cf5d066f58", "98d785d5e92b")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

@@ -63,7 +63,7 @@ def test_gradient_and_curvature_agree_with_differences(objective: str) -> None:
 
     def score(pose: Array) -> tuple[float, Array, Array]:
         gradient, along, information = np.empty(3), np.empty(3), np.empty((3, 3))
-        value, _ = evaluate(
+        value, *_ = evaluate(
             network.cells, matcher.reward, seen_by(seen), pose, gradient, along, information
         )  # fmt: skip
         return value, gradient, information

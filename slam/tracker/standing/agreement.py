@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether matches and odometry agree over seconds, not only from scan to scan.
+
+Who is carried along by a crowd is corrected a little in each scan, always to the same side. No one
+correction is more than odometry may be off, but their sum is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float
+from slam.frontend.odometry_prior import Prediction, inverted
+from slam.tracker.standing.config import StandingConfig
+
+
+class Agreement:
+    """Sums of what matches corrected, over two windows, against what odometry may be off.
+
+    A window of w s forgets with exp(-t / w): S is the sum of corrections, V that of odometry's
+    covariances. With R, what a match itself may be off, S' (V + R)^-1 S / 3 is about 1 where all
+    is well.
+
+    ratio  the larger one of the two windows
+    """
+
+    def __init__(self, config: StandingConfig) -> None:
+        self._config = config
+        self._windows = (config.window_s, config.long_window_s)
+        own = (config.match_m, config.match_m, math.radians(config.match_deg))
+        self._own = np.diag(np.square(own))
+        self.forget()
+
+    def forget(self) -> None:
+        """The robot was set elsewhere: what was summed says nothing of it."""
+        self._sums = [np.zeros(3) for _ in self._windows]
+        self._variances = [np.zeros((3, 3)) for _ in self._windows]
+        self.ratio = 0.0
+        self._worst = 0
+        self._elapsed_s = 0.0
+
+    def take(self, prediction: Prediction, T_map_robot: Float) -> None:
+        """The robot is matched to ``T_map_robot``."""
+        off = T_map_robot - prediction.T_map_robot
+        off[2] = se2.wrap(float(off[2]))
+        self.ratio, self._elapsed_s = 0.0, prediction.elapsed
+        for k, window in enumerate(self._windows):
+            keep = math.exp(-prediction.elapsed / window)
+            S = self._sums[k] = keep * self._sums[k] + off
+            V = self._variances[k] = keep * keep * self._variances[k] + prediction.covariance
+            ratio = _form(S, inverted(V + self._own)) / 3.0
+            if ratio > self.ratio:
+                self.ratio, self._worst = ratio, k
+
+    def dragged(self, vote: float) -> float:
+        """Probability in [0, 1) that the matches are wrong, and not odometry.
+
+        ``vote`` is the mean vote of the returns: where all come from what stands, odometry is.
+        """
+        if self._config.disagreed == 0.0:
+            return 0.0
+        excess = max(self.ratio - 1.0, 0.0) / self._config.disagreed
+        return (1.0 - vote) * excess * excess / (1.0 + excess * excess)
+
+    def covariance(self, dragged: float) -> Float:
+        """(3, 3) that the latest frame adds to the map's error if that is its probability.
+
+        The pose is right, or off by S: the spread of both is ``dragged`` S S', taken in over the
+        time that the window sums.
+        """
+        S, window = self._sums[self._worst], self._windows[self._worst]
+        share = dragged * min(self._elapsed_s / window, 1.0)
+        x, y, turn = S.tolist()
+        rows = [[x * x, x * y, x * turn], [x * y, y * y, y * turn], [x * turn, y * turn, turn**2]]
+        return share * np.array(rows)
+
+    def off_m(self, dragged: float) -> float:
+        """m, deviation of the position by that."""
+        x, y, _ = self._sums[self._worst].tolist()
+        return math.sqrt(dragged) * math.hypot(x, y)
+
+
+def _form(v: Float, m: Float) -> float:
+    """v' m v in a fixed order of operations."""
+    (x, y, t), (a, b, c) = v.tolist(), m.tolist()
+    return float(
+        x * (a[0] * x + 2.0 * (a[1] * y + a[2] * t))
+        + y * (b[1] * y + 2.0 * b[2] * t)
+        + c[2] * t * t
+    )

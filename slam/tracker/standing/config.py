@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers of trust in returns: who votes, and when odometry denies the matches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slam.settings import Settings, number
+
+SEEDS = "training seeds of crowds, and real logs (docs/trust_in_returns.md)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class StandingConfig(Settings):
+    """For how long the place of a return was not seen empty, and what vote it has by that."""
+
+    settled_s: float = number(
+        5.0, "s", "a return whose place was seen empty so long ago has half a vote; 0: all vote",
+        SEEDS,
+    )  # fmt: skip
+    young_trace: float = number(
+        1.0, "share", "of a faint trace (1 - y) that is closed to who has no vote", SEEDS, high=1.0
+    )
+    views: int = number(5, "scans", "earlier scans that are asked", SEEDS, low=1, high=64)
+    spacing_s: float = number(
+        0.2, "s", "least time between two kept scans; age of the second one asked", SEEDS, low=1e-3
+    )
+    ages_grow: float = number(2.5, "ratio", "of the ages of the scans asked", SEEDS, low=1.01)
+    margin_m: float = number(
+        0.05, "m", "an earlier beam went on by so much more: the place was seen empty", SEEDS
+    )
+    spread_deg: float = number(1.0, "deg", "to either side of it, all beams did", SEEDS, high=90.0)
+    sigmas: float = number(1.0, "σ", "of the prediction, added to margin_m and spread_deg", SEEDS)
+    vague_m: float = number(
+        0.05, "m", "deviation of the prediction at which emptiness counts half", SEEDS, low=1e-4
+    )
+    came_s: float = number(
+        12.0, "s", "places that were seen empty within it are looked for; 12: in all scans asked",
+        SEEDS,
+    )  # fmt: skip
+    left_s: float = number(1.5, "s", "things that left a place within it are looked for", SEEDS)
+    left_m: float = number(
+        0.25, "m", "returns this near to such a place belong to what left it", SEEDS
+    )
+    along_m: float = number(
+        0.3, "m", "votes are averaged along a surface so far each way", SEEDS, low=1e-3
+    )
+    thin_m: float = number(
+        0.1, "m", "narrower things vote: earlier beams may have missed them", SEEDS
+    )
+    disagreed: float = number(
+        6.0, "ratio", "of corrections over what odometry may be off, squared, at which being "
+        "dragged is as likely as not; 0: never asked", SEEDS,
+    )  # fmt: skip
+    window_s: float = number(2.0, "s", "corrections are summed over it", SEEDS, low=1e-3)
+    long_window_s: float = number(8.0, "s", "and over it", SEEDS, low=1e-3)
+    match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
+    match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
+    doubtful_m: float = number(
+        0.15, "m", "deviation by being dragged: not converged; 0: never", SEEDS
+    )
+
+
+ALL_VOTE = StandingConfig(settled_s=0.0, disagreed=0.0)  # every return; odometry is not asked

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What earlier scans say about the places of present returns, and the other way round."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import inner, njit
+
+
+@inner
+def _passed(
+    limit: NDArray[np.float64], step: float, x: float, y: float, margin: float, spread: float
+) -> bool:
+    """Whether all beams within ``spread`` rad went on beyond (x, y) (laser axes) by ``margin``."""
+    r = math.sqrt(x * x + y * y)
+    bins = len(limit)
+    turns = math.atan2(y, x) / step
+    first, last = math.floor(turns - spread / step + 0.5), math.floor(turns + spread / step + 0.5)
+    for k in range(first, last + 1):  # noqa: SIM110 (compiled)
+        if limit[k % bins] < r + margin:
+            return False
+    return True
+
+
+@njit
+def emptied(  # noqa: PLR0913 (kernel)
+    points: NDArray[np.float64],
+    pose: NDArray[np.float64],
+    lasers: NDArray[np.float64],
+    limits: NDArray[np.float64],
+    ages: NDArray[np.float64],
+    step: float,
+    margin: float,
+    spread: float,
+    out: NDArray[np.float64],
+) -> None:
+    """Age of the newest scan that saw the place of each point (robot frame) empty, else inf.
+
+    lasers  (J, 3) in the map, ``limits`` (J, bins) free ranges as in ``View``, newest first
+    """
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    views = len(lasers)
+    cosines, sines = np.empty(views), np.empty(views)
+    for j in range(views):
+        cosines[j], sines[j] = math.cos(lasers[j, 2]), math.sin(lasers[j, 2])
+    for k in range(len(points)):
+        x = c * points[k, 0] - s * points[k, 1] + pose[0]
+        y = s * points[k, 0] + c * points[k, 1] + pose[1]
+        out[k] = math.inf
+        for j in range(views):
+            dx, dy = x - lasers[j, 0], y - lasers[j, 1]
+            u, v = cosines[j] * dx + sines[j] * dy, cosines[j] * dy - sines[j] * dx
+            if _passed(limits[j], step, u, v, margin, spread):
+                out[k] = ages[j]
+                break
+
+
+@njit
+def indexed(
+    points: NDArray[np.float64],
+    T_robot_laser: NDArray[np.float64],
+    step: float,
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+) -> None:
+    """First and last point (robot frame, in order of bearing) of each bin about the laser; -1."""
+    c, s = math.cos(T_robot_laser[2]), math.sin(T_robot_laser[2])
+    bins = len(first)
+    for b in range(bins):
+        first[b] = last[b] = -1
+    for k in range(len(points)):
+        dx, dy = points[k, 0] - T_robot_laser[0], points[k, 1] - T_robot_laser[1]
+        b = math.floor(math.atan2(c * dy - s * dx, c * dx + s * dy) / step + 0.5) % bins
+        if first[b] < 0:
+            first[b] = k
+        last[b] = k
+
+
+@njit
+def left(  # noqa: PLR0913 (kernel)
+    before: NDArray[np.float64],
+    age: float,
+    points: NDArray[np.float64],
+    T_map_laser: NDArray[np.float64],
+    T_robot_laser: NDArray[np.float64],
+    limit: NDArray[np.float64],
+    step: float,
+    bounds: tuple[float, float, float],
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+    out: NDArray[np.float64],
+) -> None:
+    """Lower ``out`` to ``age`` for points within ``near`` m of a place that was left.
+
+    before  (m, 2) points of an earlier scan, map frame; left if present beams pass them
+    points  (n, 2) present ones, robot frame, by bin ``first`` to ``last`` (see ``indexed``)
+    limit   (bins,) free ranges of the present scan
+    bounds  margin m and spread rad of passing, near
+    """
+    margin, spread, near = bounds
+    bins = len(limit)
+    c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
+    lc, ls = math.cos(T_robot_laser[2]), math.sin(T_robot_laser[2])
+    for i in range(len(before)):
+        gx, gy = before[i, 0] - T_map_laser[0], before[i, 1] - T_map_laser[1]
+        u, v = c * gx + s * gy, c * gy - s * gx
+        if not _passed(limit, step, u, v, margin, spread):
+            continue
+        x, y = lc * u - ls * v + T_robot_laser[0], ls * u + lc * v + T_robot_laser[1]
+        r = math.sqrt(u * u + v * v)
+        middle = math.floor(math.atan2(v, u) / step + 0.5)
+        # 1.6 > pi / 2: asin(q) is below 1.6 q for q in [0, 1]
+        wide = math.floor(min(near / max(r, near), 1.0) * 1.6 / step) + 1
+        for b in range(middle - wide, middle + wide + 1):
+            at = b % bins
+            if first[at] < 0:
+                continue
+            for k in range(first[at], last[at] + 1):
+                ex, ey = points[k, 0] - x, points[k, 1] - y
+                if ex * ex + ey * ey < near * near:
+                    out[k] = min(out[k], age)
+
+
+@njit
+def along(
+    points: NDArray[np.float64],
+    joined: NDArray[np.bool_],
+    votes: NDArray[np.float64],
+    reach: float,
+    thin: float,
+    out: NDArray[np.float64],
+) -> None:
+    """Mean of ``votes`` along the surface of each point, up to ``reach`` m each way.
+
+    1 where that stretch is shorter than ``thin`` m: earlier beams may have gone by such a thing.
+    """
+    n = len(points)
+    before = np.empty(n + 1)  # sums of the votes before each point
+    before[0] = 0.0
+    for k in range(n):
+        before[k + 1] = before[k] + votes[k]
+    first, last = 0, 0
+    for k in range(n):
+        if k > 0 and not joined[k - 1]:
+            first = k
+        while _apart(points, first, k) >= reach:
+            first += 1
+        last = max(last, k)
+        while last + 1 < n and joined[last] and _apart(points, k, last + 1) < reach:
+            last += 1
+        if _apart(points, first, last) >= thin:
+            out[k] = min((before[last + 1] - before[first]) / (last + 1 - first), 1.0)
+        else:
+            out[k] = 1.0
+
+
+@inner
+def _apart(points: NDArray[np.float64], j: int, k: int) -> float:
+    dx, dy = points[j, 0] - points[k, 0], points[j, 1] - points[k, 1]
+    return math.sqrt(dx * dx + dy * dy)

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The scans of the last seconds, kept to say which present returns come from what stands."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from slam import se2
+from slam.frames import NS_PER_S, Float
+from slam.frontend.observations import Observations
+from slam.tracker.standing.config import StandingConfig
+from slam.tracker.standing.kernels import along, emptied, indexed, left
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Look:
+    """One kept scan.
+
+    T_map_laser (3,), points_map (n, 2), limit (bins,) as in ``View``
+    """
+
+    stamp_ns: int
+    T_map_laser: Float
+    points_map: Float
+    limit: Float
+    step: float
+
+
+class Standing:
+    """Gives each return its vote, by how long its place was not seen empty."""
+
+    def __init__(self, config: StandingConfig) -> None:
+        self._config = config
+        self._looks: deque[Look] = deque()
+        # a little less, as scans come when they come
+        first_s = 0.95 * config.spacing_s
+        self._ages_s = [first_s * config.ages_grow**k for k in range(config.views)]
+
+    def add(self, stamp_ns: int, T_map_robot: Float, seen: Observations) -> None:
+        """Keep a scan that was tracked."""
+        if self._config.settled_s == 0.0 or not len(seen.points_robot):
+            return
+        looks, config = self._looks, self._config
+        if len(looks) > 1 and stamp_ns - looks[-2].stamp_ns < config.spacing_s * NS_PER_S:
+            looks.pop()  # the newest is always there
+        looks.append(
+            Look(
+                stamp_ns=stamp_ns,
+                T_map_laser=se2.compose(T_map_robot, seen.T_robot_laser),
+                points_map=se2.transform(T_map_robot, seen.points_robot),
+                limit=seen.view.limit,
+                step=seen.view.step,
+            )
+        )
+        oldest = stamp_ns - round(1.5 * self._ages_s[-1] * NS_PER_S)
+        while looks[0].stamp_ns < oldest:
+            looks.popleft()
+
+    def _asked(self, stamp_ns: int, step: float) -> list[Look]:
+        """The newest, and of the others about one of each age."""
+        chosen: list[Look] = []
+        least = -math.inf
+        for look in reversed(self._looks):
+            age = (stamp_ns - look.stamp_ns) / NS_PER_S
+            if age >= least and look.step == step:
+                chosen.append(look)
+                older = [least_s for least_s in self._ages_s if least_s > age]
+                if not older:
+                    break
+                least = older[0]
+        return chosen
+
+    def votes(self, stamp_ns: int, T_map_robot: Float, prior: Float, seen: Observations) -> Float:
+        """(n,) vote of each return in [0, 1], seen from a pose predicted with a (3, 3) prior."""
+        config, points = self._config, seen.points_robot
+        asked = self._asked(stamp_ns, seen.view.step) if config.settled_s > 0.0 else []
+        if not asked or not len(points):
+            return np.ones(len(points))
+        ages = np.array([(stamp_ns - look.stamp_ns) / NS_PER_S for look in asked])
+        place, heading = max(float(prior[0, 0]), float(prior[1, 1])), float(prior[2, 2])
+        margin = config.margin_m + config.sigmas * math.sqrt(place)
+        spread = math.radians(config.spread_deg) + config.sigmas * math.sqrt(heading)
+        spread = min(spread, 0.5 * math.pi)
+        recent = [look for look, age in zip(asked, ages, strict=True) if age <= config.came_s]
+        stood = np.full(len(points), np.inf)
+        if recent:
+            emptied(
+                points, T_map_robot, np.array([look.T_map_laser for look in recent]),
+                np.array([look.limit for look in recent]), ages, seen.view.step, margin, spread,
+                stood,
+            )  # fmt: skip
+        self._look_for_what_left(asked, ages, seen, T_map_robot, (margin, spread), stood)
+        sure = 1.0 / (1.0 + place / config.vague_m**2)  # else the prediction may be what is off
+        votes = 1.0 - sure * (1.0 - 1.0 / (1.0 + (config.settled_s / stood) ** 2))
+        out = np.empty(len(points))
+        along(points, seen.joined, votes, config.along_m, config.thin_m, out)
+        return out
+
+    def _look_for_what_left(
+        self,
+        asked: list[Look],
+        ages: Float,
+        seen: Observations,
+        T_map_robot: Float,
+        passing: tuple[float, float],
+        stood: Float,
+    ) -> None:
+        config, view, points = self._config, seen.view, seen.points_robot
+        first, last = np.empty(len(view.limit), np.int64), np.empty(len(view.limit), np.int64)
+        indexed(points, seen.T_robot_laser, view.step, first, last)
+        T_map_laser = se2.compose(T_map_robot, seen.T_robot_laser)
+        for look, age in zip(asked, ages.tolist(), strict=True):
+            if age <= config.left_s:
+                left(
+                    look.points_map, age, points, T_map_laser, seen.T_robot_laser, view.limit,
+                    view.step, (*passing, config.left_m), first, last, stood,
+                )  # fmt: skip
