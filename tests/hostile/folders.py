@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from scripts.benchmark import submission
 from scripts.closed_loop.plan import Plan as DrivePlan
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.output import write_recipe
@@ -22,6 +23,7 @@ from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import write_sums
 from slam.maps import write_map
 from slam.system import Raster
+from tests.scripts.benchmark.test_submission import made as submitted
 from tests.scripts.report import made
 
 SCENE, SLAM = "evilmod:boom", "evilmod:Slam"
@@ -72,6 +74,12 @@ class Hostile:
         path.parent.mkdir(parents=True, exist_ok=True)
         bomb = np.array([Bomb(self.ran)], dtype=object)
         np.savez(path, allow_pickle=True, **dict.fromkeys(names, bomb))
+        return path
+
+    def submission(self) -> Path:
+        """A result file of ``mobilia benchmark``."""
+        path = self.path / submission.file_of("mine")
+        submission.write(path, replace(submitted(), slam=self.pipe))
         return path
 
     def run(self, *, scene: str = SCENE, slam: str = SLAM, **more: Any) -> Path:

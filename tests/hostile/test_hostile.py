@@ -64,6 +64,10 @@ def _bag_run(h: Hostile) -> Words:
 
 
 ROWS = [
+    Row("benchmark", "submission: a command as SLAM",
+        lambda h: ["--merge", str(h.submission()), "--tracks", "tour-guide", "--slam", "odometry",
+                   "--seeds", "2", "--seconds", "0.5", "--out", str(h.path / "board")]),
+    Row("verify", "submission: a command as SLAM", lambda h: [str(h.submission())]),
     Row("render", "run: a module as SLAM",
         lambda h: [str(h.run(scene="arena")), *STRIP], REFUSED),
     Row("render", "run: a command as SLAM", _drive_run, REFUSED),
