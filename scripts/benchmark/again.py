@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from scripts.benchmark import submission
-from scripts.benchmark.tracks import ODOMETRY, TRACKS
+from scripts.benchmark.tracks import TRACKS
 from scripts.comparison.recording import digest, record
 from scripts.output import machine, versions
+from scripts.report.answer import ODOMETRY
 from sim.recording.verify import Finding
 
 

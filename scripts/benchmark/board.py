@@ -10,11 +10,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark.scores import ATE, COLUMNS, SILENT, TRACKING, Row, by_level, scores
-from scripts.benchmark.tracks import LEVELS, ODOMETRY, Track
+from scripts.benchmark.scores import COLUMNS, SILENT, TRACKING, Row, scores
+from scripts.benchmark.tracks import LEVELS, Track
 from scripts.comparison.folder import write_csv
 from scripts.comparison.tables import FAILED
 from scripts.metrics.row import digits
+from scripts.report.answer import ODOMETRY, against
 from scripts.report.study import LEAST_RUNS
 from scripts.result_files import write as write_results
 from slam.evaluation.lost import EXCUSED_S, LOST_RULE
@@ -116,11 +117,8 @@ class Board:
         return out
 
     def _worse_than_wheels(self, track: str) -> bool:
-        found = []
-        for slam in (self.subject, ODOMETRY):
-            own = [row for row in self.runs[track] if row["slam"] == slam]
-            found.append(by_level(own, ATE).get(LEVELS[0], math.nan))
-        return found[0] > found[1]
+        rows = [row for row in self.runs[track] if row["dynamism"] == LEVELS[0]]
+        return against(rows, self.subject, ODOMETRY) == -1
 
     def write(self, folder: Path) -> None:
         """The three files."""
@@ -212,7 +210,7 @@ def _code(words: str) -> str:
     return "`" + " ".join(words.replace("`", "'").split()) + "`"
 
 
-_SHOWN = ("command", "seeds", "world", "quick", "seconds")
+_SHOWN = ("seeds", "world", "quick", "seconds")
 _LOST = (
     "The level from which half of the runs are lost, with its 95 % interval (bootstrap over the "
     "seeds, isotonic regression); levels go from 0 to 1. It is `never` where the whole interval is "

@@ -13,12 +13,7 @@ from scipy.stats import spearmanr
 
 from scripts.benchmark.tracks import Track
 from scripts.comparison.tables import FAILED, number
-from slam.evaluation.statistics import (
-    CONFIDENCE,
-    RESAMPLES,
-    SEED,
-    quantile,
-)
+from slam.evaluation.statistics import bootstrap_draws, central_interval, quantile
 from slam.frames import Float
 
 Row = dict[str, Any]
@@ -65,19 +60,14 @@ def lost_from_interval(levels: Sequence[float], lost: Float) -> tuple[float, flo
     n = len(lost)
     if n < 2:
         return math.nan, math.nan
-    draws = np.random.default_rng(SEED).integers(0, n, (RESAMPLES, n))
+    draws = bootstrap_draws(n)
     shares, times = np.unique(lost[draws].mean(axis=1), axis=0, return_counts=True)
     found = np.repeat([lost_from(levels, row) for row in shares], times).tolist()
-    low, high = _ends(found)
+    low, high = central_interval(found)
     _, k = _crossing(lost.mean(axis=0))
     if k is None:
         return low, high
     return min(low, float(levels[max(k - 1, 0)])), max(high, float(levels[k]))
-
-
-def _ends(drawn: Sequence[float]) -> tuple[float, float]:
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    return quantile(drawn, tail), quantile(drawn, 1.0 - tail)
 
 
 def by_seed_interval(values: Sequence[tuple[int, float]]) -> tuple[float, float]:
@@ -92,8 +82,8 @@ def by_seed_interval(values: Sequence[tuple[int, float]]) -> tuple[float, float]
     n = len(groups)
     if n < 2:
         return math.nan, math.nan
-    draws = np.random.default_rng(SEED).integers(0, n, (RESAMPLES, n)).tolist()
-    return _ends([quantile([v for k in draw for v in groups[k]], 0.5) for draw in draws])
+    draws = bootstrap_draws(n).tolist()
+    return central_interval([quantile([v for k in draw for v in groups[k]], 0.5) for draw in draws])
 
 
 def by_level(rows: Sequence[Row], metric: str) -> dict[float, float]:

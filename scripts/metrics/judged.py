@@ -17,7 +17,8 @@ from slam.replay import Track
 from slam.system import Estimate
 from slam.trajectory import Trajectory
 
-SILENT_M, SILENT_SIGMAS = 0.1, 3.0  # an error beyond both, and the SLAM trusts itself
+SILENT_M = 0.1  # m; a larger error that the SLAM denies is a silent failure
+SILENT_SIGMAS = 3.0  # of its own covariance; an error within them is admitted
 SETTLED_S = 5.0  # NEES counts after this: before, the covariance is that of the known first pose
 
 

@@ -119,7 +119,7 @@ def standing(rows: Sequence[Row], subject: str, scene: str, axis: str = "dynamis
                 at=at,
                 subject=_lost(here, subject),
                 odometry=_lost(here, odometry) if odometry else None,
-                against=_against(here, subject, odometry) if odometry else 0,
+                against=against(here, subject, odometry) if odometry else 0,
                 oracle=_lost(here, oracle) if oracle else None,
             )
         )
@@ -136,7 +136,11 @@ def _lost(rows: Sequence[Row], slam: str) -> Lost:
     )
 
 
-def _against(rows: Sequence[Row], a: str, b: str) -> int:
+def against(rows: Sequence[Row], a: str, b: str) -> int:
+    """SLAM ``a`` against ``b`` by the position error, seed by seed: 1 nearer, -1 worse, 0 unclear.
+
+    rows  of one scene at one level
+    """
     errors = by_seed(rows, a, _ATE), by_seed(rows, b, _ATE)
     seeds = sorted(errors[0].keys() & errors[1].keys())
     if not seeds:

@@ -60,14 +60,17 @@ def config(
 
 
 def _print_crowds(as_json: bool) -> None:
-    """The whole crowd of each scene, at motion 1."""
+    """The crowd of each scene at the levels of motion for which it is calibrated."""
     from dataclasses import asdict
 
-    from scenes.crowd import MIXES, OTHERS
+    from scenes.crowd import BY_LEVEL, LEVELS, OTHERS_BY_LEVEL
 
-    mixes = {**MIXES, "any other": OTHERS}
+    mixes = {**BY_LEVEL, "any other": OTHERS_BY_LEVEL}
     if as_json:
-        words = {scene: asdict(crowd) for scene, crowd in mixes.items()}
+        words = {
+            scene: {f"{at:g}": asdict(crowd) for at, crowd in zip(LEVELS, crowds, strict=True)}
+            for scene, crowds in mixes.items()
+        }
         print(json.dumps({"crowds": words}, indent=1))
         return
     from rich.table import Table
@@ -76,11 +79,12 @@ def _print_crowds(as_json: bool) -> None:
 
     table = Table(box=None, pad_edge=False)
     table.add_column("scene")
-    table.add_column("crowd at motion 1", overflow="fold")
-    for scene, crowd in mixes.items():
-        table.add_row(scene, str(crowd))
+    for at in LEVELS:
+        table.add_column(f"motion {at:g}", overflow="fold")
+    for scene, crowds in mixes.items():
+        table.add_row(scene, *(str(crowd).replace(",", ", ") for crowd in crowds))
     console.print(table)
-    console.print("At motion m there are m * m times as many of each. Another: --crowd escorts:6")
+    console.print("Between two levels the numbers are interpolated. Another: --crowd escorts:6")
 
 
 def _print_dynamism(as_json: bool) -> None:

@@ -157,7 +157,7 @@ class FollowingConfig(Settings):
     wide_m: float = _fixed(0.5, "m", "clearance half way to one's place, else one goes in file")
     gain: float = _fixed(1.5, "1/s", "speed by the distance left")
     fastest_mps: float = _fixed(1.8, "m/s", "to catch up")
-    narrow_m: float = _fixed(0.75, "m", "clearance in a doorway or a corridor; known up to 1")
+    narrow_m: float = _fixed(0.75, "m", "less clearance is a doorway or a corridor")
     narrow_side_m: float = _fixed(0.35, "m", "from the wall there")
     asked_s: float = _fixed(0.4, "s", "somebody else is held up so long: one makes room")
     room_m: float = _fixed(1.3, "m", "before somebody who walks")

@@ -15,7 +15,8 @@ from slam.frames import Float
 LOST_M = 0.5  # m of position error
 LOST_RAD = math.radians(20.0)  # of heading error
 LOST_S = 1.0  # s on end of either
-LEAP_M, LEAP_MPS = 2.0, 4.0  # between two scans: no robot here drives so far and so fast
+LEAP_M = 2.0  # m between two scans; more, and faster than the next, is no driving: it was carried
+LEAP_MPS = 4.0  # m/s; robots here drive up to 0.75
 EXCUSED_S = 10.0  # s after it was carried elsewhere, in which to find itself
 
 

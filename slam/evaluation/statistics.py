@@ -45,7 +45,7 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
     """Percentile-bootstrap 95 % interval of the median, infinite values allowed."""
     if not values:
         return math.nan, math.nan
-    return _middle(_drawn_medians(values, _draws(len(values))))
+    return central_interval(_drawn_medians(values, bootstrap_draws(len(values))).tolist())
 
 
 def ratio_interval(before: Sequence[float], after: Sequence[float]) -> tuple[float, float]:
@@ -59,15 +59,15 @@ def ratio_interval(before: Sequence[float], after: Sequence[float]) -> tuple[flo
                                 f"got {len(after)}")  # fmt: skip
     if not before:
         return math.nan, math.nan
-    draws = _draws(len(before))
+    draws = bootstrap_draws(len(before))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = _drawn_medians(after, draws) / _drawn_medians(before, draws)
     ratios[np.isnan(ratios)] = 1.0
-    return _middle(ratios)
+    return central_interval(ratios.tolist())
 
 
-def _draws(n: int) -> NDArray[np.int64]:
-    """(RESAMPLES, n) indices of n values."""
+def bootstrap_draws(n: int) -> NDArray[np.int64]:
+    """(RESAMPLES, n) indices of n values, drawn with replacement; always the same."""
     return np.random.default_rng(SEED).integers(0, n, (RESAMPLES, n))
 
 
@@ -82,11 +82,10 @@ def _drawn_medians(values: Sequence[float], draws: NDArray[np.int64]) -> NDArray
     return medians
 
 
-def _middle(resampled: NDArray[np.float64]) -> tuple[float, float]:
-    """The ends of what lies in the middle, ``CONFIDENCE`` of it."""
+def central_interval(resampled: Sequence[float]) -> tuple[float, float]:
+    """Percentiles between which the middle ``CONFIDENCE`` of the values lies."""
     tail = 0.5 * (1.0 - CONFIDENCE)
-    listed = resampled.tolist()
-    return quantile(listed, tail), quantile(listed, 1.0 - tail)
+    return quantile(resampled, tail), quantile(resampled, 1.0 - tail)
 
 
 def censored_median(lasted: Sequence[float], ended: Sequence[bool]) -> float | None:

@@ -17,19 +17,19 @@ import numpy as np
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, needed
-from slam.guests.layers import flattened, lifted, stacked
+from slam.guests.layers import flattened, lifted, stacked, voxel_m
 from slam.guests.quiet import quiet
 from slam.system import register
 
-SPACING_AT_M = 10.0  # a voxel is as wide as the beams' spacing there,
-LEAST_M, MOST_M = 0.10, 0.30  # within this
 KEPT_SHARE = 0.5  # of a voxel: edge of the cells of which map and match take one point each; at
 # 1.0 the layers fall together now and then, and the match diverges in small rooms
 POINTS = 1  # in a voxel of its map; its default
 PLANARITY = 0.2  # least eigenvalue by their sum, up to which a patch is a plane; its default
 MAP_M = 100.0  # structure farther from the robot is dropped from its map
-FIRST_M, STILL_M = 0.15, 0.02  # correspondence threshold at first; motion below it is not learnt
-ITERATIONS, CONVERGED = 100, 1e-3  # the first is its default; 1e-4 takes twice as long, no better
+FIRST_M = 0.15  # m, correspondence threshold at first; training seeds
+STILL_M = 0.02  # m; motion below it is not learnt; training seeds
+ITERATIONS = 100  # its default
+CONVERGED = 1e-3  # m and rad, of a step; 1e-4 takes twice as long and is no better
 
 
 @register("genz-icp")
@@ -42,7 +42,7 @@ class GenzIcpSlam(Guest):
 
     def begin(self, spec: LaserSpec) -> None:
         """A matcher with a map of this scanner's grain."""
-        self._voxel_m = min(max(SPACING_AT_M * spec.angle_increment, LEAST_M), MOST_M)
+        self._voxel_m = voxel_m(spec.angle_increment)
         self._map: Any = self._genz._VoxelHashMap(self._voxel_m, MAP_M, MAP_M, PLANARITY, POINTS)
         self._matcher: Any = self._genz._Registration(ITERATIONS, CONVERGED, 1)
         self._threshold: Any = self._genz._AdaptiveThreshold(FIRST_M, STILL_M, MAP_M)

@@ -17,13 +17,14 @@ from slam import se2
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, needed
+from slam.guests.kept import nearest
 from slam.guests.layers import flattened, lifted, stacked
 from slam.system import register
 
-KEEP_M, KEEP_RAD = 0.2, math.radians(10.0)
-BASE, NEAR_M = 20, 8.0  # kept scans matched against, and how far from the predicted place
-CELL_M = 0.05  # one point in each such cell
-APART_M = 0.1  # of the three layers
+KEEP_M = 0.2  # m, a scan is kept after so much way; as for Karto
+KEEP_RAD = math.radians(10.0)  # or turn; as for Karto
+CELL_M = 0.05  # m; one point in each such cell
+APART_M = 0.1  # m between the three layers
 NEIGHBOURS = 10  # points that a covariance is of; its default for pre-processing
 REACH_M = 0.15  # points farther apart are no pair; 0.25 and 0.5 m are pulled along by movers
 ITERATIONS = 30
@@ -65,10 +66,7 @@ class SmallGicpSlam(Guest):
 
     def _goal(self, pose: Float) -> Any:
         """Cloud and tree of the kept scans nearby, made anew when these change."""
-        apart = np.array(self._places)[:, :2] - pose[:2]
-        squares = (apart * apart).sum(axis=1)
-        nearest = np.argsort(squares, kind="stable")[:BASE]
-        near = sorted(int(k) for k in nearest if squares[k] < NEAR_M**2) or [len(self._kept) - 1]
+        near = sorted(nearest(self._places, pose))
         if tuple(near) != self._near:
             self._near = tuple(near)
             self._target = self._prepared(np.concatenate([self._kept[k] for k in near]))

@@ -19,15 +19,17 @@ from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.beams import ranges_of
 from slam.guests.guest import Guest, needed
+from slam.guests.kept import nearest
 from slam.system import register
 
-KEEP_M, KEEP_RAD = 0.2, math.radians(10.0)  # Karto's minimum travel distance and heading
-BASE, NEAR_M = 20, 8.0  # kept scans matched against, and how far from the predicted place
+KEEP_M = 0.2  # m, Karto's minimum travel distance
+KEEP_RAD = math.radians(10.0)  # Karto's minimum travel heading
 RANGE_M = 20.0
 MOST_BEAMS = 4000  # its matcher takes seconds a scan for as many
 NOTHING_M = 1e3  # a range that its matcher takes for no return
 FINE_RAD = math.radians(0.1)
-NARROW, WIDE = (0.3, 0.35), (1.2, 0.5)  # m across, rad either way; WIDE where NARROW does poorly
+NARROW = (0.3, 0.35)  # m across, rad either way
+WIDE = (1.2, 0.5)  # the same, where the narrow search does poorly
 POOR = 0.35  # Karto's response, of 1; its own least for a loop
 
 
@@ -74,7 +76,7 @@ class KartoSlam(Guest):
         if not self._kept:
             self._keep(scan, T_map_laser)
             return prediction.T_map_robot, {"response": 1.0}
-        near = self._near(T_map_laser)
+        near = [self._kept[k] for k in nearest(self._places, T_map_laser)]
         result = self._matchers[0].match_scan(scan, near, True, True)
         if result.response < POOR:
             wide = self._matchers[1].match_scan(scan, near, True, True)
@@ -87,13 +89,6 @@ class KartoSlam(Guest):
             self._keep(scan, T_map_laser)
         T_map_robot = se2.compose(T_map_laser, se2.inverse(self._spec.T_robot_laser))
         return T_map_robot, {"response": float(result.response)}
-
-    def _near(self, T_map_laser: Float) -> list[Any]:
-        """The kept scans to match against."""
-        apart = np.array(self._places)[:, :2] - T_map_laser[:2]
-        squares = (apart * apart).sum(axis=1)
-        nearest = np.argsort(squares, kind="stable")[:BASE]
-        return [self._kept[k] for k in nearest if squares[k] < NEAR_M**2] or self._kept[-1:]
 
     def _scan(self, points_robot: Float, T_map_laser: Float) -> Any:
         """Karto's own type: a range for each beam, here of the de-skewed end points."""

@@ -15,11 +15,9 @@ import numpy as np
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, needed
-from slam.guests.layers import flattened, lifted
+from slam.guests.layers import flattened, lifted, voxel_m
 from slam.system import register
 
-SPACING_AT_M = 10.0  # a voxel is as wide as the beams' spacing there,
-LEAST_M, MOST_M = 0.10, 0.30  # within this
 MAP_M = 100.0  # structure farther from the robot is dropped from its map
 FIRST_M, STILL_M = 0.3, 0.02  # correspondence threshold at the start; motion below it is not learnt
 
@@ -38,7 +36,7 @@ class KissIcpSlam(Guest):
         config = self._config.KISSConfig()
         config.data.deskew = False  # done already, by odometry
         config.data.max_range = MAP_M
-        config.mapping.voxel_size = min(max(SPACING_AT_M * spec.angle_increment, LEAST_M), MOST_M)
+        config.mapping.voxel_size = voxel_m(spec.angle_increment)
         config.adaptive_threshold.initial_threshold = FIRST_M
         config.adaptive_threshold.min_motion_th = STILL_M
         config.registration.max_num_threads = 1

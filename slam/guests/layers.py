@@ -9,6 +9,10 @@ import numpy as np
 
 from slam.frames import Float
 
+SPACING_AT_M = 10.0  # m; there a voxel is as wide as two beams are apart
+LEAST_VOXEL_M = 0.10  # m
+MOST_VOXEL_M = 0.30  # m
+
 
 def lifted(pose: Float) -> Float:
     """(4, 4) of a planar pose."""
@@ -22,6 +26,11 @@ def lifted(pose: Float) -> Float:
 def flattened(matrix: Float) -> Float:
     """(3,) planar part of a (4, 4): x m, y m, yaw rad."""
     return np.array([matrix[0, 3], matrix[1, 3], math.atan2(matrix[1, 0], matrix[0, 0])])
+
+
+def voxel_m(spacing_rad: float) -> float:
+    """Edge of a voxel, m: the beams' spacing at ``SPACING_AT_M``, within bounds."""
+    return min(max(SPACING_AT_M * spacing_rad, LEAST_VOXEL_M), MOST_VOXEL_M)
 
 
 def stacked(points: Float, apart_m: float) -> Float:

@@ -23,11 +23,14 @@ from slam.guests.guest import Guest, needed
 from slam.system import register
 from slam.trajectory import Trajectory
 
-KEEP_M, KEEP_RAD = 0.2, math.radians(10.0)  # Karto's minimum travel distance and heading
+KEEP_M = 0.2  # m, Karto's minimum travel distance
+KEEP_RAD = math.radians(10.0)  # Karto's minimum travel heading
 BUFFER = 20  # latest vertices matched against
-LOOP_M, CHAIN = 3.0, 10  # how far a loop may be away, and of how many vertices; its defaults
-COARSE, FINE = 0.35, 0.45  # least response of a loop; its defaults. See ``begin``
-RANGE_M = 20.0
+LOOP_M = 3.0  # m, how far a loop may be away; its default
+CHAIN = 10  # vertices of a loop, at least; its default
+COARSE = 0.35  # least response of a loop, coarse; its default
+FINE = 0.45  # and fine; its default, see ``begin``
+RANGE_M = 20.0  # m; ranges beyond are not matched
 MOST_BEAMS = 4000  # its matcher takes seconds a scan for as many
 NOTHING_M = 1e3  # a range that its matcher takes for no return
 MATCHER = {
@@ -37,7 +40,6 @@ MATCHER = {
     "coarse_search_angle_offset": 0.35,  # rad either way
     "fine_search_angle_resolution": math.radians(0.1),
 }
-LOOPS: dict[str, float] = {}  # of its own settings for loops, all as they are
 
 
 def _pose(transform: Any) -> Float:
@@ -67,7 +69,7 @@ class YagSlam(Guest):
         self._matcher = self._matching.Scan2DMatcherCpp(MATCHER | reach)
         self._slam: Any = self._graph.GraphSlam(
             self._matcher,
-            self._matching.Scan2DMatcherCpp(LOOPS | reach, loop=True),
+            self._matching.Scan2DMatcherCpp(reach, loop=True),
             scan_buffer_len=BUFFER,
             loop_search_dist=LOOP_M,
             loop_search_min_chain_size=CHAIN,

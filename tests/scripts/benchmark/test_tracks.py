@@ -15,18 +15,18 @@ from slam.errors import InvalidValueError, UnknownNameError
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "benchmark.md"
 
 PUBLISHED = {
-    "tour-guide-v1": "9413d6fa1b07",
-    "rush-hour-v1": "43b9ce334791",
-    "busy-chairs-v1": "a630c1dc724d",
-    "moving-boards-v1": "fba6c6317518",
-    "moving-day-v1": "de8e6a517036",
-    "overnight-v1": "a63017b41fe3",
-    "classroom-break-v1": "7f0509657fe3",
-    "warehouse-shift-v1": "0b093791363a",
-    "ward-round-v1": "997671c3e875",
-    "slow-scans-v1": "af56936c42e8",
-    "kidnapped-in-a-crowd-v1": "1a7070ba9fba",
-    "no-walls-v1": "4b014f90df74",
+    "tour-guide-v1": "e50d06e0c6a8",
+    "rush-hour-v1": "ba5ebbbae9db",
+    "busy-chairs-v1": "107970e75a9d",
+    "moving-boards-v1": "edcf765b5bc0",
+    "moving-day-v1": "e56db9f29148",
+    "overnight-v1": "db955dddc953",
+    "classroom-break-v1": "158c3d245256",
+    "warehouse-shift-v1": "45b08ba33073",
+    "ward-round-v1": "c2863c9346b4",
+    "slow-scans-v1": "7ab6a0bbb49b",
+    "kidnapped-in-a-crowd-v1": "19ffe08bbf05",
+    "no-walls-v1": "5c8f20504f66",
 }
 
 
