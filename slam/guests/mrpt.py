@@ -24,6 +24,7 @@ from slam.guests.limits import Limits
 from slam.trajectory import Trajectory
 
 MOST_BEAMS = 100_000
+SCAN_LIMIT_S = 2.0  # s a scan that a program may take, in the mean; rbpf-slam takes 0.1
 
 
 class MrptSlam(Guest):
@@ -112,7 +113,7 @@ class MrptSlam(Guest):
                 file.write(rawlog.sensed(stamp_ns, ranges, self._spec))
         (folder / "config.ini").write_text(self.config(f"{folder}/log"))
         words = [self._program, f"{folder}/config.ini", f"{folder}/frames.rawlog"]
-        processor_s = program.run(words, Limits.first_s + len(stamps) * Limits.scan_s)
+        processor_s = program.run(words, Limits.first_s + len(stamps) * SCAN_LIMIT_S)
         path = self.poses(self._log(folder / "log" / "log_estimated_path.txt", self.columns[0]))
         if not np.isfinite(path).all():
             raise SlamFailedError(f"{type(self).__name__} logged a pose that is not finite", "nan")
