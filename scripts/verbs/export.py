@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from scripts.console import console
+from scripts.console import console, working
 from slam.errors import InvalidValueError
 from slam.files import replacing
 
@@ -46,7 +46,9 @@ def export(
     suffix = {"tum": ".tum", "carmen": ".log.gz", "npz": ".npz"}[to]
     plain = episode.absolute()
     target = out or plain.with_name(plain.name.split(".log")[0] + suffix)
-    for path in writers[to](target, stream):
+    with working(f"writing {to}"):
+        written = writers[to](target, stream)
+    for path in written:
         console.print(escape(str(path)), soft_wrap=True)
 
 
