@@ -18,6 +18,7 @@ from scenes import registry
 from scripts import interrupt
 from scripts.console import console, note, progress
 from scripts.knobs import Change, CrowdOption, Held, Motion, options_with
+from scripts.process_options import Cluster, Jobs
 from scripts.scanner_option import Scanner, rate_hz
 from slam.errors import InvalidValueError
 
@@ -48,10 +49,8 @@ def generate(
     sessions: Annotated[
         int, typer.Option(help="So many sessions of one building instead, --change apart.")
     ] = 0,
-    jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
-    cluster: Annotated[
-        str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
-    ] = None,
+    jobs: Jobs = 1,
+    cluster: Cluster = None,
     scanner: Scanner = "full",
 ) -> None:
     """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
