@@ -9,10 +9,9 @@ import sys
 from typing import Annotated
 
 import typer
-from rich.logging import RichHandler
 
 from scripts import interrupt
-from scripts.console import console, fail, note
+from scripts.console import Lines, console, fail, note
 from scripts.many import ManyValues
 from scripts.verbs.bench import bench
 from scripts.verbs.benchmark import benchmark
@@ -80,7 +79,7 @@ def options(
     logging.basicConfig(
         level=logging.INFO if verbose else logging.WARNING,
         format="%(message)s",
-        handlers=[RichHandler(console=console, show_path=False, show_time=False)],
+        handlers=[Lines(console=console, show_path=False, show_time=False)],
     )
     load(modules or ())
 

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 
 from rich.console import Console
+from rich.logging import RichHandler
 from rich.markup import escape
 from rich.progress import (
     BarColumn,
@@ -31,6 +33,18 @@ def fail(message: str) -> None:
 def note(message: str) -> None:
     """One line that the user should see but that is no error."""
     console.print(f"[yellow]note:[/yellow] {escape(message)}", highlight=False, soft_wrap=True)
+
+
+class Lines(RichHandler):
+    """Log records as in rich, but a warning as one line, however narrow the terminal is."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print it."""
+        if record.levelno < logging.WARNING or record.exc_info:
+            super().emit(record)
+            return
+        words = escape(record.getMessage())
+        self.console.print(f"[yellow]warning:[/yellow] {words}", highlight=False, soft_wrap=True)
 
 
 def fact(sentence: str, *, bad: bool = False) -> None:
