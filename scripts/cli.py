@@ -9,10 +9,9 @@ import sys
 from typing import Annotated
 
 import typer
-from rich.logging import RichHandler
 
 from scripts import interrupt
-from scripts.console import console, fail, note
+from scripts.console import LogLines, console, fail, note
 from scripts.many import ManyValues
 from scripts.option_names import Verb
 from scripts.verbs.bench import bench
@@ -81,7 +80,7 @@ def options(
     logging.basicConfig(
         level=logging.INFO if verbose else logging.WARNING,
         format="%(message)s",
-        handlers=[RichHandler(console=console, show_path=False, show_time=False)],
+        handlers=[LogLines(console=console, show_path=False, show_time=False)],
     )
     load(modules or ())
 

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 
 from rich.console import Console
+from rich.logging import RichHandler
 from rich.markup import escape
 from rich.progress import (
     BarColumn,
@@ -37,6 +39,18 @@ def fail(message: str) -> None:
 def note(message: str) -> None:
     """One line that the user should see but that is no error."""
     console.print(f"[yellow]note:[/yellow] {escape(message)}", highlight=False, soft_wrap=True)
+
+
+class LogLines(RichHandler):
+    """Log records as in rich, but a warning as one line, however narrow the terminal is."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print it."""
+        if record.levelno < logging.WARNING or record.exc_info:
+            super().emit(record)
+            return
+        words = escape(record.getMessage())
+        self.console.print(f"[yellow]warning:[/yellow] {words}", highlight=False, soft_wrap=True)
 
 
 def fact(sentence: str, *, bad: bool = False) -> None:

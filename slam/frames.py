@@ -385,6 +385,8 @@ class StreamMetadata:
     source  "simulation", "carmen", "rosbag2", ...; ``scene`` and ``seed`` for simulations
     laser   the scanner, None for feature streams; ``robot`` its name or preset
     truth   what ``Frame.truth`` is: "simulator", "corrected poses of the log", "" for none
+    odometry  False where nobody measured it: ``Frame.odometry`` stands still, and ``Replay`` gives
+            each SLAM that of a constant velocity
     extra   JSON-serialisable facts (path, counts of repaired lines, ...); ``EPOCH`` among them is
             what the stamps of the recording are more than those of the frames, ns
     """
@@ -395,6 +397,7 @@ class StreamMetadata:
     laser: LaserSpec | None = None
     robot: str | None = None
     truth: str = ""
+    odometry: bool = True
     extra: Mapping[str, Any] = field(default_factory=dict)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.constant_velocity import ConstantVelocity
 from slam.errors import (
     InvalidValueError,
     MobiliaError,
@@ -20,7 +21,7 @@ from slam.errors import (
     SlamFailedError,
 )
 from slam.estimate import Changes, Estimate, Landmarks, Raster
-from slam.frames import Float, Frame
+from slam.frames import Float, Frame, Stream
 from slam.oracle import shown
 from slam.system import (
     CanSave,
@@ -293,10 +294,16 @@ class Replay:
         return cls({name: Track(name, system) for name, system in systems.items()})
 
     def run(self, frames: Iterable[Frame]) -> Iterator[Frame]:
-        """Give each frame, stripped of truth, to every system; yield it back with its truth."""
+        """Give each frame, stripped of truth, to every system; yield it back with its truth.
+
+        In a stream without odometry, each gets that of its own last motion.
+        """
+        measured = not isinstance(frames, Stream) or frames.metadata.odometry
+        priors = {} if measured else {name: ConstantVelocity() for name in self.tracks}
         for frame in frames:
-            for track in self.tracks.values():
-                track.take(shown(track.system, frame))
+            for name, track in self.tracks.items():
+                given = priors[name].frame(frame, track.estimates) if priors else frame
+                track.take(shown(track.system, given))
             if frame.truth is not None:
                 self._stamps.append(frame.stamp_ns)
                 self._poses.append(frame.truth)

@@ -222,12 +222,15 @@ def of_compared(path: Path, *, view: str | None = "follow", trust: bool = False)
     return footage
 
 
-def of_log(path: Path) -> Footage:
-    """A log: its scans are all that is known of the world."""
+def of_log(path: Path, *, strict: bool = False, text_format: Path | None = None) -> Footage:
+    """A log: its scans are all that is known of the world. Options as of ``open_log``."""
     from sim.recording.verify import check_bag
 
     check_bag(path)
-    stream = read_bag(path, labels=True) if is_bag(path) else open_log(path)
+    if text_format is None and is_bag(path):
+        stream = read_bag(path, labels=True, strict=strict)
+    else:
+        stream = open_log(path, strict=strict, text_format=text_format)
     first_ns = last_ns = None
     labelled, frames = False, 0
     for frame in stream:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,6 +15,9 @@ from scripts.oracle_option import Oracles, with_oracles
 from scripts.scanner_option import Scanner
 from scripts.set_option import Set
 from slam.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from scripts.film.footage import Footage
 
 
 def run(
@@ -28,8 +31,18 @@ def run(
     ],
     log: Annotated[
         Path | None,
-        typer.Option(help="A log: a bag of ROS 1 or 2, CARMEN or the folder of Victoria Park."),
+        typer.Option(
+            help="A log: a bag of ROS 1 or 2, CARMEN (.log, .clf), L/O in centimetres, an MRPT "
+            ".rawlog, the folder of Victoria Park; or any text log with --format."
+        ),
     ] = None,
+    text_format: Annotated[
+        Path | None,
+        typer.Option("--format", help="TOML file that says which columns of a text log hold what."),
+    ] = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Refuse a log that would have to be repaired.")
+    ] = False,
     scene: Annotated[
         str | None, typer.Option(help="Or a simulated scene, driven on a tour of its rooms.")
     ] = None,
@@ -65,8 +78,11 @@ def run(
         raise InvalidValueError("name exactly one of --log and --scene")
     slam = list(with_oracles(slam, oracle, set_))
     check(slam, scene)
+    if log is None and (strict or text_format is not None):
+        raise InvalidValueError("--strict and --format are about a --log")
     if log is not None:
-        on_log(slam, log, out or Path("out") / f"run-{run_name(log)}", overwrite, film)
+        footage = _opened(log, strict, text_format)
+        on_log(slam, log, footage, out or Path("out") / f"run-{run_name(log)}", overwrite, film)
     elif scene is not None:
         from scripts.single_run.live import on_scene, tour
         from scripts.single_run.session import Outputs
@@ -79,12 +95,18 @@ def run(
         )
 
 
-def on_log(names: list[str], path: Path, out: Path, overwrite: bool, film: bool) -> dict[str, Any]:
-    """Run SLAMs on a recorded log."""
+def _opened(path: Path, strict: bool, text_format: Path | None) -> Footage:
     from scripts.film.footage import of_log
+
+    return of_log(path, strict=strict, text_format=text_format)
+
+
+def on_log(
+    names: list[str], path: Path, footage: Footage, out: Path, overwrite: bool, film: bool
+) -> dict[str, Any]:
+    """Run SLAMs on a recorded log."""
     from scripts.single_run.session import Outputs, run_session
 
-    footage = of_log(path)
     show = footage.show(names)
     settings = {
         "slams": list(show.replay.tracks),

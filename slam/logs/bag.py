@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from slam.constant_velocity import standing
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import (
     EPOCH,
@@ -28,9 +29,11 @@ from slam.frames import (
 from slam.logs.bag_laser import Laser, mounting
 from slam.logs.bag_odometry import PoseTrack, Stamped, increment_covariance
 from slam.logs.bag_topics import SCAN, Bag, Topics, choose
+from slam.logs.repairs import NO_ODOMETRY, Repairs
 from slam.logs.ros_numbers import yaw_of
 
 PROBE_NS = 20 * NS_PER_S  # how far the transform to the laser is looked for
+_BASE = "base_link"  # of REP 105
 PATIENCE_NS = 2 * NS_PER_S  # how long a scan waits for its odometry
 _PLANAR = np.array([[6 * i + j for j in (0, 1, 5)] for i in (0, 1, 5)])
 _IMPOSSIBLE = (InvalidValueError, ValueError, AttributeError, TypeError, OverflowError, KeyError)
@@ -44,6 +47,7 @@ def read_bag(
     odometry: str | None = None,
     truth: str | None = None,
     labels: bool = False,
+    strict: bool = False,
 ) -> Stream:
     """A bag with a LaserScan and an Odometry topic as frames, one scan at a time from the disk.
 
@@ -62,6 +66,10 @@ def read_bag(
     Frames of our own recordings have the stamps of the simulation, from 0 s on;
     ``metadata.extra[EPOCH]`` is what the bag has more, ns.
 
+    A bag without odometry (a scanner carried in the hand) gives frames of a robot at rest, whose
+    covariance is that of one that may have moved; ``metadata.odometry`` says so, and ``Replay``
+    gives each SLAM the odometry of a constant velocity instead. ``strict`` refuses such a bag.
+
     Raises ``LogFormatError`` that names the file for anything that is not such a bag.
     """
     path = Path(path)
@@ -72,10 +80,15 @@ def read_bag(
         count = bag.topics[topics.scan][1]
         source = "rosbag1" if bag.is_ros1 else "rosbag2"
     extra: dict[str, Any] = {"file": path.name, "scan": topics.scan, "odometry": topics.odometry}
+    repairs = Repairs(path, strict)
+    if topics.odometry is None:
+        repairs.note(NO_ODOMETRY, "no message of nav_msgs/msg/Odometry", None, count)
+        repairs.warn()
     metadata = StreamMetadata(
         source=source,
         laser=laser.spec,
         truth=topics.truth or "",
+        odometry=topics.odometry is not None,
         extra=extra | ({EPOCH: epoch_ns} if epoch_ns else {}),
     )
     return Stream(
@@ -111,13 +124,14 @@ def _epoch_ns(bag: Bag, topics: Topics) -> int:
 
 def _probe(bag: Bag, topics: Topics) -> Laser:  # noqa: C901 (one branch a kind of file)
     """The scanner, from the first messages of the bag."""
-    wanted = {topics.scan, topics.odometry, *topics.transforms}
-    if topics.turns is not None:
-        wanted.add(topics.turns)
+    named = (topics.scan, topics.odometry, topics.turns, *topics.transforms)
+    wanted = {name for name in named if name is not None}
     transforms: dict[tuple[str, str], Any] = {}
     scans: list[Any] = []
     turns: list[Any] = []
-    robot, mount, start_ns = None, None, None
+    # where nobody says what moves: the usual name, or else the laser itself
+    robot = _BASE if topics.odometry is None else None
+    mount, start_ns = None, None
     for topic, log_ns, message in bag.messages(wanted):
         start_ns = log_ns if start_ns is None else start_ns
         with _about(bag.path, f"topic {topic}"):
@@ -180,6 +194,7 @@ class _Assembly:
         self._labels: dict[int, BeamLabels] = {}
         self._before: Stamped | None = None
         self._last_ns: int | None = None
+        self._before_ns: int | None = None  # the scan before, of a bag without odometry
         self._disordered = self._without_odometry = self._given = 0
 
     def take(self, topic: str, log_ns: int, message: Any) -> None:
@@ -219,22 +234,17 @@ class _Assembly:
     def _complete(self, stamp_ns: int) -> bool:
         topics = self._topics
         return (
-            self._odometry.reaches(stamp_ns)
+            (topics.odometry is None or self._odometry.reaches(stamp_ns))
             and (topics.truth is None or self._truth.reaches(stamp_ns))
             and (topics.labels is None or stamp_ns in self._labels)
         )
 
     def _frame(self, scan: Scan) -> Frame | None:
         stamp_ns = scan.stamp_ns
-        now = self._odometry.at(stamp_ns)
-        if now is None:
+        odometry = self._driven(stamp_ns)
+        if odometry is None:
             self._without_odometry += 1
             return None
-        if self._topics.increment is None:
-            spread = increment_covariance(self._before, now)
-        else:
-            spread = self._increments.pop(stamp_ns, None)
-        self._before = now
         truth = self._truth.at(stamp_ns)
         labels = self._labels.pop(stamp_ns, None)
         if len(self._increments) > 1000 or len(self._labels) > 100:  # of scans that are not there
@@ -243,15 +253,30 @@ class _Assembly:
         self._given += 1
         return Frame(
             stamp_ns=stamp_ns,
-            odometry=Odometry(
-                stamp_ns=stamp_ns,
-                T_odom_robot=now.pose,
-                increment_covariance=spread,
-                twist=now.twist,
-            ),
+            odometry=odometry,
             scan=scan,
             truth=None if truth is None else truth.pose,
             labels=labels,
+        )
+
+    def _driven(self, stamp_ns: int) -> Odometry | None:
+        """The odometry at that time; None outside that of the bag."""
+        if self._topics.odometry is None:
+            before_ns, self._before_ns = self._before_ns, stamp_ns
+            return standing(stamp_ns, before_ns)
+        now = self._odometry.at(stamp_ns)
+        if now is None:
+            return None
+        if self._topics.increment is None:
+            spread = increment_covariance(self._before, now)
+        else:
+            spread = self._increments.pop(stamp_ns, None)
+        self._before = now
+        return Odometry(
+            stamp_ns=stamp_ns,
+            T_odom_robot=now.pose,
+            increment_covariance=spread,
+            twist=now.twist,
         )
 
     def report(self, path: Path) -> None:

@@ -132,7 +132,7 @@ class Topics:
     """What is read; None where a bag does not have it."""
 
     scan: str
-    odometry: str
+    odometry: str | None
     truth: str | None
     turns: str | None
     increment: str | None
@@ -146,11 +146,14 @@ def choose(
 ) -> Topics:
     """Topics by the names asked for, else by type and the likeliest name.
 
+    A bag without any message of odometry has none; a scanner carried in the hand leaves such bags.
     Raises ``LogFormatError`` that lists the bag's topics when there is no such topic, or when the
     one asked for is of another type.
     """
     wanted_scan = _pick(bag, scan, (SCAN,), "scan")
-    wanted_odometry = _pick(bag, odometry, (ODOMETRY,), "odom")
+    wanted_odometry = None
+    if odometry is not None or any(k == ODOMETRY and count for k, count in bag.topics.values()):
+        wanted_odometry = _pick(bag, odometry, (ODOMETRY,), "odom")
     turns = f"{wanted_scan}_turn"
     increment = f"{wanted_odometry}_increment"
     truths = [

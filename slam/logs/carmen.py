@@ -5,22 +5,27 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slam.constant_velocity import standing
 from slam.errors import LogFormatError
 from slam.frames import Float, Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata
 from slam.logs import carmen_messages as messages
+from slam.logs.carmen_clock import Clock, rough_steps
 from slam.logs.carmen_messages import LaserMessage, PoseMessage
-from slam.logs.carmen_poses import ScanPoses, scan_poses
+from slam.logs.carmen_poses import ScanPoses, at_rest, scan_poses
+from slam.logs.repairs import NO_ODOMETRY, Repairs
 from slam.logs.saturation import saturated_from
-from slam.logs.stamps import Ordered, put_in_order
+from slam.logs.stamps import Ordered, digits_of, put_in_order
 from slam.logs.text import numbered_lines
 
+_STAMPED = ("FLASER", "ROBOTLASER1", "RAWLASER1", "ODOM")
 LASERS = ("ROBOTLASER1", "FLASER", "RAWLASER1")  # the first of these that a log has is read
 DEFAULT_RANGE_MAX_M = 80.0  # CARMEN's own guess for FLASER
 _RANGE_MAX_PARAM = "robot_front_laser_max"
@@ -28,7 +33,7 @@ _OFFSET_PARAM = "robot_frontlaser_offset"
 
 
 @dataclass
-class _Log:
+class Log:
     """The messages in the order of the file."""
 
     path: Path
@@ -37,9 +42,12 @@ class _Log:
     truth: list[PoseMessage] = field(default_factory=list)
     params: dict[str, float] = field(default_factory=dict)
     ignored: Counter[str] = field(default_factory=Counter)
+    digits: int = 1  # significant ones, of the stamp that has most
+    wheels: bool = True  # False: a log without odometry is none that is damaged
+    mount: Float | None = None  # of the laser on the robot; None: as far ahead as a PARAM says
 
 
-def read_carmen(path: str | Path) -> Stream:
+def read_carmen(path: str | Path, *, strict: bool = False) -> Stream:
     """A CARMEN text log (plain, .gz or .xz) as frames: FLASER, ROBOTLASER1 or RAWLASER1.
 
     Odometry is the robot pose in the scan's own line; for RAWLASER1 it is interpolated between
@@ -50,33 +58,62 @@ def read_carmen(path: str | Path) -> Stream:
     In logs whose laser pose is no fixed mount of the robot pose, the laser pose is the corrected
     one. TRUEPOS lines, where there are any, are the truth.
 
-    Stamps that step back by less than 1 s are sorted, equal ones spread (``put_in_order``);
-    ``metadata.extra`` counts both. Beams of one scan have no times of their own (offsets zero).
-    Ranges at or above the scanner's maximum are inf, ranges of 0 are NaN (REP 117). The log is read
-    whole: a damaged line anywhere raises ``LogFormatError`` with file and line.
+    What is usual in public logs is repaired: a last line without an end is left out; stamps that
+    step back by less than 1 s are sorted, equal ones spread by the odometry between them
+    (``put_in_order``); a clock that is set back goes on from where it was (``continued``). One
+    warning says so, ``metadata.extra`` counts each, and ``strict`` refuses all.
+
+    Beams of one scan have no times of their own (offsets zero). Ranges at or above the scanner's
+    maximum are inf, ranges of 0 are NaN (REP 117). The log is read whole: a damaged line anywhere
+    raises ``LogFormatError`` with file and line.
     """
-    log = _read(Path(path))
+    repairs = Repairs(Path(path), strict)
+    log = _read(Path(path), repairs)
     name = next((kind for kind in LASERS if log.scans[kind]), None)
     if name is None:
         raise LogFormatError(path, f"no scan found (none of {', '.join(LASERS)})")
-    scans = log.scans[name]
     for other in LASERS:
         if other != name and log.scans[other]:
             log.ignored[other] += len(log.scans[other])
+    return stream_of(log, name, repairs, "carmen")
+
+
+def stream_of(log: Log, name: str, repairs: Repairs, source: str) -> Stream:
+    """The scans of one kind of message with their poses, on one clock, as frames."""
+    scans = log.scans[name]
     _check_one_scanner(log.path, scans)
-    poses = scan_poses(log.path, scans, log.odom, log.truth, log.params.get(_OFFSET_PARAM, 0.0))
-    ordered = put_in_order(log.path, [s.stamp_ns for s in scans], [s.line for s in scans])
+    clock = Clock(scans, (log.odom, log.truth), repairs, log.digits)
+    scans, odom = clock(scans), clock(log.odom)
+    mount = log.mount
+    if mount is None:
+        mount = np.array([log.params.get(_OFFSET_PARAM, 0.0), 0.0, 0.0])
+    wheels = log.wheels or any(scan.robot_pose is not None for scan in scans) or bool(odom)
+    if wheels:
+        poses = scan_poses(log.path, scans, odom, clock(log.truth), mount)
+    else:
+        poses = at_rest(scans, mount)
+        repairs.note(NO_ODOMETRY, "the log has no odometry", None, len(scans))
+    ordered = put_in_order(
+        log.path,
+        [s.stamp_ns for s in scans],
+        [s.line for s in scans],
+        repairs=repairs,
+        steps_s=rough_steps(scans, odom),
+        digits=log.digits,
+    )
     ranges, range_max, range_max_source = _ranges(log, scans)
     spec = _spec(scans[0], range_max, poses.T_robot_laser)
     frames = _frames(scans, ordered, ranges, spec, poses)
+    if not wheels:
+        frames = [_without_wheels(frame, before) for before, frame in pairwise([None, *frames])]
     if not frames:
-        raise LogFormatError(path, "no scan lies within the time of the ODOM lines")
+        raise LogFormatError(log.path, "no scan lies within the time of the ODOM lines")
+    repairs.warn()
     extra: dict[str, Any] = {
         "file": log.path.name,
         "message": name,
         "odometry": poses.odometry_source,
-        "stamps_stepped_back": ordered.stepped_back,
-        "stamps_equal_spread": ordered.spread,
+        **repairs.facts(),
         "scans_without_odometry": len(scans) - len(frames),
         "range_max_m": range_max,
         "range_max_source": range_max_source,
@@ -84,13 +121,22 @@ def read_carmen(path: str | Path) -> Stream:
         "ranges_zero": int(np.isnan(ranges).sum()),
         "ignored": dict(sorted(log.ignored.items())),
     }
-    metadata = StreamMetadata(source="carmen", laser=spec, truth=poses.truth_source, extra=extra)
+    metadata = StreamMetadata(
+        source=source, laser=spec, truth=poses.truth_source, odometry=wheels, extra=extra
+    )
     return Stream(metadata=metadata, frames=lambda: frames, length=len(frames))
 
 
-def _read(path: Path) -> _Log:
-    log = _Log(path)
-    for number, line in numbered_lines(path):
+def _without_wheels(frame: Frame | None, before: Frame | None) -> Frame:
+    """The odometry of one that may have moved anywhere since."""
+    assert frame is not None
+    since = None if before is None else before.stamp_ns
+    return replace(frame, odometry=standing(frame.stamp_ns, since))
+
+
+def _read(path: Path, repairs: Repairs) -> Log:
+    log = Log(path)
+    for number, line in numbered_lines(path, repairs):
         words = line.split()
         if not words or words[0].startswith("#"):
             continue
@@ -98,12 +144,14 @@ def _read(path: Path) -> _Log:
             raise LogFormatError(path, f"expected a message name, got {words[0][:40]!r}", number)
         try:
             _take(log, number, words)
+            if words[0] in _STAMPED:
+                log.digits = max(log.digits, digits_of(words[-3]))
         except ValueError as error:
             raise LogFormatError(path, str(error), number) from error
     return log
 
 
-def _take(log: _Log, number: int, words: list[str]) -> None:
+def _take(log: Log, number: int, words: list[str]) -> None:
     match words[0]:
         case "FLASER":
             log.scans["FLASER"].append(messages.parse_flaser(number, words))
@@ -136,7 +184,7 @@ def _check_one_scanner(path: Path, scans: list[LaserMessage]) -> None:
             )
 
 
-def _ranges(log: _Log, scans: list[LaserMessage]) -> tuple[Float, float, str]:
+def _ranges(log: Log, scans: list[LaserMessage]) -> tuple[Float, float, str]:
     """(k, n) ranges with inf and NaN put in, the range limit in m and where it came from."""
     ranges = np.array([scan.ranges for scan in scans])
     first = scans[0]

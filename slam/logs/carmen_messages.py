@@ -77,7 +77,7 @@ def parse_flaser(line: int, words: list[str]) -> LaserMessage:
     _expect(len(words) == expected, f"FLASER of {n} beams has {expected} words, got {len(words)}")
     return LaserMessage(
         line=line,
-        stamp_ns=_stamp_ns(words[-3]),
+        stamp_ns=stamp_ns(words[-3]),
         ranges=_ranges(words[2 : 2 + n]),
         intensities=[],
         beams=None,
@@ -99,13 +99,13 @@ def parse_rawlaser(line: int, words: list[str]) -> LaserMessage:
 def parse_odom(line: int, words: list[str]) -> PoseMessage:
     """``ODOM``: pose of the robot by its wheels."""
     _expect(len(words) == 10, f"ODOM has 10 words, got {len(words)}")
-    return PoseMessage(line=line, stamp_ns=_stamp_ns(words[-3]), pose=_pose(words[1:4]))
+    return PoseMessage(line=line, stamp_ns=stamp_ns(words[-3]), pose=_pose(words[1:4]))
 
 
 def parse_truepos(line: int, words: list[str]) -> PoseMessage:
     """``TRUEPOS``: pose of the robot by the simulator."""
     _expect(len(words) == 10, f"TRUEPOS has 10 words, got {len(words)}")
-    return PoseMessage(line=line, stamp_ns=_stamp_ns(words[-3]), pose=_pose(words[1:4]))
+    return PoseMessage(line=line, stamp_ns=stamp_ns(words[-3]), pose=_pose(words[1:4]))
 
 
 def parse_param(words: list[str]) -> float:
@@ -134,7 +134,7 @@ def _parse_laser(line: int, words: list[str], after: tuple[int, ...]) -> LaserMe
     poses = len(tail) > 3
     return LaserMessage(
         line=line,
-        stamp_ns=_stamp_ns(words[-3]),
+        stamp_ns=stamp_ns(words[-3]),
         ranges=_ranges(words[at + 1 : at + 1 + n]),
         intensities=[number(w, math.inf) for w in words[at + 2 + n : at + 2 + n + n_remissions]],
         beams=_beams(words, n),
@@ -183,7 +183,7 @@ def _pose(words: list[str]) -> Pose:
     return x, y, theta
 
 
-def _stamp_ns(word: str) -> int:
+def stamp_ns(word: str) -> int:
     """Exact nanoseconds (``float`` would lose the last digits of Unix times); may be negative."""
     number(word, MAX_STAMP_S)
     return round(Decimal(word) * NS_PER_S)

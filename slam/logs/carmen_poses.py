@@ -33,13 +33,12 @@ def scan_poses(
     scans: list[LaserMessage],
     odom: list[PoseMessage],
     true_poses: list[PoseMessage],
-    laser_offset: float,
+    mount: Float,
 ) -> ScanPoses:
-    """Poses per scan; ``laser_offset`` m is how far ahead the laser sits, by the log's PARAM.
+    """Poses per scan; ``mount`` (3,) m, m, rad of the laser on the robot, unless the scans say.
 
     Raises ``LogFormatError`` when there is no odometry at all.
     """
-    mount = np.array([laser_offset, 0.0, 0.0])
     truth: list[Float | None] = [None] * len(scans)
     truth_source = ""
     if true_poses:
@@ -49,7 +48,7 @@ def scan_poses(
     laser = [scan.laser_pose for scan in scans if scan.laser_pose is not None]
     if not robot:
         if not odom:
-            raise LogFormatError(path, "RAWLASER1 has no pose and the log has no ODOM lines")
+            raise LogFormatError(path, "its scans have no pose and the log has no ODOM lines")
         odometry = _interpolated(path, odom, scans)
         return ScanPoses(
             odometry=odometry,
@@ -79,6 +78,17 @@ def scan_poses(
         T_robot_laser=mount,
         odometry_source="robot pose of the scan",
         truth_source=truth_source,
+    )
+
+
+def at_rest(scans: list[LaserMessage], mount: Float) -> ScanPoses:
+    """Of a log without odometry."""
+    return ScanPoses(
+        odometry=[np.zeros(3) for _ in scans],
+        truth=[None] * len(scans),
+        T_robot_laser=mount,
+        odometry_source="none: constant velocity",
+        truth_source="",
     )
 
 

@@ -12,19 +12,24 @@ from pathlib import Path
 from typing import BinaryIO, cast
 
 from slam.errors import LogFormatError
+from slam.logs.repairs import TORN_LINE, Repairs
 from slam.logs.unpacking import MAX_TEXT_BYTES, open_xz
 
 MAX_LINE_BYTES = 1 << 20  # a 20 000 beam scan needs a fifth of it
+_NO_END = "last line has no end: the file is truncated"
 _GZIP, _XZ = b"\x1f\x8b", b"\xfd7zXZ\x00"
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 
 
-def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
+def numbered_lines(path: Path, repairs: Repairs | None = None) -> Iterator[tuple[int, str]]:
     """(line number from 1, line without its newline) of a .log, .log.gz or .log.xz.
 
     Raises ``LogFormatError`` that names file and line when the file is missing, no regular file,
     empty, unreadable, corrupt, binary, or does not end with a newline: every logger ends its lines,
     so a file that stops inside one was cut off. So it does beyond ``MAX_TEXT_BYTES``.
+
+    With ``repairs``, a last line without an end is left out and counted there, whatever is in it:
+    half a number is a number, too. A file of one such line is none.
     """
     number, total = 0, 0
     try:
@@ -36,6 +41,9 @@ def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
             while raw := file.readline(MAX_LINE_BYTES):
                 number += 1
                 total += len(raw)
+                if repairs is not None and number > 1 and _torn(raw):
+                    repairs.note(TORN_LINE, _NO_END, number)
+                    return
                 if total > MAX_TEXT_BYTES:
                     raise LogFormatError(
                         path, f"unpacks to more than {MAX_TEXT_BYTES} bytes", number
@@ -59,11 +67,15 @@ def _open(path: Path) -> BinaryIO:
     return path.open("rb")
 
 
+def _torn(raw: bytes) -> bool:
+    return not raw.endswith(b"\n") and len(raw) < MAX_LINE_BYTES
+
+
 def _text(path: Path, number: int, raw: bytes) -> str:
     if not raw.endswith(b"\n"):
         if len(raw) >= MAX_LINE_BYTES:
             raise LogFormatError(path, f"line longer than {MAX_LINE_BYTES} bytes: no log", number)
-        raise LogFormatError(path, "last line has no end: the file is truncated", number)
+        raise LogFormatError(path, _NO_END, number)
     try:
         line = raw.decode("utf-8").rstrip("\r\n")
     except UnicodeDecodeError as error:

@@ -27,6 +27,7 @@ else:
 MAX_CHUNK_BYTES = 1 << 29  # of a bag, unpacked; writers use 1 to 100 MB
 MAX_FILE_BYTES = 1 << 35  # of a file of a bag that was packed whole
 MAX_TEXT_BYTES = 1 << 29  # of a text log, unpacked; the longest public ones have 200 MB
+MAX_RAWLOG_BYTES = 1 << 29  # of a rawlog, unpacked: laser and odometry of hours
 MAX_MAT_BYTES = 1 << 28  # of a MATLAB file, unpacked; those of Victoria Park have 5 MB
 XZ_MEMORY_BYTES = 1 << 27  # to unpack an .xz; ``xz -9`` needs 65 MB
 _STEP = 1 << 20

@@ -139,13 +139,16 @@ def test_topics_are_guessed_and_can_be_named(tmp_path):
         read_bag(path, scan="/front")
 
 
-def test_a_bag_without_scans_or_odometry_says_what_it_has(tmp_path):
+def test_a_bag_without_scans_or_the_odometry_asked_for_says_what_it_has(tmp_path):
     make = bags.Maker()
     only = [make.odometry(START, (0, 0, 0))]
     with pytest.raises(LogFormatError, match=r"no message of type sensor_msgs.*topics: /odom"):
         read_bag(bags.write_ros2(tmp_path / "a", only))
-    with pytest.raises(LogFormatError, match=r"no message of type nav_msgs"):
-        read_bag(bags.write_ros2(tmp_path / "b", [make.scan(START, RANGES)]))
+    bag = bags.write_ros2(tmp_path / "b", [make.scan(START, RANGES)])
+    with pytest.raises(LogFormatError, match=r"no topic /odom; there are: /scan"):
+        read_bag(bag, odometry="/odom")
+    with pytest.raises(LogFormatError, match=r"no message of nav_msgs.*--strict"):
+        open_log(bag, strict=True)
     with pytest.raises(LogFormatError, match="no message of type"):
         read_bag(bags.write_ros2(tmp_path / "c", []))
     apart = [make.scan(START, RANGES), make.odometry(START + 5000 * MS, (0, 0, 0))]

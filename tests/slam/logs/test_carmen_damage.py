@@ -60,13 +60,24 @@ def test_the_suffix_does_not_have_to_tell_the_compression(tmp_path, carmen_text)
     assert open_log(tmp_path / "a.log").length == 8
 
 
-def test_every_cut_inside_a_line_is_an_error(tmp_path, carmen_text):
-    text = carmen_text.plain_log(2)
+def test_a_last_line_cut_anywhere_is_left_out_and_refused_by_a_strict_reader(
+    tmp_path, carmen_text, caplog
+):
+    text = carmen_text.plain_log(3)
     path = tmp_path / "cut.log"
     for end in range(len(text) - 60, len(text)):
         path.write_text(text[:end])
-        if not text[:end].endswith("\n"):
-            refuse(path, "truncated")
+        caplog.clear()
+        stream = read_carmen(path)
+        torn = not text[:end].endswith("\n")
+        assert stream.length == 3
+        assert stream.metadata.extra["torn_last_line"] == torn
+        assert len(caplog.records) == torn
+        if torn:
+            with pytest.raises(LogFormatError, match=r"truncated \(refused by --strict"):
+                read_carmen(path, strict=True)
+    path.write_text("FLASER 181 1.0 2.0")
+    refuse(path, "truncated")
 
 
 CHANGES = [
