@@ -21,6 +21,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from scripts.figures import in_first_frame
 from scripts.verbs.generate import generate
+from scripts.verbs.run import on_log
 from sim.moments import toured
 from sim.recording.bag import FORMAT, BagWriter
 from sim.recording.recipe import RECIPE
@@ -194,6 +195,13 @@ def test_a_bag_of_another_format_is_not_called_changed(tmp_path: Path):
     assert "its bag is of format 1, this mobilia writes format 2" in found.why
     with pytest.raises(OutputError, match=r"format 1, .*: choose another --out"):
         generate(["arena"], tmp_path / "data", seconds=0.2, change=0.0)
+
+
+def test_a_run_on_an_episode_has_the_times_of_its_bag(recorded, tmp_path: Path):
+    on_log(["odometry"], recorded.path, tmp_path / "run", overwrite=False, film=False)
+    stamps = read_tum(recorded.path / "trajectory.tum").stamps_ns.tolist()
+    for name in ("odometry", "truth"):
+        assert read_tum(tmp_path / "run" / f"trajectory_{name}.tum").stamps_ns.tolist() == stamps
 
 
 def test_the_commands_for_evo_say_what_the_page_says(recorded, tmp_path: Path):
