@@ -20,6 +20,7 @@ from scripts.verbs.blame import blame
 from scripts.verbs.compare import compare
 from scripts.verbs.config import config
 from scripts.verbs.demo import demo
+from scripts.verbs.doctor import doctor
 from scripts.verbs.drive import drive
 from scripts.verbs.export import export
 from scripts.verbs.generate import generate
@@ -55,6 +56,7 @@ app.command("export", cls=Verb)(export)
 app.command("list", cls=Verb)(listing)
 app.command("config", cls=Verb)(config)
 app.command("bench", cls=Verb)(bench)
+app.command("doctor", cls=Verb)(doctor)
 app.command("sensor-card", cls=Verb)(sensor_card)
 app.command("reproduce", cls=Verb)(reproduce)
 app.command("compare", cls=ManyValues)(compare)
