@@ -121,9 +121,20 @@ class CellMap(abc.ABC):
         (i0, j0), (i1, j1) = places.min(axis=0).tolist(), (places.max(axis=0) + 1).tolist()
         return i0 * SIDE, j0 * SIDE, i1 * SIDE, j1 * SIDE
 
-    def raster_extent(self) -> tuple[int, int, int, int] | None:
-        """``extent``; ``InvalidValueError`` where a raster of it would exceed ``MAX_CELLS``."""
+    def raster_extent(
+        self, bounds: tuple[float, float, float, float] | None = None
+    ) -> tuple[int, int, int, int] | None:
+        """``extent``, or what of it lies within ``bounds`` (xmin, ymin, xmax, ymax, m).
+
+        Raises ``InvalidValueError`` where a raster of it would exceed ``MAX_CELLS``.
+        """
         found = self.extent()
+        if found is not None and bounds is not None:
+            low = [math.floor(edge / self.cell) for edge in bounds[:2]]
+            high = [math.ceil(edge / self.cell) for edge in bounds[2:]]
+            i0, j0 = max(found[0], low[0]), max(found[1], low[1])
+            i1, j1 = min(found[2], high[0]), min(found[3], high[1])
+            found = (i0, j0, i1, j1) if i0 < i1 and j0 < j1 else None
         if found is not None:
             across, along = found[2] - found[0], found[3] - found[1]
             if across * along > MAX_CELLS:
