@@ -126,10 +126,6 @@ BY_LEVEL = {
 about in a line with the motion. Measured by ``scripts.experiments.share_seen`` on seeds below 8."""
 OTHERS_BY_LEVEL = _mixes(escorts=(1, 3, 5, 10))
 """Those of a scene that has no row."""
-MIXES = {scene: crowds[-1] for scene, crowds in BY_LEVEL.items()}
-"""The whole crowd of each scene, at motion 1."""
-OTHERS = OTHERS_BY_LEVEL[-1]
-"""That of a scene that has no row."""
 
 
 def mix(scene: str, level: float) -> Crowd:

@@ -11,8 +11,9 @@ from typing import Annotated
 import typer
 
 from scripts import interrupt
-from scripts.console import Lines, console, fail, note
+from scripts.console import LogLines, console, fail, note
 from scripts.many import ManyValues
+from scripts.option_names import Verb
 from scripts.verbs.bench import bench
 from scripts.verbs.benchmark import benchmark
 from scripts.verbs.blame import blame
@@ -45,22 +46,22 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("demo")(demo)
-app.command("run")(run)
-app.command("render")(render)
-app.command("generate")(generate)
-app.command("verify")(verify)
-app.command("export")(export)
-app.command("list")(listing)
-app.command("config")(config)
-app.command("bench")(bench)
-app.command("sensor-card")(sensor_card)
-app.command("reproduce")(reproduce)
+app.command("demo", cls=Verb)(demo)
+app.command("run", cls=Verb)(run)
+app.command("render", cls=Verb)(render)
+app.command("generate", cls=Verb)(generate)
+app.command("verify", cls=Verb)(verify)
+app.command("export", cls=Verb)(export)
+app.command("list", cls=Verb)(listing)
+app.command("config", cls=Verb)(config)
+app.command("bench", cls=Verb)(bench)
+app.command("sensor-card", cls=Verb)(sensor_card)
+app.command("reproduce", cls=Verb)(reproduce)
 app.command("compare", cls=ManyValues)(compare)
 app.command("benchmark", cls=ManyValues)(benchmark)
 app.command("drive", cls=ManyValues)(drive)
 app.command("blame", cls=ManyValues)(blame)
-app.command("report")(report)
+app.command("report", cls=Verb)(report)
 
 
 @app.callback()
@@ -79,7 +80,7 @@ def options(
     logging.basicConfig(
         level=logging.INFO if verbose else logging.WARNING,
         format="%(message)s",
-        handlers=[Lines(console=console, show_path=False, show_time=False)],
+        handlers=[LogLines(console=console, show_path=False, show_time=False)],
     )
     load(modules or ())
 

@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 
 from rich.console import Console
 from rich.logging import RichHandler
@@ -13,12 +16,15 @@ from rich.progress import (
     BarColumn,
     Progress,
     SpinnerColumn,
+    Task,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
 from rich.table import Table
+from rich.text import Text
 
+LINE_EVERY_S = 10.0  # between lines of progress where the output is no terminal
 console = Console()
 _errors = Console(stderr=True)
 
@@ -35,7 +41,7 @@ def note(message: str) -> None:
     console.print(f"[yellow]note:[/yellow] {escape(message)}", highlight=False, soft_wrap=True)
 
 
-class Lines(RichHandler):
+class LogLines(RichHandler):
     """Log records as in rich, but a warning as one line, however narrow the terminal is."""
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -54,8 +60,9 @@ def fact(sentence: str, *, bad: bool = False) -> None:
 
 
 def progress() -> Progress:
-    """A progress bar with time left; silent when the output is no terminal."""
-    return Progress(
+    """A progress bar with time left; a line every ``LINE_EVERY_S`` where nobody can see a bar."""
+    kind = Progress if console.is_interactive else Lines
+    return kind(
         SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
@@ -65,6 +72,77 @@ def progress() -> Progress:
         console=console,
         transient=False,
     )
+
+
+class Lines(Progress):
+    """Progress for files and pipes: what each task has done so far, as plain lines."""
+
+    def start(self) -> None:
+        """Begin to tell, from a thread of its own: a long step does not call anything."""
+        self._ticks = _Ticks(self._tell)
+
+    def stop(self) -> None:
+        """Tell once more, how it ended."""
+        self._ticks.stop()
+        self._tell()
+
+    def _tell(self) -> None:
+        for task in self.tasks:
+            if task.visible:
+                _line(_words(task))
+
+
+def _words(task: Task) -> str:
+    """``office: 400/2250 scans, 12 s so far, about 54 s left``."""
+    done = str(task.fields.get("unit", ""))
+    if task.total and task.finished:
+        return f"{_plain(task.description)}: {done or 'done'}, {task.elapsed or 0.0:.0f} s"
+    left = task.time_remaining
+    parts = [done, f"{task.elapsed or 0.0:.0f} s so far"]
+    parts += [f"about {left:.0f} s left"] if left else []
+    return f"{_plain(task.description)}: {', '.join(filter(None, parts))}"
+
+
+def _plain(description: str) -> str:
+    return Text.from_markup(description).plain
+
+
+def _line(words: str) -> None:
+    console.print(escape(words), highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def working(words: str) -> Iterator[None]:
+    """For a step that counts nothing: a spinner, or a line every ``LINE_EVERY_S``."""
+    if console.is_interactive:
+        with console.status(escape(words)):
+            yield
+        return
+    started = time.monotonic()
+    ticks = _Ticks(lambda: _line(f"{words}: {time.monotonic() - started:.0f} s so far"))
+    try:
+        yield
+    finally:
+        ticks.stop()
+
+
+class _Ticks:
+    """Calls ``tell`` every ``LINE_EVERY_S``, first after that time, until ``stop``."""
+
+    def __init__(self, tell: Callable[[], None]) -> None:
+        self._tell, self._over = tell, threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        with suppress(OSError):  # nobody reads any more
+            while not self._over.wait(LINE_EVERY_S):
+                self._tell()
+
+    def stop(self) -> None:
+        """No call begins after this."""
+        self._over.set()
+        self._thread.join()
 
 
 def level_table(

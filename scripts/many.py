@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from typer.core import TyperCommand
+from scripts.option_names import Verb
 
 
-class ManyValues(TyperCommand):
+class ManyValues(Verb):
     """A command whose list options take all the words up to the next option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

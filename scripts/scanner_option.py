@@ -13,8 +13,8 @@ Scanner = Annotated[
     str,
     typer.Option(
         help="Which scanner, and which of its errors: utm30lx, tim561:noise, "
-        "'scanner(fov_deg=270,beams=541,rate_hz=20,sigma_m=0.01)'; full, noise (statistical only) "
-        "and ideal are the LMS-221's."
+        "'scanner(fov_deg=270, beams=541, rate_hz=20, sigma_m=0.01)'; full, noise (statistical "
+        "only) and ideal are the LMS-221's."
     ),
 ]
 

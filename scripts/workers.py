@@ -32,6 +32,9 @@ WORKERS_TIMEOUT_S = 30
 _LOOK_S = 0.25  # between a worker's looks at its parent
 _PDEATHSIG = 1  # linux/prctl.h
 _TRACKER = "ignore::UserWarning:joblib.externals.loky.backend.resource_tracker"
+# A worker that has grown by 300 MB is replaced by a new one between two jobs: nothing is lost, and
+# nothing is left to do. loky warns of it all the same.
+_REPLACED = "A worker stopped while some jobs were given to the executor"
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -66,6 +69,7 @@ def each(
             "initargs": (os.getpid(),),
         }
         if cluster is None:
+            warnings.filterwarnings("ignore", _REPLACED, UserWarning)  # from a thread of loky
             stack.enter_context(guarding.guarded_workers())
             if _TRACKER not in sys.warnoptions:  # handed to the tracker of semaphores: what it
                 sys.warnoptions.append(_TRACKER)  # finds left over, it removes without a word

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         Stream,
         StreamMetadata,
     )
+    from slam.scan_points import deskewed, points_robot
     from slam.system import Estimate, Raster, SlamSystem, config_of, create, register
     from slam.trajectory import Trajectory
 
@@ -33,10 +34,12 @@ _FRAMES = (
     "BeamClass", "BeamLabels", "Features", "Frame", "LaserSpec", "Odometry", "Scan", "Stream",
     "StreamMetadata",
 )  # fmt: skip
+_POINTS = ("deskewed", "points_robot")
 _SYSTEM = ("Estimate", "Raster", "SlamSystem", "config_of", "create", "register")
 _WHERE = {
     **dict.fromkeys(_FRAMES, "slam.frames"),
     **dict.fromkeys(_SYSTEM, "slam.system"),
+    **dict.fromkeys(_POINTS, "slam.scan_points"),
     "Trajectory": "slam.trajectory",
 }
 
@@ -56,7 +59,9 @@ __all__ = [
     "Trajectory",
     "config_of",
     "create",
+    "deskewed",
     "names",
+    "points_robot",
     "register",
 ]
 

@@ -33,6 +33,7 @@ from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
 NS_PER_S = 1_000_000_000
+EPOCH = "epoch_ns"  # of ``StreamMetadata.extra``
 MOST_TWIST = 1e3  # m/s and rad/s: faster, de-skewing would tear a scan apart
 MOST_BEAMS = 1_000_000  # of a scan; a thousand times those of common scanners
 LEAST_INCREMENT = 1e-5  # rad; the finest scanners have 4e-4
@@ -386,7 +387,8 @@ class StreamMetadata:
     truth   what ``Frame.truth`` is: "simulator", "corrected poses of the log", "" for none
     odometry  False where nobody measured it: ``Frame.odometry`` stands still, and ``Replay`` gives
             each SLAM that of a constant velocity
-    extra   JSON-serialisable facts (path, counts of repaired lines, ...)
+    extra   JSON-serialisable facts (path, counts of repaired lines, ...); ``EPOCH`` among them is
+            what the stamps of the recording are more than those of the frames, ns
     """
 
     source: str

@@ -46,11 +46,14 @@ class Trajectory:
         return float(np.sqrt((steps * steps).sum(axis=1)).sum())
 
 
-def write_tum(path: Path, trajectory: Trajectory) -> None:
-    """``t x y z qx qy qz qw``, one pose a line (TUM RGB-D format, as evo reads)."""
+def write_tum(path: Path, trajectory: Trajectory, epoch_ns: int = 0) -> None:
+    """``t x y z qx qy qz qw``, one pose a line (TUM RGB-D format, as evo reads).
+
+    epoch_ns  is added to each stamp: of a bag whose frames begin at 0 s (``slam.frames.EPOCH``)
+    """
     lines = []
     for stamp_ns, (x, y, theta) in zip(
-        trajectory.stamps_ns.tolist(), trajectory.poses.tolist(), strict=True
+        (trajectory.stamps_ns + epoch_ns).tolist(), trajectory.poses.tolist(), strict=True
     ):
         seconds, nanoseconds = divmod(abs(stamp_ns), NS_PER_S)
         sign = "-" if stamp_ns < 0 else ""

@@ -41,7 +41,8 @@ def test_the_page_runs_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "docs").symlink_to(REPO / "docs")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    assert [language for language, _ in BLOCKS] == ["python", "sh", "python", "sh", "sh", "json"]
+    languages = [language for language, _ in BLOCKS]
+    assert languages == ["python", "sh", "python", "python", "sh", "sh", "json"]
     printed = ""
     for language, block in BLOCKS:
         named = re.match(r"# (\w+\.py)\n", block)

@@ -27,8 +27,17 @@ UNKNOWN = 255  # of a map on file; else 0 (free) to 254 (occupied)
 _warm: set[str] = set()
 
 
-def enter(path: Path, *, recording: str, slam: str, scan_limit_s: float = Limits.scan_s) -> None:
+def enter(
+    path: Path,
+    *,
+    recording: str,
+    slam: str,
+    scan_limit_s: float = Limits.scan_s,
+    judge_maps: bool = True,
+) -> None:
     """A job: run ``slam`` over the file ``recording`` (beside ``path``'s folder), write ``path``.
+
+    Without ``judge_maps`` the last map is kept, but none is held against the truth.
 
     A SLAM that fails, even at its start, is scored as such. Whatever is not ours runs in a process
     of its own, which it may crash or hang for ``scan_limit_s`` at a scan.
@@ -36,7 +45,7 @@ def enter(path: Path, *, recording: str, slam: str, scan_limit_s: float = Limits
     drive = load(path.parent.parent / recording)
     limits = Limits(scan_s=scan_limit_s)
     _warm_up(slam, drive.frames, limits)
-    run = Entry(slam, drive, limits)
+    run = Entry(slam, drive, limits, judge_maps=judge_maps)
     run.over(drive.frames)
     np.savez_compressed(path, **run.arrays())
 
@@ -55,9 +64,11 @@ def _warm_up(slam: str, frames: Sequence[Frame], limits: Limits) -> None:
 class Entry:
     """A SLAM's run, scan by scan, with its maps judged on the way."""
 
-    def __init__(self, slam: str, drive: Recording, limits: Limits) -> None:
+    def __init__(
+        self, slam: str, drive: Recording, limits: Limits, *, judge_maps: bool = True
+    ) -> None:
         self.drive = drive
-        self.judge = MapJudge(drive)
+        self.judge = MapJudge(drive) if judge_maps else None
         self.memory = PeakMemory()
         self.failure: SlamFailedError | None = None
         self.track = Track(name=slam, system=create("odometry"))  # if it cannot be made
@@ -78,21 +89,26 @@ class Entry:
                 self.memory.begin()
                 self.track.take(frame)
                 self.memory.end()
-                self.judge.look(k)
-                if self.judge.wants(k):
-                    self.raster = self.track.map()
-                    self.judge.judge(k, self.raster)
+                if self.judge is not None:
+                    self._judge(self.judge, k)
             self.raster = self.track.map()
             self.final = self.track.final()
         except SlamFailedError as error:
             self.failure = error
+
+    def _judge(self, judge: MapJudge, k: int) -> None:
+        judge.look(k)
+        if judge.wants(k):
+            self.raster = self.track.map()
+            judge.judge(k, self.raster)
 
     def arrays(self) -> dict[str, Any]:
         """What the file holds: arrays, and the row of ``runs.csv`` as JSON."""
         track, raster = self.track, self.raster
         online = track.online()
         row = scored(track, self.final, self.failure, self.drive.truth())
-        row |= {"peak_memory_mb": self._peak_memory_mb(), **self.judge.scores()}
+        row["peak_memory_mb"] = self._peak_memory_mb()
+        row |= {} if self.judge is None else self.judge.scores()
         arrays: dict[str, Any] = {
             "stamps_ns": online.stamps_ns,
             "poses": online.poses,

@@ -68,6 +68,8 @@ class Plan:
     motion, change, crowd  the same in every run; None: as ``scripts.knobs.Axis`` says
     sets      of axis "level": what each level sets, fields of ``Recipe`` and options of the scene
     scan_limit_s  that module:Class and pipe:COMMAND may take for a scan before they count as hung
+    judge_maps  once a second against the truth (``scripts.comparison.maps``); it can take as long
+             as the SLAM does
     """
 
     slams: tuple[str, ...]
@@ -84,6 +86,7 @@ class Plan:
     crowd: str | None = None
     odometry: str = "pioneer3dx"
     sets: tuple[Mapping[str, Any], ...] = ()
+    judge_maps: bool = True
 
     def __post_init__(self) -> None:
         Limits(scan_s=self.scan_limit_s)
@@ -162,6 +165,8 @@ class Plan:
                 arguments: dict[str, Any] = {"recording": file, "slam": name}
                 if ":" in name:  # ours are not limited
                     arguments["scan_limit_s"] = self.scan_limit_s
+                if not self.judge_maps:
+                    arguments["judge_maps"] = False
                 job = Job(
                     name=f"{run.name}_{file_name(name)}",
                     call=entry.enter,

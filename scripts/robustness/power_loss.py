@@ -261,7 +261,7 @@ def by_table(names: Iterable[str]) -> dict[str, set[str]]:
 
 
 def _generated(root: Path) -> None:
-    generate("arena", root / "data", episodes=2, seconds=1.0, scanner="ideal")
+    generate(["arena"], root / "data", episodes=2, seconds=1.0, scanner="ideal")
 
 
 def _compared(*slams: str) -> Callable[[Path], object]:
@@ -340,7 +340,7 @@ def syncing_costs(
             _timed("sync_names") as names,
         ):
             started = time.perf_counter()
-            generate("arena", scratch / f"cost{k}", episodes=2, seconds=seconds)
+            generate(["arena"], scratch / f"cost{k}", episodes=2, seconds=seconds)
             spent[without].append(time.perf_counter() - started)
         if not without:
             waits.append(sum(trees) + sum(names))

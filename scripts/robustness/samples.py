@@ -43,7 +43,7 @@ _MEASURED = ("ms_per_scan_p50", "ms_per_scan_p99", "ms_per_scan_p999", "peak_mem
 
 
 def _dataset(folder: Path) -> Path:
-    generate("arena", folder, episodes=2, seconds=1.0, scanner="ideal")
+    generate(["arena"], folder, episodes=2, seconds=1.0, scanner="ideal")
     return folder
 
 
@@ -87,7 +87,7 @@ def _raster(folder: Path) -> Path:
 
 
 def _frames_of(scratch: Path, count: int) -> list[Any]:
-    generate("arena", scratch, episodes=1, seconds=1.0, scanner="ideal")
+    generate(["arena"], scratch, episodes=1, seconds=1.0, scanner="ideal")
     stream = of_log(next(scratch.glob("arena-*"))).stream
     return [frame.without_truth() for frame, _ in zip(stream, range(count), strict=False)]
 

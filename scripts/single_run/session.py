@@ -24,7 +24,7 @@ from scripts.names import file_name
 from scripts.output import machine, whole_folder, write_recipe
 from scripts.single_run import score
 from slam.files import write_text
-from slam.frames import Stream
+from slam.frames import EPOCH, Stream
 from slam.maps import write_map
 from slam.replay import Replay
 from slam.trajectory import write_tum
@@ -64,7 +64,7 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
                 pass
         wall_s = time.perf_counter() - started
         results = score.results(replay, wall_s, machine())
-        _write(folder, replay, show, results)
+        _write(folder, replay, show, results, int(stream.metadata.extra.get(EPOCH, 0)))
         if opened is not None and opened.last is not None:
             imageio.imwrite(folder / "poster.png", opened.last)
         write_recipe(folder, outputs.command, outputs.settings)
@@ -73,7 +73,9 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
     return results
 
 
-def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any]) -> None:
+def _write(
+    folder: Path, replay: Replay, show: Show, results: Mapping[str, Any], epoch_ns: int
+) -> None:
     online = {name: track.online() for name, track in replay.tracks.items()}
     world_truth = replay.truth()
     truth = figures.in_first_frame(world_truth) if world_truth is not None else None
@@ -81,12 +83,12 @@ def _write(folder: Path, replay: Replay, show: Show, results: Mapping[str, Any])
     raster = primary.map()
     truth_name = show.truth_name
     for name, track in online.items():
-        write_tum(folder / f"trajectory_{file_name(name)}.tum", track)
+        write_tum(folder / f"trajectory_{file_name(name)}.tum", track, epoch_ns)
         final = replay.tracks[name].final()
         if final is not None:
-            write_tum(folder / f"trajectory_{file_name(name)}_final.tum", final)
+            write_tum(folder / f"trajectory_{file_name(name)}_final.tum", final, epoch_ns)
     if truth is not None:
-        write_tum(folder / "trajectory_truth.tum", truth)
+        write_tum(folder / "trajectory_truth.tum", truth, epoch_ns)
         figures.errors(folder / "errors.png", online, truth)
     figures.trajectories(folder / "trajectories.png", online, truth, raster, truth_name)
     if raster is not None:

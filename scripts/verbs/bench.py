@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from scripts.console import console
+from scripts.console import console, working
 from slam.errors import InvalidValueError
 from slam.files import write_text
 
@@ -54,7 +54,7 @@ def bench(
     for heading in ("what", "figure", "unit", "target", "how"):
         table.add_column(heading, justify="right" if heading == "figure" else "left")
     for measure in measures:
-        with console.status(f"measuring ({len(rows)} rows so far)"):
+        with working(f"measuring ({len(rows)} rows so far)"):
             found = list(measure(seconds))
         for row in found:
             rows.append(row)

@@ -13,6 +13,8 @@ from rich.table import Table
 
 from scripts.console import console, note
 from scripts.names import check
+from scripts.process_options import Cluster, Jobs
+from scripts.set_option import Set
 from scripts.verbs.compare import named
 from slam.set_numbers import with_set
 
@@ -58,14 +60,9 @@ def benchmark(
     merge: Annotated[
         list[Path] | None, typer.Option(help="Submissions of others to put into the leaderboard.")
     ] = None,
-    jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
-    cluster: Annotated[
-        str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
-    ] = None,
+    jobs: Jobs = 1,
+    cluster: Cluster = None,
+    set_: Set = None,
 ) -> None:
     """Find out on which track, and from which level on, a SLAM gets lost.
 

@@ -16,7 +16,9 @@ from scripts.console import console, fact
 from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels, chosen
 from scripts.names import check
 from scripts.oracle_option import Oracles, with_oracles
+from scripts.process_options import Cluster, Jobs
 from scripts.scanner_option import Scanner, every_of
+from scripts.set_option import Set
 from scripts.verbs.generate import sweep
 from slam.errors import InvalidValueError
 from slam.guests.limits import Limits
@@ -53,14 +55,9 @@ def compare(
     scan_limit: Annotated[
         float, typer.Option(help="Time limit of a scan for a SLAM from outside, s.")
     ] = Limits.scan_s,
-    jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
-    cluster: Annotated[
-        str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
-    ] = None,
+    jobs: Jobs = 1,
+    cluster: Cluster = None,
+    set_: Set = None,
 ) -> None:
     """Run SLAMs on the same simulated runs; write tables of error against dynamism.
 

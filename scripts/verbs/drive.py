@@ -14,7 +14,9 @@ from scripts.checked import whole
 from scripts.console import console
 from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels
 from scripts.names import check
+from scripts.process_options import Jobs
 from scripts.scanner_option import Scanner, every_of
+from scripts.set_option import Set
 from scripts.verbs.compare import axis_levels, named
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
@@ -44,11 +46,8 @@ def drive(
         int | None, typer.Option(help="Use one scan in N; default about 9.4 a second.")
     ] = None,
     scanner: Scanner = "full",
-    jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
-    ] = None,
+    jobs: Jobs = 1,
+    set_: Set = None,
 ) -> None:
     """Drive to a goal in every room, steered by each SLAM's estimate; truth only scores.
 

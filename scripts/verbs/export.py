@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from scripts.console import console
+from scripts.console import console, working
 from slam.errors import InvalidValueError
 from slam.files import replacing
 
@@ -24,13 +24,14 @@ def export(
     episode: Annotated[Path, typer.Argument(help="An episode, a bag or any other log.")],
     to: Annotated[str, typer.Option(help="tum, carmen or npz.")],
     out: Annotated[
-        Path | None, typer.Option(help="File to write; default beside the episode.")
+        Path | None,
+        typer.Option(help="File to write; default beside the episode. tum: NAME_odometry.tum, ..."),
     ] = None,
 ) -> None:
     """Write an episode as TUM trajectories, as a CARMEN log or as NumPy arrays.
 
-    tum: the odometry, and the truth beside it. carmen: scans, odometry, true poses. npz:
-    everything, labels too, as arrays by name.
+    tum: NAME_odometry.tum and, where it is known, NAME_truth.tum. carmen: scans, odometry, true
+    poses. npz: everything, labels too, as arrays by name.
     """
     writers: dict[str, Callable[[Path, Stream], list[Path]]] = {
         "tum": _tum, "carmen": _carmen, "npz": _npz,
@@ -46,13 +47,16 @@ def export(
     suffix = {"tum": ".tum", "carmen": ".log.gz", "npz": ".npz"}[to]
     plain = episode.absolute()
     target = out or plain.with_name(plain.name.split(".log")[0] + suffix)
-    for path in writers[to](target, stream):
+    with working(f"writing {to}"):
+        written = writers[to](target, stream)
+    for path in written:
         console.print(escape(str(path)), soft_wrap=True)
 
 
 def _tum(target: Path, stream: Stream) -> list[Path]:
     import numpy as np
 
+    from slam.frames import EPOCH
     from slam.trajectory import Trajectory, write_tum
 
     stamps, odometry, truth = [], [], []
@@ -60,14 +64,14 @@ def _tum(target: Path, stream: Stream) -> list[Path]:
         stamps.append(frame.stamp_ns)
         odometry.append(frame.odometry.T_odom_robot)
         truth.append(frame.truth)
-    written = [target]
-    at = np.array(stamps)
-    write_tum(target, Trajectory(stamps_ns=at, poses=np.array(odometry)))
+    at, epoch_ns = np.array(stamps), int(stream.metadata.extra.get(EPOCH, 0))
+    written = [target.with_name(f"{target.stem}_odometry{target.suffix}")]
+    write_tum(written[0], Trajectory(stamps_ns=at, poses=np.array(odometry)), epoch_ns)
     known = [k for k, pose in enumerate(truth) if pose is not None]
     if known:
         written.append(target.with_name(f"{target.stem}_truth{target.suffix}"))
         poses = np.array([truth[k] for k in known])
-        write_tum(written[-1], Trajectory(stamps_ns=at[known], poses=poses))
+        write_tum(written[-1], Trajectory(stamps_ns=at[known], poses=poses), epoch_ns)
     return written
 
 
@@ -81,12 +85,15 @@ def _carmen(target: Path, stream: Stream) -> list[Path]:
 def _npz(target: Path, stream: Stream) -> list[Path]:
     import numpy as np
 
+    from slam.frames import EPOCH
+
     frames = list(stream)
     if not frames or frames[0].scan is None:
         raise InvalidValueError("npz holds scans: this log has none")
     spec = frames[0].scan.spec
     arrays = {
         "stamps_ns": np.array([f.stamp_ns for f in frames]),
+        "epoch_ns": np.array(stream.metadata.extra.get(EPOCH, 0)),
         "T_odom_robot": np.array([f.odometry.T_odom_robot for f in frames]),
         "ranges": np.array([f.scan.ranges for f in frames if f.scan is not None]),
         "angles": spec.angles,

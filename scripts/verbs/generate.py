@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +19,8 @@ from scenes import registry
 from scripts import interrupt
 from scripts.console import console, note, progress
 from scripts.knobs import Change, CrowdOption, Held, Motion, options_with
+from scripts.names import check
+from scripts.process_options import Cluster, Jobs
 from scripts.scanner_option import Scanner, rate_hz
 from slam.errors import InvalidValueError
 
@@ -29,7 +32,13 @@ MAX_SWEEP = 1000
 
 
 def generate(
-    scene: Annotated[str, typer.Argument(help="A scene by name, or module:function.")],
+    scene: Annotated[
+        list[str],
+        typer.Argument(
+            help="A scene by name, or module:function; or several, with the same seeds.",
+            metavar="SCENE...",
+        ),
+    ],
     out: Annotated[Path, typer.Option(help="Folder of the dataset.")],
     dynamism: Annotated[float, typer.Option(help="How much the room moves, 0 to 1.")] = 0.5,
     dynamism_sweep: Annotated[
@@ -38,7 +47,17 @@ def generate(
     motion: Motion = None,
     change: Change = None,
     crowd: CrowdOption = None,
-    episodes: Annotated[int, typer.Option(help="Episodes (at each dynamism).")] = 1,
+    episodes: Annotated[
+        int | None, typer.Option(help="Episodes (in each scene, at each dynamism); default 1.")
+    ] = None,
+    split: Annotated[
+        str,
+        typer.Option(
+            help="Parts by name and number of episodes instead, no seed in two of them: "
+            "train:8,validation:1,test:1. Each gets a list of its episodes, OUT/train.txt.",
+            metavar="NAME:N,...",
+        ),
+    ] = "",
     seconds: Annotated[float, typer.Option(help="Length of an episode, s.")] = 60.0,
     seed: Annotated[int, typer.Option(help="Seed of the first episode; each next one adds 1.")] = 0,
     twins: Annotated[
@@ -48,10 +67,8 @@ def generate(
     sessions: Annotated[
         int, typer.Option(help="So many sessions of one building instead, --change apart.")
     ] = 0,
-    jobs: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
-    cluster: Annotated[
-        str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
-    ] = None,
+    jobs: Jobs = 1,
+    cluster: Cluster = None,
     scanner: Scanner = "full",
 ) -> None:
     """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
@@ -60,21 +77,32 @@ def generate(
     the same bytes.
 
     [bold]mobilia generate office --dynamism 0.5 --episodes 4 --seconds 20 --out data[/bold]
+
+    [bold]mobilia generate office arena --split train:8,validation:1,test:1 --out data[/bold]
     """
     levels = sweep(dynamism_sweep) if dynamism_sweep else (dynamism,)
-    registry.check_name(scene)
+    check([], *scene)
     from scripts import workers
     from sim.recording.dataset import Plan, writing
     from sim.recording.recipe import Recipe
+    from sim.recording.splits import split_of
 
+    if split and episodes is not None:
+        raise InvalidValueError("--split says how many episodes there are: leave --episodes out")
+    parts = split_of(split)
     Held(motion=motion, change=change, crowd=crowd)  # complains by the options' names
     first = Recipe(
-        scene=scene, seed=seed, dynamism=levels[0], motion=motion, change=change, seconds=seconds,
-        scanner=scanner, options=options_with(crowd),
+        scene=scene[0], seed=seed, dynamism=levels[0], motion=motion, change=change,
+        seconds=seconds, scanner=scanner, options=options_with(crowd),
     )  # fmt: skip
-    plan = Plan(recipe=first, dynamisms=levels, episodes=episodes, twins=twins, sessions=sessions)
+    plan = Plan(
+        recipe=first, dynamisms=levels, twins=twins, sessions=sessions, split=parts,
+        episodes=sum(dict(parts).values()) or (1 if episodes is None else episodes),
+        scenes=tuple(scene) if len(scene) > 1 else (),
+    )  # fmt: skip
     workers.check_jobs(jobs)
-    registry.find(scene)  # a wrong name is told, and a module found, before anything starts
+    for name in scene:  # a wrong name is told, and a module found, before anything starts
+        registry.find(name)
     with writing(out, plan) as dataset:
         missing, notes = dataset.missing()
         for line in notes:
@@ -163,20 +191,30 @@ class _Meter:
 
 
 def _summary(dataset: Dataset, made: int, spent_s: float) -> Table:
-    """Episodes, frames, distance, what returns came from, bytes: a row for each dynamism."""
+    """Episodes, frames, distance, what returns came from, bytes: a row a scene and dynamism."""
     plan = dataset.plan
+    scenes = plan.scenes or (plan.recipe.scene,)
     table = Table(
-        title=escape(f"{plan.recipe.scene}: {made} of {len(plan.jobs())} made now"),
+        title=escape(f"{', '.join(scenes)}: {made} of {len(plan.jobs())} made now"),
         title_justify="left",
         caption=f"{spent_s:.1f} s",
     )
-    headings = ("dynamism", "episodes", "frames", "driven, m", "moving", "semi-static", "static")
+    headings = (
+        "scene",
+        "dynamism",
+        "episodes",
+        "frames",
+        "driven, m",
+        "moving",
+        "semi-static",
+        "static",
+    )
     for heading in (*headings, "MB"):
         table.add_column(heading, justify="right")
-    for level in plan.dynamisms:
-        jobs = [job for job in plan.jobs() if job.dynamism == level]
+    for scene, level in product(scenes, plan.dynamisms):
+        jobs = [job for job in plan.jobs() if (job.scene, job.dynamism) == (scene, level)]
         folders = [dataset.path / name for job in jobs for name in plan.folders(job)]
-        table.add_row(f"{level:g}", *_row(folders))
+        table.add_row(escape(scene), f"{level:g}", *_row(folders))
     return table
 
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from scripts.console import console, fact
+from scripts.console import console, fact, working
 
 
 def report(
@@ -35,10 +35,13 @@ def report(
     from scripts.report.answer import failed
     from scripts.report.closed import driven
     from scripts.report.study import study
+    from scripts.report.wanted import check_comparison
 
+    check_comparison(folder)
     found = [*(drive or []), *sorted(path for path in folder.glob("drive*") if path.is_dir())]
     about = study(folder, subject)
-    path = page.write(about, [driven(one) for one in found])
+    with working("drawing the page"):
+        path = page.write(about, [driven(one) for one in found])
     for line in failed(about.compared.runs, about.axis):
         fact(line, bad=True)
     for line in page.answers(about):

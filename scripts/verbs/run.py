@@ -13,6 +13,7 @@ from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check, run_name
 from scripts.oracle_option import Oracles, with_oracles
 from scripts.scanner_option import Scanner
+from scripts.set_option import Set
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -65,10 +66,7 @@ def run(
     ] = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
     oracle: Oracles = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
-    ] = None,
+    set_: Set = None,
 ) -> None:
     """Run SLAMs on a log or on a simulated scene and write the same files as the demo.
 

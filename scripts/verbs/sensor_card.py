@@ -10,7 +10,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from scripts.console import console, note
+from scripts.console import console, note, working
 from slam.errors import MobiliaError
 from slam.files import write_text
 
@@ -34,7 +34,8 @@ def sensor_card(
     from sim.sensors.lidar.registry import DEFAULT, describe
 
     own = scanner == DEFAULT
-    rows = sensor_rows.rows() if own else stated.rows_of(scanner)
+    with working("measuring"):
+        rows = sensor_rows.rows() if own else stated.rows_of(scanner)
     headings = ("", "what", "data sheet", "measured", "source")
     title = escape(f"{describe(scanner)} (simulated)")
     table = Table(*headings, title=title, title_justify="left")
@@ -44,7 +45,8 @@ def sensor_card(
     console.print(table)
     if out is not None:
         if own:
-            page.write_card(out, rows)
+            with working("drawing the page"):
+                page.write_card(out, rows)
             note(f"wrote {out / 'sensor_card.md'} and its pictures")
         else:
             out.mkdir(parents=True, exist_ok=True)

@@ -10,7 +10,7 @@ import typer
 from rich.markup import escape
 
 from scripts import interrupt
-from scripts.console import console, fail, progress
+from scripts.console import console, fail, progress, working
 from scripts.trust import Trust, admitted
 from slam.errors import InvalidValueError
 
@@ -56,7 +56,8 @@ def verify(
     from sim.recording.recipe import RECIPE, read_recipe
     from sim.recording.verify import STATUS, regenerate
 
-    findings = check(folder)
+    with working("checking every file"):
+        findings = check(folder)
     checked = len(findings)
     submitted = folder.suffix == ".json" and folder.is_file()
     if regenerate_ and submitted and findings[0].ok:

@@ -28,14 +28,16 @@ from scenes.scan_plane import SCAN_HEIGHT
 from scenes.scene import Mover
 from sim.moments import Moment
 from sim.recording import messages as ros
+from sim.recording import navigation_messages as nav
 from sim.recording.label_cloud import LabelsMessage
 from sim.recording.objects import ObjectsMessage
-from sim.recording.template import STORE
-from sim.recording.topics import OURS, MoreTopics
+from sim.recording.template import EPOCH_NS, STORE
+from sim.recording.topics import BEGAN, OURS, MoreTopics
 from slam import se2
 from slam._jit import njit
 from slam.errors import InvalidValueError
-from slam.frames import NS_PER_S, Float, LaserSpec, Odometry
+from slam.estimate import Raster
+from slam.frames import NS_PER_S, Float, Frame, LaserSpec, Odometry
 
 if sys.version_info >= (3, 14):
     from compression import zstd
@@ -79,7 +81,7 @@ class _Wheels:
 
     def __init__(self) -> None:
         self.odometry, self.increment = ros.OdometryMessage(), ros.IncrementMessage()
-        self.tf = ros.TransformMessage(ros.ODOM, ros.ROBOT)
+        self.tf = ros.TransformMessage((ros.ODOM, ros.FOOTPRINT, 0.0))
         self._covariance, self._known = np.zeros((3, 3)), True
         self._last: Odometry | None = None
 
@@ -100,6 +102,24 @@ class _Wheels:
             self.tf(now.stamp_ns, now.T_odom_robot),
             None if spread is None else self.increment(now.stamp_ns, step, spread),
         )
+
+
+class _Truth:
+    """/ground_truth/pose and /ground_truth/tf of one frame after another."""
+
+    def __init__(self) -> None:
+        self._pose = ros.TruthMessage()
+        self._links = ros.TransformMessage(
+            (ros.WORLD, ros.MAP, 0.0), (ros.MAP, ros.ODOM, 0.0),
+            (ros.WORLD, ros.TRUE_FOOTPRINT, 0.0),
+        )  # fmt: skip
+
+    def next(self, T_world_robot: Float, odometry: Odometry) -> tuple[bytearray, bytearray]:
+        """map -> odom is what a SLAM without error would say."""
+        stamp_ns = odometry.stamp_ns
+        T_map_odom = se2.compose(T_world_robot, se2.inverse(odometry.T_odom_robot))
+        links = self._links(stamp_ns, se2.IDENTITY, T_map_odom, T_world_robot)
+        return self._pose(stamp_ns, T_world_robot), links
 
 
 class _Chunks:
@@ -131,7 +151,12 @@ class _Chunks:
                 self._storage.close_chunk()
 
 
-_LEAN = frozenset(("/scan", "/odom", "/odom_increment", "/ground_truth/pose"))
+_LEAN = frozenset((BEGAN, "/scan", "/odom", "/odom_increment", "/ground_truth/pose"))
+_LATCHED_TOPICS = frozenset((BEGAN, "/tf_static", "/map"))
+FORMAT = 2  # of a bag: goes up when the same frames come to be other messages
+FORMATS = {
+    1: "stamps from 0 s on, base_link below odom, and no clock, map or transforms of the truth",
+}
 
 
 class MessageHash:
@@ -162,18 +187,20 @@ class BagWriter:
 
     movers    of the scene, for /ground_truth/objects
     height_m  of the scanner, for /tf_static
+    static_map  what never moves, for /map
     labels, intensities  whether frames have them
 
     The folder is whole only after the block ends without an exception.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (what a bag may hold)
         self,
         path: Path,
         spec: LaserSpec,
         *,
         movers: Sequence[Mover] = (),
         height_m: float = SCAN_HEIGHT,
+        static_map: Raster | None = None,
         labels: bool = True,
         intensities: bool = False,
     ) -> None:
@@ -188,8 +215,11 @@ class BagWriter:
             )
             for k in range(turns)
         ]  # fmt: skip
-        self._mount = ros.TransformMessage(ros.ROBOT, ros.LASER, height_m)
-        self._wheels, self._truth = _Wheels(), ros.TruthMessage()
+        self._mount = ros.TransformMessage(
+            (ros.FOOTPRINT, ros.ROBOT, 0.0), (ros.ROBOT, ros.LASER, height_m)
+        )
+        self._wheels, self._truth, self._clock = _Wheels(), _Truth(), nav.ClockMessage()
+        self._map = None if static_map is None else nav.MapMessage(static_map)
         self._labels = LabelsMessage(spec) if labels else None
         self._objects = ObjectsMessage(movers) if movers else None
         self._more = MoreTopics()
@@ -201,10 +231,14 @@ class BagWriter:
 
     def __enter__(self) -> BagWriter:
         self._writer.open()
-        made = {"/ground_truth/objects": self._objects, "/ground_truth/labels": self._labels}
+        made: dict[str, object] = {
+            "/ground_truth/objects": self._objects,
+            "/ground_truth/labels": self._labels,
+            "/map": self._map,
+        }
         for topic, kind in {**OURS, **self._more.kinds}.items():
             if made.get(topic, True):
-                latched = [_LATCHED] if topic == "/tf_static" else []
+                latched = [_LATCHED] if topic in _LATCHED_TOPICS else []
                 self._connections[topic] = self._writer.add_connection(
                     topic, kind, typestore=STORE, offered_qos_profiles=latched
                 )
@@ -226,14 +260,17 @@ class BagWriter:
             raise InvalidValueError("a bag holds scans of one scanner: this frame has another one")
         if not self._started:
             self._started = True
-            self._put("/tf_static", stamp_ns, self._mount(stamp_ns, self.spec.T_robot_laser))
+            self._begin(frame)
+        self._put("/clock", stamp_ns, self._clock(stamp_ns))
         odometry, tf, increment = self._wheels.next(frame.odometry)
         self._put("/tf", stamp_ns, tf)
         self._put("/odom", stamp_ns, odometry)
         if increment is not None:
             self._put("/odom_increment", stamp_ns, increment)
         if frame.truth is not None:
-            self._put("/ground_truth/pose", stamp_ns, self._truth(stamp_ns, frame.truth))
+            truth, links = self._truth.next(frame.truth, frame.odometry)
+            self._put("/ground_truth/pose", stamp_ns, truth)
+            self._put("/ground_truth/tf", stamp_ns, links)
         if self._objects is not None:
             markers = self._objects(stamp_ns, moment.poses, moment.moving)
             self._put("/ground_truth/objects", stamp_ns, markers)
@@ -245,10 +282,22 @@ class BagWriter:
         for topic, data in self._more(moment):
             self._put(topic, stamp_ns, data)
 
+    def _begin(self, frame: Frame) -> None:
+        """What is sent once, before the first frame."""
+        stamp_ns = frame.stamp_ns
+        self._put(BEGAN, stamp_ns, nav.BeganMessage()(stamp_ns))
+        links = self._mount(stamp_ns, se2.IDENTITY, self.spec.T_robot_laser)
+        self._put("/tf_static", stamp_ns, links)
+        if self._map is not None:
+            self._put("/map", stamp_ns, self._map(stamp_ns))
+        if frame.truth is not None:
+            self._put("/initialpose", stamp_ns, nav.StartMessage()(stamp_ns, frame.truth))
+
     def _put(self, topic: str, stamp_ns: int, data: bytearray) -> None:
+        time_ns = stamp_ns + EPOCH_NS
         self._chunks.turn_to(topic not in _LEAN)
-        self._writer.write(self._connections[topic], stamp_ns, data)  # type: ignore[arg-type]
-        self._hash.take(topic, stamp_ns, data)
+        self._writer.write(self._connections[topic], time_ns, data)  # type: ignore[arg-type]
+        self._hash.take(topic, time_ns, data)
 
     @property
     def messages_sha256(self) -> str:

@@ -15,8 +15,9 @@ from sim.core.checks import whole
 from sim.core.versions import check_world
 from sim.recording.days import FILES, write_days
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
+from sim.recording.splits import Split, checked_split, file_of, list_text, part_of
 from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
-from sim.recording.verify import Finding, check_hashes, finding, listed_in
+from sim.recording.verify import Finding, check_hashes, finding, listed_in, other_format
 from sim.twins.twins import TWINS
 from sim.world.times_of_day import MOST_SESSIONS
 from slam import bounded, locks
@@ -31,13 +32,17 @@ MAX_BYTES = 1 << 20  # of dataset.json
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """Which episodes a dataset has: ``episodes`` of them at each dynamism, of the same seeds.
+    """Which episodes a dataset has: ``episodes`` of them in each scene at each dynamism, of the
+    same seeds.
 
     recipe      of the first one; the k-th episode has its seed plus k
     dynamisms   numbers in [0, 1]
     twins       whether each episode is one drive in three versions
     sessions    0, or how many sessions of one building there are (``sim.world.sessions``): one
                 episode each, all of one seed and one dynamism
+    scenes      (), or several, that of the recipe first
+    split       (), or parts by name and number of seeds, which add up to ``episodes``
+                (``sim.recording.splits``)
     """
 
     recipe: Recipe
@@ -45,15 +50,18 @@ class Plan:
     episodes: int
     twins: bool = False
     sessions: int = 0
+    scenes: tuple[str, ...] = ()
+    split: Split = ()
 
     def __post_init__(self) -> None:
         whole("Plan.episodes", self.episodes, 1, MAX_EPISODES)
+        self._check_parts()
         if not self.dynamisms or len(set(self.dynamisms)) != len(self.dynamisms):
             raise InvalidValueError(
                 f"Plan.dynamisms must be different numbers, got {self.dynamisms}"
             )
         self._check_sessions()
-        count = self.episodes * len(self.dynamisms)
+        count = self.episodes * len(self.dynamisms) * max(1, len(self.scenes))
         if count > MAX_EPISODES:
             raise InvalidValueError(f"Plan: at most {MAX_EPISODES} episodes, got {count}")
         both = self.recipe.motion is not None and self.recipe.change is not None
@@ -65,13 +73,28 @@ class Plan:
         if len(set(names)) != len(names):
             raise InvalidValueError("Plan.dynamisms are too close: two episodes have one name")
 
+    def _check_parts(self) -> None:
+        object.__setattr__(self, "scenes", tuple(self.scenes))
+        object.__setattr__(self, "split", checked_split(self.split))
+        scenes = self.scenes
+        if scenes and (scenes[0] != self.recipe.scene or len(set(scenes)) != len(scenes)):
+            raise InvalidValueError(
+                f"Plan.scenes must be different, that of the recipe first, got {scenes!r:.200}"
+            )
+        seeds = sum(count for _, count in self.split)
+        if self.split and seeds != self.episodes:
+            raise InvalidValueError(
+                f"Plan.split must add up to the {self.episodes} episodes, got {seeds}"
+            )
+
     def _check_sessions(self) -> None:
         whole("Plan.sessions", self.sessions, 0, MOST_SESSIONS)
         alone = self.episodes == 1 and len(self.dynamisms) == 1 and not self.twins
-        if self.sessions and not alone:
+        if self.sessions and not (alone and len(self.scenes) < 2 and not self.split):
             raise InvalidValueError(
-                "Plan.sessions are of one building: one episode, one dynamism and no twins, got "
-                f"{self.episodes}, {self.dynamisms} and {self.twins}"
+                "Plan.sessions are of one building: one scene, one episode, one dynamism, no twins "
+                f"and no split, got {self.scenes or self.recipe.scene}, {self.episodes}, "
+                f"{self.dynamisms}, {self.twins} and {self.split}"
             )
 
     def jobs(self) -> list[Recipe]:
@@ -81,7 +104,10 @@ class Plan:
             return [replace(self.recipe, dynamism=level, session=k) for k in range(self.sessions)]
         first, twin = asdict(self.recipe), "dynamic" if self.twins else ""
         return [
-            Recipe(**{**first, "dynamism": d, "seed": self.recipe.seed + k, "twin": twin})
+            Recipe(
+                **{**first, "scene": s, "dynamism": d, "seed": self.recipe.seed + k, "twin": twin}
+            )
+            for s in self.scenes or (self.recipe.scene,)
             for d in self.dynamisms
             for k in range(self.episodes)
         ]
@@ -101,14 +127,24 @@ class Plan:
     def text(self) -> str:
         """``dataset.json``."""
         told = asdict(self) | {"recipe": self.recipe.words()}
-        if not self.sessions:
-            del told["sessions"]
+        for name in ("sessions", "scenes", "split"):  # added since the first plans
+            if not told[name]:
+                del told[name]
         return json.dumps({"schema": SCHEMA, **told}, indent=1, sort_keys=True) + "\n"
 
     @property
     def files(self) -> tuple[str, ...]:
-        """What lies beside the episodes: the plan, and the truth of its sessions."""
-        return (PLAN, *(FILES if self.sessions else ()))
+        """What lies beside the episodes: the plan, the truth of its sessions, lists of parts."""
+        return (PLAN, *(FILES if self.sessions else ()), *map(file_of, dict(self.split)))
+
+    def parts(self) -> dict[str, list[str]]:
+        """Names of the episodes of each part of the split."""
+        found: dict[str, list[str]] = {name: [] for name, _ in self.split}
+        if self.split:
+            for job in self.jobs():
+                part = part_of(self.split, job.seed - self.recipe.seed)
+                found[part] += self.folders(job)
+        return found
 
 
 class Dataset:
@@ -120,8 +156,8 @@ class Dataset:
     def missing(self) -> tuple[list[Recipe], list[str]]:
         """Jobs not done yet, and why whole-looking folders among them are not kept.
 
-        Raises ``WorldVersionError`` for episodes of another version of the world: one dataset has
-        one.
+        Raises ``WorldVersionError`` for episodes of another version of the world, ``OutputError``
+        for those of another format of bags: one dataset has one.
         """
         wanted, notes = [], []
         for job in self.plan.jobs():
@@ -133,7 +169,10 @@ class Dataset:
                     continue
                 found = check_hashes(folder)
                 if found.verdict == "whole":
-                    check_world(folder / RECIPE, read_recipe(folder / RECIPE).world)
+                    made = read_recipe(folder / RECIPE)
+                    check_world(folder / RECIPE, made.world)
+                    if why := other_format(made):
+                        raise OutputError(f"{folder}: {why}: choose another --out")
                 elif found.verdict == "foreign":
                     notes.append(f"left as it is: {found.why}")
                 else:
@@ -151,6 +190,8 @@ class Dataset:
         them; ``OutputError`` when one is missing."""
         if self.plan.sessions:
             write_days(self.path, self.plan.recipe, self.plan.sessions)
+        for part, names in self.plan.parts().items():
+            write_text(self.path / file_of(part), list_text(names))
         sums = {name: sha256(self.path / name) for name in self.plan.files}
         for name in self.plan.planned():
             try:

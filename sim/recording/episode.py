@@ -18,11 +18,12 @@ import numpy as np
 from sim.actors.rearranging import Rearrangement
 from sim.moments import Moment, toured
 from sim.recording import topics
-from sim.recording.bag import BagWriter
+from sim.recording.bag import FORMAT, BagWriter
 from sim.recording.rearranged import REARRANGED, write_rearranged
 from sim.recording.recipe import RECIPE, Recipe, write_recipe
 from sim.recording.relations import write_relations
 from sim.recording.sums import write_sums
+from sim.recording.template import EPOCH_NS
 from sim.simulation import Simulation
 from sim.twins.twins import TWINS, Twins
 from slam.errors import OutputError
@@ -55,9 +56,10 @@ class _Summary:
             self._classes += np.bincount(frame.labels.kind, minlength=len(BeamClass))
 
     def truth(self) -> Trajectory:
-        """The true poses so far."""
+        """The true poses so far, at the times of the bag."""
         poses = np.array(self._poses).reshape(-1, 3)
-        return Trajectory(stamps_ns=np.array(self._stamps), poses=poses)
+        stamps_ns = np.array(self._stamps) + EPOCH_NS
+        return Trajectory(stamps_ns=stamps_ns, poses=poses)
 
     def result(self) -> Result:
         """Numbers for the recipe: how many frames, m driven, returns by what they came from."""
@@ -102,7 +104,10 @@ def _write(
     scene, summary = simulation.world.scene, _Summary()
     rearranged: list[Rearrangement] = []
     with _whole(parent / recipe.name) as folder:
-        bag = BagWriter(folder, simulation.spec, movers=scene.movers, height_m=scene.scan_height_m)
+        bag = BagWriter(
+            folder, simulation.spec, movers=scene.movers, height_m=scene.scan_height_m,
+            static_map=scene.static_map,
+        )  # fmt: skip
         with bag:
             for moment in moments:
                 bag.write(moment)
@@ -115,7 +120,8 @@ def _write(
         write_map(folder / "map", scene.static_map)
         if recipe.rearranges:
             write_rearranged(folder / REARRANGED, rearranged, scene.bounds)
-        result = {**summary.result(), "messages_sha256": bag.messages_sha256}
+        sha256 = bag.messages_sha256
+        result = {**summary.result(), "bag_format": FORMAT, "messages_sha256": sha256}
         if topics.names():
             result["topics"] = topics.names()
         write_recipe(folder / RECIPE, recipe, result)

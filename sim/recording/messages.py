@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a frame says, as ROS 2 messages.
 
-Stamps are those of the earliest beam. Frames are "odom", "base_link", "laser" (REP 105) and
-"world", in which the truth and the map of an episode are. LaserScan follows REP 117 (inf no return,
+Stamps are those of the earliest beam, ``EPOCH_NS`` later. Frames are "map", "odom", "base_link"
+(REP 105), "base_footprint" (REP 120; here the same place), "laser" and "world", in which the truth
+is; "map" lies on it. LaserScan follows REP 117 (inf no return,
 NaN an error code) and, in its time fields, the driver of the LMS-200 family
 (ros-drivers/sicktoolbox_wrapper): ``scan_time`` is one turn of the mirror for a message of one
 turn, all its turns for a whole scan; ``time_increment`` is scan_time / (2 pi) * angle_increment.
@@ -22,7 +23,9 @@ from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float, LaserSpec, Odometry, Scan
 from slam.logs.ros_numbers import quaternion_of
 
-WORLD, ODOM, ROBOT, LASER = "world", "odom", "base_link", "laser"
+WORLD, MAP, ODOM = "world", "map", "odom"
+FOOTPRINT, ROBOT, LASER = "base_footprint", "base_link", "laser"
+TRUE_FOOTPRINT = "base_footprint_truth"  # where the robot is, whoever says what of "map" and "odom"
 UNKNOWN = -1.0  # first entry of a covariance: there is no such measurement (sensor_msgs/Imu)
 
 
@@ -111,7 +114,8 @@ class ScanMessage:
         return stamp_ns, self._template.stamp(stamp_ns)
 
 
-def _pose(numbers: Float) -> object:
+def pose_message(numbers: Float) -> object:
+    """A geometry_msgs/Pose of x, y, z (m) and a quaternion (x, y, z, w)."""
     x, y, z, qx, qy, qz, qw = numbers.tolist()
     return message(
         "geometry_msgs/msg/Pose",
@@ -125,7 +129,8 @@ def _vector(numbers: Sequence[float]) -> object:
     return message("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
 
 
-def _fill_pose(view: Float, pose: Float, z: float = 0.0) -> None:
+def fill_pose(view: Float, pose: Float, z: float = 0.0) -> None:
+    """Write a planar pose (x m, y m, theta rad), ``z`` m up, as the seven numbers of a Pose."""
     x, y, theta = pose.tolist()
     view[:] = (x, y, z, 0.0, 0.0, *quaternion_of(theta))
 
@@ -150,9 +155,9 @@ class OdometryMessage:
         prototype = message(
             self.KIND,
             header=header(ODOM),
-            child_frame_id=ROBOT,
+            child_frame_id=FOOTPRINT,
             pose=message(
-                "geometry_msgs/msg/PoseWithCovariance", pose=_pose(pose), covariance=spread
+                "geometry_msgs/msg/PoseWithCovariance", pose=pose_message(pose), covariance=spread
             ),
             twist=message(
                 "geometry_msgs/msg/TwistWithCovariance",
@@ -171,7 +176,7 @@ class OdometryMessage:
 
     def __call__(self, odometry: Odometry, accumulated: Float | None, dt: float) -> bytearray:
         """``accumulated`` (3, 3) in the odom frame; ``dt`` s since the frame before, 0 at first."""
-        _fill_pose(self._pose, odometry.T_odom_robot)
+        fill_pose(self._pose, odometry.T_odom_robot)
         if odometry.twist is not None:
             vx, vy, omega = odometry.twist.tolist()
             self._twist[0], self._twist[1], self._twist[5] = vx, vy, omega
@@ -192,44 +197,57 @@ class IncrementMessage:
     def __init__(self) -> None:
         marks = Marks()
         pose, spread = marks(7), marks(36)
-        inner = message("geometry_msgs/msg/PoseWithCovariance", pose=_pose(pose), covariance=spread)
-        self._template = Template(self.KIND, message(self.KIND, header=header(ROBOT), pose=inner))
+        inner = message(
+            "geometry_msgs/msg/PoseWithCovariance", pose=pose_message(pose), covariance=spread
+        )
+        self._template = Template(
+            self.KIND, message(self.KIND, header=header(FOOTPRINT), pose=inner)
+        )
         self._pose, self._spread = self._template.view(pose), self._template.view(spread)
         self._spread[:] = 0.0
 
     def __call__(self, stamp_ns: int, T_previous_robot: Float, covariance: Float) -> bytearray:
         """The covariance (3, 3) is in the previous robot frame."""
-        _fill_pose(self._pose, T_previous_robot)
+        fill_pose(self._pose, T_previous_robot)
         self._spread[_PLANAR] = covariance.ravel()
         return self._template.stamp(stamp_ns)
 
 
 class TransformMessage:
-    """tf2_msgs/TFMessage of one planar transform, ``height`` m up."""
+    """tf2_msgs/TFMessage of planar transforms.
+
+    links  (parent, child, m up) of each
+    """
 
     KIND = "tf2_msgs/msg/TFMessage"
 
-    def __init__(self, parent: str, child: str, height: float = 0.0) -> None:
-        numbers = Marks()(7)
-        x, y, z, qx, qy, qz, qw = numbers.tolist()
-        transform = message(
-            "geometry_msgs/msg/Transform",
-            translation=_vector((x, y, z)),
-            rotation=message("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
-        )
-        stamped = message(
-            "geometry_msgs/msg/TransformStamped",
-            header=header(parent),
-            child_frame_id=child,
-            transform=transform,
-        )
-        self._template = Template(self.KIND, message(self.KIND, transforms=[stamped]))
-        self._numbers, self._height = self._template.view(numbers), height
+    def __init__(self, *links: tuple[str, str, float]) -> None:
+        numbers = Marks()(7 * len(links)).reshape(-1, 7)
+        stamped = [_link(parent, child, numbers[k]) for k, (parent, child, _) in enumerate(links)]
+        self._template = Template(self.KIND, message(self.KIND, transforms=stamped))
+        self._numbers = [self._template.view(row) for row in numbers]
+        self._heights = [height for _, _, height in links]
 
-    def __call__(self, stamp_ns: int, T_parent_child: Float) -> bytearray:
-        """The transform at that time."""
-        _fill_pose(self._numbers, T_parent_child, self._height)
+    def __call__(self, stamp_ns: int, *T_parent_child: Float) -> bytearray:
+        """The transforms at that time, in the order of the links."""
+        for view, pose, height in zip(self._numbers, T_parent_child, self._heights, strict=True):
+            fill_pose(view, pose, height)
         return self._template.stamp(stamp_ns)
+
+
+def _link(parent: str, child: str, numbers: Float) -> object:
+    x, y, z, qx, qy, qz, qw = numbers.tolist()
+    transform = message(
+        "geometry_msgs/msg/Transform",
+        translation=_vector((x, y, z)),
+        rotation=message("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
+    )
+    return message(
+        "geometry_msgs/msg/TransformStamped",
+        header=header(parent),
+        child_frame_id=child,
+        transform=transform,
+    )
 
 
 class TruthMessage:
@@ -239,11 +257,11 @@ class TruthMessage:
 
     def __init__(self) -> None:
         numbers = Marks()(7)
-        prototype = message(self.KIND, header=header(WORLD), pose=_pose(numbers))
+        prototype = message(self.KIND, header=header(WORLD), pose=pose_message(numbers))
         self._template = Template(self.KIND, prototype)
         self._pose = self._template.view(numbers)
 
     def __call__(self, stamp_ns: int, T_world_robot: Float) -> bytearray:
         """The true pose at that time."""
-        _fill_pose(self._pose, T_world_robot)
+        fill_pose(self._pose, T_world_robot)
         return self._template.stamp(stamp_ns)

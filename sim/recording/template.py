@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
+from slam.frames import NS_PER_S
+
 _STAMP = (0x5EC0ACED, 0x3ABB0ACE)
+# Time of a bag at second 0 of its simulation: 14 November 2023, 22:13:20 UTC. Readers of ROS take a
+# stamp near 0 for "the latest" or for a clock that nobody has set. Round, so that people see the
+# simulated second in a stamp; the same for every bag, so that bags stay the same bytes.
+EPOCH_NS = 1_700_000_000 * NS_PER_S
 STORE = get_typestore(Stores.ROS2_HUMBLE)  # the types used here are the same in later ones
 
 
@@ -25,8 +31,18 @@ def message(kind: str, **fields: Any) -> Any:
 
 def header(frame_id: str) -> Any:
     """A std_msgs/Header with a stamp that ``Template.stamp`` finds."""
-    stamp = message("builtin_interfaces/msg/Time", sec=_STAMP[0], nanosec=_STAMP[1])
-    return message("std_msgs/msg/Header", stamp=stamp, frame_id=frame_id)
+    return message("std_msgs/msg/Header", stamp=marked_time(), frame_id=frame_id)
+
+
+def marked_time() -> Any:
+    """A builtin_interfaces/Time that ``Template.stamp`` finds."""
+    return message("builtin_interfaces/msg/Time", sec=_STAMP[0], nanosec=_STAMP[1])
+
+
+def time_of(stamp_ns: int) -> Any:
+    """The time of a frame as a bag says it, for the header of a topic of your own."""
+    seconds, nanoseconds = divmod(stamp_ns + EPOCH_NS, NS_PER_S)
+    return message("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
 
 
 class Marks:
@@ -73,8 +89,11 @@ class Template:
         return at + np.arange(marks.shape[1] * marks.itemsize)
 
     def stamp(self, stamp_ns: int) -> bytearray:
-        """Set every stamp of the message; its bytes, valid until the next change."""
-        seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+        """Set every stamp of the message; its bytes, valid until the next change.
+
+        stamp_ns  of the simulation; the message says ``EPOCH_NS`` more
+        """
+        seconds, nanoseconds = divmod(stamp_ns + EPOCH_NS, NS_PER_S)
         for view in self._stamps:
             view[0], view[1] = seconds, nanoseconds
         return self.data

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from sim.moments import Moment
 from sim.recording import messages as ros
+from sim.recording import navigation_messages as nav
 from sim.recording.label_cloud import LabelsMessage
 from sim.recording.objects import ObjectsMessage
 from sim.recording.template import STORE
@@ -16,12 +17,18 @@ from slam.errors import InvalidValueError, UnknownNameError
 Maker = Callable[[Moment], Any]
 F = TypeVar("F", bound=Maker)
 _topics: dict[str, tuple[str, Maker]] = {}
+BEGAN = "/ground_truth/time"  # read by ``slam.logs.bag_topics``, too
 OURS = {  # by name their types, in the order of a bag's connections
+    BEGAN: nav.BeganMessage.KIND,
+    "/clock": nav.ClockMessage.KIND,
+    "/map": nav.MapMessage.KIND,
+    "/initialpose": nav.StartMessage.KIND,
     "/tf_static": ros.TransformMessage.KIND,
     "/tf": ros.TransformMessage.KIND,
     "/odom": ros.OdometryMessage.KIND,
     "/odom_increment": ros.IncrementMessage.KIND,
     "/ground_truth/pose": ros.TruthMessage.KIND,
+    "/ground_truth/tf": ros.TransformMessage.KIND,
     "/ground_truth/objects": ObjectsMessage.KIND,
     "/ground_truth/labels": LabelsMessage.KIND,
     "/scan": ros.ScanMessage.KIND,

@@ -12,7 +12,7 @@ from typing import Literal, cast
 
 from sim.core.versions import not_this_world
 from sim.recording import topics
-from sim.recording.bag import MessageHash
+from sim.recording.bag import FORMAT, FORMATS, MessageHash
 from sim.recording.episode import record
 from sim.recording.rearranged import REARRANGED
 from sim.recording.recipe import RECIPE, Made, Recipe, read_recipe
@@ -162,13 +162,17 @@ def regenerate(folder: Path, *, trust: bool = False) -> Finding:
 
     A difference on another CPU or with other versions is no damage: NumPy, MuJoCo and zstd promise
     the same bits on one machine and one version only. Then the verdict says what is different. An
-    episode of another version of the world is not made: the verdict is "other world".
+    episode of another version of the world, or of another format of bags, is not made: the verdict
+    is "other world".
 
     trust  whether a scene that is code, by the name in the recipe, is run; else that raises
            ``UntrustedNameError``
     """
     made = read_recipe(folder / RECIPE)
     why = not_this_world(made.world)
+    if why:
+        return Finding(episode=folder.name, verdict="other world", why=f"not made again: {why}")
+    why = other_format(made)
     if why:
         return Finding(episode=folder.name, verdict="other world", why=f"not made again: {why}")
     wanted, here = made.result.get("topics", []), topics.names()
@@ -186,6 +190,15 @@ def regenerate(folder: Path, *, trust: bool = False) -> Finding:
     if same:
         return Finding(episode=folder.name, verdict="same bytes")
     return _difference(folder.name, made, str(result.get("messages_sha256")))
+
+
+def other_format(made: Made) -> str:
+    """Why the same frames come out as another bag here, in words; empty where they do not."""
+    there = made.result.get("bag_format", 1)
+    if there == FORMAT:
+        return ""
+    was = FORMATS.get(there, "a newer mobilia made it") if isinstance(there, int) else "unknown"
+    return f"its bag is of format {there!r:.20}, this mobilia writes format {FORMAT} (then: {was})"
 
 
 def _difference(episode: str, made: Made, messages: str) -> Finding:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 import shutil
-from abc import abstractmethod
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import ClassVar
@@ -24,6 +23,7 @@ from slam.guests.limits import Limits
 from slam.trajectory import Trajectory
 
 MOST_BEAMS = 100_000
+SCAN_LIMIT_S = 2.0  # s a scan that a program may take, in the mean; rbpf-slam takes 0.1
 
 
 class MrptSlam(Guest):
@@ -37,8 +37,11 @@ class MrptSlam(Guest):
     """
 
     command: ClassVar[str]
+    config: ClassVar[str]  # the text of its config file; ``{folder}`` is where its logs go
     motion: ClassVar[rawlog.MotionModel]
     columns: ClassVar[tuple[int, int]]  # of its logs of the path and of times, in MRPT 2.5
+    pose_columns: ClassVar[tuple[int, int, int]]  # x, y (m) and yaw (rad) in that of the path
+    ms_column: ClassVar[int]  # in that of times
 
     def __init__(self) -> None:
         found = shutil.which(self.command)
@@ -92,31 +95,21 @@ class MrptSlam(Guest):
         """How far the program's memory grew over the scans, of its last run."""
         return self._growth_bytes
 
-    @abstractmethod
-    def config(self, folder: str) -> str:
-        """The text of its config file; its logs are to go to ``folder``."""
-
-    @abstractmethod
-    def poses(self, rows: Float) -> Float:
-        """(n, 3) m, m, rad of the rows of its log of the path."""
-
-    @abstractmethod
-    def spent(self, rows: Float) -> Float:
-        """(n,) ms of the rows of its log of times."""
-
     def _run(self, folder: Path) -> list[tuple[Estimate, float]]:
         stamps = self._path.trajectory().stamps_ns.tolist()
         with (folder / "frames.rawlog").open("wb") as file:
             for stamp_ns, (increment, ranges) in zip(stamps, self._frames, strict=True):
                 file.write(rawlog.action(stamp_ns, increment, self.motion))
                 file.write(rawlog.sensed(stamp_ns, ranges, self._spec))
-        (folder / "config.ini").write_text(self.config(f"{folder}/log"))
+        (folder / "config.ini").write_text(self.config.format(folder=f"{folder}/log"))
         words = [self._program, f"{folder}/config.ini", f"{folder}/frames.rawlog"]
-        processor_s = program.run(words, Limits.first_s + len(stamps) * Limits.scan_s)
-        path = self.poses(self._log(folder / "log" / "log_estimated_path.txt", self.columns[0]))
+        processor_s = program.run(words, Limits.first_s + len(stamps) * SCAN_LIMIT_S)
+        rows = self._log(folder / "log" / "log_estimated_path.txt", self.columns[0])
+        path = rows[:, self.pose_columns]
         if not np.isfinite(path).all():
             raise SlamFailedError(f"{type(self).__name__} logged a pose that is not finite", "nan")
-        wall_ms = self.spent(self._log(folder / "log" / "log_times.txt", self.columns[1]))
+        rows = self._log(folder / "log" / "log_times.txt", self.columns[1])
+        wall_ms = rows[:, self.ms_column]
         memory = self._log(folder / "log" / "log_MemoryUsage.txt", 2)[:, 1]
         if not np.isfinite([wall_ms, memory]).all():
             raise SlamFailedError(f"{type(self).__name__} logged a time or memory that is not "

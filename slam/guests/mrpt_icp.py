@@ -8,7 +8,6 @@ arena and station, still and at motion 0.5): every scan is matched, by every poi
 
 from __future__ import annotations
 
-from slam.frames import Float
 from slam.guests.mrpt import MrptSlam
 from slam.guests.rawlog import MotionModel
 from slam.system import register
@@ -65,21 +64,12 @@ class IcpSlam(MrptSlam):
     """MRPT's icp-slam, a guest over files: ICP to a map of points, run when the last scan is in."""
 
     command = "icp-slam"
+    config = CONFIG
     columns = (4, 2)
+    pose_columns = (1, 2, 3)  # step, x, y, yaw
+    ms_column = 0  # ms, size of the map
     # not used: it takes odometry's step as the start of its ICP, however sure
     motion = MotionModel(
         m_per_m=0.05, m_per_rad=0.05, rad_per_m=0.05, rad_per_rad=0.05, least_m=0.005,
         least_rad=0.005,
     )  # fmt: skip
-
-    def config(self, folder: str) -> str:
-        """``CONFIG``."""
-        return CONFIG.format(folder=folder)
-
-    def poses(self, rows: Float) -> Float:
-        """Rows: step, x, y, yaw."""
-        return rows[:, 1:4]
-
-    def spent(self, rows: Float) -> Float:
-        """Rows: ms, size of the map."""
-        return rows[:, 0]

@@ -12,7 +12,6 @@ and flew off by tens of metres among movers: it does not weigh odometry.
 
 from __future__ import annotations
 
-from slam.frames import Float
 from slam.guests.mrpt import MrptSlam
 from slam.guests.rawlog import MotionModel
 from slam.system import register
@@ -87,21 +86,12 @@ class RbpfSlam(MrptSlam):
     """MRPT's rbpf-slam, a guest over files: particles with grids, run when the last scan is in."""
 
     command = "rbpf-slam"
+    config = CONFIG
     columns = (8, 4)
+    pose_columns = (1, 2, 4)  # step, x, y, z, yaw, pitch, roll, time: the mean of the particles
+    ms_column = 1  # step, ms, size of the map, whether the scan went into it
     # about three times a Pioneer's own errors
     motion = MotionModel(
         m_per_m=0.05, m_per_rad=0.05, rad_per_m=0.08, rad_per_rad=0.08, least_m=0.01,
         least_rad=0.01,
     )  # fmt: skip
-
-    def config(self, folder: str) -> str:
-        """``CONFIG``: one seed, so that a run repeats itself."""
-        return CONFIG.format(folder=folder)
-
-    def poses(self, rows: Float) -> Float:
-        """Rows: step, x, y, z, yaw, pitch, roll, time: the mean of the particles."""
-        return rows[:, [1, 2, 4]]
-
-    def spent(self, rows: Float) -> Float:
-        """Rows: step, ms, size of the map, whether the scan went into it."""
-        return rows[:, 1]

@@ -15,7 +15,6 @@ from slam.names import child_environment
 
 _CHUNK = 1 << 16
 _KEPT_WORDS = 4000  # bytes of what it prints
-_STATUS_S = 1.0  # from the end of its output to the end of its life
 
 
 def run(command: Sequence[str], limit_s: float) -> float:
@@ -30,15 +29,17 @@ def run(command: Sequence[str], limit_s: float) -> float:
     except (OSError, ValueError) as error:
         raise SlamFailedError(f"cannot start {command[0]!r}: {error}") from error
     try:
-        words = _listened(guard, time.monotonic() + limit_s, limit_s)
-        deadline = time.monotonic() + _STATUS_S
+        deadline = time.monotonic() + limit_s
+        words = _listened(guard, deadline, limit_s)
         while not (status := guard.status()) and time.monotonic() < deadline:
             time.sleep(0.005)
     finally:
         guard.dismiss()
+    if not status:
+        raise SlamFailedError(f"hung: did not end within {limit_s:g} s", "hung")
     if status != "ended with status 0":
         last = " | ".join(text for line in words.splitlines() if (text := " ".join(line.split())))
-        raise SlamFailedError(f"{command[0]!r} {status or 'closed its output'}: {last[-400:]!r}")
+        raise SlamFailedError(f"{command[0]!r} {status}: {last[-400:]!r}")
     return _children_s() - before
 
 

@@ -15,7 +15,17 @@ import numpy as np
 
 from slam.constant_velocity import standing
 from slam.errors import InvalidValueError, LogFormatError
-from slam.frames import NS_PER_S, BeamLabels, Float, Frame, Odometry, Scan, Stream, StreamMetadata
+from slam.frames import (
+    EPOCH,
+    NS_PER_S,
+    BeamLabels,
+    Float,
+    Frame,
+    Odometry,
+    Scan,
+    Stream,
+    StreamMetadata,
+)
 from slam.logs.bag_laser import Laser, mounting
 from slam.logs.bag_odometry import PoseTrack, Stamped, increment_covariance
 from slam.logs.bag_topics import SCAN, Bag, Topics, choose
@@ -53,6 +63,9 @@ def read_bag(
     else from ``time_increment``. The mounting is that of the transforms from the odometry's child
     frame to the scan's frame, or the robot's origin where the bag has none.
 
+    Frames of our own recordings have the stamps of the simulation, from 0 s on;
+    ``metadata.extra[EPOCH]`` is what the bag has more, ns.
+
     A bag without odometry (a scanner carried in the hand) gives frames of a robot at rest, whose
     covariance is that of one that may have moved; ``metadata.odometry`` says so, and ``Replay``
     gives each SLAM the odometry of a constant velocity instead. ``strict`` refuses such a bag.
@@ -63,8 +76,10 @@ def read_bag(
     with Bag(path) as bag:
         topics = choose(bag, scan=scan, odometry=odometry, truth=truth, labels=labels)
         laser = _probe(bag, topics)
+        epoch_ns = _epoch_ns(bag, topics)
         count = bag.topics[topics.scan][1]
         source = "rosbag1" if bag.is_ros1 else "rosbag2"
+    extra: dict[str, Any] = {"file": path.name, "scan": topics.scan, "odometry": topics.odometry}
     repairs = Repairs(path, strict)
     if topics.odometry is None:
         repairs.note(NO_ODOMETRY, "no message of nav_msgs/msg/Odometry", None, count)
@@ -74,9 +89,11 @@ def read_bag(
         laser=laser.spec,
         truth=topics.truth or "",
         odometry=topics.odometry is not None,
-        extra={"file": path.name, "scan": topics.scan, "odometry": topics.odometry},
+        extra=extra | ({EPOCH: epoch_ns} if epoch_ns else {}),
     )
-    return Stream(metadata=metadata, frames=lambda: _frames(path, topics, laser), length=count)
+    return Stream(
+        metadata=metadata, frames=lambda: _frames(path, topics, laser, epoch_ns), length=count
+    )
 
 
 @contextmanager
@@ -92,6 +109,17 @@ def _stamp_ns(message: Any, log_ns: int) -> int:
     """Of the header; drivers that leave it empty get the time of the log."""
     stamp = message.header.stamp
     return int(stamp.sec) * NS_PER_S + int(stamp.nanosec) or log_ns
+
+
+def _epoch_ns(bag: Bag, topics: Topics) -> int:
+    """Time of the bag at second 0 of the simulation that it is of; 0 for every other bag."""
+    if topics.began is None:
+        return 0
+    for _, _, message in bag.messages({topics.began}):
+        with _about(bag.path, f"topic {topics.began}"):
+            simulated = message.time_ref
+            return _stamp_ns(message, 0) - int(simulated.sec) * NS_PER_S - int(simulated.nanosec)
+    return 0
 
 
 def _probe(bag: Bag, topics: Topics) -> Laser:  # noqa: C901 (one branch a kind of file)
@@ -138,10 +166,10 @@ def _frame_name(name: str) -> str:
     return name.lstrip("/")
 
 
-def _frames(path: Path, topics: Topics, laser: Laser) -> Iterator[Frame]:
+def _frames(path: Path, topics: Topics, laser: Laser, epoch_ns: int) -> Iterator[Frame]:
     names = (topics.scan, topics.odometry, topics.truth, topics.increment, topics.labels)
     with Bag(path) as bag:
-        assembly = _Assembly(topics, laser)
+        assembly = _Assembly(topics, laser, epoch_ns)
         for topic, log_ns, message in bag.messages({name for name in names if name}):
             try:
                 assembly.take(topic, log_ns, message)
@@ -158,8 +186,8 @@ def _frames(path: Path, topics: Topics, laser: Laser) -> Iterator[Frame]:
 class _Assembly:
     """Puts together what belongs to one stamp."""
 
-    def __init__(self, topics: Topics, laser: Laser) -> None:
-        self._topics, self._laser = topics, laser
+    def __init__(self, topics: Topics, laser: Laser, epoch_ns: int) -> None:
+        self._topics, self._laser, self._epoch_ns = topics, laser, epoch_ns
         self.waiting: deque[tuple[Scan, int]] = deque()  # scans and when they were logged
         self._odometry, self._truth = PoseTrack(), PoseTrack()
         self._increments: dict[int, Float] = {}
@@ -171,7 +199,7 @@ class _Assembly:
 
     def take(self, topic: str, log_ns: int, message: Any) -> None:
         """One message of one of the topics."""
-        stamp_ns, topics = _stamp_ns(message, log_ns), self._topics
+        stamp_ns, topics = _stamp_ns(message, log_ns) - self._epoch_ns, self._topics
         if topic == topics.scan:
             scan = self._laser.scan(message, stamp_ns)
             if self._last_ns is not None and scan.stamp_ns <= self._last_ns:

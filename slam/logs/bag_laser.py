@@ -159,6 +159,7 @@ def mounting(
     chain = _chain(transforms, robot, laser)
     if chain is None:
         return None
+    chain = [link for link in chain if not _is_identity(link)] or chain[:1]
     if len(chain) == 1:
         t, q = chain[0].translation, chain[0].rotation
         if q.x == 0.0 and q.y == 0.0:
@@ -174,6 +175,11 @@ def mounting(
         ]
     yaw = math.atan2(turn[1][0], turn[0][0])
     return np.array([at[0], at[1], yaw]), turn[2][2] < 0.0
+
+
+def _is_identity(link: Any) -> bool:
+    t, q = link.translation, link.rotation
+    return (t.x, t.y, t.z, q.x, q.y, q.z, q.w) == (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def _chain(transforms: Mapping[tuple[str, str], Any], robot: str, laser: str) -> list[Any] | None:

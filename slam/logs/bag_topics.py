@@ -22,11 +22,13 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 INCREMENT = "geometry_msgs/msg/PoseWithCovarianceStamped"
 POSE = "geometry_msgs/msg/PoseStamped"
 CLOUD = "sensor_msgs/msg/PointCloud2"
+TIME = "sensor_msgs/msg/TimeReference"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 unpacking.bound_rosbags()
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 for _name in TRANSFORMS:  # the library's ROS 1 has none of the two
     ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", _name))
+BEGAN = "/ground_truth/time"  # of our own recordings
 _STORAGE = (".mcap", ".db3", ".bag")
 
 
@@ -136,6 +138,7 @@ class Topics:
     increment: str | None
     labels: str | None
     transforms: tuple[str, ...]
+    began: str | None = None
 
 
 def choose(
@@ -168,6 +171,7 @@ def choose(
         increment=increment if _kind(bag, increment) == INCREMENT else None,
         labels=_labels(bag) if labels else None,
         transforms=tuple(n for n, (kind, _) in sorted(bag.topics.items()) if kind in TRANSFORMS),
+        began=BEGAN if _kind(bag, BEGAN) == TIME else None,
     )
 
 

@@ -14,8 +14,6 @@ from scenes.assembly import room_of
 from scenes.crowd import (
     BY_LEVEL,
     GROUP,
-    MIXES,
-    OTHERS,
     OTHERS_BY_LEVEL,
     ROW,
     Crowd,
@@ -61,7 +59,7 @@ def test_a_crowd_that_does_not_fit_is_refused():
 
 
 def test_counts_grow_with_the_level():
-    for scene in (*MIXES, "any other"):
+    for scene in (*BY_LEVEL, "any other"):
         crowds = [mix(scene, level / 20) for level in range(21)]
         for kind in (field.name for field in fields(Crowd)):
             counts = [getattr(crowd, kind) for crowd in crowds]
@@ -70,7 +68,7 @@ def test_counts_grow_with_the_level():
         for k, crowd in enumerate(BY_LEVEL.get(scene, OTHERS_BY_LEVEL), 1):
             assert crowds[5 * k] == crowd, (scene, k)
         assert crowds[0] == Crowd()
-        assert crowds[-1] == MIXES.get(scene, OTHERS)
+        assert crowds[-1] == BY_LEVEL.get(scene, OTHERS_BY_LEVEL)[-1]
     assert mix("arena", 0.5) == BY_LEVEL["arena"][1]
 
 

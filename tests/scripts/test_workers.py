@@ -136,3 +136,27 @@ def test_what_the_tracker_of_semaphores_finds_left_over_goes_without_a_word():
         [sys.executable, "-c", code], cwd=REPO, capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def grows(item: int) -> int:
+    """A job after which its worker is replaced: it seems to have grown."""
+    from joblib.externals.loky import process_executor
+
+    process_executor._MEMORY_LEAK_CHECK_DELAY = 0.0
+    process_executor._MAX_MEMORY_LEAK_SIZE = -1e12
+    return item
+
+
+def test_a_worker_that_is_replaced_is_not_the_users_business():
+    code = (
+        "from scripts import workers; from tests.scripts.test_workers import grows\n"
+        "assert sorted(workers.each(grows, range(8), jobs=2)) == list(range(8))\n"
+        "import warnings; warnings.warn('another', UserWarning)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120,
+        cwd=REPO, env={**os.environ, "PYTHONPATH": str(REPO)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "A worker stopped" not in done.stderr
+    assert "UserWarning: another" in done.stderr

@@ -16,7 +16,7 @@ PAGE = Path(__file__).resolve().parents[3] / "docs" / "benchmark.md"
 
 PUBLISHED = {
     "tour-guide-v1": "e50d06e0c6a8",
-    "rush-hour-v1": "ba5ebbbae9db",
+    "rush-hour-v1": "1230cd569120",
     "busy-chairs-v1": "107970e75a9d",
     "moving-boards-v1": "edcf765b5bc0",
     "moving-day-v1": "e56db9f29148",

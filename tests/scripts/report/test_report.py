@@ -356,3 +356,43 @@ def test_the_browser_would_notice(tmp_path: Path):
         assert browser.evaluate("document.documentElement.scrollWidth") > 375
         assert any(address.endswith("none.png") for address in browser.requests)
         assert browser.console
+
+
+def other_folder(tmp_path: Path, kind: str) -> Path:
+    folder = tmp_path / kind
+    folder.mkdir()
+    if kind == "dataset":
+        (folder / "dataset.json").write_text("{}")
+    elif kind == "episode":
+        (folder / "recipe.json").write_text('{"recipe": {}}')
+    elif kind != "empty":
+        (folder / "recipe.json").write_text(json.dumps({"command": kind}))
+    if kind == "drive":
+        (folder / "runs.csv").write_text("scene\n")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("kind", "says"),
+    [
+        ("run", "is of mobilia run. A report is about a comparison: mobilia compare --slam"),
+        ("demo", "is of mobilia demo"),
+        ("dataset", "is a dataset of mobilia generate"),
+        ("episode", "is an episode of mobilia generate"),
+        ("drive", "mobilia report COMPARISON --drive"),
+        ("benchmark", "leaderboard.md there is its report"),
+        ("blame", "blame.png there is its report"),
+        ("compare", "is unfinished: the same mobilia compare again goes on"),
+        ("empty", "holds no comparison: mobilia compare --slam A B --out DIR"),
+    ],
+)
+def test_another_folder_is_told_which_verb_is_missing(tmp_path: Path, kind: str, says: str):
+    folder = other_folder(tmp_path, kind)
+    with pytest.raises(LogFormatError, match=re.escape(says)) as told:
+        CliRunner().invoke(cli.app, ["report", str(folder)], catch_exceptions=False)
+    assert str(folder) in str(told.value)
+
+
+def test_what_is_not_there_is_told_the_verb_too(tmp_path: Path):
+    with pytest.raises(LogFormatError, match="no such folder: mobilia compare"):
+        CliRunner().invoke(cli.app, ["report", str(tmp_path / "no")], catch_exceptions=False)

@@ -21,9 +21,10 @@ import typer
 from scripts.verbs.export import export
 from scripts.verbs.generate import generate, sweep
 from scripts.verbs.verify import verify
-from sim.recording.dataset import Plan, writing
+from sim.recording.dataset import Plan, check_dataset, read_plan, writing
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, write_sums
+from sim.recording.template import EPOCH_NS
 from sim.recording.verify import check_hashes, messages_sha256, regenerate
 from slam.errors import InvalidValueError, LogFormatError, MobiliaError, OutputError
 from slam.logs import read_bag, read_carmen
@@ -62,7 +63,7 @@ def whole_episodes(out: Path) -> list[Path]:
 @pytest.fixture(scope="module")
 def serial(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("serial") / "data"
-    generate("arena", out, **SETTINGS)
+    generate(["arena"], out, **SETTINGS)
     return out
 
 
@@ -80,7 +81,7 @@ def test_killed_in_mid_episode_and_started_again_ends_with_the_same_bytes(serial
     out = tmp_path / "data"
     code = (
         "from pathlib import Path; from scripts.verbs.generate import generate\n"
-        f"generate('arena', Path({str(out)!r}), **{SETTINGS})"
+        f"generate(['arena'], Path({str(out)!r}), **{SETTINGS})"
     )
     child = subprocess.Popen([sys.executable, "-c", code], env=environment())
     wait_for(lambda: whole_episodes(out) and list(out.glob(".*.part/*/*.mcap")))
@@ -89,7 +90,7 @@ def test_killed_in_mid_episode_and_started_again_ends_with_the_same_bytes(serial
     assert not (out / SUMS).exists()
     first = whole_episodes(out)[0]
     kept = (first / RECIPE).stat()
-    generate("arena", out, **SETTINGS)
+    generate(["arena"], out, **SETTINGS)
     assert (out / SUMS).read_bytes() == (serial / SUMS).read_bytes()
     assert (first / RECIPE).stat().st_mtime_ns == kept.st_mtime_ns  # not made again
     assert {p.name for p in out.iterdir()} == {*NAMES, SUMS, "dataset.json"}
@@ -179,7 +180,7 @@ def test_a_flipped_bit_is_found_named_and_mended(serial, tmp_path, capsys):
     assert f"{NAMES[1]}.mcap is damaged" in (printed.out + printed.err).replace("\n", "")
     with pytest.raises(LogFormatError, match=NAMES[1]):
         list(read_bag(out / NAMES[1], labels=True))
-    generate("arena", out, **SETTINGS)
+    generate(["arena"], out, **SETTINGS)
     assert (out / SUMS).read_bytes() == (serial / SUMS).read_bytes()
     verify(out)
 
@@ -220,14 +221,14 @@ def test_two_writers_another_plan_and_foreign_files_are_refused(serial, tmp_path
         pass
     before = (serial / SUMS).read_bytes()
     with pytest.raises(OutputError, match="another dataset"):
-        generate("arena", serial, **{**SETTINGS, "seed": 9})
+        generate(["arena"], serial, **{**SETTINGS, "seed": 9})
     assert (serial / SUMS).read_bytes() == before
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("mine")
     with pytest.raises(OutputError, match="no dataset"):
-        generate("arena", tmp_path / "mine", **SETTINGS)
+        generate(["arena"], tmp_path / "mine", **SETTINGS)
     with pytest.raises(OutputError, match=r"thesis\.tex"):
-        generate("arena", tmp_path / "mine" / "thesis.tex", **SETTINGS)
+        generate(["arena"], tmp_path / "mine" / "thesis.tex", **SETTINGS)
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
 
 
@@ -245,11 +246,11 @@ def small_disk(tmp_path) -> Iterator[Path]:
 
 def test_a_full_and_a_read_only_disk_are_named(small_disk):
     with pytest.raises(OutputError, match=f"cannot write .*{NAMES[0]}: No space left"):
-        generate("arena", small_disk / "data", **SETTINGS)
+        generate(["arena"], small_disk / "data", **SETTINGS)
     assert [p.name for p in (small_disk / "data").iterdir()] == ["dataset.json"]
     subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
     with pytest.raises(OutputError, match=r"cannot write .*other: Read-only"):
-        generate("arena", small_disk / "other", **SETTINGS)
+        generate(["arena"], small_disk / "other", **SETTINGS)
 
 
 @pytest.mark.parametrize(
@@ -269,17 +270,17 @@ def test_a_full_and_a_read_only_disk_are_named(small_disk):
 )
 def test_impossible_wishes_are_one_clear_line_and_leave_nothing(change, message, tmp_path):
     with pytest.raises(InvalidValueError, match=message):
-        generate("arena", tmp_path / "data", **{**SETTINGS, **change})
+        generate(["arena"], tmp_path / "data", **{**SETTINGS, **change})
     assert not list(tmp_path.iterdir())
 
 
 def test_an_unknown_scene_scanner_or_cluster_is_refused(tmp_path):
     with pytest.raises(MobiliaError, match="Did you mean 'rplidar_a1'"):
-        generate("arena", tmp_path / "c", **SETTINGS, scanner="lidar")
+        generate(["arena"], tmp_path / "c", **SETTINGS, scanner="lidar")
     with pytest.raises(MobiliaError, match="Did you mean 'arena'"):
-        generate("arenas", tmp_path / "a", **SETTINGS)
+        generate(["arenas"], tmp_path / "a", **SETTINGS)
     with pytest.raises(InvalidValueError, match="no Dask scheduler"):
-        generate("arena", tmp_path / "b", **SETTINGS, cluster="nowhere")
+        generate(["arena"], tmp_path / "b", **SETTINGS, cluster="nowhere")
 
 
 def test_a_sweep_has_both_ends():
@@ -289,7 +290,7 @@ def test_a_sweep_has_both_ends():
 
 def test_twins_share_path_and_odometry_and_differ_in_what_moves(tmp_path):
     out = tmp_path / "data"
-    generate("arena", out, episodes=1, seconds=2.0, seed=2, dynamism=1.0, twins=True)
+    generate(["arena"], out, episodes=1, seconds=2.0, seed=2, dynamism=1.0, twins=True)
     frames = {
         name: list(read_bag(out / f"arena-d1-s0002-{name}"))
         for name in ("dynamic", "semi_static", "static")
@@ -306,12 +307,56 @@ def test_twins_share_path_and_odometry_and_differ_in_what_moves(tmp_path):
     assert regenerate(out / "arena-d1-s0002-static").verdict == "same bytes"
 
 
+def test_one_command_makes_parts_of_several_scenes(tmp_path):
+    out = tmp_path / "data"
+    options = {"seconds": 0.2, "seed": 5, "split": "train:2,test:1", "twins": True}
+    generate(["arena", "corridor"], out, **options)
+    listed = {name: (out / f"{name}.txt").read_text().split() for name in ("train", "test")}
+    folders = sorted(path.parent.name for path in out.glob("*/recipe.json"))
+    assert sorted(listed["train"] + listed["test"]) == folders
+    assert len(folders) == 2 * 3 * 3  # scenes, seeds, twins
+    seeds = {part: {name.split("-s")[1][:4] for name in names} for part, names in listed.items()}
+    assert seeds == {"train": {"0005", "0006"}, "test": {"0007"}}
+    assert all({name.split("-")[0] for name in names} == {"arena", "corridor"}
+               for names in listed.values())  # fmt: skip
+    assert read_plan(out).split == (("train", 2), ("test", 1))
+    assert all(finding.ok for finding in check_dataset(out))
+    first = (out / SUMS).read_bytes()
+    shutil.rmtree(out / listed["test"][0])
+    generate(["arena", "corridor"], out, **options)
+    assert (out / SUMS).read_bytes() == first
+    (out / "test.txt").write_text("arena-d0.5-s0005\n")
+    assert not all(finding.ok for finding in check_dataset(out))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"split": "train"}, "Plan.split must be names with numbers"),
+        ({"split": "train:0"}, "Plan.split must be names with numbers"),
+        ({"split": "train:1,train:2"}, "Plan.split must be names with numbers"),
+        ({"split": "../x:1"}, "Plan.split must be names with numbers"),
+        ({"split": "train:1", "episodes": 3}, "leave --episodes out"),
+        ({"split": "train:2", "sessions": 2}, "Plan.sessions are of one building"),
+    ],
+)
+def test_parts_that_cannot_be_are_told(tmp_path, change, says):
+    with pytest.raises(InvalidValueError, match=says):
+        generate(["arena"], tmp_path / "data", seconds=0.2, **change)
+    with pytest.raises(InvalidValueError, match=r"Plan\.scenes must be different"):
+        generate(["arena", "arena"], tmp_path / "data", seconds=0.2)
+    assert not (tmp_path / "data").exists()
+
+
 def test_exports_are_read_back(serial, tmp_path):
     episode, frames = serial / NAMES[0], list(read_bag(serial / NAMES[0], labels=True))
     export(episode, "tum", tmp_path / "a.tum")
-    poses = read_tum(tmp_path / "a_truth.tum").poses
+    truth, poses = read_tum(tmp_path / "a_truth.tum"), read_tum(episode / "trajectory.tum").poses
+    assert truth.stamps_ns.tolist() == [f.stamp_ns + EPOCH_NS for f in frames]
+    np.testing.assert_array_equal(truth.poses, poses)
     np.testing.assert_allclose(poses, [f.truth for f in frames], atol=1e-9)
-    odometry = read_tum(tmp_path / "a.tum").poses
+    assert not (tmp_path / "a.tum").exists()  # of what, its name would not say
+    odometry = read_tum(tmp_path / "a_odometry.tum").poses
     np.testing.assert_allclose(odometry, [f.odometry.T_odom_robot for f in frames], atol=1e-9)
     export(episode, "carmen", tmp_path / "a.log.gz")
     back = list(read_carmen(tmp_path / "a.log.gz"))
@@ -356,7 +401,7 @@ def test_a_dask_cluster_that_loses_a_worker_makes_the_same_bytes(serial, tmp_pat
             client.wait_for_workers(2, timeout=60)
         killer = threading.Thread(target=kill_in_mid_episode, args=(parts[1], out))
         killer.start()
-        generate("arena", out, **SETTINGS, cluster=address)
+        generate(["arena"], out, **SETTINGS, cluster=address)
         killer.join()
         assert parts[1].poll() == -signal.SIGKILL
     finally:

@@ -37,7 +37,7 @@ def sums(out: Path) -> dict[str, bytes]:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("sessions") / "data"
-    generate("office", out, sessions=N, **SETTINGS)
+    generate(["office"], out, sessions=N, **SETTINGS)
     return out
 
 
@@ -64,7 +64,7 @@ def test_killed_and_started_again_ends_with_the_same_bytes(made, tmp_path):
         time.sleep(0.01)
     child.send_signal(signal.SIGKILL)
     child.wait()
-    generate("office", out, sessions=N, **SETTINGS)
+    generate(["office"], out, sessions=N, **SETTINGS)
     assert sums(out) == sums(made)
 
 
@@ -80,7 +80,7 @@ def test_damage_to_the_truth_is_found_and_made_good(made, tmp_path):
         assert name in whole.why
         assert {found.verdict for found in episodes} == {"whole"}
     (out / CHANGES).write_text("mine")
-    generate("office", out, sessions=N, **SETTINGS)
+    generate(["office"], out, sessions=N, **SETTINGS)
     assert sums(out) == sums(made)
 
 
@@ -127,7 +127,7 @@ def test_a_table_that_is_none_is_refused_by_name(made, tmp_path):
 
 
 def test_what_changes_out_of_sight_during_an_episode_is_written_down(tmp_path):
-    generate("arena", tmp_path / "data", **{**SETTINGS, "seconds": 9.0, "change": 1.0})
+    generate(["arena"], tmp_path / "data", **{**SETTINGS, "seconds": 9.0, "change": 1.0})
     (folder,) = (p for p in (tmp_path / "data").iterdir() if p.is_dir())
     (header, *rows) = csv.reader((folder / REARRANGED).read_text().splitlines())
     assert tuple(header) == COLUMNS

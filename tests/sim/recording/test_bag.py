@@ -23,6 +23,7 @@ from sim.moments import Moment, toured
 from sim.recording.bag import BagWriter, _accumulate
 from sim.recording.messages import turns_of
 from sim.recording.relations import pairs
+from sim.recording.template import EPOCH_NS
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 from slam import create, se2
@@ -31,7 +32,7 @@ from slam.evaluation import metrics
 from slam.frames import NS_PER_S, BeamClass, Frame, LaserSpec, Odometry, Scan
 from slam.logs import read_bag
 from slam.maps import read_map
-from slam.trajectory import read_tum
+from slam.trajectory import Trajectory, read_tum
 
 CUBE, CYLINDER = 1, 3  # of visualization_msgs/Marker
 
@@ -132,6 +133,11 @@ def test_topics_are_standard_messages(decoded, recorded):
         "/odom_increment": ("geometry_msgs/msg/PoseWithCovarianceStamped", n),
         "/tf": ("tf2_msgs/msg/TFMessage", n),
         "/tf_static": ("tf2_msgs/msg/TFMessage", 1),
+        "/clock": ("rosgraph_msgs/msg/Clock", n),
+        "/map": ("nav_msgs/msg/OccupancyGrid", 1),
+        "/initialpose": ("geometry_msgs/msg/PoseWithCovarianceStamped", 1),
+        "/ground_truth/time": ("sensor_msgs/msg/TimeReference", 1),
+        "/ground_truth/tf": ("tf2_msgs/msg/TFMessage", n),
         "/ground_truth/pose": ("geometry_msgs/msg/PoseStamped", n),
         "/ground_truth/objects": ("visualization_msgs/msg/MarkerArray", n),
         "/ground_truth/labels": ("sensor_msgs/msg/PointCloud2", n),
@@ -152,7 +158,7 @@ def test_scans_follow_rep_117_and_the_driver(decoded, recorded):
     spec = recorded.simulation.spec
     stamp = turn.header.stamp.sec * NS_PER_S + turn.header.stamp.nanosec
     first = recorded.moments[0].frame.stamp_ns
-    assert stamp - first == round(spec.beam_time_offsets[1] * 1e9)
+    assert stamp - EPOCH_NS - first == round(spec.beam_time_offsets[1] * 1e9)
     for k, moment in enumerate(recorded.moments):
         ranges = np.array(decoded["/scan"][k][2].ranges, dtype=np.float32)
         assert np.array_equal(ranges, moment.frame.scan.ranges, equal_nan=True)
@@ -167,7 +173,7 @@ def test_objects_stand_where_they_truly_are(decoded, recorded):
     for (_, stamp, array), moment in zip(
         decoded["/ground_truth/objects"], recorded.moments, strict=True
     ):
-        assert stamp == moment.frame.stamp_ns
+        assert stamp == moment.frame.stamp_ns + EPOCH_NS
         assert len(array.markers) == len(movers) - 1
         for marker in array.markers:
             mover = movers[marker.id]
@@ -243,6 +249,7 @@ def test_the_files_beside_the_bag_hold_the_truth(recorded):
     lines = (recorded.path / "relations.txt").read_text().splitlines()
     assert len(lines) == len(pairs(truth)) > 0
     t1, t2, x, y, z, roll, pitch, yaw = map(float, lines[0].split())
+    assert min(t1, t2) >= EPOCH_NS // NS_PER_S
     k1, k2 = (int(np.argmin(np.abs(truth.stamps_ns * 1e-9 - t))) for t in (t1, t2))
     np.testing.assert_allclose((x, y, yaw), se2.between(live[k1], live[k2]), atol=1e-8)
     assert (z, roll, pitch) == (0.0, 0.0, 0.0)
@@ -273,7 +280,9 @@ def test_evo_reads_the_bag_and_the_tum_file(recorded, tmp_path):
     odometry = create("odometry")
     for frame in read_bag(recorded.path):
         odometry.update(frame)
-    ours = metrics.ate(odometry.trajectory(), read_tum(recorded.path / "trajectory.tum")).value
+    truth = read_tum(recorded.path / "trajectory.tum")
+    truth = Trajectory(stamps_ns=truth.stamps_ns - EPOCH_NS, poses=truth.poses)
+    ours = metrics.ate(odometry.trajectory(), truth).value
     assert theirs == pytest.approx(ours, abs=1e-6)
 
 

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is printed where nobody sees a progress bar."""
+
+from __future__ import annotations
+
+import io
+import time
+
+import pytest
+from rich.console import Console
+
+from scripts import console
+
+
+@pytest.fixture
+def printed(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
+    """What a file gets, a line of progress every 50 ms."""
+    file = io.StringIO()
+    monkeypatch.setattr(console, "console", Console(file=file, width=40))
+    monkeypatch.setattr(console, "LINE_EVERY_S", 0.05)
+    return file
+
+
+def wait_for(file: io.StringIO, words: str) -> None:
+    deadline = time.monotonic() + 10.0
+    while words not in file.getvalue():
+        assert time.monotonic() < deadline, file.getvalue()
+        time.sleep(0.01)
+
+
+def test_a_file_gets_lines_while_a_long_step_calls_nothing(printed: io.StringIO):
+    with console.progress() as bar:
+        task = bar.add_task("office \\[x] of a long name and many words", total=100, unit="")
+        wait_for(printed, "office [x] of a long name and many words: 0 s so far")
+        bar.update(task, completed=50, unit="50/100 scans")
+        wait_for(printed, "50/100 scans, 0 s so far")
+        bar.update(task, completed=100, unit="100/100 scans")
+    lines = printed.getvalue().splitlines()
+    assert lines[-1] == "office [x] of a long name and many words: 100/100 scans, 0 s"
+    time.sleep(0.15)
+    assert printed.getvalue().splitlines() == lines  # it is over
+
+
+def test_a_quick_step_is_one_line_and_an_unseen_one_none(printed: io.StringIO):
+    with console.progress() as bar:
+        bar.add_task("hidden", total=0, unit="", visible=False)
+        bar.update(bar.add_task("seen", total=1, unit=""), completed=1)
+    assert printed.getvalue() == "seen: done, 0 s\n"
+
+
+def test_what_counts_nothing_tells_too(printed: io.StringIO):
+    with console.working("measuring [3 rows]"):
+        wait_for(printed, "measuring [3 rows]: 0 s so far\n")
+    told = printed.getvalue()
+    with console.working("quick"):
+        pass
+    assert printed.getvalue() == told
+
+
+def test_it_is_told_every_ten_seconds():
+    assert console.LINE_EVERY_S == 10.0

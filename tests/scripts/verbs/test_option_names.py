@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What cannot be is said by the name of the option that was typed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from scripts.cli import app
+from scripts.option_names import OPTIONS_OF, by_option
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("demo --seconds -3", "--seconds must be > 0 and finite, got -3.0"),
+        ("demo --scan-height 9", "--scan-height must lie in"),
+        ("demo --seed -1", "--seed must be a whole number >= 0, got -1"),
+        ("generate office --seconds -3", "--seconds must be > 0 and at most 86400, got -3.0"),
+        ("generate office --episodes 0", "--episodes must be a whole number from 1"),
+        ("compare --slam odometry --seconds -3", "--seconds must be > 0"),
+        ("compare --slam odometry odometry", "--slam must be one or more, each once"),
+        ("compare --slam odometry --every 0", "--every must be 1 to 1000, got 0"),
+        ("compare --slam odometry --scan-limit -3", "--scan-limit must be > 0 s"),
+        ("drive arena --slam odometry --seconds -3", "--seconds must lie in (0, 10000]"),
+        ("benchmark --slam odometry --seconds -3", "--seconds must be > 0"),
+        ("blame --scene arena --threshold -3", "--threshold must be > 0"),
+    ],
+)
+def test_the_option_is_named_and_no_field(tmp_path: Path, called, words: str, says: str):
+    done = called(*words.split(), "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert says in done.stderr
+    assert not re.search(r"\b[A-Z]\w+\.[a-z]", done.stderr)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_words_stay_as_they_are():
+    options = ("--seconds", "--dynamism")
+    for said in (
+        "Recipe.odometry must be one of a, b",  # the verb has no such option
+        "MatcherConfig.seconds must be > 0",  # no field that an option fills
+        "x.log: no recipe: seconds must be > 0",
+        "--seconds must be > 0",
+    ):
+        assert by_option(said, options) == said
+    said = by_option("Recipe.seconds and Dynamism.motion must be > 0, got 1", options)
+    assert said == "--seconds and Dynamism.motion must be > 0, got 1"
+
+
+def test_every_option_that_a_field_is_said_to_have_is_there():
+    from typer.main import get_command
+
+    verbs = get_command(app).commands.values()
+    there = {name for verb in verbs for one in verb.params for name in one.opts}
+    assert {name for names in OPTIONS_OF.values() for name in names} <= there
