@@ -23,7 +23,6 @@ from slam.system import Raster
 from slam.trajectory import Trajectory
 
 COLORS = {"shunting": "#ce2c3c", "odometry": "#de6e18", "truth": "#168c5a"}
-MOST_PX = 2400  # cells of a picture's longer side: more than any of its pixels
 CHANGED = 0.45  # fainter differences: looks too few to tell
 _LOOK: dict[str, Any] = {
     "font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
@@ -96,29 +95,9 @@ def _extent(raster: Raster) -> tuple[float, float, float, float]:
     return x, x + width * raster.resolution_m, y, y + height * raster.resolution_m
 
 
-def shrunk(raster: Raster, most: int = MOST_PX) -> Raster:
-    """A large raster in fewer cells, each the largest of several: a thin wall stays one."""
-    n = -(-max(raster.values.shape) // most)
-    if n <= 1:
-        return raster
-    stripes = []
-    for first in range(0, raster.values.shape[0], n * 64):  # so that no copy of all is made
-        part = raster.values[first : first + n * 64]
-        padded = np.pad(part, [(0, -size % n) for size in part.shape], constant_values=np.nan)
-        height, width = padded.shape
-        blocks = padded.reshape(height // n, n, width // n, n)
-        stripes.append(np.fmax.reduce(np.fmax.reduce(blocks, axis=3), axis=1))
-    return Raster(
-        values=np.vstack(stripes),
-        resolution_m=n * raster.resolution_m,
-        T_map_origin=raster.T_map_origin,
-    )
-
-
 def draw_raster(ax: Axes, raster: Raster, **look: Any) -> None:
     """A raster as grey values under a plot."""
     look = {"vmax": 1.0, "interpolation": "antialiased", **look}
-    raster = shrunk(raster)
     ax.imshow(np.nan_to_num(raster.values), origin="lower", extent=_extent(raster), cmap="Greys",
               vmin=0.0, **look)  # fmt: skip
 
@@ -186,7 +165,6 @@ def _coloured(ax: Axes, raster: Raster, values: Float, cmap: Any, label: str, pa
 @styled()
 def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float) -> None:
     """The map in the paper's style (Fig. 13): activities coloured, last scan blue, path black."""
-    raster = shrunk(raster)
     faint = np.where(raster.values > 0.02, raster.values, np.nan)
     colors = mpl.colormaps["YlOrRd"].with_extremes(bad="#fafaf8")
     with _over_map(path, raster, track, "Activities of the map") as ax:
@@ -204,6 +182,5 @@ def changes_picture(path: Path, raster: Raster, changes: Changes, track: Traject
             (changes.gone, "Reds", "gone: in long-term memory, seen empty"),
             (changes.appeared, "Greens", "new: not (yet) in long-term memory"),
         ):
-            layer = shrunk(layer)
             thick = maximum_filter(np.nan_to_num(layer.values), size=3)  # a chair's leg: two cells
-            _coloured(ax, layer, np.where(thick > CHANGED, thick, np.nan), cmap, label, 0.02)
+            _coloured(ax, raster, np.where(thick > CHANGED, thick, np.nan), cmap, label, 0.02)
