@@ -97,7 +97,7 @@ class MapsInParts(Protocol):
 
     def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
         """The cells of ``map()`` within xmin, ymin, xmax, ymax, m in the map frame, and their
-        neighbours up to one cell; None where there is no map yet.
+        neighbours up to one cell, NaN where nothing is; None where nothing can be.
         """
 
 

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from scripts.film import draw, panes
+from scripts.film.changed import Changed
 from scripts.film.chart import Bar, ErrorChart, Series
 from scripts.film.close_up import CloseUp, off_by
 from scripts.film.draw import Color, Picture
@@ -23,17 +24,16 @@ from scripts.film.layout import Box, Layout
 from scripts.film.map_pane import SIGMAS, MapPane, Trail
 from scripts.film.map_tiles import LevelMap, MapTiles
 from scripts.film.scan_pane import legend, points_robot
-from scripts.film.view import Bounds, Stage
+from scripts.film.view import Stage
 from slam import se2
 from slam.estimate import Raster
 from slam.frames import NS_PER_S, Float, Frame
-from slam.frontend.seen_space import FREE_WITHOUT_RETURN_M, SeenSpace
+from slam.frontend.seen_space import SeenSpace
 from slam.replay import Replay, Track
 from slam.system import MapsInParts
 
 SEEN_EVERY_NS = 200_000_000  # the areas of neighbouring scans overlap
 MOST_MAPS = 60  # whole ones, of a log
-SWEPT_M = FREE_WITHOUT_RETURN_M + 1.0
 FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn anew
 _OTHERS: tuple[Color, ...] = (draw.RED, draw.BLUE, (122, 63, 176))
 
@@ -48,7 +48,7 @@ class Show:
     duration_s  of the run;   pace  of the film, which shows a part of it
     seen        the space that scans have swept; series, trails  errors and paths by track;
                 unsure  when the primary track did not trust itself
-    changed     where the map may have changed since it was drawn last: xmin, ymin, xmax, ymax, m
+    changed     where the map may have changed since it was drawn last
     """
 
     replay: Replay
@@ -63,7 +63,7 @@ class Show:
     series: dict[str, Series] = field(default_factory=dict)
     trails: dict[str, Trail] = field(default_factory=dict)
     unsure: list[Bar] = field(default_factory=list)
-    changed: Bounds | None = None
+    changed: Changed = field(default_factory=Changed)
     _seen_ns: int = -SEEN_EVERY_NS
     _first: tuple[int, Float | None] | None = None
     _last: Frame | None = None
@@ -112,7 +112,8 @@ class Show:
                 error[2] = se2.wrap(float(error[2]))
             self.series.setdefault(name, Series()).add(seconds, error, estimate.covariance)
         self._note_trust(seconds)
-        self._note_change(frame)
+        if frame.scan is not None and self.stage.bounds is None:
+            self.changed.add(frame.scan, self.track().estimates[-1].T_map_robot)
         return seconds
 
     def paint(self, frame: Frame) -> Picture:
@@ -147,16 +148,6 @@ class Show:
             self.unsure[-1] = replace(before, end_s=seconds)
         else:
             self.unsure.append(Bar(lane="unsure", start_s=seconds, end_s=seconds))
-
-    def _note_change(self, frame: Frame) -> None:
-        """What this scan reached, and what beams without a return may have swept."""
-        here = self.track().estimates[-1].T_map_robot[:2]
-        ends = self.last_points_map if frame.scan is not None else np.zeros((0, 2))
-        around = np.vstack([here - SWEPT_M, here + SWEPT_M, ends])
-        if self.changed is not None:
-            around = np.vstack([around, np.reshape(self.changed, (2, 2))])
-        (x0, y0), (x1, y1) = around.min(axis=0).tolist(), around.max(axis=0).tolist()
-        self.changed = (x0, y0, x1, y1)
 
     def T_view_map(self) -> Float:
         """The map drawn the way the world lies, where that is known; for display only."""
@@ -243,12 +234,12 @@ class _Panes:
             return track.map()
         tiles.fit(self._map.view(show.trails[show.primary], show.T_view_map()).scale)
         rest_s = 0.0 if isinstance(track.system, MapsInParts) else show.duration_s / MOST_MAPS
-        if show.changed is not None and abs(seconds - self._mapped_at) >= rest_s:
+        if abs(seconds - self._mapped_at) >= rest_s:
             self._mapped_at = seconds
-            part = track.map_part(tiles.aligned(show.changed))
-            show.changed = None
-            if part is not None:
-                tiles.put(part)
+            for bounds in show.changed.taken(in_parts=rest_s == 0.0):
+                part = track.map_part(tiles.aligned(bounds))
+                if part is not None:
+                    tiles.put(part)
         return tiles.whole()
 
     def vignette(self, whole: Picture) -> Picture:

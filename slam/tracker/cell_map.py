@@ -124,11 +124,11 @@ class CellMap(abc.ABC):
     def raster_extent(
         self, bounds: tuple[float, float, float, float] | None = None
     ) -> tuple[int, int, int, int] | None:
-        """``extent``, or what of it lies within ``bounds`` (xmin, ymin, xmax, ymax, m).
+        """``extent``, or what lies within ``bounds`` (xmin, ymin, xmax, ymax, m), alive or not.
 
         Raises ``InvalidValueError`` where a raster of it would exceed ``MAX_CELLS``.
         """
-        found = self.extent()
+        found = self.extent() if bounds is None else self._room()
         if found is not None and bounds is not None:
             low = [math.floor(edge / self.cell) for edge in bounds[:2]]
             high = [math.ceil(edge / self.cell) for edge in bounds[2:]]
@@ -143,6 +143,13 @@ class CellMap(abc.ABC):
                     f"raster of {self.cell} m it would have more than {MAX_CELLS} cells"
                 )
         return found
+
+    def _room(self) -> tuple[int, int, int, int] | None:
+        """Cell indices as of ``extent``, of all places where a block may live."""
+        (rows, columns), (i0, j0) = self.cells.directory.shape, self.cells.corner.tolist()
+        if not rows or not columns:
+            return None
+        return i0 * SIDE, j0 * SIDE, (i0 + columns) * SIDE, (j0 + rows) * SIDE
 
     def bytes_per_neuron(self) -> float:
         """Bytes of every array, unused slots and directory included, per cell that is alive."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scripts.film.changed import Changed
 from scripts.film.encode import LAPSE_FPS, MOST_PICTURES, Pace
 from scripts.film.map_pane import View, raster_picture
 from scripts.film.map_tiles import TILE, MapTiles
@@ -86,7 +87,8 @@ def test_the_parts_of_a_slam_are_those_of_its_map():
     stream = frames(World2D(office()), office_loop(), rate_hz=5.0, spec=laser(181))[:40]
     for name in ("shunting", "occupancy"):
         track = Track(name, create(name))
-        assert track.map_part((0.0, 0.0, 1.0, 1.0)) is None
+        empty = track.map_part((0.0, 0.0, 1.0, 1.0))
+        assert empty is None or np.isnan(empty.values).all()
         assert track.survive(stream) is None
         assert isinstance(track.system, MapsInParts)
         whole, part = track.map(), track.map_part((1.0, -0.5, 4.0, 2.0))
@@ -124,3 +126,37 @@ def test_the_film_of_a_long_log_has_a_bounded_number_of_pictures():
     assert (short.speed, short.fps) == (1.0, 10.0)
     assert Pace.of_log(10.0, 375).fps == 30.0
     assert Pace.of_log(0.0, 1).due(0.0) == 1
+
+
+def test_what_scans_changed_is_all_that_a_film_must_draw():
+    """Parts drawn a few scans at a time end as the whole map does."""
+    stream = frames(World2D(office()), office_loop(), rate_hz=4.0, spec=laser(181))[:60]
+    track, tiles, changed = Track("shunting", create("shunting")), MapTiles(), Changed()
+    drawn = 0
+    for k, frame in enumerate(stream):
+        track.take(frame)
+        changed.add(frame.scan, track.estimates[-1].T_map_robot)
+        if k % 7 == 0 or k == len(stream) - 1:
+            for bounds in changed.taken():
+                part = track.map_part(tiles.aligned(bounds))
+                drawn += part.values.size
+                tiles.put(part)
+    whole = MapTiles()
+    whole.put(track.map())
+    one, other = tiles.whole(), whole.whole()
+    view = View.fitting((-3.0, -3.0, 25.0, 15.0), 900, 600)
+    same = raster_picture(one, view, np.zeros(3)) == raster_picture(other, view, np.zeros(3))
+    assert same.mean() > 0.9999
+    assert list(changed.taken()) == []
+    assert drawn < 10 * track.map().values.size
+
+
+def test_runs_of_squares_cover_each_once():
+    changed = Changed()
+    changed._squares = {(0, 0), (0, 1), (0, 3), (1, 3), (-1, -2)}
+    assert list(changed.taken()) == [
+        (-8.0, -4.0, -4.0, 0.0), (0.0, 0.0, 8.0, 4.0),
+        (12.0, 0.0, 16.0, 4.0), (12.0, 4.0, 16.0, 8.0),
+    ]  # fmt: skip
+    changed._squares = {(0, 0), (2, 3)}
+    assert list(changed.taken(in_parts=False)) == [(0.0, 0.0, 16.0, 12.0)]
