@@ -203,7 +203,7 @@ class ErrorChart:
 
     def _y_heading(self, radians: Float, reach: float) -> Float:
         box = self._heading
-        level = np.clip(np.degrees(radians) / reach, -9.0, 9.0)  # drawn only as far as the box goes
+        level = np.clip(np.degrees(radians) / reach, -1.0, 1.0)  # beyond the axis: along its edge
         y: Float = box.height * 0.5 * (1.0 - level)
         return y
 
@@ -226,7 +226,7 @@ class ErrorChart:
         for name, one in self._in_order(series):
             self._curve(picture, box, name, one, self._y_heading(one.thinned("heading"), reach))
         known = {n: s.heading[-1] for n, s in series.items() if s.heading}
-        words = {name: f"{math.degrees(h):+.2f}°" for name, h in known.items() if h == h}
+        words = {name: _turned(math.degrees(h), reach) for name, h in known.items() if h == h}
         degrees = math.degrees(own.claimed_rad[-1]) if own.claimed_rad else 0.0
         self._say(picture, box, "heading error", words, f"±2 σ it claims: {degrees:.2f}°")
 
@@ -287,6 +287,12 @@ def _largest(column: array[float], least: float = math.nan) -> float:
 def _window(picture: Picture, box: Box) -> Picture:
     """A view of that part of the picture: what is drawn into it ends at its edges."""
     return picture[box.y : box.y + box.height + 1, box.x : box.x + box.width + 1]
+
+
+def _turned(degrees: float, reach: float) -> str:
+    """A heading error; with an arrow where it is beyond the axis, along whose edge it is drawn."""
+    beyond = "" if abs(degrees) <= reach else " ↑" if degrees > 0.0 else " ↓"
+    return f"{degrees:+.2f}°{beyond}"
 
 
 def _faint(color: Color) -> Color:

@@ -23,7 +23,7 @@ from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.layout import Box, Layout
 from scripts.film.map_pane import SIGMAS, MapPane, Trail
 from scripts.film.map_tiles import LevelMap, MapTiles
-from scripts.film.scan_pane import legend, points_robot
+from scripts.film.scan_pane import LEGEND, legend, points_robot
 from scripts.film.view import Stage
 from slam import se2
 from slam.estimate import Raster
@@ -75,6 +75,18 @@ class Show:
             return draw.ORANGE if name == "odometry" else draw.GREEN
         others = [other for other in self.replay.tracks if other != "odometry"]
         return _OTHERS[others.index(name) % len(_OTHERS)]
+
+    def named(self) -> list[tuple[str, Color]]:
+        """Whose colour is which: the tracks, then the truth where there is one."""
+        known = (
+            [(self.truth_name, draw.GREEN)] if "truth" in self.trails and self.truth_name else []
+        )
+        return [(name, self.color(name)) for name in self.replay.tracks] + known
+
+    def legend(self) -> list[tuple[str, Color]]:
+        """The same for a strip, with what the colours of the beams say."""
+        beams = LEGEND if self.stage.labelled else ()
+        return self.named() + [(f"scan: {word}", color) for word, color in beams]
 
     def seconds(self, frame: Frame) -> float:
         """s since the first frame noted."""
@@ -307,9 +319,7 @@ class _Panes:
         """Which colour is whose, from the right."""
         show, unit = self._show, self._layout.unit
         size, x = round(13 * unit), self._layout.size[0] - round(16 * unit)
-        known = show.truth_name if "truth" in show.trails else ""
-        named = [(n, show.color(n)) for n in show.replay.tracks]
-        for word, color in reversed([*named, *([(known, draw.GREEN)] if known else [])]):
+        for word, color in reversed(show.named()):
             x -= draw.text_width(word, size, bold=True)
             draw.text(canvas, word, (x, round(14 * unit)), size, color, bold=True)
             bar, y = round(18 * unit), round(21 * unit)
