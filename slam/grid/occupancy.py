@@ -177,9 +177,11 @@ class Grid(CellMap):
             self.release()
         return result
 
-    def probabilities(self) -> Raster | None:
-        """p of every cell that was ever seen, NaN elsewhere."""
-        extent = self.raster_extent()
+    def probabilities(
+        self, bounds: tuple[float, float, float, float] | None = None
+    ) -> Raster | None:
+        """p of every cell that was ever seen, NaN elsewhere; within ``bounds``, m, or all."""
+        extent = self.raster_extent(bounds)
         if extent is None:
             return None
         i0, j0, i1, j1 = extent
@@ -221,3 +223,9 @@ class OccupancySlam(Tracker):
         grid = self.cell_map
         assert isinstance(grid, Grid)
         return grid.probabilities()
+
+    def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
+        """The same within xmin, ymin, xmax, ymax, m; None for an empty grid."""
+        grid = self.cell_map
+        assert isinstance(grid, Grid)
+        return grid.probabilities(bounds)
