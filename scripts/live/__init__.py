@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The live view: a running world or a log, served over the Foxglove WebSocket (extra ``live``)."""
