@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
-from scripts.live.requests import FASTEST, SLOWEST, OnView, Run, Seek, Speed, Step
+from scripts.live import FASTEST, SLOWEST
+from scripts.live.requests import OnView, Run, Seek, Speed, Step
 from scripts.live.session import Shown
 from slam.errors import InvalidValueError, MobiliaError
 

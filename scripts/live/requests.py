@@ -21,7 +21,6 @@ MOST_LETTERS = 100  # of a name
 FAR_M = 1e6  # no place of a scene is farther away
 MOST_TWIST = 1e3  # m/s and rad/s; the drive clips to what it can do
 MOST_SCANS = 1000  # of a step
-SLOWEST, FASTEST = 0.05, 20.0  # of the view, as a factor of real time
 
 
 @dataclass(frozen=True, kw_only=True)

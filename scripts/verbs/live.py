@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from scripts.console import console, note
 from scripts.knobs import Change, CrowdOption, Held, Motion
+from scripts.live import FASTEST, SLOWEST
 from scripts.names import check
 from scripts.scanner_option import Scanner
 from slam.errors import InvalidValueError
@@ -65,6 +66,8 @@ def live(
     path = _file(scene, log, bag)
     if not 0 <= port <= 65535:
         raise InvalidValueError(f"--port must lie in 0..65535, got {port}")
+    if not SLOWEST <= speed <= FASTEST:
+        raise InvalidValueError(f"--speed must lie in [{SLOWEST:g}, {FASTEST:g}], got {speed:g}")
     slams = list(with_set(slam or ["shunting"], set_ or []))
     check(slams, scene)
     from scripts.live import opened, sdk
