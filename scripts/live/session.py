@@ -128,17 +128,20 @@ class Session:
     room       of a simulation, None for a log
     primary    the track whose map is shown
     paths      (n, 2) m in the map frame, by track and "truth": where it was at each frame
+    pending    what is to be said with the next frame
+    speed      of the view: a faster one gets fewer maps in a second of the run
     """
 
     def __init__(self, stream: Stream, replay: Replay, room: Room | None = None) -> None:
         self.replay, self.room, self.primary = replay, room, primary_of(replay)
         self.paths: dict[str, Path] = {name: Path() for name in (*replay.tracks, "truth")}
         self._stream = stream
-        self._map_ns = self._events_ns = -BIG_MAP_NS
+        self._map_ns = self._events_ns = -EPOCH_NS
         self._raster: Raster | None = None
         self._landmarks: Landmarks | None = None
         self._sure = True
-        self.pending: list[Said] = []  # to be said with the next frame
+        self.pending: list[Said] = []
+        self.speed = 1.0
 
     def run(self) -> Iterator[Shown]:
         """All frames of the stream."""
@@ -173,7 +176,8 @@ class Session:
 
     def _map(self, stamp_ns: int) -> None:
         cells = 0 if self._raster is None else self._raster.values.size
-        if stamp_ns - self._map_ns < (MAP_NS if cells <= BIG_MAP_CELLS else BIG_MAP_NS):
+        period_ns = MAP_NS if cells <= BIG_MAP_CELLS else BIG_MAP_NS
+        if stamp_ns - self._map_ns < period_ns * max(1.0, self.speed):
             return
         track, self._map_ns = self.replay.tracks[self.primary], stamp_ns
         self._raster, self._landmarks = track.map(), track.landmarks()

@@ -39,6 +39,7 @@ class View:
         listener.state = self._state
         self._first_ns = shown_ns[0]
         self._server = server.start(sdk, self._publisher, listener, self._inbox, address, shown_ns)
+        session.speed = playback.speed
         self._due: Shown | None = None
         self._told_end = False
 
@@ -92,6 +93,7 @@ class View:
     def _on_view(self, request: OnView) -> str:
         playback, seeks = self._playback, isinstance(request, Seek)
         done = playback.do(request)
+        self.session.speed = playback.speed
         self._pace.restart()
         if seeks:
             self._due = None

@@ -16,8 +16,10 @@ from scripts.live.requests import Drive, Kidnap, MoveDoor, Push, Touch
 from scripts.live.session import EPOCH_NS, Path, stamps_of
 from scripts.verbs.live import LAYOUT
 from sim.moments import toured
+from sim.recording.episode import record
+from sim.recording.recipe import Recipe
 from sim.simulation import Simulation
-from slam.errors import InvalidValueError, UnknownNameError
+from slam.errors import InvalidValueError, NeedsLabelsError, UnknownNameError
 from slam.frames import Frame
 
 SETTINGS = {"scene": "arena", "dynamism": 0.5, "labels": True}
@@ -76,15 +78,20 @@ def test_a_click_pushes_what_is_there_in_either_frame_and_nothing_far_away():
         hands.do(Kidnap(goal="moon"))
 
 
-def test_a_log_is_shown_with_its_own_stamps(tmp_path):
-    log = tmp_path / "made.log"
+def carmen(n: int) -> str:
+    """n scans of a wall around a robot that drives 5 cm a scan, 5 a second."""
     ranges = " ".join(["2.00"] * 180)
     lines = []
-    for k in range(12):
+    for k in range(n):
         t, x = 1_100_000_000.0 + 0.2 * k, 0.05 * k
         pose = f"{x:.3f} 0.0 0.0 {x:.3f} 0.0 0.0"
         lines.append(f"FLASER 180 {ranges} {pose} {t:.6f} host {0.2 * k:.6f}\n")
-    log.write_text("".join(lines))
+    return "".join(lines)
+
+
+def test_a_log_is_shown_with_its_own_stamps(tmp_path):
+    log = tmp_path / "made.log"
+    log.write_text(carmen(12))
     session, (first_ns, last_ns) = opened.of_file(["odometry"], log)
     shown = list(session.run())
     assert [moment.number for moment in shown] == list(range(12))
@@ -125,3 +132,22 @@ def test_the_layout_names_topics_and_services_that_there_are():
         if name.startswith("CallService"):
             service = panel["serviceName"].lstrip("/")
             SERVICES[service].read(service, panel["requestPayload"].encode())
+
+
+def test_a_bag_is_shown_with_its_truth_and_labels(tmp_path):
+    recipe = Recipe(scene="arena", dynamism=0.5, seed=3, seconds=0.4)
+    record(recipe, tmp_path)
+    (bag,) = tmp_path.iterdir()
+    session, _ = opened.of_file(["odometry"], bag)
+    shown = list(session.run())
+    assert len(shown) > 10
+    assert shown[0].frame.labels is not None
+    assert shown[-1].truth_map is not None
+    assert shown[-1].errors("odometry")["position_m"] == pytest.approx(0.0, abs=0.05)
+
+
+def test_an_oracle_needs_labels(tmp_path):
+    log = tmp_path / "made.log"
+    log.write_text(carmen(3))
+    with pytest.raises(NeedsLabelsError, match=r"made.log has no labels"):
+        opened.of_file(["oracle(shunting)"], log)
