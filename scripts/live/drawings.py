@@ -19,7 +19,7 @@ from slam.estimate import Landmarks, Raster
 from slam.frames import NS_PER_S, Float, Frame, Scan
 from slam.maps import raster_image
 
-LIFT_M = 0.02  # of lines above the floor, that they are seen
+LIFT_M = 0.02  # of lines above the floor, that they are seen; the map lies halfway
 ARROW_M = 0.6
 RING = 36  # corners of an ellipse
 _BYTES = ("red", "green", "blue", "alpha", "label")  # of a point, after x, y, z
@@ -118,7 +118,7 @@ class Drawings:
         names = ("red", "green", "blue", "alpha")
         side = raster.resolution_m
         return self._m.Grid(
-            timestamp=stamp, frame_id="map", pose=self.pose(raster.T_map_origin, -LIFT_M),
+            timestamp=stamp, frame_id="map", pose=self.pose(raster.T_map_origin, 0.5 * LIFT_M),
             column_count=width, cell_size=self._m.Vector2(x=side, y=side),
             row_stride=4 * width, cell_stride=4, data=cells.tobytes(),
             fields=[

@@ -7,7 +7,7 @@ from typing import Any
 
 from scripts import interrupt
 from scripts.live import server
-from scripts.live.inbox import Inbox
+from scripts.live.inbox import MOST_WAITING, Inbox
 from scripts.live.pace import Pace
 from scripts.live.playback import Playback
 from scripts.live.publisher import Publisher
@@ -53,9 +53,12 @@ class View:
         self._server.stop()
 
     def turn(self) -> None:
-        """Once round: a request, or the next moment when it is due."""
+        """Once round: what clients ask for, then the next moment when it is due."""
         interrupt.check()
         playback = self._playback
+        for _ in range(MOST_WAITING):  # all that wait, lest twists grow old where scans are slow
+            if not self._wait(0.0):
+                break
         self._tell_refused()
         if self._due is None and not playback.resting:
             self._due = playback.advance()

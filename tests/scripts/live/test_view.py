@@ -44,7 +44,7 @@ def view() -> Iterator[View]:
 
 @pytest.fixture
 def client(view: View) -> Iterator[Client]:
-    pytest.importorskip("websockets")
+    pytest.importorskip("websockets", reason="needs a WebSocket client")
     with Client.of(f"ws://127.0.0.1:{view.port}") as client:
         client.subscribe(
             "/playback", "/world", "/truth/pose", "/scan/points", "/tf", "/odometry/errors"
