@@ -25,6 +25,7 @@ from scripts.verbs.drive import drive
 from scripts.verbs.export import export
 from scripts.verbs.generate import generate
 from scripts.verbs.listing import listing
+from scripts.verbs.live import live
 from scripts.verbs.render import render
 from scripts.verbs.report import report
 from scripts.verbs.reproduce import reproduce
@@ -63,6 +64,7 @@ app.command("compare", cls=ManyValues)(compare)
 app.command("benchmark", cls=ManyValues)(benchmark)
 app.command("drive", cls=ManyValues)(drive)
 app.command("blame", cls=ManyValues)(blame)
+app.command("live", cls=ManyValues)(live)
 app.command("report", cls=Verb)(report)
 
 
