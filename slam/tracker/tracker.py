@@ -67,6 +67,7 @@ class Tracker(abc.ABC):
         self._odometry_noise = OdometryNoise.of_beams(self.config)
         self._quality = TrackingQuality(self.config.freeze_below, self._numbers.quality)
         self._relocalisation: Relocalisation | None = None
+        self._suspected: Relocalisation | None = None  # while frozen
         self._loops = Loops(self.config, self._matcher, self._new_submap)
         self._standing = Standing(self.config.standing)
         self._agreement = Agreement(self.config.standing)
@@ -166,17 +167,20 @@ class Tracker(abc.ABC):
         good = numbers.good_share * self._quality.usual_match()
         poor = numbers.widest_share * good
         vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > numbers.vague_cells * self.config.cell_m
+        around = self._matcher.around(self.cell_map)
         for window, wanted in ((near, vague or match.matched < good), (widest, True)):
             if not wanted or (window is widest and match.matched >= poor):
                 break
-            found = self._matcher.search(self.cell_map, observations, predicted, precision, window)
+            found = self._matcher.search(
+                self.cell_map, observations, predicted, precision, window, around
+            )
             if found.score > match.score:
                 match = found
         if match.matched >= poor or not self._quality.is_worth_searching_near():
             return match
         everyone = replace(observations, votes=None)
         usual = self._quality.usual_whole()
-        shoved = slipped(self.cell_map, self._matcher, everyone, prediction, usual)
+        shoved = slipped(self.cell_map, self._matcher, everyone, prediction, usual, around)
         return match if shoved is None else shoved
 
     def _recover(
@@ -229,9 +233,9 @@ class Tracker(abc.ABC):
         quality.count(denied)
         if denied and quality.scans <= quality.config.patience:
             self.cell_map.release()
-            if quality.scans >= quality.config.lost_after and quality.suspicious:
-                self._relocalisation = Relocalisation(self.cell_map, self._matcher)
+            self._suspect(observations, prediction)
             return "lost" if quality.scans > quality.config.lost_after else "frozen"
+        self._suspected = None
         confirmed, contradicted, _ = self.cell_map.integrate(
             observations.view, T_map_laser, step, write=True
         )
@@ -241,6 +245,16 @@ class Tracker(abc.ABC):
             elapsed = prediction.elapsed
             quality.learn(match.matched, confirmed, contradicted, elapsed, match.overlapped)
         return "lost" if denied else "tracking"
+
+    def _suspect(self, observations: Observations, prediction: Prediction) -> None:
+        """The frame is denied: begin to search the map, and from some such frames on be lost."""
+        quality = self._quality
+        if not quality.suspicious:
+            return
+        suspected = self._suspected or Relocalisation(self.cell_map, self._matcher)
+        suspected.look(observations, prediction)
+        lost = quality.scans >= quality.config.lost_after
+        self._relocalisation, self._suspected = (suspected, None) if lost else (None, suspected)
 
     def _update_uncertainty(
         self,

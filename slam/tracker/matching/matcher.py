@@ -14,7 +14,7 @@ from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import inverted, turned
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
-from slam.tracker.matching.local_search import SearchWindow, search
+from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import Climb, Reward, Seen, refine
 
 
@@ -197,11 +197,19 @@ class Matcher:
         prediction: Float,
         precision: Float,
         window: SearchWindow,
+        around: Around | None = None,
     ) -> Match:
-        """The best optimum in ``window`` about the prediction: branch and bound, then climb."""
+        """The best optimum in ``window`` about the prediction: branch and bound, then climb.
+
+        ``around``: what searches of the same frame laid out before.
+        """
         start, evaluations = search(
             cell_map, self.reward.short_term, observations, prediction, precision,
-            window, self.config.reward,
+            window, self.config.reward, around,
         )  # fmt: skip
         match = self.climb(cell_map, observations, start, prediction, precision)
         return replace(match, searched=True, evaluations=evaluations)
+
+    def around(self, cell_map: CellMap) -> Around:
+        """For several searches of one frame."""
+        return Around(cell_map, self.reward.short_term)

@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("6a6b85d26cc9", "21d5ed1d8e93")),
-        (OccupancyConfig, ["grid"], ("d1cf5d066f58", "98d785d5e92b")),
+        (ShuntingConfig, [], ("2e6f1766b191", "6913d6a9334f")),
+        (OccupancyConfig, ["grid"], ("22bf1d8010ad", "dac2f04b2851")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
