@@ -32,11 +32,15 @@ from slam.tracker.standing.recent import Standing
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.quality import TrackingQuality
 from slam.tracker.tracking.relocalise import Relocalisation, coarse, slip, slipped
+from slam.tracker.tracking.wake import Wake
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
 from slam.tracker.uncertainty.residuals import Evidence, look
 from slam.tracker.warmup import warm_up
 from slam.trajectory import Trajectory
+
+
+OUT = 2.0
 
 
 class Tracker(abc.ABC):
@@ -68,6 +72,7 @@ class Tracker(abc.ABC):
         self._quality = TrackingQuality(self.config.freeze_below, self._numbers.quality)
         self._relocalisation: Relocalisation | None = None
         self._suspected: Relocalisation | None = None  # while frozen
+        self._wake: Wake | None = None  # while frozen or lost
         self._loops = Loops(self.config, self._matcher, self._new_submap)
         self._standing = Standing(self.config.standing)
         self._agreement = Agreement(self.config.standing)
@@ -101,12 +106,12 @@ class Tracker(abc.ABC):
         self._vote = float(votes.mean()) if len(votes) else 1.0
         prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
         evidence = self._compare(observations, match, prediction, state)  # 4 residuals
-        state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
+        match, state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
         self._update_uncertainty(
             observations, prediction, match, evidence, state
         )  # 6 pose, odometry noise
         self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
-        if state == "tracking":
+        if state == "tracking" or self._wake is not None:
             self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
         return self._report(frame, match, state)
 
@@ -150,29 +155,31 @@ class Tracker(abc.ABC):
         if self._relocalisation is not None:
             match, state = self._recover(self._relocalisation, observations, prediction)
             return prediction, match, state
-        match = _near(self._match(observations, prediction), prediction)
+        match = _near(self._match(observations, prediction, self.cell_map), prediction)
         if match.slipped:
             prediction = replace(prediction, covariance=slip(self._numbers.relocalise))
         return prediction, match, "tracking"
 
-    def _match(self, observations: Observations, prediction: Prediction) -> Match:
+    def _match(
+        self, observations: Observations, prediction: Prediction, cell_map: CellMap
+    ) -> Match:
         """Climb from the prediction; search around it when that is vague or finds too little."""
         predicted = prediction.T_map_robot
         prior = prediction.prior
         precision = inverted(prior)
-        start = self._matcher.approach(self.cell_map, observations, predicted, prior)
-        match = self._matcher.climb(self.cell_map, observations, start, predicted, precision)
+        start = self._matcher.approach(cell_map, observations, predicted, prior)
+        match = self._matcher.climb(cell_map, observations, start, predicted, precision)
         numbers = self.config.matching.local
         near, widest = SearchWindow.about(prior, numbers), SearchWindow.widest(numbers)
         good = numbers.good_share * self._quality.usual_match()
         poor = numbers.widest_share * good
         vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > numbers.vague_cells * self.config.cell_m
-        around = self._matcher.around(self.cell_map)
+        around = self._matcher.around(cell_map)
         for window, wanted in ((near, vague or match.matched < good), (widest, True)):
             if not wanted or (window is widest and match.matched >= poor):
                 break
             found = self._matcher.search(
-                self.cell_map, observations, predicted, precision, window, around
+                cell_map, observations, predicted, precision, window, around
             )
             if found.score > match.score:
                 match = found
@@ -180,28 +187,54 @@ class Tracker(abc.ABC):
             return match
         everyone = replace(observations, votes=None)
         usual = self._quality.usual_whole()
-        shoved = slipped(self.cell_map, self._matcher, everyone, prediction, usual, around)
+        shoved = slipped(cell_map, self._matcher, everyone, prediction, usual, around)
         return match if shoved is None else shoved
 
     def _recover(
         self, recovery: Relocalisation, observations: Observations, prediction: Prediction
     ) -> tuple[Match, str]:
         """Dead reckoning, until one hypothesis alone explains what is seen."""
+        prediction = self._go_on(observations, prediction)
+        observations = replace(observations, votes=None)  # they are of another place
         predicted = prediction.T_map_robot
         precision = inverted(prediction.prior)
-        observations = replace(observations, votes=None)  # they are of another place
         here = self._matcher.climb(self.cell_map, observations, predicted, predicted, precision)
-        match = recovery.step(observations, prediction, here, self._quality.usual_whole())
+        carried = self._wake is None or self._wake.carried
+        if not carried and self._wake.agreed_s >= OUT:
+            self.cell_map = self._wake.map
+            self._relocalisation = self._wake = None
+            self._quality.count(False)
+            return unmatched(predicted, matched=here.matched, score=here.score), "relocated"
+        usual = self._quality.usual_whole()
+        match = recovery.step(observations, prediction, here, usual, carried=carried)
         if match is not None:
-            self._relocalisation = None
+            if self._wake is not None and recovery.went_on:
+                self.cell_map = self._wake.map
+            self._relocalisation = self._wake = None
             self._quality.count(False)
             self._pose_covariance.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
         if recovery.elapsed_s > self._numbers.quality.give_up_s:
             # elsewhere: go on from here, as on the first frame
-            self._relocalisation = None
+            self._relocalisation = self._wake = None
             self._quality.give_up()
         return unmatched(predicted, matched=here.matched, score=here.score), "lost"
+
+    def _go_on(self, observations: Observations, prediction: Prediction) -> Prediction:
+        """The pose on the wake's map, where the scan agrees with it; else by odometry."""
+        wake = self._wake
+        if wake is None:
+            return prediction
+        enough = float(observations.weights.sum()) >= self._numbers.relocalise.least_weight
+        match = self._match(observations, prediction, wake.map) if enough else None
+        if match is not None and match.matched >= self._quality.least_continuous():
+            increment = se2.between(self._T_map_robot, match.T_map_robot)
+            prediction = replace(prediction, T_map_robot=match.T_map_robot, increment=increment)
+        wake.carried |= match is not None and match.matched < self._quality.least_continuous()
+        agreed = match is not None and not self._quality.arises(match.matched)
+        wake.agreed_s = wake.agreed_s + prediction.elapsed if agreed else 0.0
+        wake.add(observations, prediction.T_map_robot, prediction.elapsed)
+        return prediction
 
     def _compare(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
@@ -215,10 +248,10 @@ class Tracker(abc.ABC):
 
     def _update_map(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
-    ) -> str:
-        """Let the map see the frame, unless the map in view contradicts it; the state."""
+    ) -> tuple[Match, str]:
+        """Let the map see the frame, unless the map in view contradicts it; match and state."""
         if state != "tracking":
-            return state
+            return match, state
         rasterise(self.cell_map, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
         step = min(prediction.elapsed, self.config.map.longest_look_s)
@@ -233,18 +266,29 @@ class Tracker(abc.ABC):
         quality.count(denied)
         if denied and quality.scans <= quality.config.patience:
             self.cell_map.release()
+            match = self._doubt(observations, prediction, match)
             self._suspect(observations, prediction)
-            return "lost" if quality.scans > quality.config.lost_after else "frozen"
-        self._suspected = None
+            return match, "lost" if quality.scans > quality.config.lost_after else "frozen"
+        self._suspected = self._wake = None
         confirmed, contradicted, _ = self.cell_map.integrate(
             observations.view, T_map_laser, step, write=True
         )
         if len(observations.points_robot) == 0:
-            return "lost" if denied else "blind"  # odometry alone
+            return match, "lost" if denied else "blind"  # odometry alone
         if not denied:
             elapsed = prediction.elapsed
             quality.learn(match.matched, confirmed, contradicted, elapsed, match.overlapped)
-        return "lost" if denied else "tracking"
+        return match, "lost" if denied else "tracking"
+
+    def _doubt(self, observations: Observations, prediction: Prediction, match: Match) -> Match:
+        """The map denies the frame: from now on scans are matched to each other, too."""
+        if self._wake is None:
+            self._wake = Wake(self.cell_map)
+            self._wake.carried = match.matched < self._quality.least_continuous()
+            self._wake.add(observations, match.T_map_robot, prediction.elapsed)
+            return match
+        moved = self._go_on(observations, prediction)
+        return replace(match, T_map_robot=moved.T_map_robot)
 
     def _suspect(self, observations: Observations, prediction: Prediction) -> None:
         """The frame is denied: begin to search the map, and from some such frames on be lost."""

@@ -78,6 +78,10 @@ class TrackingQuality:
         least = self.config.suspicious if self.suspicious else 0.0
         return self._share(matched) < max(self.freeze_below, least)
 
+    def least_continuous(self) -> float:
+        """Matched share below which a scan does not go on from those before it: carried."""
+        return self.config.sudden * self.usual_match()
+
     def _share(self, matched: float) -> float:
         return matched / max(self.usual_match(), 1e-9)
 

@@ -95,6 +95,7 @@ class Relocalisation:
         self._prices = matcher.config.matching.budget
         self.hypotheses: list[Hypothesis] = []
         self.elapsed_s, self.searches = 0.0, 0
+        self.went_on = False
         self._coarse: CoarseMap | None = None
         self._search: WholeSearch | None = None
         self._since_search_s = math.inf
@@ -107,7 +108,13 @@ class Relocalisation:
         self._look_around(observations, Budget(self._prices, self._prices.frozen_share))
 
     def step(
-        self, observations: Observations, prediction: Prediction, here: Match, usual: float
+        self,
+        observations: Observations,
+        prediction: Prediction,
+        here: Match,
+        usual: float,
+        *,
+        carried: bool,
     ) -> Match | None:
         """Take a frame in; the match of the hypothesis that is accepted, or None.
 
@@ -132,7 +139,7 @@ class Relocalisation:
         self._look_around(observations, budget)
         found += self._tried_places(observations, budget, price)
         self.hypotheses = _kept(found, usual, self._config)
-        return self._accepted(usual, prediction.T_map_robot)
+        return self._accepted(usual, prediction.T_map_robot, carried)
 
     def _go_on(self, prediction: Prediction) -> None:
         """The robot has moved on since the scan that is searched for."""
@@ -178,7 +185,7 @@ class Relocalisation:
         seen = float(observations.weights.sum())
         return Hypothesis(match=match, support=self._support(observations, match), seen=seen)
 
-    def _accepted(self, usual: float, predicted: Float) -> Match | None:
+    def _accepted(self, usual: float, predicted: Float, carried: bool) -> Match | None:
         """The match of the best hypothesis, if it is good and no other is.
 
         The place of dead reckoning goes before places that only look as good: a room may be
@@ -191,7 +198,8 @@ class Relocalisation:
         going_on = [h for h in rivals if _near(h.match.T_map_robot, predicted, config)]
         if going_on:
             best = going_on[0]
-        elif len(rivals) > 1:
+            self.went_on = True
+        elif len(rivals) > 1 or not carried:
             return None
         if best.waited or not (going_on or self.searches):
             return None  # not sure yet that nothing else explains it
