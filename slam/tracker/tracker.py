@@ -32,6 +32,7 @@ from slam.tracker.standing.recent import Standing
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.quality import TrackingQuality
 from slam.tracker.tracking.relocalise import Relocalisation, coarse, slip, slipped
+from slam.tracker.tracking.verdict import Verdict
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
 from slam.tracker.uncertainty.residuals import Evidence, look
@@ -68,6 +69,7 @@ class Tracker(abc.ABC):
         self._quality = TrackingQuality(self.config.freeze_below, self._numbers.quality)
         self._relocalisation: Relocalisation | None = None
         self._suspected: Relocalisation | None = None  # while frozen
+        self._verdict = Verdict(self._numbers.verdict)
         self._loops = Loops(self.config, self._matcher, self._new_submap)
         self._standing = Standing(self.config.standing)
         self._agreement = Agreement(self.config.standing)
@@ -121,6 +123,8 @@ class Tracker(abc.ABC):
         match = unmatched(np.zeros(3), matched=1.0, score=0.0)
         self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
         self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
+        if not len(observations.points_robot):
+            self._verdict.see_nothing()
         return self._report(frame, match, "tracking" if len(observations.points_robot) else "blind")
 
     def _predict(self, odometry: Odometry) -> Prediction:
@@ -191,9 +195,12 @@ class Tracker(abc.ABC):
         precision = inverted(prediction.prior)
         observations = replace(observations, votes=None)  # they are of another place
         here = self._matcher.climb(self.cell_map, observations, predicted, predicted, precision)
-        match = recovery.step(observations, prediction, here, self._quality.usual_whole())
+        usual = self._quality.usual_whole()
+        match = recovery.step(observations, prediction, here, usual)
+        self._verdict.take(recovery.here / usual, recovery.elsewhere(predicted) / usual)
         if match is not None:
             self._relocalisation = None
+            self._verdict.trust()
             self._quality.count(False)
             self._pose_covariance.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
@@ -233,18 +240,35 @@ class Tracker(abc.ABC):
         quality.count(denied)
         if denied and quality.scans <= quality.config.patience:
             self.cell_map.release()
+            self._judge(observations, match, confirmed, contradicted)
             self._suspect(observations, prediction)
             return "lost" if quality.scans > quality.config.lost_after else "frozen"
         self._suspected = None
         confirmed, contradicted, _ = self.cell_map.integrate(
             observations.view, T_map_laser, step, write=True
         )
+        self._judge(observations, match, confirmed, contradicted)
         if len(observations.points_robot) == 0:
             return "lost" if denied else "blind"  # odometry alone
         if not denied:
             elapsed = prediction.elapsed
             quality.learn(match.matched, confirmed, contradicted, elapsed, match.overlapped)
         return "lost" if denied else "tracking"
+
+    def _judge(
+        self, observations: Observations, match: Match, confirmed: float, contradicted: float
+    ) -> None:
+        """Whether the robot is lost, or the map in view outdated."""
+        total, enough = confirmed + contradicted, self._numbers.relocalise.least_weight
+        few = float(observations.weights.sum()) < enough or total == 0.0
+        if len(observations.points_robot) == 0:
+            self._verdict.see_nothing()
+        elif few or not self._quality.suspicious:
+            self._verdict.trust()
+        else:
+            support = match.overlapped * confirmed / total
+            here = support / self._quality.usual_whole()
+            self._verdict.take(here, ratio=self._agreement.ratio)
 
     def _suspect(self, observations: Observations, prediction: Prediction) -> None:
         """The frame is denied: begin to search the map, and from some such frames on be lost."""
@@ -312,6 +336,8 @@ class Tracker(abc.ABC):
                 "nis": self._odometry_noise.nis,
                 "trust": self._vote * (1.0 - self._dragged),
                 "odometry_ratio": self._agreement.ratio,
+                "verdict": self._verdict.word,
+                "p_lost": self._verdict.p_lost,
             },
         )
 
