@@ -43,7 +43,7 @@ class CellMap(abc.ABC):
     def twin(self) -> Self:
         """A copy that can be written without this one."""
         other = copy.copy(self)
-        other.cells = Cells(*(array.copy() for array in self.cells))
+        other.cells = Cells(*[array.copy() for array in self.cells])  # type: ignore[arg-type]
         return other
 
     def cover(self, xmin: float, ymin: float, xmax: float, ymax: float) -> None:

@@ -32,15 +32,13 @@ from slam.tracker.standing.recent import Standing
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.quality import TrackingQuality
 from slam.tracker.tracking.relocalise import Relocalisation, coarse, slip, slipped
+from slam.tracker.tracking.verdict import Verdict
 from slam.tracker.tracking.wake import Wake
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
 from slam.tracker.uncertainty.residuals import Evidence, look
 from slam.tracker.warmup import warm_up
 from slam.trajectory import Trajectory
-
-
-OUT = 2.0
 
 
 class Tracker(abc.ABC):
@@ -73,6 +71,7 @@ class Tracker(abc.ABC):
         self._relocalisation: Relocalisation | None = None
         self._suspected: Relocalisation | None = None  # while frozen
         self._wake: Wake | None = None  # while frozen or lost
+        self._verdict = Verdict(self._numbers.verdict)
         self._loops = Loops(self.config, self._matcher, self._new_submap)
         self._standing = Standing(self.config.standing)
         self._agreement = Agreement(self.config.standing)
@@ -126,6 +125,8 @@ class Tracker(abc.ABC):
         match = unmatched(np.zeros(3), matched=1.0, score=0.0)
         self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
         self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
+        if not len(observations.points_robot):
+            self._verdict.see_nothing()
         return self._report(frame, match, "tracking" if len(observations.points_robot) else "blind")
 
     def _predict(self, odometry: Odometry) -> Prediction:
@@ -155,15 +156,19 @@ class Tracker(abc.ABC):
         if self._relocalisation is not None:
             match, state = self._recover(self._relocalisation, observations, prediction)
             return prediction, match, state
-        match = _near(self._match(observations, prediction, self.cell_map), prediction)
+        match = _near(self._match(observations, prediction), prediction)
         if match.slipped:
             prediction = replace(prediction, covariance=slip(self._numbers.relocalise))
         return prediction, match, "tracking"
 
     def _match(
-        self, observations: Observations, prediction: Prediction, cell_map: CellMap
+        self, observations: Observations, prediction: Prediction, wake: CellMap | None = None
     ) -> Match:
-        """Climb from the prediction; search around it when that is vague or finds too little."""
+        """Climb from the prediction; search around it when that is vague or finds too little.
+
+        ``wake``: to match to in the place of the map.
+        """
+        cell_map = self.cell_map if wake is None else wake
         predicted = prediction.T_map_robot
         prior = prediction.prior
         precision = inverted(prior)
@@ -199,26 +204,29 @@ class Tracker(abc.ABC):
         predicted = prediction.T_map_robot
         precision = inverted(prediction.prior)
         here = self._matcher.climb(self.cell_map, observations, predicted, predicted, precision)
-        carried = self._wake is None or self._wake.carried
-        if not carried and self._wake.agreed_s >= OUT:
-            self.cell_map = self._wake.map
-            self._relocalisation = self._wake = None
-            self._quality.count(False)
-            return unmatched(predicted, matched=here.matched, score=here.score), "relocated"
-        usual = self._quality.usual_whole()
+        wake, usual = self._wake, self._quality.usual_whole()
+        carried = wake is None or wake.carried
         match = recovery.step(observations, prediction, here, usual, carried=carried)
+        self._verdict.take(recovery.here / usual, recovery.elsewhere(predicted) / usual)
+        if wake is not None and not carried and wake.agreed_s >= self._numbers.quality.outdated_s:
+            self._go_on_in(wake.map)  # the map is outdated here
+            return unmatched(predicted, matched=here.matched, score=here.score), "relocated"
         if match is not None:
-            if self._wake is not None and recovery.went_on:
-                self.cell_map = self._wake.map
-            self._relocalisation = self._wake = None
-            self._quality.count(False)
+            self._go_on_in(wake.map if wake is not None and recovery.went_on else self.cell_map)
+            self._verdict.trust()
             self._pose_covariance.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
         if recovery.elapsed_s > self._numbers.quality.give_up_s:
             # elsewhere: go on from here, as on the first frame
-            self._relocalisation = self._wake = None
+            self._go_on_in(self.cell_map)
             self._quality.give_up()
         return unmatched(predicted, matched=here.matched, score=here.score), "lost"
+
+    def _go_on_in(self, cell_map: CellMap) -> None:
+        """Be lost no more: track in this map from now on."""
+        self.cell_map = cell_map
+        self._relocalisation = self._wake = None
+        self._quality.count(False)
 
     def _go_on(self, observations: Observations, prediction: Prediction) -> Prediction:
         """The pose on the wake's map, where the scan agrees with it; else by odometry."""
@@ -267,12 +275,14 @@ class Tracker(abc.ABC):
         if denied and quality.scans <= quality.config.patience:
             self.cell_map.release()
             match = self._doubt(observations, prediction, match)
+            self._judge(observations, match, confirmed, contradicted)
             self._suspect(observations, prediction)
             return match, "lost" if quality.scans > quality.config.lost_after else "frozen"
         self._suspected = self._wake = None
         confirmed, contradicted, _ = self.cell_map.integrate(
             observations.view, T_map_laser, step, write=True
         )
+        self._judge(observations, match, confirmed, contradicted)
         if len(observations.points_robot) == 0:
             return match, "lost" if denied else "blind"  # odometry alone
         if not denied:
@@ -289,6 +299,21 @@ class Tracker(abc.ABC):
             return match
         moved = self._go_on(observations, prediction)
         return replace(match, T_map_robot=moved.T_map_robot)
+
+    def _judge(
+        self, observations: Observations, match: Match, confirmed: float, contradicted: float
+    ) -> None:
+        """Whether the robot is lost, or the map in view outdated."""
+        total, enough = confirmed + contradicted, self._numbers.relocalise.least_weight
+        few = float(observations.weights.sum()) < enough or total == 0.0
+        if len(observations.points_robot) == 0:
+            self._verdict.see_nothing()
+        elif few or not self._quality.suspicious:
+            self._verdict.trust()
+        else:
+            support = match.overlapped * confirmed / total
+            here = support / self._quality.usual_whole()
+            self._verdict.take(here, ratio=self._agreement.ratio)
 
     def _suspect(self, observations: Observations, prediction: Prediction) -> None:
         """The frame is denied: begin to search the map, and from some such frames on be lost."""
@@ -356,6 +381,8 @@ class Tracker(abc.ABC):
                 "nis": self._odometry_noise.nis,
                 "trust": self._vote * (1.0 - self._dragged),
                 "odometry_ratio": self._agreement.ratio,
+                "verdict": self._verdict.word,
+                "p_lost": self._verdict.p_lost,
             },
         )
 

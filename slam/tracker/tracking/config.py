@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from slam.settings import Settings, number
 
 MANY = 100_000
+SEEDS = "scripts/experiments/verdict.py, training seeds"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +33,9 @@ class QualityConfig(Settings):
     denied: float = number(0.30, "share", "of the map in view contradicted: denied")
     still_denied: float = number(0.20, "share", "the same, if the frame before was denied")
     sudden: float = number(0.3, "share", "of the usual match, after a small step: carried")
+    outdated_s: float = number(
+        2.0, "s", "scans agree with those before: the map is outdated, not the pose", SEEDS
+    )
     sudden_m: float = number(0.5, "m", "largest such step")
     sudden_rad: float = number(0.5, "rad", "largest turn of such a step")
 
@@ -69,11 +73,29 @@ class RelocaliseConfig(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class VerdictConfig(Settings):
+    """Lost, or the map outdated: see ``tracker.tracking.verdict``."""
+
+    outdated: float = number(
+        0.85, "share", "of the usual support: below, the map is outdated here", SEEDS
+    )
+    even: float = number(0.45, "share", "of the usual support: lost is as likely as not", SEEDS)
+    steep: float = number(20.0, "1", "log odds of being lost, by that share", SEEDS)
+    agreed: float = number(
+        4.0, "ratio", "of corrections over what odometry may be off: more is evidence", SEEDS
+    )
+    rival: float = number(
+        20.0, "1", "the same, by what a known other place has more of the usual support", SEEDS
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class TrackingConfig(Settings):
     """Following the robot, and finding it again."""
 
     quality: QualityConfig = field(default=QualityConfig())
     relocalise: RelocaliseConfig = field(default=RelocaliseConfig())
+    verdict: VerdictConfig = field(default=VerdictConfig())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -86,6 +86,8 @@ class Relocalisation:
     hypotheses  places that are followed, the best first
     elapsed_s   since then
     searches    of the whole map that were finished, all their places tried
+    here        support of the place of dead reckoning in the latest scan
+    spent_ns    work of the latest scan, counted
     """
 
     def __init__(self, cell_map: CellMap, matcher: Matcher) -> None:
@@ -94,8 +96,8 @@ class Relocalisation:
         self._config = matcher.config.tracking.relocalise
         self._prices = matcher.config.matching.budget
         self.hypotheses: list[Hypothesis] = []
-        self.elapsed_s, self.searches = 0.0, 0
-        self.went_on = False
+        self.elapsed_s, self.searches, self.here = 0.0, 0, 0.0
+        self.spent_ns, self.went_on = 0.0, False
         self._coarse: CoarseMap | None = None
         self._search: WholeSearch | None = None
         self._since_search_s = math.inf
@@ -105,7 +107,9 @@ class Relocalisation:
     def look(self, observations: Observations, prediction: Prediction) -> None:
         """Take in a frame that is denied: the robot may be lost, and the search begins."""
         self._go_on(prediction)
-        self._look_around(observations, Budget(self._prices, self._prices.frozen_share))
+        budget = Budget(self._prices, self._prices.frozen_share)
+        self._look_around(observations, budget)
+        self.spent_ns = budget.spent_ns
 
     def step(
         self,
@@ -134,12 +138,23 @@ class Relocalisation:
             for h in self.hypotheses
         ]
         found.append(self._new(observations, here))
+        self.here = found[-1].support
         budget.spend(price * len(matched))
         found += self._tried_places(observations, budget, price)
         self._look_around(observations, budget)
         found += self._tried_places(observations, budget, price)
+        self.spent_ns = budget.spent_ns
         self.hypotheses = _kept(found, usual, self._config)
         return self._accepted(usual, prediction.T_map_robot, carried)
+
+    def elsewhere(self, T_map_robot: Float) -> float:
+        """Support of the best place that is followed and is not this one; 0 where none is."""
+        others = [
+            h.support
+            for h in self.hypotheses
+            if not _near(h.match.T_map_robot, T_map_robot, self._config)
+        ]
+        return max(others, default=0.0)
 
     def _go_on(self, prediction: Prediction) -> None:
         """The robot has moved on since the scan that is searched for."""

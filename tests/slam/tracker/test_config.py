@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("2e6f1766b191", "6913d6a9334f")),
-        (OccupancyConfig, ["grid"], ("22bf1d8010ad", "dac2f04b2851")),
+        (ShuntingConfig, [], ("22f6d83f3280", "011a637adf89")),
+        (OccupancyConfig, ["grid"], ("275946ac2fde", "659732fa0fa1")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
