@@ -208,14 +208,14 @@ class Tracker(abc.ABC):
         carried = wake is None or wake.carried
         match = recovery.step(observations, prediction, here, usual, carried=carried)
         self._verdict.take(recovery.here / usual, recovery.elsewhere(predicted) / usual)
-        if wake is not None and not carried and wake.agreed_s >= self._numbers.quality.outdated_s:
-            self._go_on_in(wake.map)  # the map is outdated here
-            return unmatched(predicted, matched=here.matched, score=here.score), "relocated"
         if match is not None:
             self._go_on_in(wake.map if wake is not None and recovery.went_on else self.cell_map)
             self._verdict.trust()
             self._pose_covariance.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
+        if wake is not None and not carried and self._quality.goes_on(wake.agreed, wake.agreed_s):
+            self._go_on_in(wake.map)  # the map is outdated here
+            return unmatched(predicted, matched=here.matched, score=here.score), "relocated"
         if recovery.elapsed_s > self._numbers.quality.give_up_s:
             # elsewhere: go on from here, as on the first frame
             self._go_on_in(self.cell_map)
@@ -240,7 +240,7 @@ class Tracker(abc.ABC):
             prediction = replace(prediction, T_map_robot=match.T_map_robot, increment=increment)
         wake.carried |= match is not None and match.matched < self._quality.least_continuous()
         agreed = match is not None and not self._quality.arises(match.matched)
-        wake.agreed_s = wake.agreed_s + prediction.elapsed if agreed else 0.0
+        wake.count(agreed, prediction.elapsed)
         wake.add(observations, prediction.T_map_robot, prediction.elapsed)
         return prediction
 

@@ -33,6 +33,10 @@ class QualityConfig(Settings):
     denied: float = number(0.30, "share", "of the map in view contradicted: denied")
     still_denied: float = number(0.20, "share", "the same, if the frame before was denied")
     sudden: float = number(0.3, "share", "of the usual match, after a small step: carried")
+    continuous: float = number(
+        0.5, "share", "of the usual match with the scans before: less, and it was carried", SEEDS
+    )
+    outdated_scans: int = number(10, "frames", "least, with outdated_s", SEEDS, low=1, high=MANY)
     outdated_s: float = number(
         2.0, "s", "scans agree with those before: the map is outdated, not the pose", SEEDS
     )
@@ -59,6 +63,8 @@ class RelocaliseConfig(Settings):
     on_s: float = number(1.0, "s", "least time passed with a hypothesis", low=1e-6)
     same_m: float = number(0.3, "m", "hypotheses nearer than this are one")
     same_rad: float = number(0.2, "rad", "and turned by less than this")
+    drift_m: float = number(2.0, "m", "a robot that was not carried may be off by", SEEDS)
+    drift_rad: float = number(0.5, "rad", "and turned by")
     least_weight: float = number(
         40.0, "weight",
         "in view from which on a frame can deny the map or identify a place: 4 m of surface",

@@ -80,7 +80,11 @@ class TrackingQuality:
 
     def least_continuous(self) -> float:
         """Matched share below which a scan does not go on from those before it: carried."""
-        return self.config.sudden * self.usual_match()
+        return self.config.continuous * self.usual_match()
+
+    def goes_on(self, scans: int, seconds: float) -> bool:
+        """Whether so many scans in a row that agree with one another outweigh the map's denial."""
+        return scans >= self.config.outdated_scans and seconds >= self.config.outdated_s
 
     def _share(self, matched: float) -> float:
         return matched / max(self.usual_match(), 1e-9)

@@ -214,13 +214,19 @@ class Relocalisation:
         if going_on:
             best = going_on[0]
             self.went_on = True
-        elif len(rivals) > 1 or not carried:
+        elif len(rivals) > 1 or not (carried or self._drifted(best, predicted)):
             return None
         if best.waited or not (going_on or self.searches):
             return None  # not sure yet that nothing else explains it
         enough = config.enough_later if best.tried(config, config.later) else config.enough
         enough_seen = best.tried(config) and best.seen >= config.least_weight
         return best.match if enough_seen and best.support >= enough * usual else None
+
+    def _drifted(self, best: Hypothesis, predicted: Float) -> bool:
+        """Whether drift alone may have led from that place to the one of dead reckoning."""
+        x, y, turn = (best.match.T_map_robot - predicted).tolist()
+        config = self._config
+        return math.hypot(x, y) < config.drift_m and abs(se2.wrap(turn)) < config.drift_rad
 
     def _carried(
         self, old: Hypothesis, observations: Observations, prediction: Prediction

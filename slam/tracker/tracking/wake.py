@@ -25,13 +25,13 @@ class Wake:
 
     map      a copy of the SLAM's map, written as if nothing were wrong
     carried  whether a scan did not agree with those before it
-    agreed_s s for which scans agreed with it as well as usual
+    agreed   scans in a row that agreed with it as well as usual, for ``agreed_s``
     """
 
     def __init__(self, cell_map: CellMap) -> None:
         self.map = cell_map.twin()
         self.carried = False
-        self.agreed_s = 0.0
+        self.agreed_s, self.agreed = 0.0, 0
 
     def add(self, observations: Observations, T_map_robot: Float, elapsed: float) -> None:
         """Take in a scan from where it was seen."""
@@ -39,3 +39,8 @@ class Wake:
         T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
         step = min(elapsed, self.map.config.map.longest_look_s)
         self.map.integrate(observations.view, T_map_laser, step, write=True)
+
+    def count(self, agrees: bool, elapsed: float) -> None:
+        """Another scan that agrees with it as well as usual, or one that does not."""
+        self.agreed = self.agreed + 1 if agrees else 0
+        self.agreed_s = self.agreed_s + elapsed if agrees else 0.0
