@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("6a6b85d26cc9", "21d5ed1d8e93")),
-        (OccupancyConfig, ["grid"], ("d1cf5d066f58", "98d785d5e92b")),
+        (ShuntingConfig, [], ("c325a4af41c8", "c2d0ad59307f")),
+        (OccupancyConfig, ["grid"], ("be65d1745509", "227c38ba027e")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
