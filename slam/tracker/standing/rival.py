@@ -47,6 +47,7 @@ class Rival:
     def __init__(self, matcher: Matcher, standing: Standing) -> None:
         self._matcher, self._standing = matcher, standing
         self._config = matcher.config.standing
+        self._least_weight = matcher.config.tracking.relocalise.least_weight
         self._usual = 0.0
         self._second: Second | None = None
 
@@ -83,6 +84,9 @@ class Rival:
         return self._decide(match)
 
     def _has_fallen(self, observations: Observations, match: Match) -> bool:
+        """Among a few things alone nothing is decided: all of them may have moved."""
+        if float(observations.weights.sum()) < self._least_weight:
+            return False
         votes = observations.votes
         if votes is None or float(votes.mean()) >= self._config.outvoted:
             return False
