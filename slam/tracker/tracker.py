@@ -29,6 +29,7 @@ from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
 from slam.tracker.standing.agreement import Agreement
 from slam.tracker.standing.recent import Standing
+from slam.tracker.standing.rival import Rival
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.quality import TrackingQuality
 from slam.tracker.tracking.relocalise import Relocalisation, coarse, slip, slipped
@@ -75,6 +76,7 @@ class Tracker(abc.ABC):
         self._loops = Loops(self.config, self._matcher, self._new_submap)
         self._standing = Standing(self.config.standing)
         self._agreement = Agreement(self.config.standing)
+        self._rival = Rival(self._matcher, self._standing)
         self._vote, self._dragged = 1.0, 0.0
         self._trusted = True  # the pose of the frame before
         self._path = PosePath()
@@ -103,7 +105,9 @@ class Tracker(abc.ABC):
         )
         observations = replace(observations, votes=votes)
         self._vote = float(votes.mean()) if len(votes) else 1.0
-        prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
+        prediction, match, state = self._localise(
+            frame.stamp_ns, observations, prediction
+        )  # 3 Eq. (13)
         evidence = self._compare(observations, match, prediction, state)  # 4 residuals
         match, state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
         self._update_uncertainty(
@@ -143,7 +147,7 @@ class Tracker(abc.ABC):
         )
 
     def _localise(
-        self, observations: Observations, prediction: Prediction
+        self, stamp_ns: int, observations: Observations, prediction: Prediction
     ) -> tuple[Prediction, Match, str]:
         """The pose by scan matching, or by relocalisation where the robot was lost; the state.
 
@@ -154,9 +158,11 @@ class Tracker(abc.ABC):
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = replace(prediction, carried=self._pose_covariance.odometry_part(motion))
         if self._relocalisation is not None:
+            self._rival.forget()
             match, state = self._recover(self._relocalisation, observations, prediction)
             return prediction, match, state
         match = _near(self._match(observations, prediction), prediction)
+        match = self._rival.decided(self.cell_map, stamp_ns, observations, prediction, match)
         if match.slipped:
             prediction = replace(prediction, covariance=slip(self._numbers.relocalise))
         return prediction, match, "tracking"
@@ -260,6 +266,8 @@ class Tracker(abc.ABC):
         """Let the map see the frame, unless the map in view contradicts it; match and state."""
         if state != "tracking":
             return match, state
+        if self._rival.undecided:
+            return match, "frozen"
         rasterise(self.cell_map, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
         step = min(prediction.elapsed, self.config.map.longest_look_s)
@@ -338,8 +346,12 @@ class Tracker(abc.ABC):
         if state == "tracking" and not match.slipped:
             self._agreement.take(prediction, match.T_map_robot)
             self._dragged = self._agreement.dragged(self._vote)
-            self._pose_covariance.dragged(self._agreement.covariance(self._dragged))
+            left_behind = self._agreement.left_behind(self._dragged)
+            self._pose_covariance.dragged(left_behind, self._agreement.covariance(self._dragged))
         else:
+            if not match.slipped:
+                dragged = self._agreement.dragged(self._vote)
+                self._pose_covariance.dragged(self._agreement.covariance(dragged))
             self._agreement.forget()
             if match.slipped:  # found by a search, among what does not fit there
                 found = (1.0 - match.overlapped) * coarse(self._numbers.relocalise)
@@ -390,6 +402,15 @@ class Tracker(abc.ABC):
         """Whether the crowd may have carried the robot far."""
         doubtful_m = self.config.standing.doubtful_m
         return 0.0 < doubtful_m < self._agreement.off_m(self._dragged)
+
+    def displace(self, by: Float) -> None:
+        """For experiments: from now on the pose is believed to be off by ``by`` (3,), map frame.
+
+        As after a slip that nobody noticed: covariance, map and all that was kept of earlier scans
+        stay as they are.
+        """
+        self._T_map_robot = self._T_map_robot + by
+        self._T_map_robot[2] = se2.wrap(float(self._T_map_robot[2]))
 
     def window(
         self, xmin: float, ymin: float, xmax: float, ymax: float
