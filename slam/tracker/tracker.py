@@ -201,7 +201,7 @@ class Tracker(abc.ABC):
         if match is not None:
             self._relocalisation = None
             self._verdict.trust()
-            self._quality.count(False)
+            self._quality.relocated(recovery.accepted)
             self._pose_covariance.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
         if recovery.elapsed_s > self._numbers.quality.give_up_s:
@@ -237,6 +237,8 @@ class Tracker(abc.ABC):
             )
             motion = match.T_map_robot - self._T_map_robot
             denied = quality.denied(match.matched, confirmed, contradicted, motion)
+            support = match.overlapped * confirmed / max(confirmed + contradicted, 1e-9)
+            denied = denied and not quality.excuses(support)
         quality.count(denied)
         if denied and quality.scans <= quality.config.patience:
             self.cell_map.release()
