@@ -217,6 +217,7 @@ class Tracker(abc.ABC):
         if match is not None:
             self._go_on_in(wake.map if wake is not None and recovery.went_on else self.cell_map)
             self._verdict.trust()
+            self._quality.relocated(recovery.accepted)
             self._pose_covariance.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
         if wake is not None and not carried and self._quality.goes_on(wake.agreed, wake.agreed_s):
@@ -279,6 +280,8 @@ class Tracker(abc.ABC):
             )
             motion = match.T_map_robot - self._T_map_robot
             denied = quality.denied(match.matched, confirmed, contradicted, motion)
+            support = match.overlapped * confirmed / max(confirmed + contradicted, 1e-9)
+            denied = denied and not quality.excuses(support)
         quality.count(denied)
         if denied and quality.scans <= quality.config.patience:
             self.cell_map.release()

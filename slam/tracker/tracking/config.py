@@ -32,6 +32,9 @@ class QualityConfig(Settings):
     suspicious: float = number(0.70, "share", "of the usual match: below, the map is checked")
     denied: float = number(0.30, "share", "of the map in view contradicted: denied")
     still_denied: float = number(0.20, "share", "the same, if the frame before was denied")
+    excused: float = number(
+        0.5, "share", "of the support of a place found: as much does not deny it at first"
+    )
     sudden: float = number(0.3, "share", "of the usual match, after a small step: carried")
     continuous: float = number(
         0.5, "share", "of the usual match with the scans before: less, and it was carried", SEEDS

@@ -88,6 +88,7 @@ class Relocalisation:
     searches    of the whole map that were finished, all their places tried
     here        support of the place of dead reckoning in the latest scan
     spent_ns    work of the latest scan, counted
+    accepted    support of the hypothesis that was accepted, 0 before
     """
 
     def __init__(self, cell_map: CellMap, matcher: Matcher) -> None:
@@ -97,7 +98,7 @@ class Relocalisation:
         self._prices = matcher.config.matching.budget
         self.hypotheses: list[Hypothesis] = []
         self.elapsed_s, self.searches, self.here = 0.0, 0, 0.0
-        self.spent_ns, self.went_on = 0.0, False
+        self.spent_ns, self.accepted, self.went_on = 0.0, 0.0, False
         self._coarse: CoarseMap | None = None
         self._search: WholeSearch | None = None
         self._since_search_s = math.inf
@@ -220,7 +221,10 @@ class Relocalisation:
             return None  # not sure yet that nothing else explains it
         enough = config.enough_later if best.tried(config, config.later) else config.enough
         enough_seen = best.tried(config) and best.seen >= config.least_weight
-        return best.match if enough_seen and best.support >= enough * usual else None
+        if not enough_seen or best.support < enough * usual:
+            return None
+        self.accepted = best.support
+        return best.match
 
     def _drifted(self, best: Hypothesis, predicted: Float) -> bool:
         """Whether drift alone may have led from that place to the one of dead reckoning."""

@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("22f6d83f3280", "011a637adf89")),
-        (OccupancyConfig, ["grid"], ("275946ac2fde", "659732fa0fa1")),
+        (ShuntingConfig, [], ("a91a4a671d10", "5c1166418d3a")),
+        (OccupancyConfig, ["grid"], ("928bd035291e", "3b970aee4703")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
