@@ -225,7 +225,7 @@ class Tracker(abc.ABC):
             return unmatched(predicted, matched=here.matched, score=here.score), "relocated"
         if recovery.elapsed_s > self._numbers.quality.give_up_s:
             # elsewhere: go on from here, as on the first frame
-            self._go_on_in(self.cell_map)
+            self._go_on_in(self.cell_map if wake is None else wake.map)
             self._quality.give_up()
         return unmatched(predicted, matched=here.matched, score=here.score), "lost"
 
