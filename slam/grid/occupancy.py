@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,6 +143,12 @@ class Grid(CellMap):
         numbers = config.grid
         self._odds = Odds(numbers.hit, numbers.miss, numbers.most, numbers.struck)
         self.log_odds = np.zeros_like(self.cells.age)
+
+    def twin(self) -> Self:
+        """The log-odds are copied too."""
+        other = super().twin()
+        other.log_odds = self.log_odds.copy()
+        return other
 
     def grow(self) -> None:
         """Make room where a kernel ran out of it."""

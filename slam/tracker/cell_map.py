@@ -8,14 +8,16 @@ pooled in blocks of 8 x 8; a directory maps a block's place to its slot in the p
 from __future__ import annotations
 
 import abc
+import copy
 import math
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError
 from slam.frontend.visibility import View
-from slam.tracker.cells import SIDE, dense, forget_impressions, living, no_cells, with_room
+from slam.tracker.cells import SIDE, Cells, dense, forget_impressions, living, no_cells, with_room
 from slam.tracker.config import TrackerConfig
 
 MAX_BLOCKS_ACROSS = 1 << 15  # directory edge; 7.8 km at 3 cm cells
@@ -37,6 +39,12 @@ class CellMap(abc.ABC):
     def pace(self, step: float) -> float:
         """Prior age, s, of a cell whose looks are ``step`` s long: its first do not count fully."""
         return max(self.config.trace_s, self.config.map.pace_looks * step)
+
+    def twin(self) -> Self:
+        """A copy that can be written without this one."""
+        other = copy.copy(self)
+        other.cells = Cells(*[array.copy() for array in self.cells])  # type: ignore[arg-type]
+        return other
 
     def cover(self, xmin: float, ymin: float, xmax: float, ymax: float) -> None:
         """Grow the directory so that blocks may be born anywhere in the rectangle (m)."""
