@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("6a6b85d26cc9", "21d5ed1d8e93")),
-        (OccupancyConfig, ["grid"], ("d1cf5d066f58", "98d785d5e92b")),
+        (ShuntingConfig, [], ("2fd3de12012f", "d0501f207c7a")),
+        (OccupancyConfig, ["grid"], ("497b414f5c54", "a3a445821005")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
