@@ -68,6 +68,8 @@ class FeaturedShuntingSlam(ShuntingSlam):
     ``config`` as for "shunting". Uses ``frame.features``; corners where a frame has only a scan.
     """
 
+    map_moves = False  # a map of few points gains nothing by it
+
     def __init__(
         self, config: ShuntingConfig | str | Mapping[str, Any] = "robust", **options: Any
     ) -> None:

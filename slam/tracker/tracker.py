@@ -7,6 +7,7 @@ import abc
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -51,6 +52,7 @@ class Tracker(abc.ABC):
     """
 
     config_class: ClassVar[type[TrackerConfig]]
+    map_moves: ClassVar[bool] = True  # with the loops that are closed, if the config says so
 
     def __init__(self, config: TrackerConfig | str | Mapping[str, Any] = "robust") -> None:
         self.config = self.config_class.of(config)
@@ -73,7 +75,9 @@ class Tracker(abc.ABC):
         self._suspected: Relocalisation | None = None  # while frozen
         self._wake: Wake | None = None  # while frozen or lost
         self._verdict = Verdict(self._numbers.verdict)
-        self._loops = Loops(self.config, self._matcher, self._new_submap)
+        new_map = partial(self._new_map, self.config) if self.map_moves else None
+        self._loops = Loops(self.config, self._matcher, self._new_submap, new_map)
+        self._T_map_odom, self._corrected_by = np.zeros(3), np.zeros(3)
         self._standing = Standing(self.config.standing)
         self._agreement = Agreement(self.config.standing)
         self._rival = Rival(self._matcher, self._standing)
@@ -93,11 +97,14 @@ class Tracker(abc.ABC):
     def update(self, frame: Frame) -> Estimate:
         """One frame in seven steps: from odometry and scan to pose, covariance and map.
 
+        Before them, a bounded part of the search for loops. A correction that is ready moves map
+        and pose then; ``diagnostics`` say so: "correction" and "T_map_odom" (docs/loops.md).
         Not converged while frozen, lost, or blind: a scan without a single return.
         """
         if self._before is None and self._resumed is None:
             return self._first(frame)
         self._path.check_order(frame.stamp_ns)
+        self._correct()
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
         votes = self._standing.votes(
@@ -132,6 +139,28 @@ class Tracker(abc.ABC):
         if not len(observations.points_robot):
             self._verdict.see_nothing()
         return self._report(frame, match, "tracking" if len(observations.points_robot) else "blind")
+
+    def _correct(self) -> None:
+        """Search for loops; move into the map that they have corrected, if it is ready."""
+        self._corrected_by = np.zeros(3)
+        self._loops.work()
+        lost = self._wake is not None or self._relocalisation is not None
+        if not self._trusted or lost or self._resumed is not None:
+            return
+        correction = self._loops.correction(self._path.poses)
+        if correction is None:
+            return
+        self.cell_map = correction.cell_map
+        before, T = self._T_map_robot, correction.T_new_old
+        self._T_map_robot = se2.compose(T, before)
+        self._T_map_odom = se2.compose(T, self._T_map_odom)
+        self._corrected_by = self._T_map_robot - before
+        self._corrected_by[2] = se2.wrap(float(self._corrected_by[2]))
+        self._path.replace(correction.poses)
+        self._standing.moved(T)
+        self._pose_covariance.turned(float(T[2]))
+        self._rival.forget()
+        self._agreement.forget()
 
     def _predict(self, odometry: Odometry) -> Prediction:
         """By odometry; on the first frame with a loaded map, where the robot was before."""
@@ -369,13 +398,21 @@ class Tracker(abc.ABC):
     ) -> None:
         """For closing loops: motion as matched, or by odometry where an end of it is uncertain."""
         motion = se2.between(self._T_map_robot, match.T_map_robot)
-        covariance = self._pose_covariance.newest_drift
-        if state != "tracking" or not self._trusted:
+        covariance, written = self._pose_covariance.newest_drift, state == "tracking"
+        if state == "relocated":  # carried away, or odometry was right: loops decide
+            off = match.T_map_robot - prediction.T_map_robot
+            off[2] = se2.wrap(float(off[2]))
+            covariance = prediction.covariance + coarse(self._numbers.relocalise)
+            covariance = covariance + np.diag(off * off)
+        elif state != "tracking" or not self._trusted:
             motion, covariance = prediction.increment, prediction.covariance
         self._trusted = state in ("tracking", "relocated")
         covariance = turned(covariance, -float(self._T_map_robot[2]))
         everyone = replace(observations, votes=None)
-        self._loops.add(len(self._path), match.T_map_robot, motion, covariance, everyone)
+        self._loops.add(
+            len(self._path), match.T_map_robot, motion, covariance, everyone,
+            elapsed=prediction.elapsed, written=written,
+        )  # fmt: skip
 
     def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
         self._before = frame.odometry
@@ -398,6 +435,8 @@ class Tracker(abc.ABC):
                 "odometry_ratio": self._agreement.ratio,
                 "verdict": self._verdict.word,
                 "p_lost": self._verdict.p_lost,
+                "correction": self._corrected_by.tolist(),
+                "T_map_odom": self._T_map_odom.tolist(),
             },
         )
 
@@ -459,7 +498,7 @@ class Tracker(abc.ABC):
         return slam
 
     def trajectory(self) -> Trajectory:
-        """The poses with loops closed; the online ones up to 100 m of way, or without a loop."""
+        """The poses with the loops closed that were found so far; the online ones without any."""
         return self._path.trajectory(self._loops.corrected(self._path.poses()))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from slam.settings import Settings, number
+from slam.settings import Settings, number, word
 
 MANY = 100_000
 SEEDS = "scripts/experiments/verdict.py, training seeds"
@@ -141,5 +141,27 @@ class LoopsConfig(Settings):
     chain_rad: float = number(0.0015, "rad", "added deviation of a step's match", low=1e-6)
     loop_m: float = number(0.03, "m", "added deviation of a loop", low=1e-6)
     loop_rad: float = number(0.003, "rad", "added deviation of a loop", low=1e-6)
+    early: float = number(0.5, "share", "of long_m from which on key frames are chained", high=1.0)
+    corrects: int = number(1, "1", "1: map and pose follow the graph; 0: past poses alone", high=1)
+    work: int = number(
+        48, "units", "of work a scan; one: a key frame drawn, a third of a match",
+        "docs/loops.md", low=1, high=MANY,
+    )  # fmt: skip
+    agree_m: float = number(0.3, "m", "a closure farther off needs another that agrees", low=1e-6)
+    agree_rad: float = number(0.05, "rad", "a closure farther off needs another that agrees")
+    denying: int = number(
+        2, "key frames", "at which the map is torn: it is drawn anew", low=1, high=MANY
+    )
+    datum: str = word(
+        "all", ("all", "first"), "what a correction moves least: all key frames, or the first"
+    )
+    batch: int = number(8, "loops", "found since: the graph is solved again", low=1, high=MANY)
+    apply_m: float = number(
+        0.1, "m", "between neighbours, map against graph: the map is torn", low=1e-6
+    )
+    apply_rad: float = number(0.02, "rad", "the same of the turn between them", low=1e-6)
     loose: float = number(1.0, "1/m², 1/rad²", "prior information of a loop's match", low=1e-6)
     information_share: float = number(0.3, "share", "of a match's information, used in the graph")
+
+
+NOT_CORRECTED = LoopsConfig(corrects=0)

@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from slam.frames import Float
-from slam.frontend.odometry_prior import Prediction
+from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
 from slam.tracker.uncertainty.covariances import advance, carried, observable
@@ -137,6 +137,12 @@ class PoseCovariance:
         self.covariance = self.covariance + covariance
         if now is not None:
             self.covariance = self.covariance + now
+
+    def turned(self, by: float) -> None:
+        """The map frame was turned by ``by`` rad, and the robot with it."""
+        self._drift, self._blind = turned(self._drift, by), turned(self._blind, by)
+        self._shared, self._geometry = turned(self._shared, by), turned(self._geometry, by)
+        self.covariance = self._drift + self._blind + self._shared
 
     def _fewer(self) -> float:
         """By how much the shared errors of surfaces average out less than in a whole room."""
