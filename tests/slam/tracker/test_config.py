@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("a91a4a671d10", "5c1166418d3a")),
-        (OccupancyConfig, ["grid"], ("928bd035291e", "3b970aee4703")),
+        (ShuntingConfig, [], ("599c561428fe", "a93de9194c8d")),
+        (OccupancyConfig, ["grid"], ("579550e467f0", "0f364709d996")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
