@@ -25,6 +25,12 @@ RESULTS = "results.md"  # the page of the folder docs/results
 INSTEAD = {"README.md": "index.md", "docs/results": RESULTS, **OUTSIDE}  # which page shows what
 _LINK = re.compile(r"(?<=\]\()([^)\s#]+)")
 _CLIP = re.compile(r'<a href="([^"]+\.mp4)"><img alt="([^"]*)" src="([^"]+)" ?/?></a>')
+_VIDEO = (  # a click or Enter plays it; until then nothing covers the picture but a sign (site.css)
+    r'<span class="clip"><video muted loop playsinline preload="none" tabindex="0" '
+    r'onclick="this.controls=true;this.play();this.onclick=null" '
+    r'onkeydown="if(event.key===\'Enter\'&amp;&amp;this.onclick)this.onclick()" '
+    r'poster="\3" aria-label="\2"><source src="\1" type="video/mp4"></video></span>'
+)
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
@@ -59,8 +65,4 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
 def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
     """A picture that links to a clip becomes the clip, with the picture until it is played."""
     del page, config, files
-    return _CLIP.sub(
-        r'<video controls muted loop playsinline preload="none" poster="\3" aria-label="\2">'
-        r'<source src="\1" type="video/mp4"></video>',
-        html,
-    )
+    return _CLIP.sub(_VIDEO, html)
