@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
@@ -24,6 +26,13 @@ from slam.trajectory import Trajectory
 
 COLORS = {"shunting": "#ce2c3c", "odometry": "#de6e18", "truth": "#168c5a"}
 CHANGED = 0.45  # fainter differences: looks too few to tell
+NEW = 0.7  # what appeared must differ by more: a wall seen for the first time is new, too
+_TICKS = (  # up to which ratio of the ends which multiples of a power of ten are labelled
+    (3.0, (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)),
+    (1000.0, (1.0, 2.0, 5.0)),
+    (math.inf, (1.0,)),
+)
+LINEAR_DEG = 1.0  # degrees about 0 where the axis of the heading error is linear
 _LOOK: dict[str, Any] = {
     "font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
     "axes.spines.right": False, "figure.constrained_layout.use": True,
@@ -110,13 +119,36 @@ def errors(path: Path, tracks: Mapping[str, Trajectory], truth: Trajectory) -> N
         stamps, offset, turned = error_series(track, truth)
         color = color_of(name, list(tracks))
         axes[0].plot(stamps, offset, color=color, lw=1.3, label=name)
-        axes[1].plot(
-            stamps, np.maximum(np.degrees(np.abs(turned)), 0.01), color=color, lw=1.3, label=name
-        )
+        axes[1].plot(stamps, np.degrees(turned), color=color, lw=1.3, label=name)
     axes[0].set(ylabel="position error in m", yscale="log", title="Error over time, unaligned")
-    axes[1].set(ylabel="heading error in degrees", yscale="log", xlabel="time in s")
+    log_axis(axes[0])
+    axes[1].set(ylabel="heading error in degrees", xlabel="time in s")
+    axes[1].set_yscale("symlog", linthresh=LINEAR_DEG)  # its sign matters, and it passes 0
+    axes[1].yaxis.set_major_formatter(FormatStrFormatter("%g"))
     axes[0].legend(frameon=False)
     save(figure, path)
+
+
+def log_axis(ax: Axes) -> None:
+    """Decades in plain numbers, with 2 and 5 between them where there are few."""
+    drawn = [one for one in ax.lines if one.get_transform() == ax.transData]  # no crosses, no rules
+    values = np.concatenate([np.zeros(0), *(np.asarray(one.get_ydata(), float) for one in drawn)])
+    if not (values > 0.0).any():
+        return
+    ax.set_yscale("log", nonpositive="clip")
+    low, high = (_step(end, up) for end, up in zip(ax.get_ylim(), (False, True), strict=True))
+    ax.set_ylim(low, high)
+    subs = next(subs for most, subs in _TICKS if high / low <= most)
+    ax.yaxis.set_major_locator(LogLocator(subs=subs))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _at: f"{value:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _step(value: float, up: bool) -> float:
+    """The next 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(value))
+    steps = [power * k for k in (1.0, 2.0, 5.0, 10.0)]
+    return next(s for s in steps if s >= value) if up else max(s for s in steps if s <= value)
 
 
 def error_series(track: Trajectory, truth: Trajectory) -> tuple[Float, Float, Float]:
@@ -151,7 +183,7 @@ def _over_map(path: Path, raster: Raster, track: Trajectory, title: str) -> Iter
     yield ax
     ax.plot(track.poses[:, 0], track.poses[:, 1], "k-", lw=0.9, label="trajectory")
     ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title=title)
-    ax.legend(loc="upper left", frameon=False)
+    figure.legend(loc="outside lower center", ncols=4, frameon=False)
     save(figure, path)
 
 
@@ -167,7 +199,7 @@ def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float
     """The map in the paper's style (Fig. 13): activities coloured, last scan blue, path black."""
     faint = np.where(raster.values > 0.02, raster.values, np.nan)
     colors = mpl.colormaps["YlOrRd"].with_extremes(bad="#fafaf8")
-    with _over_map(path, raster, track, "Activities of the map") as ax:
+    with _over_map(path, raster, track, "Map: activity of each cell, 0 to 1") as ax:
         _coloured(ax, raster, faint, colors, "activity", 0.05)
         ax.plot(points_map[:, 0], points_map[:, 1], ".", color="#1f61be", ms=1.5, label="last scan")
 
@@ -178,9 +210,12 @@ def changes_picture(path: Path, raster: Raster, changes: Changes, track: Traject
     with _over_map(path, raster, track, "Recent changes of the map") as ax:
         ax.set_facecolor("#fafaf8")
         draw_raster(ax, raster, vmax=2.0, interpolation="nearest")
-        for layer, cmap, label in (
-            (changes.gone, "Reds", "gone: in long-term memory, seen empty"),
-            (changes.appeared, "Greens", "new: not (yet) in long-term memory"),
+        for layer, least, cmap, label in (
+            (changes.gone, CHANGED, "Reds", "gone: in long-term memory, seen empty"),
+            (changes.appeared, NEW, "Greens", "new: seen, hardly in long-term memory"),
         ):
             thick = maximum_filter(np.nan_to_num(layer.values), size=3)  # a chair's leg: two cells
-            _coloured(ax, raster, np.where(thick > CHANGED, thick, np.nan), cmap, label, 0.02)
+            if (thick > least).any():
+                _coloured(ax, raster, np.where(thick > least, thick, np.nan), cmap, label, 0.02)
+            else:
+                ax.plot([], [], "s", color="none", label=f"nothing is {label.partition(':')[0]}")

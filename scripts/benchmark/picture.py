@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draw the share of lost runs against the level: ``python -m scripts.benchmark.picture BOARD``.
+"""The share of lost runs against the level, from a ``leaderboard.json``: two pictures.
 
-``BOARD`` is a ``leaderboard.json`` of ``mobilia benchmark``. Two pictures: the mean of the tracks
-that count, and one panel for each track.
+One has the mean of the tracks that count, the other a panel for each track.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -23,12 +20,9 @@ from matplotlib.lines import Line2D
 
 from scripts.figures import save, styled
 from scripts.report.answer import ODOMETRY
-from scripts.result_files import RESULTS, ROOT
-from slam.errors import LogFormatError, MobiliaError
+from slam.errors import LogFormatError
 from slam.frames import Float
 
-BOARD = RESULTS / "leaderboard.json"
-PICTURES = ROOT / "docs" / "pictures"
 ORACLE = "oracle"  # of every track its own
 PERCENT = 100.0
 COLUMNS = 4
@@ -77,11 +71,15 @@ def read(path: Path) -> Lost:
         for key, row in board["lost_shares"].items():
             track, _, slam = key.partition(" ")
             if row["levels"] == levels.tolist():
-                name = ORACLE if slam.startswith(f"{ORACLE}(") else slam
-                shares.setdefault(name, {})[track] = PERCENT * np.array(row["lost"])
+                shares.setdefault(shown_name(slam), {})[track] = PERCENT * np.array(row["lost"])
         return Lost(levels=levels, tracks=tracks, shares=shares, runs=len(board["seeds"]))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise LogFormatError(path, f"not a leaderboard of mobilia benchmark: {error!r}") from error
+
+
+def shown_name(slam: str) -> str:
+    """``ORACLE`` for each track's own one."""
+    return ORACLE if slam.startswith(f"{ORACLE}(") else slam
 
 
 def _order(lost: Lost) -> list[str]:
@@ -187,23 +185,3 @@ def _axes(ax: Axes, lost: Lost, label: str | None) -> None:
 def _save(figure: Figure, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     save(figure, path)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw both."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("board", nargs="?", type=Path, default=BOARD, help="a leaderboard.json")
-    parser.add_argument("--out", type=Path, default=PICTURES, help="folder of the pictures")
-    wanted = parser.parse_args(arguments)
-    try:
-        lost = read(wanted.board)
-        overall(lost, wanted.out / "benchmark.png")
-        by_track(lost, wanted.out / "benchmark_tracks.png")
-    except (MobiliaError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

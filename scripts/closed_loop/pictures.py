@@ -22,6 +22,7 @@ from sim.world.world import World
 
 Row = dict[str, Any]
 PX_PER_M = 40
+ASIDE = 0.05  # of the level's axis beyond its first and last point
 MARKS = {"reached": "#168c5a", "wrong": "#ce2c3c", "given up": "#8a8f98", "failed": "#20242c"}
 
 
@@ -46,7 +47,8 @@ def curves(path: Path, levels: Sequence[Row], axis: str = "dynamism") -> None:
         title=f"{scene}: median precision, 95 % interval",
     )  # fmt: skip
     for ax in (success, precision):
-        ax.set(xlabel=axis, xticks=sorted({row["dynamism"] for row in levels}))
+        ticks = sorted({row["dynamism"] for row in levels})
+        ax.set(xlabel=axis, xticks=ticks, xlim=(ticks[0] - ASIDE, ticks[-1] + ASIDE))
         ax.grid(alpha=0.35)
     handles, labels = success.get_legend_handles_labels()
     figure.legend(
@@ -90,7 +92,7 @@ def paths(path: Path, rows: Sequence[Sequence[Driven]], axis: str = "dynamism") 
             who = run.identity
             level = f"{axis} {who['dynamism']:g}"
             axes[r, c].set_title(f"{who['slam']}, {level}, seed {who['seed']}", fontsize=9)
-    figure.legend(handles=_legend(), loc="outside lower center", ncols=6, frameon=False)
+    figure.legend(handles=_legend(), loc="outside lower center", ncols=7, frameon=False)
     save(figure, path)
 
 
@@ -115,6 +117,7 @@ def _legend() -> list[Line2D]:
         Line2D([], [], color=COLORS["truth"], label="true path"),
         Line2D([], [], color="#1f61be", ls=":", label="believed path"),
     ]
+    lines += [Line2D([], [], ls="", label="furniture and people: at the start")]
     return lines + [
         Line2D([], [], color=color, marker="o", ls="", label=outcome)
         for outcome, color in MARKS.items()

@@ -98,7 +98,8 @@ class _Camera:
         for name in _named(found):
             points += [strip.poses[row][found.tape.names.index(name)][:2] for row in span]
         low, high = np.min(points, axis=0), np.max(points, axis=0)
-        side = min(max(float((high - low).max()) + 2.0, SIDE_M[0]), SIDE_M[1])
+        most = SIDE_M[1] if found.moment is not None else math.inf  # the whole path of a good run
+        side = min(max(float((high - low).max()) + 2.0, SIDE_M[0]), most)
         half = 0.5 * side * self._view.plan.scale
         x, y = self._view.to_pixels([0.5 * (low + high)])[0]
         height, width = self._view.plan.picture.shape[:2]

@@ -105,7 +105,7 @@ class ErrorChart:
     ) -> Picture:
         """A fresh picture; ``kidnaps``: moments of, s."""
         own = series[self._primary]
-        worst = max([self._worst(series), *own.claimed])
+        worst = max(self._worst(series), _largest(own.claimed, -math.inf))
         high = next(power for power in (0.0, 1.0, 2.0) if power == 2.0 or worst <= 10.0**power)
         reach = self._reach(own)
         picture = self._grid(high, reach).copy()
@@ -129,12 +129,12 @@ class ErrorChart:
         return x
 
     def _worst(self, series: Mapping[str, Series]) -> float:
-        return max((p for s in series.values() for p in s.position if p == p), default=1.0)
+        known = [_largest(s.position) for s in series.values() if s.position]
+        return max((p for p in known if p == p), default=1.0)
 
     def _reach(self, own: Series) -> float:
         """Degrees that the heading's axis goes up and down to."""
-        values = [abs(v) for v in own.heading if v == v] + list(own.claimed_rad)
-        worst = math.degrees(max(values, default=0.0))
+        worst = math.degrees(max(_largest(own.heading, 0.0), _largest(own.claimed_rad, 0.0)))
         return next((r for r in _HEADINGS_DEG if r >= worst), _HEADINGS_DEG[-1])
 
     def _grid(self, high: float, reach: float) -> Picture:
@@ -203,7 +203,7 @@ class ErrorChart:
 
     def _y_heading(self, radians: Float, reach: float) -> Float:
         box = self._heading
-        level = np.clip(np.degrees(radians) / reach, -9.0, 9.0)  # drawn only as far as the box goes
+        level = np.clip(np.degrees(radians) / reach, -1.0, 1.0)  # beyond the axis: along its edge
         y: Float = box.height * 0.5 * (1.0 - level)
         return y
 
@@ -226,7 +226,7 @@ class ErrorChart:
         for name, one in self._in_order(series):
             self._curve(picture, box, name, one, self._y_heading(one.thinned("heading"), reach))
         known = {n: s.heading[-1] for n, s in series.items() if s.heading}
-        words = {name: f"{math.degrees(h):+.2f}°" for name, h in known.items() if h == h}
+        words = {name: _turned(math.degrees(h), reach) for name, h in known.items() if h == h}
         degrees = math.degrees(own.claimed_rad[-1]) if own.claimed_rad else 0.0
         self._say(picture, box, "heading error", words, f"±2 σ it claims: {degrees:.2f}°")
 
@@ -279,9 +279,20 @@ class ErrorChart:
                 )
 
 
+def _largest(column: array[float], least: float = math.nan) -> float:
+    """The largest amount in it, or ``least``; NaN counts for nothing."""
+    return float(np.fmax.reduce(np.abs(np.array(column)), initial=least))
+
+
 def _window(picture: Picture, box: Box) -> Picture:
     """A view of that part of the picture: what is drawn into it ends at its edges."""
     return picture[box.y : box.y + box.height + 1, box.x : box.x + box.width + 1]
+
+
+def _turned(degrees: float, reach: float) -> str:
+    """A heading error; with an arrow where it is beyond the axis, along whose edge it is drawn."""
+    beyond = "" if abs(degrees) <= reach else " ↑" if degrees > 0.0 else " ↓"
+    return f"{degrees:+.2f}°{beyond}"
 
 
 def _faint(color: Color) -> Color:

@@ -23,6 +23,10 @@ Size = tuple[int, int]
 
 SIZE: Size = (1280, 720)
 FILM_S = 60.0  # a longer run is shown faster, unless a speed is asked for
+MOST_SPEED = 1e4
+LAPSE_FPS = 10.0  # of the film of a long log
+SCANS_A_PICTURE = 6
+LEAST_PICTURES, MOST_PICTURES = 60, 600
 CRF = 21  # H.264's constant rate factor: hardly a loss to see
 _SIZES = (320, 4096)
 
@@ -69,8 +73,8 @@ class Pace:
     def __post_init__(self) -> None:
         if not 1.0 <= self.fps <= 240.0:
             raise InvalidValueError(f"fps must lie in 1..240, got {self.fps}")
-        if not 0.01 <= self.speed <= 1e4:
-            raise InvalidValueError(f"speed must lie in 0.01..10000, got {self.speed}")
+        if not 0.01 <= self.speed <= MOST_SPEED:
+            raise InvalidValueError(f"speed must lie in 0.01..{MOST_SPEED:g}, got {self.speed}")
         if not 0.0 <= self.from_s < self.to_s:
             raise InvalidValueError(
                 f"a film must go from 0 s or later to a later moment, got {self.from_s} to "
@@ -81,6 +85,20 @@ class Pace:
     def within_a_minute(cls, duration_s: float, fps: float = FPS) -> Pace:
         """Real time, faster where the film would last longer than ``FILM_S``."""
         return cls(fps=fps, speed=max(1.0, duration_s / FILM_S))
+
+    @classmethod
+    def of_log(cls, duration_s: float, scans: int) -> Pace:
+        """Real time up to a minute, no picture oftener than scans; longer logs in time-lapse.
+
+        One picture for ``SCANS_A_PICTURE`` scans, at most ``MOST_PICTURES``: each costs about as
+        much as a few scans cost the SLAM.
+        """
+        rate = scans / duration_s if duration_s > 0.0 else FPS
+        if duration_s <= FILM_S:
+            return cls(fps=min(max(rate, LAPSE_FPS), FPS))
+        pictures = min(max(scans // SCANS_A_PICTURE, LEAST_PICTURES), MOST_PICTURES)
+        speed = duration_s * LAPSE_FPS / pictures
+        return cls(fps=LAPSE_FPS, speed=min(max(speed, 1.0), MOST_SPEED))
 
     def due(self, seconds: float) -> int:
         """How many pictures the film has up to a moment of the run."""

@@ -22,6 +22,8 @@ CELL_WIDTH = 400  # px
 GAP, MARGIN = 10, 14
 LABEL = 22  # px above a picture for its time
 HEADING = 30  # px above a row for its name
+KEY_PX, SWATCH = 13, 20  # px, of the words and of the colours of a legend
+Legend = Sequence[tuple[str, draw.Color]]
 
 
 def evenly(n: int, start_s: float, end_s: float) -> list[float]:
@@ -40,14 +42,18 @@ def strip(
     *,
     columns: int | None = None,
     cell_width: int = CELL_WIDTH,
+    legend: Legend = (),
 ) -> Picture:
     """One row of pictures (or several of ``columns`` each) with their times; written to ``path``.
 
     pictures  (height, width, 3) uint8 RGB, all of one size
     seconds   of each, written above it
+    legend    what colours stand for, written below all of them
     Raises ``InvalidValueError`` where these do not fit together.
     """
-    return strips({"": pictures}, seconds, path, columns=columns, cell_width=cell_width)
+    return strips(
+        {"": pictures}, seconds, path, columns=columns, cell_width=cell_width, legend=legend
+    )
 
 
 def strips(
@@ -57,11 +63,14 @@ def strips(
     *,
     columns: int | None = None,
     cell_width: int = CELL_WIDTH,
+    legend: Legend = (),
 ) -> Picture:
     """Strips under one another, each under its name: the same moments of several runs."""
     columns = min(columns or len(seconds), len(seconds))
     shape = _cell(rows, seconds, cell_width)
     blocks = [_block(name, parts, seconds, columns, shape) for name, parts in rows.items()]
+    if legend:
+        blocks.append(_key(legend, blocks[0].shape[1]))
     inner = np.vstack(blocks)
     whole: Picture = np.full(
         (inner.shape[0] + MARGIN, inner.shape[1] + 2 * MARGIN, 3), draw.PAPER, np.uint8
@@ -71,6 +80,26 @@ def strips(
         with replacing(path) as temporary:
             Image.fromarray(whole).save(temporary, format="PNG", optimize=True)
     return whole
+
+
+def _key(legend: Legend, width: int) -> Picture:
+    """Colours and words, in as many lines as they take."""
+    lines: list[list[tuple[str, draw.Color]]] = [[]]
+    x = 0
+    for word, color in legend:
+        wide = SWATCH + draw.text_width(word, KEY_PX) + SWATCH
+        if lines[-1] and x + wide > width:
+            lines.append([])
+            x = 0
+        lines[-1].append((word, color))
+        x += wide
+    picture: Picture = np.full((LABEL * len(lines) + GAP, width, 3), draw.PAPER, np.uint8)
+    for row, line in enumerate(lines):
+        x, y = 0, GAP + row * LABEL
+        for word, color in line:
+            picture[y + 4 : y + 12, x : x + SWATCH - 6] = color
+            x = draw.text(picture, word, (x + SWATCH, y), KEY_PX, draw.INK) + SWATCH
+    return picture
 
 
 def _cell(

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from scripts.comparison.tables import number
+from scripts.figures import log_axis
 from scripts.metrics.row import Metric
 from scripts.metrics.table import METRICS
 from scripts.report import style
@@ -59,7 +60,7 @@ def _axes(ax: Axes, study: Study, metric: Metric) -> None:
         ax.axhline(1.0, color=style.TRUTH, lw=1.0, ls="--", zorder=0)
         style.remark(ax, 1.0, "honest", style.TRUTH)
     if metric.log:
-        style.log_axis(ax)
+        log_axis(ax)
     else:
         ax.set_ylim(bottom=0.0, top=100.0 if metric.shown == "%" else None)
         ax.yaxis.set_major_locator(MaxNLocator(5))

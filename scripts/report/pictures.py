@@ -16,7 +16,7 @@ from matplotlib.transforms import Affine2D
 
 from scenes.kinds import is_door
 from scripts.comparison.folder import RunFile
-from scripts.figures import error_series, in_first_frame
+from scripts.figures import error_series, in_first_frame, log_axis
 from scripts.report import style
 from slam import se2
 from slam.evaluation.lost import LOST_M
@@ -99,7 +99,7 @@ def errors(run: RunFile, slams: Sequence[str]) -> str:
                 above.plot(seconds[-1], offset[-1] * 100.0, "x", color=color, ms=8, mew=2)
         above.axhline(LOST_M * 100.0, color=style.MUTED, lw=0.8, ls=":")
         style.remark(above, LOST_M * 100.0, "lost", style.MUTED)
-        style.log_axis(above)
+        log_axis(above)
         above.set_ylabel("position error, cm")
         seconds = (run.stamps_ns - run.stamps_ns[0]) / 1e9
         below.fill_between(seconds, moving_share(run) * 100.0, color=MOVING, alpha=0.55, lw=0)

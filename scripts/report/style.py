@@ -10,11 +10,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from scripts import figures
 
@@ -25,11 +23,6 @@ INK, MUTED, RULE = "#20242c", "#6b7280", "#d9dce1"
 TRUTH = figures.COLORS["truth"]
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _GLYPHS = ("●", "■", "▲", "◆", "▼", "✚", "✖")
-_TICKS = (  # up to which ratio of the ends which multiples of a power of ten are labelled
-    (3.0, (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)),
-    (1000.0, (1.0, 2.0, 5.0)),
-    (math.inf, (1.0,)),
-)
 _RC: dict[str, Any] = {
     "font.family": "sans-serif", "font.size": 9.0, "axes.labelsize": 9.0, "axes.titlesize": 9.5,
     "axes.titleweight": "bold", "axes.titlelocation": "left", "axes.edgecolor": MUTED,
@@ -99,28 +92,6 @@ def level_axis(ax: Axes, levels: Sequence[float], axis: str = "dynamism") -> Non
     ax.set_xlabel(axis)
     ax.set_xticks(levels)
     ax.set_xticklabels([f"{level:g}" for level in levels])
-
-
-def log_axis(ax: Axes) -> None:
-    """Decades in plain numbers, with 2 and 5 between them where there are few."""
-    drawn = [one for one in ax.lines if one.get_transform() == ax.transData]  # no crosses, no rules
-    values = np.concatenate([np.zeros(0), *(np.asarray(one.get_ydata(), float) for one in drawn)])
-    if not (values > 0.0).any():
-        return
-    ax.set_yscale("log", nonpositive="clip")
-    low, high = (_step(end, up) for end, up in zip(ax.get_ylim(), (False, True), strict=True))
-    ax.set_ylim(low, high)
-    subs = next(subs for most, subs in _TICKS if high / low <= most)
-    ax.yaxis.set_major_locator(LogLocator(subs=subs))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _at: f"{value:g}"))
-    ax.yaxis.set_minor_formatter(NullFormatter())
-
-
-def _step(value: float, up: bool) -> float:
-    """The next 1, 2 or 5 times a power of ten."""
-    power = 10.0 ** math.floor(math.log10(value))
-    steps = [power * k for k in (1.0, 2.0, 5.0, 10.0)]
-    return next(s for s in steps if s >= value) if up else max(s for s in steps if s <= value)
 
 
 def remark(ax: Axes, y: float, words: str, tint: str) -> None:

@@ -127,7 +127,8 @@ def _render(
             if log is not None:
                 log.note(frame)
         if strip_to is not None:
-            strip(snapshots.finish(), moments, strip_to, columns=min(3, len(moments)))
+            columns = min(3, len(moments))
+            strip(snapshots.finish(), moments, strip_to, columns=columns, legend=show.legend())
     wall_s = time.perf_counter() - started
     if reel is not None and out is not None:
         long_s = reel.frames / show.pace.fps

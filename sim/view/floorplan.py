@@ -38,6 +38,8 @@ WALL = (66, 73, 88)
 PALE = 0.42  # share of white in the colour of furniture
 MARGIN_M = 0.3
 BAR_PX = 140  # longest scale bar
+FOOT_PX = 28  # row of the scale bar below the room
+LEAST_PX = 160  # a picture that is lower has no such row, and no bar
 SHIFT = 4  # fractional bits of pixel coordinates given to OpenCV
 PAD = 8  # px around what is written
 FONT = cv2.FONT_HERSHEY_SIMPLEX
@@ -49,9 +51,10 @@ class FloorPlan:
     def __init__(self, scene: Scene, width: int, height: int) -> None:
         xmin, ymin, xmax, ymax = scene.bounds
         wide, high = xmax - xmin + 2 * MARGIN_M, ymax - ymin + 2 * MARGIN_M
-        self.scale = min(width / wide, height / high)
+        self._foot = FOOT_PX if height >= LEAST_PX else 0
+        self.scale = min(width / wide, (height - self._foot) / high)
         self._centre = np.array([0.5 * (xmin + xmax), 0.5 * (ymin + ymax)])
-        self._middle = np.array([0.5 * width, 0.5 * height])
+        self._middle = np.array([0.5 * width, 0.5 * (height - self._foot)])
         self.picture = self._paint(scene, width, height)
         self.picture.setflags(write=False)
 
@@ -84,7 +87,8 @@ class FloorPlan:
             if colour != WALL:
                 rim = tuple(round(0.72 * c) for c in colour)
                 cv2.polylines(picture, [pixels], True, rim, 1, cv2.LINE_AA, SHIFT)
-        self._draw_scale(picture)
+        if self._foot:
+            self._draw_scale(picture)
         return picture
 
     def _cast(self, picture: NDArray[np.uint8], shadow: NDArray[np.uint8]) -> None:
@@ -99,8 +103,7 @@ class FloorPlan:
         length = max((m for m in (1, 2, 5, 10, 20) if m * self.scale <= BAR_PX), default=1)
         height = picture.shape[0]
         label, bar = f"{length} m", round(length * self.scale)
-        x, y = 2 * PAD, height - 2 * PAD
-        panel(picture, 0, height - 4 * PAD, bar + text_width(label, height) + 6 * PAD, 4 * PAD)
+        x, y = 2 * PAD, height - self._foot // 2
         ends = [((x, y), (x + bar, y))]
         ends += [((x + tick, y - 4), (x + tick, y + 4)) for tick in (0, bar)]
         for start, end in ends:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from slam.settings import Settings, number
 
 MANY = 100_000
+SEEDS = "scripts/experiments/verdict.py, training seeds"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +32,17 @@ class QualityConfig(Settings):
     suspicious: float = number(0.70, "share", "of the usual match: below, the map is checked")
     denied: float = number(0.30, "share", "of the map in view contradicted: denied")
     still_denied: float = number(0.20, "share", "the same, if the frame before was denied")
+    excused: float = number(
+        0.5, "share", "of the support of a place found: as much does not deny it at first"
+    )
     sudden: float = number(0.3, "share", "of the usual match, after a small step: carried")
+    continuous: float = number(
+        0.5, "share", "of the usual match with the scans before: less, and it was carried", SEEDS
+    )
+    outdated_scans: int = number(10, "frames", "least, with outdated_s", SEEDS, low=1, high=MANY)
+    outdated_s: float = number(
+        2.0, "s", "scans agree with those before: the map is outdated, not the pose", SEEDS
+    )
     sudden_m: float = number(0.5, "m", "largest such step")
     sudden_rad: float = number(0.5, "rad", "largest turn of such a step")
 
@@ -55,6 +66,8 @@ class RelocaliseConfig(Settings):
     on_s: float = number(1.0, "s", "least time passed with a hypothesis", low=1e-6)
     same_m: float = number(0.3, "m", "hypotheses nearer than this are one")
     same_rad: float = number(0.2, "rad", "and turned by less than this")
+    drift_m: float = number(2.0, "m", "a robot that was not carried may be off by", SEEDS)
+    drift_rad: float = number(0.5, "rad", "and turned by")
     least_weight: float = number(
         40.0, "weight",
         "in view from which on a frame can deny the map or identify a place: 4 m of surface",
@@ -69,11 +82,29 @@ class RelocaliseConfig(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class VerdictConfig(Settings):
+    """Lost, or the map outdated: see ``tracker.tracking.verdict``."""
+
+    outdated: float = number(
+        0.85, "share", "of the usual support: below, the map is outdated here", SEEDS
+    )
+    even: float = number(0.45, "share", "of the usual support: lost is as likely as not", SEEDS)
+    steep: float = number(20.0, "1", "log odds of being lost, by that share", SEEDS)
+    agreed: float = number(
+        4.0, "ratio", "of corrections over what odometry may be off: more is evidence", SEEDS
+    )
+    rival: float = number(
+        20.0, "1", "the same, by what a known other place has more of the usual support", SEEDS
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class TrackingConfig(Settings):
     """Following the robot, and finding it again."""
 
     quality: QualityConfig = field(default=QualityConfig())
     relocalise: RelocaliseConfig = field(default=RelocaliseConfig())
+    verdict: VerdictConfig = field(default=VerdictConfig())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -127,11 +127,16 @@ class PoseCovariance:
         )
         self.covariance = self._drift + self._blind + self._shared
 
-    def dragged(self, covariance: Float) -> None:
-        """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot."""
+    def dragged(self, covariance: Float, now: Float | None = None) -> None:
+        """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot.
+
+        ``now``: (3, 3) that the pose alone is off by more, until the next frame.
+        """
         self._drift = self._drift + covariance
         self.newest_drift = self.newest_drift + covariance
         self.covariance = self.covariance + covariance
+        if now is not None:
+            self.covariance = self.covariance + now
 
     def _fewer(self) -> float:
         """By how much the shared errors of surfaces average out less than in a whole room."""

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from scripts.benchmark import picture
+from scripts.benchmark import picture, publish
 from slam.errors import LogFormatError
 
 
@@ -47,15 +47,42 @@ def test_names_at_the_ends_of_lines_never_overlap():
 
 
 def test_both_pictures_are_drawn(board, tmp_path):
-    assert picture.main([str(board), "--out", str(tmp_path / "pictures")]) == 0
-    for name in ("benchmark.png", "benchmark_tracks.png"):
-        assert cv2.imread(str(tmp_path / "pictures" / name)) is not None
+    lost = picture.read(board)
+    for draw in (picture.overall, picture.by_track):
+        draw(lost, tmp_path / "it.png")
+        assert cv2.imread(str(tmp_path / "it.png")) is not None
 
 
 def test_what_is_no_leaderboard_is_refused(tmp_path):
-    path = tmp_path / "other.json"
+    path = tmp_path / "leaderboard.json"
     for text in ("[]", "{}", "no json", '{"tracks": {"a": 1}, "levels_run": [0]}'):
         path.write_text(text)
         with pytest.raises(LogFormatError, match="leaderboard"):
             picture.read(path)
-    assert picture.main([str(path)]) == 1
+    assert publish.main([str(tmp_path)]) == 1
+
+
+def test_a_leaderboard_is_published(board, tmp_path):
+    data = json.loads(board.read_text())
+    row = {"lost_from": "inf", "lost_at_top": 0.25, "error_tracking_m": 0.02, "silent_share": None,
+           "spearman": 0.95, "ms_per_scan_p50": 2.0}  # fmt: skip
+    data["leaderboard"] = {
+        f"{track} {slam}": {"track": track, "slam": slam, **row}
+        for track in data["tracks"] for slam in ("mine", "oracle(shunting)")
+    }  # fmt: skip
+    data["leaderboard"]["a-v1 mine"] |= {"lost_from": 0.5, "lost_at_top": 0.75}
+    board.write_text(json.dumps(data, indent=1))
+    (board.parent / "leaderboard.md").write_text("# Leaderboard\n")
+    docs = tmp_path / "docs"
+    (docs / "pictures").mkdir(parents=True)
+    (docs / "benchmark.md").write_text("<!-- leaderboard -->\n<!-- /leaderboard -->\n")
+    words = [str(tmp_path), "--docs", str(docs), "--results", str(docs), "--commit", "abc"]
+    assert publish.main(words) == 0
+    page = (docs / "benchmark.md").read_text()
+    assert "| `mine` | 1 of 2 | 50 | 2.00 | – | 2 of 2 | 2.00 |" in page
+    assert page.index("`oracle`") < page.index("`mine`")
+    assert "2 tracks that count" in page
+    assert "`c-v1`" in page
+    assert json.loads((docs / "leaderboard.json").read_text())["commit"] == "abc"
+    assert (docs / "leaderboard.md").is_file()
+    assert (docs / "pictures" / "benchmark.png").is_file()

@@ -269,7 +269,7 @@ def test_the_verb_leaves_picture_table_and_numbers(tmp_path: Path):
         ((), "name exactly one of RUN and --scene"),
         (("nowhere",), "nowhere: no such folder"),
         (("--scene", "arnea"), "Did you mean 'arena'"),
-        (("--scene", "arena", "--threshold", "0"), "Rule.threshold_m must be > 0"),
+        (("--scene", "arena", "--threshold", "0"), "--threshold must be > 0"),
         (("--scene", "arena", "--every", "0"), "--every must be a whole number >= 1"),
         (("--scene", "arena", "--horizon", "-1"), "--horizon must be > 0 s"),
         (("--scene", "arena", "--top", "-1"), "--top must be a whole number >= 0"),

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from scripts.film.chart import BAND_PALE, Bar, ErrorChart, Series
+from scripts.film.chart import BAND_PALE, Bar, ErrorChart, Series, _turned
 from scripts.film.draw import GREEN, INK, MAGENTA, ORANGE, RED, paler
 
 COLORS = {"shunting": RED, "odometry": ORANGE}
@@ -99,3 +99,9 @@ def test_nothing_and_a_single_number_can_be_painted():
 def test_painting_again_gives_the_same():
     pane, data = chart(), {"shunting": series(0.02, 0.01), "odometry": series(2.0, 0.1)}
     np.testing.assert_array_equal(pane.paint(data, ()), pane.paint(data, ()))
+
+
+def test_a_heading_beyond_the_axis_is_marked():
+    assert _turned(1.5, 2.0) == "+1.50°"
+    assert _turned(15.5, 2.0) == "+15.50° ↑"
+    assert _turned(-2.1, 2.0) == "-2.10° ↓"

@@ -260,9 +260,10 @@ def test_what_is_no_run_is_told_in_one_line(run: Path, tmp_path: Path):
     assert "render 'intel.log' itself with --slam ekf" in told(run)
 
 
-def test_a_truncated_log_is_named(tmp_path: Path):
+def test_a_log_torn_in_the_middle_is_named(tmp_path: Path):
     log = tmp_path / "torn.log"
-    log.write_text("FLASER 3 1.0 1.0 1.0 0 0 0 0 0 0 1.0 host 1.0\nFLASER 3 1.")
+    line = "FLASER 3 1.0 1.0 1.0 0 0 0 0 0 0 1.0 host 1.0"
+    log.write_text(f"{line}\nFLASER 3 1.\n{line}\n")
     with pytest.raises(LogFormatError, match=r"torn\.log"):
         render(log, "--out", tmp_path / "film.mp4")
     assert [p.name for p in tmp_path.iterdir()] == ["torn.log"]

@@ -64,3 +64,13 @@ def test_evenly():
 def test_what_does_not_fit_is_named(pictures, seconds, says):
     with pytest.raises(InvalidValueError, match=says):
         strip(pictures, seconds)
+
+
+def test_a_legend_stands_below_and_wraps():
+    parts = [np.full((40, 60, 3), 10, np.uint8)]
+    legend = [("one of the colours", (1, 2, 3)), ("another of the colours", (4, 5, 6))]
+    bare, told = (strip(parts, [0.0], cell_width=200, legend=named) for named in ((), legend))
+    below = told[len(bare) - MARGIN :]
+    for _, color in legend:  # in a line of its own each, as both are wider than the strip
+        assert (below == color).all(axis=2).any()
+    assert len(told) > len(bare) + 2 * LABEL - 1

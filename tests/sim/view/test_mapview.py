@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import scenes
+from sim.view.floorplan import FOOT_PX
+from sim.view.icons import INK
 from sim.view.mapview import SCAN_HIT, TRAILS, MapView
 from slam.errors import InvalidValueError
 
@@ -105,3 +107,14 @@ def test_wrong_numbers_are_refused(office, poses):
         view.draw(poses[:-1])
     with pytest.raises(InvalidValueError, match="px"):
         MapView(scene, 0, 400)
+
+
+@pytest.mark.parametrize("size", [(640, 480), (400, 1200), (1000, 300)])
+def test_the_scale_bar_is_below_the_room(size):
+    scene = scenes.build("arena", 0)
+    view = MapView(scene, *size)
+    xmin, ymin, xmax, _ = scene.bounds
+    lowest = view.to_pixels([(xmin, ymin), (xmax, ymin)])[:, 1].max()
+    ink = (view.plan.picture[-FOOT_PX:] == INK).all(axis=2)
+    assert ink.any()
+    assert lowest < size[1] - FOOT_PX

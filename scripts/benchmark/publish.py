@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Put a leaderboard into the docs: ``python -m scripts.benchmark.publish out/benchmark``.
+
+Copies ``leaderboard.json`` to ``docs/results`` and ``leaderboard.md`` to ``docs``, draws the two
+pictures of ``scripts.benchmark.picture``, and writes a row for each SLAM into docs/benchmark.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from scripts.benchmark import picture
+from scripts.benchmark.scores import SILENT, TRACKING
+from scripts.experiments.measured import table
+from scripts.marks import fill_page
+from scripts.metrics.row import digits
+from scripts.result_files import RESULTS, ROOT
+from slam.errors import InvalidValueError, MobiliaError
+from slam.evaluation.statistics import quantile
+from slam.files import write_text
+
+DOCS = ROOT / "docs"
+PAGE, MARK = "benchmark.md", "leaderboard"
+CM, PERCENT = 100.0, 100.0
+HEADS = (
+    "SLAM", "tracks on which half of the runs are lost", "lost at level 1, %",
+    "error while not lost, cm", "silent, % of scans", "rank correlation ≥ 0.9 on", "ms a scan, p50",
+)  # fmt: skip
+
+
+def rows(board: dict[str, Any]) -> list[list[str]]:
+    """A row for each SLAM over the tracks that count, the fewest lost runs first."""
+    counting = {name for name, track in board["tracks"].items() if track["counts"]}
+    own: dict[str, list[dict[str, Any]]] = {}
+    for row in board["leaderboard"].values():
+        if row["track"] in counting:
+            slam = picture.shown_name(row["slam"])
+            own.setdefault(slam, []).append(row)
+    if not own:
+        raise InvalidValueError("no track of the leaderboard counts")
+    ranked = sorted(own.items(), key=lambda item: _mean(item[1], "lost_at_top"))
+    return [_row(slam, found) for slam, found in ranked]
+
+
+def _row(slam: str, found: Sequence[dict[str, Any]]) -> list[str]:
+    broken = sum(math.isfinite(float(row["lost_from"])) for row in found)
+    ranked = [float(row["spearman"]) for row in found if row["spearman"] is not None]
+    return [
+        f"`{slam}`",
+        f"{broken} of {len(found)}",
+        f"{PERCENT * _mean(found, 'lost_at_top'):.0f}",
+        _median(found, TRACKING, CM),
+        "–"
+        if all(row[SILENT] is None for row in found)
+        else f"{PERCENT * _mean(found, SILENT):.1f}",
+        f"{sum(value >= 0.9 for value in ranked)} of {len(ranked)}",
+        _median(found, "ms_per_scan_p50", 1.0),
+    ]
+
+
+def _values(found: Sequence[dict[str, Any]], key: str) -> list[float]:
+    return [float(row[key]) for row in found if row[key] is not None]
+
+
+def _mean(found: Sequence[dict[str, Any]], key: str) -> float:
+    values = _values(found, key)
+    return sum(values) / len(values) if values else math.inf
+
+
+def _median(found: Sequence[dict[str, Any]], key: str, factor: float) -> str:
+    values = _values(found, key)
+    return digits(factor * quantile(values, 0.5)) if values else "–"
+
+
+def told(board: dict[str, Any]) -> str:
+    """The table and how it was made."""
+    counting = [name for name, track in board["tracks"].items() if track["counts"]]
+    left = [f"`{name}`" for name in board["tracks"] if name not in counting]
+    made = (
+        f"{len(counting)} tracks that count, {len(board['levels_run'])} levels, "
+        f"{len(board['seeds'])} seeds from {min(board['seeds'])}. Errors and times are medians of "
+        "the tracks, the rest are means."
+    )
+    if left:
+        made += f" Left out, because the oracle was lost or off there: {', '.join(left)}."
+    return f"{table(HEADS, rows(board))}\n\n{made}"
+
+
+def publish(folder: Path, docs: Path, results: Path, commit: str) -> None:
+    """Copy, draw and fill; raises ``LogFormatError`` for what is no leaderboard."""
+    source = folder / "leaderboard.json"
+    lost = picture.read(source)
+    board = json.loads(source.read_text(encoding="utf-8"))
+    text = told(board)
+    if commit:
+        first = f'{{\n "commit": {json.dumps(commit)},\n'
+        copied = source.read_text(encoding="utf-8").replace("{\n", first, 1)
+    else:
+        copied = source.read_text(encoding="utf-8")
+    write_text(results / "leaderboard.json", copied)
+    write_text(docs / "leaderboard.md", (folder / "leaderboard.md").read_text(encoding="utf-8"))
+    picture.overall(lost, docs / "pictures" / "benchmark.png")
+    picture.by_track(lost, docs / "pictures" / "benchmark_tracks.png")
+    fill_page(docs / PAGE, MARK, text)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Publish one."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="of mobilia benchmark")
+    parser.add_argument("--docs", type=Path, default=DOCS)
+    parser.add_argument("--results", type=Path, default=RESULTS)
+    parser.add_argument("--commit", default="", help="of the code that ran")
+    wanted = parser.parse_args(arguments)
+    try:
+        publish(wanted.folder, wanted.docs, wanted.results, wanted.commit)
+    except (MobiliaError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
