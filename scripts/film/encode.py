@@ -27,6 +27,7 @@ MOST_SPEED = 1e4
 LAPSE_FPS = 10.0  # of the film of a long log
 SCANS_A_PICTURE = 6
 LEAST_PICTURES, MOST_PICTURES = 60, 600
+CRF = 21  # H.264's constant rate factor: hardly a loss to see
 _SIZES = (320, 4096)
 
 
@@ -108,14 +109,16 @@ class Pace:
 
 
 @contextmanager
-def film(path: Path, fps: float) -> Iterator[Film]:
+def film(path: Path, fps: float, *, crf: int = CRF) -> Iterator[Film]:
     """A film that appears under ``path`` when the block ends well, and not at all otherwise.
+
+    crf  H.264's constant rate factor: more is coarser and smaller
 
     Raises ``OutputError`` when ffmpeg stops or ends badly (disk full, say), or got no picture.
     """
     require_ffmpeg()
     with replacing(path) as temporary:
-        reel = Film(temporary, path, fps)
+        reel = Film(temporary, path, fps, crf)
         try:
             yield reel
             reel.finish()
@@ -129,10 +132,10 @@ class Film:
     imageio's own writer does not tell how ffmpeg ended: a film cut short would pass for a whole one
     """
 
-    def __init__(self, temporary: Path, path: Path, fps: float) -> None:
+    def __init__(self, temporary: Path, path: Path, fps: float, crf: int = CRF) -> None:
         self.frames = 0
         self.last: Picture | None = None
-        self._temporary, self._path, self._fps = temporary, path, fps
+        self._temporary, self._path, self._fps, self._crf = temporary, path, fps, crf
         self._ffmpeg: subprocess.Popen[bytes] | None = None
 
     def add(self, picture: Picture) -> None:
@@ -178,7 +181,8 @@ class Film:
             imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "quiet",
             "-f", "rawvideo", "-vcodec", "rawvideo", "-s", f"{width}x{height}",
             "-pix_fmt", "rgb24", "-r", f"{self._fps:.02f}", "-i", "-", "-an",
-            "-vcodec", "libx264", "-pix_fmt", "yuv420p", "-preset", "veryfast", "-crf", "21",
+            "-vcodec", "libx264", "-pix_fmt", "yuv420p", "-preset", "veryfast",
+            "-crf", str(self._crf),
             "-movflags", "+faststart", str(self._temporary),
         ]  # fmt: skip
         return subprocess.Popen(
