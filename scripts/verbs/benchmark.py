@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from scripts.benchmark.board import Board
 
 
+MOST_COLUMNS = 5  # SLAMs in the table of the terminal; the page has all
+
+
 def benchmark(
     out: Annotated[Path, typer.Option(help="Folder of the benchmark.")] = Path("out/benchmark"),
     slam: Annotated[
@@ -103,11 +106,12 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
         caption_justify="left",
     )  # fmt: skip
     table.add_column("track", no_wrap=True)
-    for name in board.slams:
+    shown = board.slams if len(board.slams) <= MOST_COLUMNS else [board.subject]
+    for name in shown:
         table.add_column(escape(name), justify="right", overflow="fold")
     for track in board.tracks:
         mark = "" if board.fair[track.name]["counts"] else " *"
-        cells = (escape(lost_from_words(board.row(track.name, name))) for name in board.slams)
+        cells = (escape(lost_from_words(board.row(track.name, name))) for name in shown)
         table.add_row(track.name + mark, *cells)
     console.print(table)
     for name, why in board.missing.items():

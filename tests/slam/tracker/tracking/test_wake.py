@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot that is lost to its map goes on tracking, and is not carried by what only looks right."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from slam import se2
+from slam.frames import Frame
+from slam.frontend.observations import observe
+from slam.grid.config import OccupancyConfig
+from slam.grid.occupancy import OccupancySlam
+from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.tracker.tracking.wake import Wake
+from tests.world2d import Drive, Wheels, World2D, arena, frames, going_on, rectangle
+
+POOR = Wheels(noise=0.08, scale_sd=0.1)
+BEFORE = Drive((0.0, 0.0, 0.0), ((0.0, 0.8, 12.0),))
+# Four walls about the robot, which come one after another.
+BOARDS = ((1.3, -1.2, 1.3, 1.3), (-1.2, 1.3, 1.3, 1.3), (-1.2, -1.2, -1.2, 1.3),
+          (-1.2, -1.2, 1.3, -1.2))  # fmt: skip
+
+
+def closing_in(kind: type[ShuntingSlam] | type[OccupancySlam]) -> list[tuple[str, float]]:
+    """States and position errors, m, while boards come between the robot and its room, and after.
+
+    It turns on the spot with poor wheels for 20 s in the box.
+    """
+    system = kind(ShuntingConfig(cell_m=0.05)) if kind is ShuntingSlam else kind(
+        OccupancyConfig(cell_m=0.05)
+    )  # fmt: skip
+    stream: list[Frame] = frames(World2D(arena()), BEFORE, rate_hz=5.0, seed=3)
+    out = []
+    for count in (1, 2, 3, 4, 4):
+        walls = np.vstack([arena(), np.array(BOARDS[:count])])
+        at = tuple(float(v) for v in stream[-1].truth)  # type: ignore[union-attr]
+        turn = Drive(at, ((0.0, 0.5, 12.0 if count == 4 else 1.0),))  # type: ignore[arg-type]
+        more = frames(World2D(walls), turn, rate_hz=5.0, seed=count, wheels=POOR)
+        stream += going_on(more, stream[-1])
+    for frame in stream:
+        estimate = system.update(frame.without_truth())
+        off = estimate.T_map_robot - frame.truth
+        out.append((estimate.diagnostics["state"], math.hypot(float(off[0]), float(off[1]))))
+    return out
+
+
+@pytest.mark.parametrize("kind", [ShuntingSlam, OccupancySlam])
+def test_boards_that_close_in_do_not_lose_the_robot(kind) -> None:
+    """Nothing of the room is in view in the end, and nothing carried the robot."""
+    seen = closing_in(kind)
+    assert max(off for _, off in seen) < 0.05
+    assert seen[-1][0] == "tracking"
+
+
+def test_what_the_wake_sees_is_not_in_the_map() -> None:
+    for system in (ShuntingSlam(), OccupancySlam()):
+        stream = frames(World2D(arena()), BEFORE, rate_hz=5.0, seed=3)
+        for frame in stream[:30]:
+            system.update(frame.without_truth())
+        before = [array.copy() for array in system.cell_map.cells]
+        map_before = system.map()
+        wake = Wake(system.cell_map)
+        observations = observe(stream[30], np.zeros(3), system.config)
+        for _ in range(20):
+            wake.add(observations, np.array([0.4, -0.3, 0.2]), 0.2)
+        for one, other in zip(before, system.cell_map.cells, strict=True):
+            np.testing.assert_array_equal(one, other)
+        after = system.map()
+        assert map_before is not None
+        assert after is not None
+        np.testing.assert_array_equal(map_before.values, after.values)
+        assert not np.array_equal(wake.map.cells.y, system.cell_map.cells.y)
+
+
+def test_agreement_is_counted_in_a_row() -> None:
+    wake = Wake(ShuntingSlam().cell_map)
+    for agrees in (True, True, False, True):
+        wake.count(agrees, 0.2)
+    assert (wake.agreed, wake.agreed_s) == (1, 0.2)
+
+
+def test_a_robot_that_is_carried_is_told_by_its_surroundings() -> None:
+    """Everything changes between two scans: no way leads there."""
+    system = ShuntingSlam(ShuntingConfig(cell_m=0.05))
+    world = World2D(np.vstack([arena(), rectangle(-2.0, 1.0, -1.2, 2.2)]))
+    stream = frames(world, Drive((0.0, 0.0, 0.0), ((0.0, 0.8, 24.0),)), rate_hz=5.0, seed=3)
+    for frame in stream:
+        system.update(frame.without_truth())
+    there = Drive((-2.6, 1.5, 2.2), ((0.0, 0.3, 8.0),))
+    states, last = [], None
+    for frame in going_on(frames(world, there, rate_hz=5.0, seed=4), stream[-1]):
+        last = system.update(frame.without_truth())
+        states.append(last.diagnostics["state"])
+        if last.diagnostics["state"] == "frozen":
+            assert system._wake is not None
+            assert system._wake.carried
+    assert last is not None
+    assert "relocated" in states
+    off = last.T_map_robot - there.at(8.0)[0]
+    assert math.hypot(float(off[0]), float(off[1])) < 0.1
+    assert abs(se2.wrap(float(off[2]))) < math.radians(3.0)
+
+
+def test_no_other_place_is_believed_while_scans_agree_with_one_another() -> None:
+    """Told that nothing carried it, a robot that is elsewhere does not jump there."""
+    system = ShuntingSlam(ShuntingConfig(cell_m=0.05))
+    world = World2D(np.vstack([arena(), rectangle(-2.0, 1.0, -1.2, 2.2)]))
+    stream = frames(world, Drive((0.0, 0.0, 0.0), ((0.0, 0.8, 24.0),)), rate_hz=5.0, seed=3)
+    for frame in stream:
+        system.update(frame.without_truth())
+    there = Drive((-2.6, 1.5, 2.2), ((0.0, 0.3, 8.0),))
+    states, poses = [], []
+    for frame in going_on(frames(world, there, rate_hz=5.0, seed=4), stream[-1]):
+        if system._wake is not None:
+            system._wake.carried = False
+        estimate = system.update(frame.without_truth())
+        states.append(estimate.diagnostics["state"])
+        poses.append(estimate.T_map_robot)
+    assert "lost" in states
+    assert states[-1] == "tracking"  # on a map that was outdated
+    jumps = np.abs(np.diff(np.array(poses)[:, :2], axis=0)).max()
+    assert jumps < 0.5
