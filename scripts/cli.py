@@ -20,10 +20,12 @@ from scripts.verbs.blame import blame
 from scripts.verbs.compare import compare
 from scripts.verbs.config import config
 from scripts.verbs.demo import demo
+from scripts.verbs.doctor import doctor
 from scripts.verbs.drive import drive
 from scripts.verbs.export import export
 from scripts.verbs.generate import generate
 from scripts.verbs.listing import listing
+from scripts.verbs.live import live
 from scripts.verbs.render import render
 from scripts.verbs.report import report
 from scripts.verbs.reproduce import reproduce
@@ -55,12 +57,14 @@ app.command("export", cls=Verb)(export)
 app.command("list", cls=Verb)(listing)
 app.command("config", cls=Verb)(config)
 app.command("bench", cls=Verb)(bench)
+app.command("doctor", cls=Verb)(doctor)
 app.command("sensor-card", cls=Verb)(sensor_card)
 app.command("reproduce", cls=Verb)(reproduce)
 app.command("compare", cls=ManyValues)(compare)
 app.command("benchmark", cls=ManyValues)(benchmark)
 app.command("drive", cls=ManyValues)(drive)
 app.command("blame", cls=ManyValues)(blame)
+app.command("live", cls=ManyValues)(live)
 app.command("report", cls=Verb)(report)
 
 

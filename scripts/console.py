@@ -95,7 +95,7 @@ class Lines(Progress):
 def _words(task: Task) -> str:
     """``office: 400/2250 scans, 12 s so far, about 54 s left``."""
     done = str(task.fields.get("unit", ""))
-    if task.total and task.finished:
+    if task.total is not None and task.completed >= task.total:
         return f"{_plain(task.description)}: {done or 'done'}, {task.elapsed or 0.0:.0f} s"
     left = task.time_remaining
     parts = [done, f"{task.elapsed or 0.0:.0f} s so far"]

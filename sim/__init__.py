@@ -10,6 +10,11 @@ from functools import partial
 
 from gymnasium.envs.registration import register, registry
 
+import mobilia
+
+if _sentence := mobilia.hidden("slam", "scenes"):
+    raise ImportError(_sentence)
+
 from scenes.registry import OWN
 from sim.core.versions import WORLD, gone
 

@@ -44,13 +44,19 @@ def toured(
     pilot = Pilot(world, config, keep_out=keep_out)
     for _ in range(n_frames(seconds, simulation.scan_period_s)):
         world.set_command(*pilot.command(simulation.scan_period_s))
-        poses, moving = world.mover_poses(), world.movers_moving()
-        frame = simulation.observe()
-        for event in simulation.rearranged:
-            row = world.mover_names.index(event.name)
-            poses[row], moving[row] = event.after, False
-        rearranged = tuple(simulation.rearranged)
-        yield Moment(frame=frame, poses=poses, moving=moving, rearranged=rearranged)
+        yield observed(simulation)
+
+
+def observed(simulation: Simulation) -> Moment:
+    """Let one scan's worth of time pass under the present command; the moment it gives."""
+    world = simulation.world
+    poses, moving = world.mover_poses(), world.movers_moving()
+    frame = simulation.observe()
+    for event in simulation.rearranged:
+        row = world.mover_names.index(event.name)
+        poses[row], moving[row] = event.after, False
+    rearranged = tuple(simulation.rearranged)
+    return Moment(frame=frame, poses=poses, moving=moving, rearranged=rearranged)
 
 
 def thinned(moments: Iterable[Moment], every: int) -> Iterator[Moment]:

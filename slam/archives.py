@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import struct
+import warnings
 import zipfile
 import zlib
 from collections.abc import Iterable
@@ -56,7 +57,9 @@ def read_arrays(
                 raise LogFormatError(
                     path, f"unpacks to {claimed} bytes; at most {max_bytes} are allowed"
                 )
-            return {name: _array(path, archive, members[name], max_bytes) for name in wanted}
+            with warnings.catch_warnings():  # a header of Python 2 is no damage in itself
+                warnings.filterwarnings("ignore", "Reading `.npy`", UserWarning)
+                return {name: _array(path, archive, members[name], max_bytes) for name in wanted}
     except LogFormatError:
         raise
     except BROKEN as error:

@@ -58,10 +58,11 @@ class Raster:
 
     def __post_init__(self) -> None:
         values = frozen("Raster", "values", self.values, (None, None), np.float32)
-        known = values[~np.isnan(values)]
-        if known.size and (known.min() < 0.0 or known.max() > 1.0):
+        # NaN where all are: without a copy of what is known, which a large map has no room for
+        low, high = (f.reduce(values, axis=None, initial=np.nan) for f in (np.fmin, np.fmax))
+        if low < 0.0 or high > 1.0:
             raise InvalidValueError(
-                f"Raster.values must lie in [0, 1] or be NaN, got {known.min()}..{known.max()}"
+                f"Raster.values must lie in [0, 1] or be NaN, got {low}..{high}"
             )
         if not 0.0 < self.resolution_m < np.inf:
             raise InvalidValueError(f"Raster.resolution_m must be > 0 m, got {self.resolution_m}")

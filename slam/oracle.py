@@ -27,7 +27,8 @@ KINDS = {
     "moving": (BeamClass.MOVING,),
 }
 OPTIONAL = (
-    "landmarks", "changes", "save", "cells_hold",  # the optional protocols of ``slam.system``
+    # the optional protocols of ``slam.system``
+    "landmarks", "changes", "save", "cells_hold", "map_part",
     "estimates_at_end",  # of a program over files
     "processor_s", "memory_growth_bytes",  # of a system in a process of its own
 )  # fmt: skip

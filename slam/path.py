@@ -29,6 +29,10 @@ class PosePath:
         self._stamps.append(stamp_ns)
         self._poses.append(T_map_robot.copy())
 
+    def replace(self, poses: Float) -> None:
+        """The frames so far were at these (n, 3)."""
+        self._poses = list(poses)
+
     def poses(self) -> Float:
         """(n, 3) m, m, rad."""
         return np.array(self._poses, dtype=np.float64).reshape(-1, 3)

@@ -39,33 +39,61 @@ class Edge:
     robust: bool = False
 
 
+class Relaxation:
+    """Least squares of poses (n, 3), the first held fast, one round at a time.
+
+    poses    (n, 3) after the rounds so far
+    weights  (len(edges),); near 0: an edge that was let go of
+    done     nothing moves any more, or ``ROUNDS`` are over
+    """
+
+    def __init__(self, poses: Float, edges: list[Edge]) -> None:
+        self.poses = np.array(poses, dtype=np.float64)
+        self.weights = np.ones(len(edges))
+        self.done = len(self.poses) < 2 or not edges
+        if self.done:
+            return
+        self._a = np.array([e.a for e in edges])
+        self._b = np.array([e.b for e in edges])
+        self._measured = np.array([e.T_a_b for e in edges])
+        self._information = np.array([e.information for e in edges])
+        self._robust = np.array([e.robust for e in edges])
+        self._rounds = 0
+        squares = self._squares(self._residuals()[0])
+        self._mu = max(2.0 * float(squares[self._robust].max(initial=0.0)) / INLIER, 1.0)
+
+    def _residuals(self) -> tuple[Float, Float, Float]:
+        return _residuals(self.poses, self._a, self._b, self._measured)
+
+    def _squares(self, residuals: Float) -> Float:
+        return np.asarray(np.einsum("ni,nij,nj->n", residuals, self._information, residuals))
+
+    def round(self) -> None:
+        """One step of Gauss-Newton; the loops that do not fit lose weight."""
+        residuals, to_a, to_b = self._residuals()
+        scale = self._mu * INLIER
+        weights = (scale / (self._squares(residuals) + scale)) ** 2
+        self.weights = np.where(self._robust, weights, 1.0)
+        information = self.weights[:, None, None] * self._information
+        step = _step(len(self.poses), self._a, self._b, residuals, to_a, to_b, information)
+        self.poses[1:] += step.reshape(-1, 3)
+        self._rounds += 1
+        still = self._mu == 1.0 and float(np.abs(step).max()) < STILL
+        self.done = still or self._rounds == ROUNDS
+        self._mu = max(self._mu / SHARPER, 1.0)
+        if self.done:
+            self.poses[:, 2] = se2.wrap_array(self.poses[:, 2])
+
+
 def optimise(poses: Float, edges: list[Edge]) -> tuple[Float, Float]:
     """Poses (n, 3) of least squares, the first held fast, and each edge's weight (len(edges),).
 
     A weight near 0 is an edge that was let go of.
     """
-    poses = np.array(poses, dtype=np.float64)
-    if len(poses) < 2 or not edges:
-        return poses, np.ones(len(edges))
-    a = np.array([e.a for e in edges])
-    b = np.array([e.b for e in edges])
-    measured = np.array([e.T_a_b for e in edges])
-    information = np.array([e.information for e in edges])
-    robust = np.array([e.robust for e in edges])
-    residuals = _residuals(poses, a, b, measured)[0]
-    squares = np.einsum("ni,nij,nj->n", residuals, information, residuals)
-    mu = max(2.0 * float(squares[robust].max(initial=0.0)) / INLIER, 1.0)
-    for _ in range(ROUNDS):
-        residuals, to_a, to_b = _residuals(poses, a, b, measured)
-        squares = np.einsum("ni,nij,nj->n", residuals, information, residuals)
-        weights = np.where(robust, (mu * INLIER / (squares + mu * INLIER)) ** 2, 1.0)
-        step = _step(len(poses), a, b, residuals, to_a, to_b, weights[:, None, None] * information)
-        poses[1:] += step.reshape(-1, 3)
-        if mu == 1.0 and np.abs(step).max() < STILL:
-            break
-        mu = max(mu / SHARPER, 1.0)
-    poses[:, 2] = se2.wrap_array(poses[:, 2])
-    return poses, weights
+    relaxation = Relaxation(poses, edges)
+    while not relaxation.done:
+        relaxation.round()
+    return relaxation.poses, relaxation.weights
 
 
 def _residuals(poses: Float, a: Float, b: Float, measured: Float) -> tuple[Float, Float, Float]:
@@ -107,11 +135,48 @@ def carried(before: Float, after: Float, at: Float, poses: Float) -> Float:
     ``at`` (m,) is the place of each in the list of key poses, e.g. 3.25: a quarter from the fourth
     to the fifth.
     """
-    out = np.empty_like(poses)
-    for k, place in enumerate(at.tolist()):
-        low = min(int(place), len(before) - 1)
-        high = min(low + 1, len(before) - 1)
-        by_low = se2.compose(after[low], se2.between(before[low], poses[k]))
-        by_high = se2.compose(after[high], se2.between(before[high], poses[k]))
-        out[k] = se2.interpolate(by_low, by_high, place - math.floor(place))
+    low = np.minimum(at.astype(np.int64), len(before) - 1)
+    high = np.minimum(low + 1, len(before) - 1)
+    by_low = _composed(after[low], relative(before[low], poses))
+    by_high = _composed(after[high], relative(before[high], poses))
+    apart = by_high - by_low  # millimetres: straight from one to the other
+    apart[:, 2] = se2.wrap_array(apart[:, 2])
+    out = by_low + (at - np.floor(at))[:, None] * apart
+    out[:, 2] = se2.wrap_array(out[:, 2])
     return out
+
+
+def least_moved(poses: Float, before: Float) -> Float:
+    """(n, 3) poses, moved as a whole so that their positions are nearest to those ``before``.
+
+    A graph says nothing of where it lies as a whole. Geodesy calls this choice the datum of a free
+    network.
+    """
+    middle, goal = poses[:, :2].mean(axis=0), before[:, :2].mean(axis=0)
+    p, q = poses[:, :2] - middle, before[:, :2] - goal
+    across = float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum())
+    theta = math.atan2(across, float((p * q).sum()))
+    origin = goal - se2.transform([0.0, 0.0, theta], middle)
+    T = np.array([*origin.tolist(), theta])
+    return np.array([se2.compose(T, pose) for pose in poses])
+
+
+def _turns(poses: Float) -> tuple[Float, Float]:
+    """Cosines and sines (n,) of headings, with libm: see ``slam.se2``."""
+    headings = poses[:, 2].tolist()
+    return np.array([math.cos(t) for t in headings]), np.array([math.sin(t) for t in headings])
+
+
+def _composed(first: Float, then: Float) -> Float:
+    """(n, 3) row by row ``se2.compose``; headings not wrapped."""
+    c, s = _turns(first)
+    x = first[:, 0] + c * then[:, 0] - s * then[:, 1]
+    y = first[:, 1] + s * then[:, 0] + c * then[:, 1]
+    return np.stack([x, y, first[:, 2] + then[:, 2]], axis=1)
+
+
+def relative(first: Float, then: Float) -> Float:
+    """(n, 3) row by row ``se2.between``; headings not wrapped."""
+    d = then - first
+    c, s = _turns(first)
+    return np.stack([c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0], d[:, 2]], axis=1)

@@ -27,6 +27,7 @@ from slam.system import (
     CanSave,
     HasChanges,
     HasLandmarks,
+    MapsInParts,
     RunsAtTheEnd,
     SaysCells,
     SlamSystem,
@@ -53,6 +54,11 @@ def asked_map(system: SlamSystem) -> Raster | None:
     """The map now, None for none or an empty one; ``SlamFailedError`` for what no map can be."""
     with judged():
         raster: object = system.map()
+    return as_map(raster)
+
+
+def as_map(raster: object) -> Raster | None:
+    """That map; ``SlamFailedError`` for what no map can be."""
     if raster is None:
         return None
     if not isinstance(raster, Raster):
@@ -209,6 +215,14 @@ class Track:
         """The map now; raises ``SlamFailedError`` for what no map can be."""
         with self._named("map()"):
             return asked_map(self.system)
+
+    def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
+        """The map within ``bounds`` of a system that ``MapsInParts``; raises as ``map`` does."""
+        system = self.system
+        if not isinstance(system, MapsInParts):
+            return self.map()
+        with self._named("map_part()"), judged():
+            return as_map(system.map_part(bounds))
 
     def landmarks(self) -> Landmarks | None:
         """Its landmarks, None for a system without; raises ``SlamFailedError`` as ``map`` does."""

@@ -7,8 +7,8 @@
         def map(self) -> Raster | None: ...
         def trajectory(self) -> Trajectory: ...
 
-A SLAM may have more: ``HasLandmarks``, ``HasChanges``, ``CanSave``, ``SaysCells`` and
-``RunsAtTheEnd`` are optional.
+A SLAM may have more: ``HasLandmarks``, ``HasChanges``, ``CanSave``, ``MapsInParts``,
+``SaysCells`` and ``RunsAtTheEnd`` are optional.
 Who wants one of these asks whether it is there (``slam.replay.Track``), never for a class.
 
 ``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class,
@@ -39,7 +39,8 @@ from slam.trajectory import Trajectory
 from slam.variants import inside, oracle_of, parsed
 
 __all__ = [
-    "CanSave", "Changes", "Estimate", "HasChanges", "HasLandmarks", "Landmarks", "Raster",
+    "CanSave", "Changes", "Estimate", "HasChanges", "HasLandmarks", "Landmarks", "MapsInParts",
+    "Raster",
     "RunsAtTheEnd", "SaysCells", "SlamSystem", "config_of", "create", "describe", "names",
     "refuse_at_the_end", "register", "register_prefix", "told",
 ]  # fmt: skip
@@ -88,6 +89,16 @@ class CanSave(Protocol):
 
     def save(self, path: Path) -> None:
         """Write the map; raises ``OutputError``."""
+
+
+@runtime_checkable
+class MapsInParts(Protocol):
+    """Optional: a map that can be had in part. The film of a long log draws what has changed."""
+
+    def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
+        """The cells of ``map()`` within xmin, ymin, xmax, ymax, m in the map frame, and their
+        neighbours up to one cell, NaN where nothing is; None where nothing can be.
+        """
 
 
 @runtime_checkable

@@ -6,7 +6,11 @@
 The robot maps the office on one tour. Then it is put, between two scans, to where it stands at some
 moment of another tour through the same office at another time (other people, other noise, chairs
 elsewhere), at least 3 m or 90 degrees away, near a place it has mapped. The odometry knows nothing
-of it. What counts: scans until the estimate is not trusted, seconds until it is again, and where.
+of it. What counts: scans until the estimate is not trusted, seconds until it is again, and where;
+and the processor time of the scans at which it is not trusted.
+
+With ``--log FILE`` it maps a log, and is then put back to an earlier part of the same log. The
+place where it was then estimated to be counts as the right one.
 """
 
 from __future__ import annotations
@@ -16,9 +20,11 @@ import copy
 import json
 import math
 import sys
+import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,11 +34,14 @@ from sim.simulation import stream
 from slam import SlamSystem, create, se2
 from slam.files import write_text
 from slam.frames import Float, Frame, Odometry, Scan
+from slam.frontend.odometry_sum import thinned
+from slam.logs import open_log
 
 FAR_M, FAR_RAD = 3.0, math.pi / 2.0
 KNOWN_M, KNOWN_RAD = 1.0, 1.0  # the new place is that near to one of the mapping tour
 RIGHT_M, RIGHT_RAD = 0.3, 0.2
 AFTER_S = 10.0
+LEAST_AFTER = 40  # scans followed at least
 DETECTED_WITHIN = 3  # scans
 
 
@@ -47,16 +56,34 @@ class Outcome:
     error_m: float | None  # when it trusts itself again
     right: bool  # trusted at the end, and where it truly is
     wrong: bool  # ever trusted elsewhere after having been lost, or never suspicious
+    spent_ms: tuple[float, ...] = ()  # of the scans at which it was lost, and the one that found it
 
 
-def recording(seed: int, seconds: float, dynamism: float, *, again: bool) -> list[Frame]:
-    """A tour through the office of ``seed``; ``again``: at another time."""
+def recording(
+    seed: int,
+    seconds: float,
+    dynamism: float,
+    *,
+    again: bool,
+    scene: str = "office",
+    every: int = 1,
+) -> list[Frame]:
+    """One in ``every`` scans of a tour through a scene; ``again``: at another time."""
     other = seed + 1000
     seeds = Seeds(seed)
     if again:
         seeds = Seeds(seed, lidar=other, odometry=other, people=other, driving=other)
     rates = Dynamism.world_1(dynamism)
-    return list(stream("office", seed=seeds, dynamism=rates, seconds=seconds))
+    size: dict[str, Any] = {"size_m": 40.0, "n_rooms": 40} if scene == "random-rooms" else {}
+    return thinned(list(stream(scene, seed=seeds, dynamism=rates, seconds=seconds, **size)), every)
+
+
+def of_log(slam: SlamSystem, path: Path) -> list[Frame]:
+    """The frames of a log, with the poses at which ``slam`` saw them as truth."""
+    return [
+        replace(frame, truth=slam.update(frame.without_truth()).T_map_robot)
+        for frame in open_log(path)
+    ]
 
 
 def targets(mapped: list[Frame], later: list[Frame], scans: int, count: int) -> Iterator[int]:
@@ -108,9 +135,13 @@ def follow(
     slam = copy.deepcopy(slam)
     detected: int | None = None
     recovered_s, error_m, wrong, right = None, None, False, False
-    first = frames[0]
+    first, spent_ms, trusted = frames[0], [], True
     for k, frame in enumerate(frames):
+        began = time.process_time()
         estimate = slam.update(frame.without_truth())
+        if not (trusted and estimate.converged):
+            spent_ms.append(1e3 * (time.process_time() - began))
+        trusted = estimate.converged
         assert frame.truth is not None
         error = estimate.T_map_robot - se2.between(T_world_map, frame.truth)
         away = math.hypot(error[0], error[1])
@@ -125,20 +156,18 @@ def follow(
                 recovered_s, error_m = (frame.stamp_ns - first.stamp_ns) * 1e-9, away
     return Outcome(
         seed=seed, moved_m=moved_m, detected=detected, recovered_s=recovered_s, error_m=error_m,
-        right=right, wrong=wrong or detected is None,
+        right=right, wrong=wrong or detected is None, spent_ms=tuple(spent_ms),
     )  # fmt: skip
 
 
-def kidnap(name: str, seed: int, count: int, seconds: float, dynamism: float) -> Iterator[Outcome]:
-    """``count`` kidnaps in one office."""
-    mapped = recording(seed, seconds, dynamism, again=False)
-    later = recording(seed, seconds, dynamism, again=True)
-    slam = create(name)
-    for frame in mapped:
-        slam.update(frame.without_truth())
+def kidnaps(
+    slam: SlamSystem, mapped: list[Frame], later: list[Frame], count: int, seed: int
+) -> Iterator[Outcome]:
+    """``count`` kidnaps of ``slam``, which has seen ``mapped``, to places of ``later``."""
     T_world_map = mapped[0].truth
     assert T_world_map is not None
-    scans = round(AFTER_S * 1e9 / (mapped[1].stamp_ns - mapped[0].stamp_ns))
+    period_ns = float(np.median(np.diff([frame.stamp_ns for frame in mapped])))
+    scans = max(round(AFTER_S * 1e9 / period_ns), LEAST_AFTER)
     for start in targets(mapped, later, scans, count):
         frames = list(kidnapped(mapped, later, start, scans))
         from_, to = mapped[-1].truth, frames[0].truth
@@ -146,6 +175,23 @@ def kidnap(name: str, seed: int, count: int, seconds: float, dynamism: float) ->
         assert to is not None
         moved_m = math.hypot(*(to - from_)[:2].tolist())
         yield follow(slam, frames, T_world_map, moved_m, seed)
+
+
+def all_kidnaps(wanted: argparse.Namespace) -> Iterator[Outcome]:
+    """Of a log, or of one scene for each seed."""
+    if wanted.log is not None:
+        slam = create(wanted.slam)
+        mapped = of_log(slam, wanted.log)
+        yield from kidnaps(slam, mapped, mapped, wanted.each, 0)
+        return
+    for seed in wanted.seeds:
+        of = (seed, wanted.seconds, wanted.dynamism)
+        how: dict[str, Any] = {"scene": wanted.scene, "every": wanted.every}
+        mapped, later = (recording(*of, again=again, **how) for again in (False, True))
+        slam = create(wanted.slam)
+        for frame in mapped:
+            slam.update(frame.without_truth())
+        yield from kidnaps(slam, mapped, later, wanted.each, seed)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -156,13 +202,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--each", type=int, default=6, help="kidnaps for each seed")
     parser.add_argument("--seconds", type=float, default=90.0, help="of mapping, simulated")
     parser.add_argument("--dynamism", type=float, default=0.5)
+    parser.add_argument("--scene", default="office")
+    parser.add_argument("--every", type=int, default=1, help="scans, of which one is seen")
+    parser.add_argument("--log", type=Path, help="a log to map in the place of a scene")
     parser.add_argument("--json", type=Path, help="also write the outcomes here")
     wanted = parser.parse_args(arguments)
     outcomes: list[Outcome] = []
-    for seed in wanted.seeds:
-        for one in kidnap(wanted.slam, seed, wanted.each, wanted.seconds, wanted.dynamism):
-            outcomes.append(one)
-            print(one, flush=True)
+    for one in all_kidnaps(wanted):
+        outcomes.append(one)
+        print(replace(one, spent_ms=()), flush=True)
     soon = sum(o.detected is not None and o.detected <= DETECTED_WITHIN for o in outcomes)
     times = sorted(o.recovered_s for o in outcomes if o.recovered_s is not None)
     print(
@@ -172,6 +220,13 @@ def main(arguments: list[str] | None = None) -> int:
         f"time to recover: median {np.median(times) if times else math.nan:.2f} s, "
         f"worst {times[-1] if times else math.nan:.2f} s"
     )
+    spent = [ms for one in outcomes for ms in one.spent_ms]
+    if spent:
+        p50, p99, p999 = np.percentile(spent, [50.0, 99.0, 99.9]).tolist()
+        print(
+            f"{len(spent)} scans while lost, processor time: p50 {p50:.1f}, p99 {p99:.1f}, "
+            f"p99.9 {p999:.1f}, longest {max(spent):.1f} ms"
+        )
     if wanted.json is not None:
         write_text(wanted.json, json.dumps([asdict(o) for o in outcomes], indent=2) + "\n")
     return 0

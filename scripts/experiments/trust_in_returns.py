@@ -3,9 +3,9 @@
 
 ``python -m scripts.experiments.trust_in_returns --seeds 0 1 --seconds 50``.
 
-For each variant over all runs: geometric mean and worst of the unaligned online error, the share of
-scans that are off by more than ``OFF_M``, outside 3 sigma and converged, and the median time of a
-scan. "oracle" is the SLAM on the same scans without the returns of what can move.
+For each variant over all runs: geometric mean and worst of the unaligned online error, and the
+share of silent failures (``Judged.silent_share``). "oracle" is the SLAM on the same scans without
+the returns of what can move.
 """
 
 from __future__ import annotations
@@ -17,18 +17,16 @@ from functools import partial
 
 import numpy as np
 
+from scripts.metrics.judged import Judged, world_truth
 from sim.simulation import Simulation, tour
 from slam import create
-from slam.evaluation import metrics
-from slam.frames import Float, Frame
+from slam.frames import Frame
 from slam.frontend.odometry_sum import MotionSum
 from slam.oracle import shown
-from slam.replay import asked
+from slam.replay import Track
 from slam.shunting import ShuntingSlam
 from slam.system import SlamSystem
-from slam.trajectory import Trajectory
 
-OFF_M, SIGMAS = 0.1, 3.0
 VARIANTS: dict[str, Mapping[str, object]] = {
     "whole": {},
     "all returns vote": {"standing.settled_s": 0.0},
@@ -39,6 +37,7 @@ VARIANTS: dict[str, Mapping[str, object]] = {
     "thin things judged": {"standing.thin_m": 0.0},
     "vague poses judge": {"standing.vague_m": 1000.0, "standing.sigmas": 0.0},
     "odometry not asked": {"standing.disagreed": 0.0},
+    "no second pose": {"standing.fallen": 0.0},
 }
 
 
@@ -57,21 +56,11 @@ def recorded(scene: str, seed: int, seconds: float, motion: float, every: int) -
 
 def scored(system: SlamSystem, frames: Sequence[Frame]) -> tuple[float, float]:
     """Unaligned error, m, and the share of silent failures."""
-    estimates = [asked(system, shown(system, frame)) for frame in frames]
-    stamps = np.array([frame.stamp_ns for frame in frames])
-    online = Trajectory(stamps_ns=stamps, poses=np.array([e.T_map_robot for e in estimates]))
-    truth = Trajectory(stamps_ns=stamps, poses=np.array([frame.truth for frame in frames]))
-    errors = metrics.pose_errors(online, truth)
-    silent = [
-        estimate.converged and off > OFF_M and not _covered(e[:2], estimate.covariance[:2, :2])
-        for estimate, off, e in zip(estimates, errors.distances, errors.errors, strict=True)
-    ]
-    return metrics.ate(online, truth).value, float(np.mean(silent))
-
-
-def _covered(e: Float, covariance: Float) -> bool:
-    """Whether an error (2,) is within ``SIGMAS`` of a covariance (2, 2)."""
-    return float(e @ np.linalg.solve(covariance + 1e-12 * np.eye(2), e)) <= SIGMAS**2
+    track = Track("one", system)
+    for frame in frames:
+        track.take(shown(system, frame))
+    run = Judged.of(track, world_truth(frames))
+    return run.ate(), run.silent_share() or 0.0
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -105,7 +105,7 @@ class ErrorChart:
     ) -> Picture:
         """A fresh picture; ``kidnaps``: moments of, s."""
         own = series[self._primary]
-        worst = max([self._worst(series), *own.claimed])
+        worst = max(self._worst(series), _largest(own.claimed, -math.inf))
         high = next(power for power in (0.0, 1.0, 2.0) if power == 2.0 or worst <= 10.0**power)
         reach = self._reach(own)
         picture = self._grid(high, reach).copy()
@@ -129,12 +129,12 @@ class ErrorChart:
         return x
 
     def _worst(self, series: Mapping[str, Series]) -> float:
-        return max((p for s in series.values() for p in s.position if p == p), default=1.0)
+        known = [_largest(s.position) for s in series.values() if s.position]
+        return max((p for p in known if p == p), default=1.0)
 
     def _reach(self, own: Series) -> float:
         """Degrees that the heading's axis goes up and down to."""
-        values = [abs(v) for v in own.heading if v == v] + list(own.claimed_rad)
-        worst = math.degrees(max(values, default=0.0))
+        worst = math.degrees(max(_largest(own.heading, 0.0), _largest(own.claimed_rad, 0.0)))
         return next((r for r in _HEADINGS_DEG if r >= worst), _HEADINGS_DEG[-1])
 
     def _grid(self, high: float, reach: float) -> Picture:
@@ -277,6 +277,11 @@ class ErrorChart:
                 picture[y + 1 : y + self._bar - self._px(2), low : max(x1, x0 + self._px(2))] = (
                     color
                 )
+
+
+def _largest(column: array[float], least: float = math.nan) -> float:
+    """The largest amount in it, or ``least``; NaN counts for nothing."""
+    return float(np.fmax.reduce(np.abs(np.array(column)), initial=least))
 
 
 def _window(picture: Picture, box: Box) -> Picture:

@@ -23,6 +23,11 @@ Size = tuple[int, int]
 
 SIZE: Size = (1280, 720)
 FILM_S = 60.0  # a longer run is shown faster, unless a speed is asked for
+MOST_SPEED = 1e4
+LAPSE_FPS = 10.0  # of the film of a long log
+SCANS_A_PICTURE = 6
+LEAST_PICTURES, MOST_PICTURES = 60, 600
+CRF = 21  # H.264's constant rate factor: hardly a loss to see
 _SIZES = (320, 4096)
 
 
@@ -68,8 +73,8 @@ class Pace:
     def __post_init__(self) -> None:
         if not 1.0 <= self.fps <= 240.0:
             raise InvalidValueError(f"fps must lie in 1..240, got {self.fps}")
-        if not 0.01 <= self.speed <= 1e4:
-            raise InvalidValueError(f"speed must lie in 0.01..10000, got {self.speed}")
+        if not 0.01 <= self.speed <= MOST_SPEED:
+            raise InvalidValueError(f"speed must lie in 0.01..{MOST_SPEED:g}, got {self.speed}")
         if not 0.0 <= self.from_s < self.to_s:
             raise InvalidValueError(
                 f"a film must go from 0 s or later to a later moment, got {self.from_s} to "
@@ -81,6 +86,20 @@ class Pace:
         """Real time, faster where the film would last longer than ``FILM_S``."""
         return cls(fps=fps, speed=max(1.0, duration_s / FILM_S))
 
+    @classmethod
+    def of_log(cls, duration_s: float, scans: int) -> Pace:
+        """Real time up to a minute, no picture oftener than scans; longer logs in time-lapse.
+
+        One picture for ``SCANS_A_PICTURE`` scans, at most ``MOST_PICTURES``: each costs about as
+        much as a few scans cost the SLAM.
+        """
+        rate = scans / duration_s if duration_s > 0.0 else FPS
+        if duration_s <= FILM_S:
+            return cls(fps=min(max(rate, LAPSE_FPS), FPS))
+        pictures = min(max(scans // SCANS_A_PICTURE, LEAST_PICTURES), MOST_PICTURES)
+        speed = duration_s * LAPSE_FPS / pictures
+        return cls(fps=LAPSE_FPS, speed=min(max(speed, 1.0), MOST_SPEED))
+
     def due(self, seconds: float) -> int:
         """How many pictures the film has up to a moment of the run."""
         if seconds < self.from_s:
@@ -90,14 +109,16 @@ class Pace:
 
 
 @contextmanager
-def film(path: Path, fps: float) -> Iterator[Film]:
+def film(path: Path, fps: float, *, crf: int = CRF) -> Iterator[Film]:
     """A film that appears under ``path`` when the block ends well, and not at all otherwise.
+
+    crf  H.264's constant rate factor: more is coarser and smaller
 
     Raises ``OutputError`` when ffmpeg stops or ends badly (disk full, say), or got no picture.
     """
     require_ffmpeg()
     with replacing(path) as temporary:
-        reel = Film(temporary, path, fps)
+        reel = Film(temporary, path, fps, crf)
         try:
             yield reel
             reel.finish()
@@ -111,10 +132,10 @@ class Film:
     imageio's own writer does not tell how ffmpeg ended: a film cut short would pass for a whole one
     """
 
-    def __init__(self, temporary: Path, path: Path, fps: float) -> None:
+    def __init__(self, temporary: Path, path: Path, fps: float, crf: int = CRF) -> None:
         self.frames = 0
         self.last: Picture | None = None
-        self._temporary, self._path, self._fps = temporary, path, fps
+        self._temporary, self._path, self._fps, self._crf = temporary, path, fps, crf
         self._ffmpeg: subprocess.Popen[bytes] | None = None
 
     def add(self, picture: Picture) -> None:
@@ -160,7 +181,8 @@ class Film:
             imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "quiet",
             "-f", "rawvideo", "-vcodec", "rawvideo", "-s", f"{width}x{height}",
             "-pix_fmt", "rgb24", "-r", f"{self._fps:.02f}", "-i", "-", "-an",
-            "-vcodec", "libx264", "-pix_fmt", "yuv420p", "-preset", "veryfast", "-crf", "21",
+            "-vcodec", "libx264", "-pix_fmt", "yuv420p", "-preset", "veryfast",
+            "-crf", str(self._crf),
             "-movflags", "+faststart", str(self._temporary),
         ]  # fmt: skip
         return subprocess.Popen(

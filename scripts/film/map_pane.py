@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from scripts.film import draw
 from scripts.film.draw import Color, Picture
+from scripts.film.map_tiles import LevelMap, levels_of
 from slam import se2
 from slam.frames import Float
 from slam.system import Raster
@@ -21,6 +22,7 @@ SIGMAS = 3.0  # of the ellipses
 MAX_TRAIL = 1500  # points of a trail as drawn
 FOLLOW_M = 9.0  # around the path, in a view that follows it
 STEP_M = 4.0  # such a view grows in steps: a sliding picture is hard to watch
+STEP_SHARE = 0.1  # of a large view: so that it is drawn anew a few dozen times, however large
 
 
 def _activity_colors() -> Picture:
@@ -90,9 +92,10 @@ class Trail:
         return np.vstack([xy[:-1:step], xy[-1:]])
 
 
-def raster_picture(raster: Raster, view: View, T_view_map: Float) -> Picture:
+def raster_picture(raster: Raster | LevelMap, view: View, T_view_map: Float) -> Picture:
     """A map raster drawn into ``view``; ``T_view_map`` turns the map for display only."""
-    levels = (np.nan_to_num(raster.values) * np.float32(255.0)).astype(np.uint8)
+    raster = levels_of(raster) if isinstance(raster, Raster) else raster
+    levels = raster.levels
     T = se2.compose(T_view_map, raster.T_map_origin)
     c, s = math.cos(T[2]), math.sin(T[2])
     k = raster.resolution_m * view.scale
@@ -182,13 +185,17 @@ class MapPane:
     _view: View = field(default_factory=lambda: View(0.0, 0.0, 1.0, 1, 1))
 
     def refresh(
-        self, raster: Raster | None, landmarks: Float | None, path: Trail, T_view_map: Float
+        self,
+        raster: Raster | LevelMap | None,
+        landmarks: Float | None,
+        path: Trail,
+        T_view_map: Float,
     ) -> None:
         """Draw the map anew: a third of the cost of a frame, and it changes slowly.
 
         landmarks  optional (n, 5) x, y, half axes (m), direction (rad) in the map frame
         """
-        self._view = View.fitting(self._bounds(path, T_view_map), self.width, self.height)
+        self._view = self.view(path, T_view_map)
         if raster is None:
             self._under = np.full((self.height, self.width, 3), draw.PAPER, np.uint8)
         else:
@@ -196,6 +203,10 @@ class MapPane:
         if landmarks is not None:
             self._draw_landmarks(self._under, landmarks, T_view_map)
         scale_bar(self._under, self._view, self.unit)
+
+    def view(self, path: Trail, T_view_map: Float) -> View:
+        """What the pane shows next."""
+        return View.fitting(self._bounds(path, T_view_map), self.width, self.height)
 
     def paint(
         self,
@@ -237,6 +248,7 @@ class MapPane:
             xmin, ymin, xmax, ymax = self.bounds
             return xmin - 0.4, ymin - 0.4, xmax + 0.4, ymax + 0.4
         points = se2.transform(T_view_map, path.points())
-        low = np.floor((points.min(axis=0) - FOLLOW_M) / STEP_M) * STEP_M
-        high = np.ceil((points.max(axis=0) + FOLLOW_M) / STEP_M) * STEP_M
+        low, high = points.min(axis=0) - FOLLOW_M, points.max(axis=0) + FOLLOW_M
+        step = max(STEP_M, draw.round_down(STEP_SHARE * float((high - low).max())))
+        low, high = np.floor(low / step) * step, np.ceil(high / step) * step
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])

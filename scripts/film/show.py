@@ -15,20 +15,25 @@ import cv2
 import numpy as np
 
 from scripts.film import draw, panes
+from scripts.film.changed import Changed
 from scripts.film.chart import Bar, ErrorChart, Series
 from scripts.film.close_up import CloseUp, off_by
 from scripts.film.draw import Color, Picture
 from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.layout import Box, Layout
 from scripts.film.map_pane import SIGMAS, MapPane, Trail
+from scripts.film.map_tiles import LevelMap, MapTiles
 from scripts.film.scan_pane import LEGEND, legend, points_robot
 from scripts.film.view import Stage
 from slam import se2
+from slam.estimate import Raster
 from slam.frames import NS_PER_S, Float, Frame
 from slam.frontend.seen_space import SeenSpace
 from slam.replay import Replay, Track
+from slam.system import MapsInParts
 
 SEEN_EVERY_NS = 200_000_000  # the areas of neighbouring scans overlap
+MOST_MAPS = 60  # whole ones, of a log
 FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn anew
 _OTHERS: tuple[Color, ...] = (draw.RED, draw.BLUE, (122, 63, 176))
 
@@ -43,6 +48,7 @@ class Show:
     duration_s  of the run;   pace  of the film, which shows a part of it
     seen        the space that scans have swept; series, trails  errors and paths by track;
                 unsure  when the primary track did not trust itself
+    changed     where the map may have changed since it was drawn last
     """
 
     replay: Replay
@@ -57,6 +63,7 @@ class Show:
     series: dict[str, Series] = field(default_factory=dict)
     trails: dict[str, Trail] = field(default_factory=dict)
     unsure: list[Bar] = field(default_factory=list)
+    changed: Changed = field(default_factory=Changed)
     _seen_ns: int = -SEEN_EVERY_NS
     _first: tuple[int, Float | None] | None = None
     _last: Frame | None = None
@@ -117,6 +124,8 @@ class Show:
                 error[2] = se2.wrap(float(error[2]))
             self.series.setdefault(name, Series()).add(seconds, error, estimate.covariance)
         self._note_trust(seconds)
+        if frame.scan is not None and self.stage.bounds is None:
+            self.changed.add(frame.scan, self.track().estimates[-1].T_map_robot)
         return seconds
 
     def paint(self, frame: Frame) -> Picture:
@@ -191,8 +200,10 @@ class _Panes:
             colors={name: show.color(name) for name in show.replay.tracks},
             lanes=[*stage.lanes, "unsure"],
         )
+        # of a log, nobody knows how large its world is
+        self._tiles = MapTiles() if stage.bounds is None else None
         self._base = self._still()
-        self._fresh_at = -np.inf
+        self._fresh_at = self._mapped_at = -np.inf
         self._camera: Picture | None = None
 
     def paint(self, frame: Frame, seconds: float) -> Picture:
@@ -204,7 +215,7 @@ class _Panes:
             self._fresh_at = seconds
             landmarks = track.landmarks()
             known = None if landmarks is None else landmarks.ellipses(SIGMAS)
-            self._map.refresh(track.map(), known, trails[show.primary], T_view_map)
+            self._map.refresh(self._raster(seconds), known, trails[show.primary], T_view_map)
         canvas = self._base.copy()
         self._headline(canvas, seconds)
         drawn = [(trails[n], show.color(n), 4 if n == "truth" else 2) for n in show.names()]
@@ -223,6 +234,25 @@ class _Panes:
         for pane, box in zip(self._more, layout.more, strict=True):
             _put(canvas, box, pane(show, frame, box.size))
         return canvas
+
+    def _raster(self, seconds: float) -> Raster | LevelMap | None:
+        """The map now; of a log, what its view has pixels for.
+
+        A map that is not to be had in parts is asked for some dozens of times.
+        """
+        show, tiles = self._show, self._tiles
+        track = show.track()
+        if tiles is None:
+            return track.map()
+        tiles.fit(self._map.view(show.trails[show.primary], show.T_view_map()).scale)
+        rest_s = 0.0 if isinstance(track.system, MapsInParts) else show.duration_s / MOST_MAPS
+        if abs(seconds - self._mapped_at) >= rest_s:
+            self._mapped_at = seconds
+            for bounds in show.changed.taken(in_parts=rest_s == 0.0):
+                part = track.map_part(tiles.aligned(bounds))
+                if part is not None:
+                    tiles.put(part)
+        return tiles.whole()
 
     def vignette(self, whole: Picture) -> Picture:
         """Two panes of a painted frame, one above the other, equally wide."""

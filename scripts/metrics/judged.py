@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError
 from slam.evaluation import lost, metrics
@@ -19,6 +20,7 @@ from slam.trajectory import Trajectory
 
 SILENT_M = 0.1  # m; a larger error that the SLAM denies is a silent failure
 SILENT_SIGMAS = 3.0  # of its own covariance; an error within them is admitted
+DUE_S = 2.0  # s of such an error, after which the SLAM has to admit it
 SETTLED_S = 5.0  # NEES counts after this: before, the covariance is that of the known first pose
 
 
@@ -116,7 +118,22 @@ class Judged:
         """
         if self.covariances is None or not self.covariances.any():
             return None
-        trusted = np.array([e.converged for e in self.estimates], dtype=np.bool_)
+        return float((self.is_off() & ~self.is_told()).mean())
+
+    def is_off(self) -> NDArray[np.bool_]:
+        """(n,) scans off by more than ``SILENT_M``."""
+        return np.asarray(self.pairs.distances > SILENT_M)
+
+    def converged(self) -> NDArray[np.bool_]:
+        """(n,) scans whose pose the SLAM trusts."""
+        return np.array([e.converged for e in self.estimates], dtype=np.bool_)
+
+    def is_told(self) -> NDArray[np.bool_]:
+        """(n,) scans that are not trusted, or off by less than ``SILENT_SIGMAS`` of the covariance
+        of position; ``InvalidValueError`` for a run without covariances.
+        """
+        if self.covariances is None:
+            raise InvalidValueError("this metric needs a run with covariances")
         off, P = self.pairs.errors[:, :2], self.covariances[:, :2, :2]
         # e' P^-1 e > 9 by the adjugate: true of a P that is singular and denies the error, too
         scaled = (
@@ -126,7 +143,16 @@ class Judged:
         )
         determinants = P[:, 0, 0] * P[:, 1, 1] - P[:, 0, 1] ** 2
         beyond = scaled >= SILENT_SIGMAS**2 * determinants
-        return float((trusted & beyond & (self.pairs.distances > SILENT_M)).mean())
+        return np.asarray(~(self.converged() & beyond))
+
+    def is_due(self) -> NDArray[np.bool_]:
+        """(n,) scans off by more than ``SILENT_M`` without a break for ``DUE_S`` or longer."""
+        seconds = (self.pairs.stamps_ns - self.pairs.stamps_ns[0]) / NS_PER_S
+        out, since = np.zeros(len(seconds), dtype=np.bool_), math.inf
+        for k, off in enumerate(self.is_off().tolist()):
+            since = min(since, float(seconds[k])) if off else math.inf
+            out[k] = off and seconds[k] - since >= DUE_S
+        return out
 
     def nees_over_3(self) -> float | None:
         """Mean after ``SETTLED_S``; None where the SLAM claims nothing, as guests."""

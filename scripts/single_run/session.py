@@ -15,7 +15,7 @@ import imageio.v2 as imageio
 from rich.markup import escape
 
 from scripts import figures
-from scripts.console import console
+from scripts.console import console, working
 from scripts.film import FPS
 from scripts.film.encode import Pace, film, require_ffmpeg
 from scripts.film.render import shoot, watched
@@ -23,6 +23,8 @@ from scripts.film.show import Show
 from scripts.names import file_name
 from scripts.output import machine, whole_folder, write_recipe
 from scripts.single_run import score
+from scripts.single_run.costs import Costs, say
+from scripts.single_run.small_maps import small_changes, small_map
 from slam.files import write_text
 from slam.frames import EPOCH, Stream
 from slam.maps import write_map
@@ -40,6 +42,7 @@ class Outputs:
     overwrite: bool = False
     film: bool = True
     film_fps: float = FPS
+    pace: Pace | None = None  # of the film; None: real time, or faster for it to last a minute
 
 
 def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
@@ -56,26 +59,31 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         command=outputs.command,
         settings=outputs.settings,
     ) as folder:
-        show.pace = Pace.within_a_minute(show.duration_s, outputs.film_fps)
+        costs = Costs()
+        show.pace = outputs.pace or Pace.within_a_minute(show.duration_s, outputs.film_fps)
         reel = film(folder / "film.mp4", show.pace.fps) if outputs.film else nullcontext()
         started = time.perf_counter()
         with reel as opened:
             for _ in watched(shoot(stream, show, opened), stream, show.title):
                 pass
         wall_s = time.perf_counter() - started
-        results = score.results(replay, wall_s, machine())
-        _write(folder, replay, show, results, int(stream.metadata.extra.get(EPOCH, 0)))
-        if opened is not None and opened.last is not None:
-            imageio.imwrite(folder / "poster.png", opened.last)
+        with costs.slam(), working("closing loops, scoring"):
+            results = score.results(replay, wall_s, machine())
+        with working("drawing map, paths and errors"):
+            _draw(folder, replay, show, int(stream.metadata.extra.get(EPOCH, 0)))
+            if opened is not None and opened.last is not None:
+                imageio.imwrite(folder / "poster.png", opened.last)
+        results["cost"] = costs.block(replay)
+        write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
         write_recipe(folder, outputs.command, outputs.settings)
     score.print_table(results, show.title)
+    say(results["cost"])
     _tell(outputs)
     return results
 
 
-def _write(
-    folder: Path, replay: Replay, show: Show, results: Mapping[str, Any], epoch_ns: int
-) -> None:
+def _draw(folder: Path, replay: Replay, show: Show, epoch_ns: int) -> None:
+    """Maps, trajectories and their pictures."""
     online = {name: track.online() for name, track in replay.tracks.items()}
     world_truth = replay.truth()
     truth = figures.in_first_frame(world_truth) if world_truth is not None else None
@@ -90,15 +98,19 @@ def _write(
     if truth is not None:
         write_tum(folder / "trajectory_truth.tum", truth, epoch_ns)
         figures.errors(folder / "errors.png", online, truth)
-    figures.trajectories(folder / "trajectories.png", online, truth, raster, truth_name)
+    small = None
     if raster is not None:
         write_map(folder / "map", show.seen.merge(raster))
-        figures.map_picture(folder / "map.png", raster, online[show.primary], show.last_points_map)
+        small = small_map(raster)
+        del raster  # a large one has its gigabyte
+    figures.trajectories(folder / "trajectories.png", online, truth, small, truth_name)
+    own, changes_png = online[show.primary], folder / "changes.png"
+    if small is not None:
+        figures.map_picture(folder / "map.png", small, own, show.last_points_map)
     primary.save(folder / "map.npz")
     changes = primary.changes()
-    if raster is not None and changes is not None:
-        figures.changes_picture(folder / "changes.png", raster, changes, online[show.primary])
-    write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
+    if small is not None and changes is not None:
+        figures.changes_picture(changes_png, small, small_changes(changes), own)
 
 
 _WORTH_OPENING = ("film.mp4", "map.png", "changes.png", "trajectories.png", "errors.png")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich import box
 from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
@@ -198,19 +199,16 @@ def _summary(dataset: Dataset, made: int, spent_s: float) -> Table:
         title=escape(f"{', '.join(scenes)}: {made} of {len(plan.jobs())} made now"),
         title_justify="left",
         caption=f"{spent_s:.1f} s",
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),  # nine columns in 80 characters
+        pad_edge=False,
     )
-    headings = (
-        "scene",
-        "dynamism",
-        "episodes",
-        "frames",
-        "driven, m",
-        "moving",
-        "semi-static",
-        "static",
-    )
-    for heading in (*headings, "MB"):
-        table.add_column(heading, justify="right")
+    returns = ("moving", "semi static", "static")
+    table.add_column("scene", overflow="fold")
+    for heading in ("dynamism", "episodes", "frames", "driven, m", *returns, "MB"):
+        longest = max(map(len, heading.split()))
+        table.add_column(heading, justify="right", min_width=longest)
     for scene, level in product(scenes, plan.dynamisms):
         jobs = [job for job in plan.jobs() if (job.scene, job.dynamism) == (scene, level)]
         folders = [dataset.path / name for job in jobs for name in plan.folders(job)]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from scripts.console import working
 from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check, run_name
 from scripts.oracle_option import Oracles, with_oracles
@@ -98,13 +99,15 @@ def run(
 def _opened(path: Path, strict: bool, text_format: Path | None) -> Footage:
     from scripts.film.footage import of_log
 
-    return of_log(path, strict=strict, text_format=text_format)
+    with working(f"reading {path.name}"):
+        return of_log(path, strict=strict, text_format=text_format)
 
 
 def on_log(
     names: list[str], path: Path, footage: Footage, out: Path, overwrite: bool, film: bool
 ) -> dict[str, Any]:
     """Run SLAMs on a recorded log."""
+    from scripts.film.encode import Pace
     from scripts.single_run.session import Outputs, run_session
 
     show = footage.show(names)
@@ -117,5 +120,12 @@ def on_log(
     return run_session(
         footage.stream,
         show,
-        Outputs(folder=out, command="run", settings=settings, overwrite=overwrite, film=film),
+        Outputs(
+            folder=out,
+            command="run",
+            settings=settings,
+            overwrite=overwrite,
+            film=film,
+            pace=Pace.of_log(footage.duration_s, footage.stream.length or 1),
+        ),
     )

@@ -8,7 +8,7 @@ between two of them calls ``mj_forward`` then.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,11 +20,12 @@ from scenes import build
 from scenes.crowd import Crowd, crowd_of, mix, with_crowd
 from scenes.scene import Scene
 from sim.actors.castors import checked_level, stand_on_castors
-from sim.actors.chairs import pushers, tables
+from sim.actors.chairs import Shoves, pushers, tables
 from sim.actors.doors import Doors
 from sim.actors.people.people import People
 from sim.actors.rearranging import Rearrangement, Rearranging
 from sim.actors.robot import Drive, DriveConfig
+from sim.actors.rolling import Rolling
 from sim.core import state
 from sim.core.bodies import Bodies
 from sim.core.checks import instance, number, numbers
@@ -295,6 +296,16 @@ class World:
         return self.bodies.clearance(self.data)
 
     # -- everything that moves --------------------------------------------------------------
+
+    @property
+    def doors(self) -> Doors:
+        """The doors, as ``sim.world.hands`` opens them."""
+        return self._doors
+
+    @property
+    def shoves(self) -> Mapping[str, Shoves | Rolling]:
+        """What pushes chairs, bins and loads, by group."""
+        return self._shoves
 
     def mover_poses(self) -> Float:
         """(n, 3) x m, y m, heading rad of each of ``scene.movers``, in that order.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +144,12 @@ class Grid(CellMap):
         self._odds = Odds(numbers.hit, numbers.miss, numbers.most, numbers.struck)
         self.log_odds = np.zeros_like(self.cells.age)
 
+    def twin(self) -> Self:
+        """The log-odds are copied too."""
+        other = super().twin()
+        other.log_odds = self.log_odds.copy()
+        return other
+
     def grow(self) -> None:
         """Make room where a kernel ran out of it."""
         super().grow()
@@ -177,9 +183,11 @@ class Grid(CellMap):
             self.release()
         return result
 
-    def probabilities(self) -> Raster | None:
-        """p of every cell that was ever seen, NaN elsewhere."""
-        extent = self.raster_extent()
+    def probabilities(
+        self, bounds: tuple[float, float, float, float] | None = None
+    ) -> Raster | None:
+        """p of every cell that was ever seen, NaN elsewhere; within ``bounds``, m, or all."""
+        extent = self.raster_extent(bounds)
         if extent is None:
             return None
         i0, j0, i1, j1 = extent
@@ -221,3 +229,9 @@ class OccupancySlam(Tracker):
         grid = self.cell_map
         assert isinstance(grid, Grid)
         return grid.probabilities()
+
+    def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
+        """The same within xmin, ymin, xmax, ymax, m; None for an empty grid."""
+        grid = self.cell_map
+        assert isinstance(grid, Grid)
+        return grid.probabilities(bounds)

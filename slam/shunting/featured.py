@@ -38,6 +38,7 @@ from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.peaks import Peaks, peaks
 from slam.shunting.slam import ShuntingSlam
 from slam.system import Estimate, register
+from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.matcher import Match, seen_by
 from slam.tracker.matching.score import evaluate
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
@@ -66,6 +67,8 @@ class FeaturedShuntingSlam(ShuntingSlam):
 
     ``config`` as for "shunting". Uses ``frame.features``; corners where a frame has only a scan.
     """
+
+    map_moves = False  # a map of few points gains nothing by it
 
     def __init__(
         self, config: ShuntingConfig | str | Mapping[str, Any] = "robust", **options: Any
@@ -112,7 +115,9 @@ class FeaturedShuntingSlam(ShuntingSlam):
         self._first_counts_s = self.config.map.first_look_s
         return super()._first(frame)
 
-    def _match(self, observations: Observations, prediction: Prediction) -> Match:
+    def _match(
+        self, observations: Observations, prediction: Prediction, wake: CellMap | None = None
+    ) -> Match:
         step = min(max(prediction.elapsed, 1e-3), self.config.map.longest_look_s)
         self._steps_s.append(step)
         if self._first_counts_s > 0.0:  # however long it acted, it was one look
@@ -121,7 +126,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
             self._first_counts_s = 0.0
         agreed = self._agreed(observations, prediction)
         if int(agreed.accepted.sum()) < self.config.features.enough_pairs:
-            return super()._match(observations, prediction)
+            return super()._match(observations, prediction, wake)
         pulling = dataclasses.replace(observations, weights=agreed.accepted.astype(np.float64))
         if self.config.objective == "log":
             return self._climbed(pulling, agreed, prediction)

@@ -41,6 +41,10 @@ class ShuntingSlam(Tracker):
         """
         return export.existence(self.network)
 
+    def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
+        """The same within xmin, ymin, xmax, ymax, m; None for an empty network."""
+        return export.existence(self.network, bounds)
+
     def changes(self) -> Changes | None:
         """What appeared and what is gone lately; None without a map or a long-term memory."""
         return export.changes(self.network)

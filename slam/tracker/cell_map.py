@@ -8,14 +8,16 @@ pooled in blocks of 8 x 8; a directory maps a block's place to its slot in the p
 from __future__ import annotations
 
 import abc
+import copy
 import math
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError
 from slam.frontend.visibility import View
-from slam.tracker.cells import SIDE, dense, forget_impressions, living, no_cells, with_room
+from slam.tracker.cells import SIDE, Cells, dense, forget_impressions, living, no_cells, with_room
 from slam.tracker.config import TrackerConfig
 
 MAX_BLOCKS_ACROSS = 1 << 15  # directory edge; 7.8 km at 3 cm cells
@@ -37,6 +39,12 @@ class CellMap(abc.ABC):
     def pace(self, step: float) -> float:
         """Prior age, s, of a cell whose looks are ``step`` s long: its first do not count fully."""
         return max(self.config.trace_s, self.config.map.pace_looks * step)
+
+    def twin(self) -> Self:
+        """A copy that can be written without this one."""
+        other = copy.copy(self)
+        other.cells = Cells(*[array.copy() for array in self.cells])  # type: ignore[arg-type]
+        return other
 
     def cover(self, xmin: float, ymin: float, xmax: float, ymax: float) -> None:
         """Grow the directory so that blocks may be born anywhere in the rectangle (m)."""
@@ -121,9 +129,20 @@ class CellMap(abc.ABC):
         (i0, j0), (i1, j1) = places.min(axis=0).tolist(), (places.max(axis=0) + 1).tolist()
         return i0 * SIDE, j0 * SIDE, i1 * SIDE, j1 * SIDE
 
-    def raster_extent(self) -> tuple[int, int, int, int] | None:
-        """``extent``; ``InvalidValueError`` where a raster of it would exceed ``MAX_CELLS``."""
-        found = self.extent()
+    def raster_extent(
+        self, bounds: tuple[float, float, float, float] | None = None
+    ) -> tuple[int, int, int, int] | None:
+        """``extent``, or what lies within ``bounds`` (xmin, ymin, xmax, ymax, m), alive or not.
+
+        Raises ``InvalidValueError`` where a raster of it would exceed ``MAX_CELLS``.
+        """
+        found = self.extent() if bounds is None else self._room()
+        if found is not None and bounds is not None:
+            low = [math.floor(edge / self.cell) for edge in bounds[:2]]
+            high = [math.ceil(edge / self.cell) for edge in bounds[2:]]
+            i0, j0 = max(found[0], low[0]), max(found[1], low[1])
+            i1, j1 = min(found[2], high[0]), min(found[3], high[1])
+            found = (i0, j0, i1, j1) if i0 < i1 and j0 < j1 else None
         if found is not None:
             across, along = found[2] - found[0], found[3] - found[1]
             if across * along > MAX_CELLS:
@@ -132,6 +151,13 @@ class CellMap(abc.ABC):
                     f"raster of {self.cell} m it would have more than {MAX_CELLS} cells"
                 )
         return found
+
+    def _room(self) -> tuple[int, int, int, int] | None:
+        """Cell indices as of ``extent``, of all places where a block may live."""
+        (rows, columns), (i0, j0) = self.cells.directory.shape, self.cells.corner.tolist()
+        if not rows or not columns:
+            return None
+        return i0 * SIDE, j0 * SIDE, (i0 + columns) * SIDE, (j0 + rows) * SIDE
 
     def bytes_per_neuron(self) -> float:
         """Bytes of every array, unused slots and directory included, per cell that is alive."""

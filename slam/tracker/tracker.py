@@ -7,6 +7,7 @@ import abc
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -29,9 +30,12 @@ from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
 from slam.tracker.standing.agreement import Agreement
 from slam.tracker.standing.recent import Standing
+from slam.tracker.standing.rival import Rival
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.quality import TrackingQuality
 from slam.tracker.tracking.relocalise import Relocalisation, coarse, slip, slipped
+from slam.tracker.tracking.verdict import Verdict
+from slam.tracker.tracking.wake import Wake
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
 from slam.tracker.uncertainty.residuals import Evidence, look
@@ -48,6 +52,7 @@ class Tracker(abc.ABC):
     """
 
     config_class: ClassVar[type[TrackerConfig]]
+    map_moves: ClassVar[bool] = True  # with the loops that are closed, if the config says so
 
     def __init__(self, config: TrackerConfig | str | Mapping[str, Any] = "robust") -> None:
         self.config = self.config_class.of(config)
@@ -67,9 +72,15 @@ class Tracker(abc.ABC):
         self._odometry_noise = OdometryNoise.of_beams(self.config)
         self._quality = TrackingQuality(self.config.freeze_below, self._numbers.quality)
         self._relocalisation: Relocalisation | None = None
-        self._loops = Loops(self.config, self._matcher, self._new_submap)
+        self._suspected: Relocalisation | None = None  # while frozen
+        self._wake: Wake | None = None  # while frozen or lost
+        self._verdict = Verdict(self._numbers.verdict)
+        new_map = partial(self._new_map, self.config) if self.map_moves else None
+        self._loops = Loops(self.config, self._matcher, self._new_submap, new_map)
+        self._T_map_odom, self._corrected_by = np.zeros(3), np.zeros(3)
         self._standing = Standing(self.config.standing)
         self._agreement = Agreement(self.config.standing)
+        self._rival = Rival(self._matcher, self._standing)
         self._vote, self._dragged = 1.0, 0.0
         self._trusted = True  # the pose of the frame before
         self._path = PosePath()
@@ -86,11 +97,14 @@ class Tracker(abc.ABC):
     def update(self, frame: Frame) -> Estimate:
         """One frame in seven steps: from odometry and scan to pose, covariance and map.
 
+        Before them, a bounded part of the search for loops. A correction that is ready moves map
+        and pose then; ``diagnostics`` say so: "correction" and "T_map_odom" (docs/loops.md).
         Not converged while frozen, lost, or blind: a scan without a single return.
         """
         if self._before is None and self._resumed is None:
             return self._first(frame)
         self._path.check_order(frame.stamp_ns)
+        self._correct()
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
         votes = self._standing.votes(
@@ -98,14 +112,16 @@ class Tracker(abc.ABC):
         )
         observations = replace(observations, votes=votes)
         self._vote = float(votes.mean()) if len(votes) else 1.0
-        prediction, match, state = self._localise(observations, prediction)  # 3 Eq. (13)
+        prediction, match, state = self._localise(
+            frame.stamp_ns, observations, prediction
+        )  # 3 Eq. (13)
         evidence = self._compare(observations, match, prediction, state)  # 4 residuals
-        state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
+        match, state = self._update_map(observations, match, prediction, state)  # 5 Eq. (8)
         self._update_uncertainty(
             observations, prediction, match, evidence, state
         )  # 6 pose, odometry noise
         self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
-        if state == "tracking":
+        if state == "tracking" or self._wake is not None:
             self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
         return self._report(frame, match, state)
 
@@ -120,7 +136,31 @@ class Tracker(abc.ABC):
         match = unmatched(np.zeros(3), matched=1.0, score=0.0)
         self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
         self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
+        if not len(observations.points_robot):
+            self._verdict.see_nothing()
         return self._report(frame, match, "tracking" if len(observations.points_robot) else "blind")
+
+    def _correct(self) -> None:
+        """Search for loops; move into the map that they have corrected, if it is ready."""
+        self._corrected_by = np.zeros(3)
+        self._loops.work()
+        lost = self._wake is not None or self._relocalisation is not None
+        if not self._trusted or lost or self._resumed is not None:
+            return
+        correction = self._loops.correction(self._path.poses)
+        if correction is None:
+            return
+        self.cell_map = correction.cell_map
+        before, T = self._T_map_robot, correction.T_new_old
+        self._T_map_robot = se2.compose(T, before)
+        self._T_map_odom = se2.compose(T, self._T_map_odom)
+        self._corrected_by = self._T_map_robot - before
+        self._corrected_by[2] = se2.wrap(float(self._corrected_by[2]))
+        self._path.replace(correction.poses)
+        self._standing.moved(T)
+        self._pose_covariance.turned(float(T[2]))
+        self._rival.forget()
+        self._agreement.forget()
 
     def _predict(self, odometry: Odometry) -> Prediction:
         """By odometry; on the first frame with a loaded map, where the robot was before."""
@@ -136,7 +176,7 @@ class Tracker(abc.ABC):
         )
 
     def _localise(
-        self, observations: Observations, prediction: Prediction
+        self, stamp_ns: int, observations: Observations, prediction: Prediction
     ) -> tuple[Prediction, Match, str]:
         """The pose by scan matching, or by relocalisation where the robot was lost; the state.
 
@@ -147,57 +187,98 @@ class Tracker(abc.ABC):
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = replace(prediction, carried=self._pose_covariance.odometry_part(motion))
         if self._relocalisation is not None:
+            self._rival.forget()
             match, state = self._recover(self._relocalisation, observations, prediction)
             return prediction, match, state
         match = _near(self._match(observations, prediction), prediction)
+        match = self._rival.decided(self.cell_map, stamp_ns, observations, prediction, match)
         if match.slipped:
             prediction = replace(prediction, covariance=slip(self._numbers.relocalise))
         return prediction, match, "tracking"
 
-    def _match(self, observations: Observations, prediction: Prediction) -> Match:
-        """Climb from the prediction; search around it when that is vague or finds too little."""
+    def _match(
+        self, observations: Observations, prediction: Prediction, wake: CellMap | None = None
+    ) -> Match:
+        """Climb from the prediction; search around it when that is vague or finds too little.
+
+        ``wake``: to match to in the place of the map.
+        """
+        cell_map = self.cell_map if wake is None else wake
         predicted = prediction.T_map_robot
         prior = prediction.prior
         precision = inverted(prior)
-        start = self._matcher.approach(self.cell_map, observations, predicted, prior)
-        match = self._matcher.climb(self.cell_map, observations, start, predicted, precision)
+        start = self._matcher.approach(cell_map, observations, predicted, prior)
+        match = self._matcher.climb(cell_map, observations, start, predicted, precision)
         numbers = self.config.matching.local
         near, widest = SearchWindow.about(prior, numbers), SearchWindow.widest(numbers)
         good = numbers.good_share * self._quality.usual_match()
         poor = numbers.widest_share * good
         vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > numbers.vague_cells * self.config.cell_m
+        around = self._matcher.around(cell_map)
         for window, wanted in ((near, vague or match.matched < good), (widest, True)):
             if not wanted or (window is widest and match.matched >= poor):
                 break
-            found = self._matcher.search(self.cell_map, observations, predicted, precision, window)
+            found = self._matcher.search(
+                cell_map, observations, predicted, precision, window, around
+            )
             if found.score > match.score:
                 match = found
         if match.matched >= poor or not self._quality.is_worth_searching_near():
             return match
         everyone = replace(observations, votes=None)
         usual = self._quality.usual_whole()
-        shoved = slipped(self.cell_map, self._matcher, everyone, prediction, usual)
+        shoved = slipped(cell_map, self._matcher, everyone, prediction, usual, around)
         return match if shoved is None else shoved
 
     def _recover(
         self, recovery: Relocalisation, observations: Observations, prediction: Prediction
     ) -> tuple[Match, str]:
         """Dead reckoning, until one hypothesis alone explains what is seen."""
+        prediction = self._go_on(observations, prediction)
+        observations = replace(observations, votes=None)  # they are of another place
         predicted = prediction.T_map_robot
         precision = inverted(prediction.prior)
-        observations = replace(observations, votes=None)  # they are of another place
         here = self._matcher.climb(self.cell_map, observations, predicted, predicted, precision)
-        match = recovery.step(observations, prediction, here, self._quality.usual_whole())
+        wake, usual = self._wake, self._quality.usual_whole()
+        carried = wake is None or wake.carried
+        match = recovery.step(observations, prediction, here, usual, carried=carried)
+        self._verdict.take(recovery.here / usual, recovery.elsewhere(predicted) / usual)
         if match is not None:
-            self._relocalisation = None
-            self._quality.count(False)
+            self._go_on_in(wake.map if wake is not None and recovery.went_on else self.cell_map)
+            self._verdict.trust()
+            self._quality.relocated(recovery.accepted)
             self._pose_covariance.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
+        if wake is not None and not carried and self._quality.goes_on(wake.agreed, wake.agreed_s):
+            self._go_on_in(wake.map)  # the map is outdated here
+            return unmatched(predicted, matched=here.matched, score=here.score), "relocated"
         if recovery.elapsed_s > self._numbers.quality.give_up_s:
             # elsewhere: go on from here, as on the first frame
-            self._relocalisation = None
+            self._go_on_in(self.cell_map if wake is None else wake.map)
             self._quality.give_up()
         return unmatched(predicted, matched=here.matched, score=here.score), "lost"
+
+    def _go_on_in(self, cell_map: CellMap) -> None:
+        """Be lost no more: track in this map from now on."""
+        self.cell_map = cell_map
+        self._relocalisation = self._wake = None
+        self._quality.count(False)
+
+    def _go_on(self, observations: Observations, prediction: Prediction) -> Prediction:
+        """The pose on the wake's map, where the scan agrees with it; else by odometry."""
+        wake = self._wake
+        if wake is None:
+            return prediction
+        enough = float(observations.weights.sum()) >= self._numbers.relocalise.least_weight
+        match = self._match(observations, prediction, wake.map) if enough else None
+        if match is not None and match.matched >= self._quality.least_continuous():
+            increment = se2.between(self._T_map_robot, match.T_map_robot)
+            prediction = replace(prediction, T_map_robot=match.T_map_robot, increment=increment)
+        wake.carried |= match is not None and match.matched < self._quality.least_continuous()
+        agreed = match is not None and not self._quality.arises(match.matched)
+        wake.count(agreed, prediction.elapsed)
+        wake.add(observations, prediction.T_map_robot, prediction.elapsed)
+        return prediction
 
     def _compare(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
@@ -211,10 +292,12 @@ class Tracker(abc.ABC):
 
     def _update_map(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
-    ) -> str:
-        """Let the map see the frame, unless the map in view contradicts it; the state."""
+    ) -> tuple[Match, str]:
+        """Let the map see the frame, unless the map in view contradicts it; match and state."""
         if state != "tracking":
-            return state
+            return match, state
+        if self._rival.undecided:
+            return match, "frozen"
         rasterise(self.cell_map, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
         step = min(prediction.elapsed, self.config.map.longest_look_s)
@@ -226,21 +309,61 @@ class Tracker(abc.ABC):
             )
             motion = match.T_map_robot - self._T_map_robot
             denied = quality.denied(match.matched, confirmed, contradicted, motion)
+            support = match.overlapped * confirmed / max(confirmed + contradicted, 1e-9)
+            denied = denied and not quality.excuses(support)
         quality.count(denied)
         if denied and quality.scans <= quality.config.patience:
             self.cell_map.release()
-            if quality.scans >= quality.config.lost_after and quality.suspicious:
-                self._relocalisation = Relocalisation(self.cell_map, self._matcher)
-            return "lost" if quality.scans > quality.config.lost_after else "frozen"
+            match = self._doubt(observations, prediction, match)
+            self._judge(observations, match, confirmed, contradicted)
+            self._suspect(observations, prediction)
+            return match, "lost" if quality.scans > quality.config.lost_after else "frozen"
+        self._suspected = self._wake = None
         confirmed, contradicted, _ = self.cell_map.integrate(
             observations.view, T_map_laser, step, write=True
         )
+        self._judge(observations, match, confirmed, contradicted)
         if len(observations.points_robot) == 0:
-            return "lost" if denied else "blind"  # odometry alone
+            return match, "lost" if denied else "blind"  # odometry alone
         if not denied:
             elapsed = prediction.elapsed
             quality.learn(match.matched, confirmed, contradicted, elapsed, match.overlapped)
-        return "lost" if denied else "tracking"
+        return match, "lost" if denied else "tracking"
+
+    def _doubt(self, observations: Observations, prediction: Prediction, match: Match) -> Match:
+        """The map denies the frame: from now on scans are matched to each other, too."""
+        if self._wake is None:
+            self._wake = Wake(self.cell_map)
+            self._wake.carried = match.matched < self._quality.least_continuous()
+            self._wake.add(observations, match.T_map_robot, prediction.elapsed)
+            return match
+        moved = self._go_on(observations, prediction)
+        return replace(match, T_map_robot=moved.T_map_robot)
+
+    def _judge(
+        self, observations: Observations, match: Match, confirmed: float, contradicted: float
+    ) -> None:
+        """Whether the robot is lost, or the map in view outdated."""
+        total, enough = confirmed + contradicted, self._numbers.relocalise.least_weight
+        few = float(observations.weights.sum()) < enough or total == 0.0
+        if len(observations.points_robot) == 0:
+            self._verdict.see_nothing()
+        elif few or not self._quality.suspicious:
+            self._verdict.trust()
+        else:
+            support = match.overlapped * confirmed / total
+            here = support / self._quality.usual_whole()
+            self._verdict.take(here, ratio=self._agreement.ratio)
+
+    def _suspect(self, observations: Observations, prediction: Prediction) -> None:
+        """The frame is denied: begin to search the map, and from some such frames on be lost."""
+        quality = self._quality
+        if not quality.suspicious:
+            return
+        suspected = self._suspected or Relocalisation(self.cell_map, self._matcher)
+        suspected.look(observations, prediction)
+        lost = quality.scans >= quality.config.lost_after
+        self._relocalisation, self._suspected = (suspected, None) if lost else (None, suspected)
 
     def _update_uncertainty(
         self,
@@ -255,8 +378,12 @@ class Tracker(abc.ABC):
         if state == "tracking" and not match.slipped:
             self._agreement.take(prediction, match.T_map_robot)
             self._dragged = self._agreement.dragged(self._vote)
-            self._pose_covariance.dragged(self._agreement.covariance(self._dragged))
+            left_behind = self._agreement.left_behind(self._dragged)
+            self._pose_covariance.dragged(left_behind, self._agreement.covariance(self._dragged))
         else:
+            if not match.slipped:
+                dragged = self._agreement.dragged(self._vote)
+                self._pose_covariance.dragged(self._agreement.covariance(dragged))
             self._agreement.forget()
             if match.slipped:  # found by a search, among what does not fit there
                 found = (1.0 - match.overlapped) * coarse(self._numbers.relocalise)
@@ -271,13 +398,21 @@ class Tracker(abc.ABC):
     ) -> None:
         """For closing loops: motion as matched, or by odometry where an end of it is uncertain."""
         motion = se2.between(self._T_map_robot, match.T_map_robot)
-        covariance = self._pose_covariance.newest_drift
-        if state != "tracking" or not self._trusted:
+        covariance, written = self._pose_covariance.newest_drift, state == "tracking"
+        if state == "relocated":  # carried away, or odometry was right: loops decide
+            off = match.T_map_robot - prediction.T_map_robot
+            off[2] = se2.wrap(float(off[2]))
+            covariance = prediction.covariance + coarse(self._numbers.relocalise)
+            covariance = covariance + np.diag(off * off)
+        elif state != "tracking" or not self._trusted:
             motion, covariance = prediction.increment, prediction.covariance
         self._trusted = state in ("tracking", "relocated")
         covariance = turned(covariance, -float(self._T_map_robot[2]))
         everyone = replace(observations, votes=None)
-        self._loops.add(len(self._path), match.T_map_robot, motion, covariance, everyone)
+        self._loops.add(
+            len(self._path), match.T_map_robot, motion, covariance, everyone,
+            elapsed=prediction.elapsed, written=written,
+        )  # fmt: skip
 
     def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
         self._before = frame.odometry
@@ -298,6 +433,10 @@ class Tracker(abc.ABC):
                 "nis": self._odometry_noise.nis,
                 "trust": self._vote * (1.0 - self._dragged),
                 "odometry_ratio": self._agreement.ratio,
+                "verdict": self._verdict.word,
+                "p_lost": self._verdict.p_lost,
+                "correction": self._corrected_by.tolist(),
+                "T_map_odom": self._T_map_odom.tolist(),
             },
         )
 
@@ -305,6 +444,15 @@ class Tracker(abc.ABC):
         """Whether the crowd may have carried the robot far."""
         doubtful_m = self.config.standing.doubtful_m
         return 0.0 < doubtful_m < self._agreement.off_m(self._dragged)
+
+    def displace(self, by: Float) -> None:
+        """For experiments: from now on the pose is believed to be off by ``by`` (3,), map frame.
+
+        As after a slip that nobody noticed: covariance, map and all that was kept of earlier scans
+        stay as they are.
+        """
+        self._T_map_robot = self._T_map_robot + by
+        self._T_map_robot[2] = se2.wrap(float(self._T_map_robot[2]))
 
     def window(
         self, xmin: float, ymin: float, xmax: float, ymax: float
@@ -350,7 +498,7 @@ class Tracker(abc.ABC):
         return slam
 
     def trajectory(self) -> Trajectory:
-        """The poses with loops closed; the online ones up to 100 m of way, or without a loop."""
+        """The poses with the loops closed that were found so far; the online ones without any."""
         return self._path.trajectory(self._loops.corrected(self._path.poses()))
 
 

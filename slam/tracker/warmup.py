@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Get the kernels of an ordinary scan ready before the first frame, so that none waits for them.
 
-Those of the wide search get ready when it is first wanted (``search``), which may be never.
+Those of the searches too: a robot that is lost has no more time than another.
 
 Compiled code is cached on disk: the seconds are spent once after an installation, or in every
 process where no folder for the cache can be written.
@@ -17,10 +17,14 @@ import numpy as np
 
 from slam.compiling import announced
 from slam.frames import NS_PER_S, LaserSpec, Scan
-from slam.frontend.observations import from_scan
+from slam.frontend.observations import Observations, from_scan
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.budget import Budget
+from slam.tracker.matching.coarse_map import CoarseMap
+from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Matcher
+from slam.tracker.matching.whole_search import WholeSearch
 from slam.tracker.rasterise import rasterise
 from slam.tracker.standing.config import StandingConfig
 from slam.tracker.standing.recent import Standing
@@ -68,4 +72,15 @@ def _run_all(config: TrackerConfig, new_map: Callable[[Any], CellMap]) -> None:
     standing.votes(NS_PER_S // 2, origin, covariance, seen)
     start = matcher.approach(cell_map, seen, origin, covariance)
     matcher.climb(cell_map, seen, start, origin, np.linalg.inv(covariance))
+    _search(cell_map, matcher, seen)
     cell_map.window(0.0, 0.0, 1.0, 1.0)
+
+
+def _search(cell_map: CellMap, matcher: Matcher, seen: Observations) -> None:
+    """Run the kernels of both searches."""
+    window = SearchWindow(reach_m=0.2, turn_rad=0.1)
+    matcher.search(cell_map, seen, np.zeros(3), np.eye(3), window)
+    coarse = CoarseMap(cell_map, 0.3)
+    search = WholeSearch(coarse, seen.points_robot, 1, matcher.config.matching.whole)
+    while not search.done:
+        search.advance(Budget(matcher.config.matching.budget, 1.0))

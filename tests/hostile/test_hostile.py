@@ -39,6 +39,7 @@ OPEN_NOTHING = {
     "list": "what is registered",
     "config": "numbers of ours",
     "bench": "scenes of ours",
+    "doctor": "the installed packages",
     "sensor-card": "scenes of ours",
     "reproduce": "logs by the readers of run --log; its results, of which it takes numbers",
 }

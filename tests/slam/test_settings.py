@@ -149,8 +149,12 @@ STAY = {
     "tracker/cells.py": "layout: a block is 8 x 8; how fast arrays grow",
     "tracker/map_file.py": "version of the file, and what a file may claim",
     "tracker/matching/branch_and_bound.py": "how the work is split; no result depends on it",
+    "tracker/matching/budget.py": "a unit",
+    "tracker/matching/coarse_map.py": "how the work is laid out; no result depends on it",
     "tracker/matching/global_search.py": "how the work is laid out; no result depends on it",
     "tracker/matching/local_search.py": "how the work is laid out; integers of a field in bytes",
+    "tracker/matching/planes.py": "how the work is laid out; places in an array",
+    "tracker/matching/whole_search.py": "how the work is laid out; no result depends on it",
     "tracker/uncertainty/residuals.py": "places in an array",
 }
 

@@ -23,7 +23,7 @@ STRIP = 16 * SIDE  # cells pooled at a time, so that little of the map is ever l
 MAX_ACROSS = 40  # coarsest blocks along the map
 
 
-def _pooled(fine: NDArray[np.uint8], pool: int) -> NDArray[np.uint8]:
+def pooled(fine: NDArray[np.uint8], pool: int) -> NDArray[np.uint8]:
     """The largest of ``pool`` x ``pool`` neighbouring values."""
     rows, columns = fine.shape
     blocks = fine.reshape(rows // pool, pool, columns // pool, pool)
@@ -31,7 +31,7 @@ def _pooled(fine: NDArray[np.uint8], pool: int) -> NDArray[np.uint8]:
     return largest
 
 
-def _spread(source: NDArray[np.uint8], beside: float) -> NDArray[np.uint8]:
+def spread(source: NDArray[np.uint8], beside: float) -> NDArray[np.uint8]:
     """The source, or ``beside`` times the largest of the eight values around."""
     padded = np.pad(source, 1)
     wide = np.maximum(np.maximum(padded[:, :-2], padded[:, 1:-1]), padded[:, 2:])
@@ -39,7 +39,8 @@ def _spread(source: NDArray[np.uint8], beside: float) -> NDArray[np.uint8]:
     return np.maximum(source, (beside * around).astype(np.uint8))
 
 
-def _pooling(cell: float, pitch_m: float) -> int:
+def pooling(cell: float, pitch_m: float) -> int:
+    """Cells that are pooled each way, a power of 2."""
     pool = 1
     while pool < SIDE and 2 * pool * cell <= 1.01 * pitch_m:
         pool *= 2
@@ -49,7 +50,7 @@ def _pooling(cell: float, pitch_m: float) -> int:
 def coarse_field(cell_map: CellMap, short_term: float) -> NDArray[np.uint8]:
     """The whole map, pooled; row 0, column 0 at the corner of ``cell_map.extent()``."""
     config = cell_map.config.matching.whole
-    extent, pool = cell_map.extent(), _pooling(cell_map.cell, config.pitch_m)
+    extent, pool = cell_map.extent(), pooling(cell_map.cell, config.pitch_m)
     if extent is None:
         return np.zeros((0, 0), np.uint8)
     i0, j0, i1, j1 = extent
@@ -57,11 +58,12 @@ def coarse_field(cell_map: CellMap, short_term: float) -> NDArray[np.uint8]:
     for row in range(0, j1 - j0, STRIP):
         rows = min(STRIP, j1 - j0 - row)
         fine = field_of(cell_map, short_term, i0, j0 + row, rows, i1 - i0)
-        coarse[row // pool : (row + rows) // pool] = _pooled(fine, pool)
-    return _spread(coarse, config.beside)
+        coarse[row // pool : (row + rows) // pool] = pooled(fine, pool)
+    return spread(coarse, config.beside)
 
 
-def _headings(points: Float, pitch: float, config: GlobalConfig) -> Float:
+def headings(points: Float, pitch: float, config: GlobalConfig) -> Float:
+    """Turns to try, rad: all round, so that a far point moves by about one pitch between two."""
     distances = np.sort(np.sqrt((points * points).sum(axis=1)))
     far = float(distances[(3 * len(distances)) // 4])
     step = min(max(pitch / max(far, pitch), config.finest_rad), config.coarsest_rad)
@@ -89,14 +91,14 @@ def places(
     if extent is None or len(near) == 0:
         return []
     chosen = np.ascontiguousarray(near[:: math.ceil(len(near) / config.points)])
-    pool = _pooling(cell_map.cell, config.pitch_m)
+    pool = pooling(cell_map.cell, config.pitch_m)
     pitch = pool * cell_map.cell
     if field is None:
         field = coarse_field(cell_map, short_term)
     i0, j0, i1, j1 = extent
     middle = np.array([0.5 * (i0 + i1) * cell_map.cell, 0.5 * (j0 + j1) * cell_map.cell, 0.0])
     reach = math.ceil(0.5 * max(field.shape))
-    turns = _headings(chosen, pitch, config)
+    turns = headings(chosen, pitch, config)
     if about is not None:
         middle, reach = np.array(about[0]), math.ceil(about[1] / pitch)
         step = float(turns[1])

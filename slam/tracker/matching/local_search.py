@@ -154,6 +154,28 @@ def field_of(
     return field
 
 
+class Around:
+    """The map around a robot as one search after another wants it, while nothing is written."""
+
+    def __init__(self, cell_map: CellMap, short_term: float) -> None:
+        self._cell_map, self._short_term = cell_map, short_term
+        self._low, self._high = np.zeros(2, np.int64), np.zeros(2, np.int64)
+        self._levels = np.zeros((LEVELS + 1, 0, 0), np.uint8)
+
+    def levels(
+        self, low: NDArray[np.int32], high: NDArray[np.int32]
+    ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+        """Levels that hold the cells from ``low`` to ``high`` (column, row), and their corner."""
+        if (low < self._low).any() or (high >= self._high).any():
+            first = low >> SHIFT
+            blocks = (high >> SHIFT) + 1 - first
+            self._low, self._high = first * SIDE, (first + blocks) * SIDE
+            (i0, j0), (columns, rows) = self._low.tolist(), (blocks * SIDE).tolist()
+            field = field_of(self._cell_map, self._short_term, i0, j0, rows, columns)
+            self._levels = levels_of(field, LEVELS)
+        return self._low.astype(np.int32), self._levels
+
+
 def headings(points: Float, window: SearchWindow, cell: float, config: LocalConfig) -> Float:
     """Turns to try, rad: a far point moves little between two of them."""
     distances = np.sqrt((points * points).sum(axis=1))
@@ -172,8 +194,12 @@ def search(  # noqa: PLR0913 (arrays of one problem)
     precision: Float,
     window: SearchWindow,
     gain: float,
+    around: Around | None = None,
 ) -> tuple[Float, int]:
-    """Best pose on the lattice of the window, and how many candidates were scored."""
+    """Best pose on the lattice of the window, and how many candidates were scored.
+
+    ``around``: what searches of the same frame laid out before.
+    """
     cell, config = cell_map.cell, cell_map.config.matching.local
     points = observations.points_robot
     if len(points) == 0:
@@ -182,18 +208,16 @@ def search(  # noqa: PLR0913 (arrays of one problem)
     chosen = np.ascontiguousarray(points[::every])
     turns = headings(chosen, window, cell, config)
     reach = math.ceil(window.reach_m / cell)
-    radius = math.sqrt(float((chosen * chosen).sum(axis=1).max()))
+    bases = np.empty((len(turns), len(chosen), 2), np.int32)
+    place(chosen, prediction, turns, cell, 0, 0, bases)
     # Offsets may overshoot by a block of the coarsest level.
     edge = reach + (1 << LEVELS) + 2
-    i0 = ((math.floor((prediction[0] - radius) / cell) - edge) >> SHIFT) * SIDE
-    j0 = ((math.floor((prediction[1] - radius) / cell) - edge) >> SHIFT) * SIDE
-    across = ((math.ceil(2.0 * radius / cell) + 2 * edge) // SIDE + 3) * SIDE
-    field = field_of(cell_map, short_term, i0, j0, across, across)
-    bases = np.empty((len(turns), len(chosen), 2), np.int32)
-    place(chosen, prediction, turns, cell, i0, j0, bases)
+    low, high = bases.min(axis=(0, 1)) - edge, bases.max(axis=(0, 1)) + edge
+    corner, levels = (around or Around(cell_map, short_term)).levels(low, high)
+    bases -= corner
     scale = gain * float(observations.weights.mean()) * len(points) / len(chosen) / FULL
     lattice = Lattice(
-        levels=levels_of(field, LEVELS),
+        levels=levels,
         bases=bases,
         turns=turns,
         reach=reach,

@@ -14,7 +14,7 @@ from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import inverted, turned
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
-from slam.tracker.matching.local_search import SearchWindow, search
+from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import Climb, Reward, Seen, refine
 
 
@@ -61,6 +61,7 @@ class Match:
     tau          weight the reward had in the end
     searched     whether the wide search ran; ``evaluations`` candidate poses it scored
     slipped      whether it was found against the odometry
+    rewarded     reward for a unit of weight, by the votes of the returns
     """
 
     T_map_robot: Float
@@ -72,6 +73,7 @@ class Match:
     evaluations: int = 0
     slipped: bool = False
     overlapped: float = 0.0
+    rewarded: float = 0.0
 
 
 def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
@@ -119,6 +121,7 @@ class Matcher:
         pose = np.array(start, dtype=np.float64)
         information = np.zeros((3, 3))
         tau, matched, overlapped, score = self.config.reward, 0.0, 0.0, -math.inf
+        rewarded = 0.0
         while full > 0.0:
             rewarded, prior, count, absent = refine(
                 cell_map.cells,
@@ -142,7 +145,7 @@ class Matcher:
         pose[2] = se2.wrap(float(pose[2]))
         return Match(
             T_map_robot=pose, information=information, matched=matched, score=score, tau=tau,
-            overlapped=overlapped,
+            overlapped=overlapped, rewarded=rewarded / full if full > 0.0 else 0.0,
         )  # fmt: skip
 
     def approach(
@@ -197,11 +200,19 @@ class Matcher:
         prediction: Float,
         precision: Float,
         window: SearchWindow,
+        around: Around | None = None,
     ) -> Match:
-        """The best optimum in ``window`` about the prediction: branch and bound, then climb."""
+        """The best optimum in ``window`` about the prediction: branch and bound, then climb.
+
+        ``around``: what searches of the same frame laid out before.
+        """
         start, evaluations = search(
             cell_map, self.reward.short_term, observations, prediction, precision,
-            window, self.config.reward,
+            window, self.config.reward, around,
         )  # fmt: skip
         match = self.climb(cell_map, observations, start, prediction, precision)
         return replace(match, searched=True, evaluations=evaluations)
+
+    def around(self, cell_map: CellMap) -> Around:
+        """For several searches of one frame."""
+        return Around(cell_map, self.reward.short_term)

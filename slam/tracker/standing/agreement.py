@@ -62,20 +62,22 @@ class Agreement:
         """
         if self._config.disagreed == 0.0:
             return 0.0
-        excess = max(self.ratio - 1.0, 0.0) / self._config.disagreed
-        return (1.0 - vote) * excess * excess / (1.0 + excess * excess)
+        nats = min(1.5 * (self.ratio - self._config.disagreed), 50.0)  # of 3 numbers: 3 / 2
+        return (1.0 - vote) / (1.0 + math.exp(-nats))
 
     def covariance(self, dragged: float) -> Float:
-        """(3, 3) that the latest frame adds to the map's error if that is its probability.
+        """(3, 3) of the pose if that is its probability: the pose is right, or off by S.
 
-        The pose is right, or off by S: the spread of both is ``dragged`` S S', taken in over the
-        time that the window sums.
+        The spread of both is ``dragged`` S S'.
         """
-        S, window = self._sums[self._worst], self._windows[self._worst]
-        share = dragged * min(self._elapsed_s / window, 1.0)
-        x, y, turn = S.tolist()
+        x, y, turn = self._sums[self._worst].tolist()
         rows = [[x * x, x * y, x * turn], [x * y, y * y, y * turn], [x * turn, y * turn, turn**2]]
-        return share * np.array(rows)
+        return dragged * np.array(rows)
+
+    def left_behind(self, dragged: float) -> Float:
+        """(3, 3) the part of that which the window is about to forget: the map's from now on."""
+        keep = math.exp(-self._elapsed_s / self._windows[self._worst])
+        return (1.0 - keep * keep) * self.covariance(dragged)
 
     def off_m(self, dragged: float) -> float:
         """m, deviation of the position by that."""

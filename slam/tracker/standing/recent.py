@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,6 +59,17 @@ class Standing:
         oldest = stamp_ns - round(1.5 * self._ages_s[-1] * NS_PER_S)
         while looks[0].stamp_ns < oldest:
             looks.popleft()
+
+    def moved(self, T_new_old: Float) -> None:
+        """The map moved: so did what was seen in it."""
+        self._looks = deque(
+            replace(
+                look,
+                T_map_laser=se2.compose(T_new_old, look.T_map_laser),
+                points_map=se2.transform(T_new_old, look.points_map),
+            )
+            for look in self._looks
+        )
 
     def _asked(self, stamp_ns: int, step: float) -> list[Look]:
         """The newest, and of the others about one of each age."""

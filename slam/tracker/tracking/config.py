@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from slam.settings import Settings, number
+from slam.settings import Settings, number, word
 
 MANY = 100_000
+SEEDS = "scripts/experiments/verdict.py, training seeds"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +32,17 @@ class QualityConfig(Settings):
     suspicious: float = number(0.70, "share", "of the usual match: below, the map is checked")
     denied: float = number(0.30, "share", "of the map in view contradicted: denied")
     still_denied: float = number(0.20, "share", "the same, if the frame before was denied")
+    excused: float = number(
+        0.5, "share", "of the support of a place found: as much does not deny it at first"
+    )
     sudden: float = number(0.3, "share", "of the usual match, after a small step: carried")
+    continuous: float = number(
+        0.5, "share", "of the usual match with the scans before: less, and it was carried", SEEDS
+    )
+    outdated_scans: int = number(10, "frames", "least, with outdated_s", SEEDS, low=1, high=MANY)
+    outdated_s: float = number(
+        2.0, "s", "scans agree with those before: the map is outdated, not the pose", SEEDS
+    )
     sudden_m: float = number(0.5, "m", "largest such step")
     sudden_rad: float = number(0.5, "rad", "largest turn of such a step")
 
@@ -55,6 +66,8 @@ class RelocaliseConfig(Settings):
     on_s: float = number(1.0, "s", "least time passed with a hypothesis", low=1e-6)
     same_m: float = number(0.3, "m", "hypotheses nearer than this are one")
     same_rad: float = number(0.2, "rad", "and turned by less than this")
+    drift_m: float = number(2.0, "m", "a robot that was not carried may be off by", SEEDS)
+    drift_rad: float = number(0.5, "rad", "and turned by")
     least_weight: float = number(
         40.0, "weight",
         "in view from which on a frame can deny the map or identify a place: 4 m of surface",
@@ -69,11 +82,29 @@ class RelocaliseConfig(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class VerdictConfig(Settings):
+    """Lost, or the map outdated: see ``tracker.tracking.verdict``."""
+
+    outdated: float = number(
+        0.85, "share", "of the usual support: below, the map is outdated here", SEEDS
+    )
+    even: float = number(0.45, "share", "of the usual support: lost is as likely as not", SEEDS)
+    steep: float = number(20.0, "1", "log odds of being lost, by that share", SEEDS)
+    agreed: float = number(
+        4.0, "ratio", "of corrections over what odometry may be off: more is evidence", SEEDS
+    )
+    rival: float = number(
+        20.0, "1", "the same, by what a known other place has more of the usual support", SEEDS
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class TrackingConfig(Settings):
     """Following the robot, and finding it again."""
 
     quality: QualityConfig = field(default=QualityConfig())
     relocalise: RelocaliseConfig = field(default=RelocaliseConfig())
+    verdict: VerdictConfig = field(default=VerdictConfig())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,5 +141,27 @@ class LoopsConfig(Settings):
     chain_rad: float = number(0.0015, "rad", "added deviation of a step's match", low=1e-6)
     loop_m: float = number(0.03, "m", "added deviation of a loop", low=1e-6)
     loop_rad: float = number(0.003, "rad", "added deviation of a loop", low=1e-6)
+    early: float = number(0.5, "share", "of long_m from which on key frames are chained", high=1.0)
+    corrects: int = number(1, "1", "1: map and pose follow the graph; 0: past poses alone", high=1)
+    work: int = number(
+        48, "units", "of work a scan; one: a key frame drawn, a third of a match",
+        "docs/loops.md", low=1, high=MANY,
+    )  # fmt: skip
+    agree_m: float = number(0.3, "m", "a closure farther off needs another that agrees", low=1e-6)
+    agree_rad: float = number(0.05, "rad", "a closure farther off needs another that agrees")
+    denying: int = number(
+        2, "key frames", "at which the map is torn: it is drawn anew", low=1, high=MANY
+    )
+    datum: str = word(
+        "all", ("all", "first"), "what a correction moves least: all key frames, or the first"
+    )
+    batch: int = number(8, "loops", "found since: the graph is solved again", low=1, high=MANY)
+    apply_m: float = number(
+        0.1, "m", "between neighbours, map against graph: the map is torn", low=1e-6
+    )
+    apply_rad: float = number(0.02, "rad", "the same of the turn between them", low=1e-6)
     loose: float = number(1.0, "1/m², 1/rad²", "prior information of a loop's match", low=1e-6)
     information_share: float = number(0.3, "share", "of a match's information, used in the graph")
+
+
+NOT_CORRECTED = LoopsConfig(corrects=0)

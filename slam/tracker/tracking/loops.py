@@ -1,204 +1,308 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loops of long runs: key frames, little maps round them, and a pose graph over all.
+"""Loops closed while driving: key frames, a pose graph over them, and when the map follows it.
 
-The online map is left as it is. What comes out is the corrected trajectory, made when it is asked
-for. Each key frame is matched to the few before it: matched to the whole map, as it was online, a
-step would hide the drift that a loop is to correct. Then it is matched to the little map of the
-nearest earlier stretch of the way; and when all are in place, to those of every other passage.
+The work is done a little with each scan, in whole units (``LoopsConfig.work``), so that no scan
+takes long and one stream always gives the same result. For each key frame in turn: its step from
+those before, a search for a closure, the graph, and ties to every other passage.
 """
 
 from __future__ import annotations
 
 import logging
 import math
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Float
-from slam.frontend.observations import Observations
-from slam.frontend.odometry_prior import inverted
-from slam.posegraph import Edge, carried, optimise
+from slam.posegraph import Edge, Relaxation, carried, least_moved, relative
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
-from slam.tracker.matching.global_search import coarse_field, places
-from slam.tracker.matching.matcher import Match, Matcher
-from slam.tracker.rasterise import rasterise
-from slam.tracker.tracking.relocalise import coarse, spread, support
+from slam.tracker.matching.matcher import Matcher
+from slam.tracker.tracking.closures import DRAWN, Closures
+from slam.tracker.tracking.keys import KeyFrames
+from slam.tracker.tracking.redraw import Correction, Redrawing
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class KeyFrame:
-    """One frame that is kept.
-
-    frame         its index among all frames
-    T_map_robot   (3,) online
-    step          (3,) motion since the previous key frame online, (3, 3) covariance in that frame
-    way_m         driven up to here
-    """
-
-    frame: int
-    T_map_robot: Float
-    observations: Observations
-    step: Float
-    covariance: Float
-    way_m: float
-
-
-class Loops:
-    """Collects key frames, closes loops between them when asked."""
+class Loops(KeyFrames):
+    """Key frames, closures between them, and the corrections that follow."""
 
     def __init__(
-        self, config: TrackerConfig, matcher: Matcher, new_map: Callable[[], CellMap]
+        self,
+        config: TrackerConfig,
+        matcher: Matcher,
+        new_submap: Callable[[], CellMap],
+        new_map: Callable[[], CellMap] | None = None,
     ) -> None:
-        """``new_map`` makes an empty map for what a few key frames saw."""
-        self._new_map = new_map
-        self._numbers = config.loops
-        self._slack = spread(config.loops.slack_m, config.loops.slack_rad)
-        self._coarse = coarse(config.tracking.relocalise)
-        self._matcher = matcher
-        self.keys: list[KeyFrame] = []
-        self.edges: list[Edge] = []  # loops found so far
-        self._tried = 0  # key frames that were looked at
-        self._poses: list[Float] = []  # corrected, of the key frames tried
-        self._chain: list[Edge] = []  # step by step, without loops; and where it leads
-        self._chained: list[Float] = []
-        self._submaps: dict[int, CellMap] = {}
-        self._fields: dict[int, NDArray[np.uint8]] = {}  # of those that were searched
-        self._step: Float = np.zeros(3)
-        self._covariance: Float = np.zeros((3, 3))
-        self._way_m = 0.0
+        """``new_submap`` makes an empty map for a few key frames, ``new_map`` one for all of them;
+        without the latter, poses of the past are corrected, and nothing else.
+        """
+        super().__init__(config.loops)
+        self._numbers, self._map_config = config.loops, config.map
+        self._new_map = new_map if config.loops.corrects else None
+        self.closures = Closures(config, matcher, new_submap, self.keys)
+        self.poses: list[Float] = []  # by the graph, of the key frames in it
+        self._chain: list[Edge] = []
+        self._edges: dict[tuple[int, int], Edge] = {}
+        self.weights: dict[tuple[int, int], float] = {}  # of loops; near 0: let go of
+        self._pending: list[Edge] = []  # closures that no other confirms so far
+        self._searched = 0  # key frames that were searched for a closure
+        self._ties: deque[int] = deque()  # key frames to tie to other passages
+        self._tied: list[Float | None] = []  # where each was when it was tied
+        self._later: deque[tuple[int, int]] = deque()  # from which key frame on, and where to tie
+        self._first: Float = np.zeros(3)
+        self._rough: dict[int, tuple[int, int]] = {}  # found by search, by key frame
+        self._tied_to: set[int] = set()  # key frames with ties
+        self._again = 0
+        self._relaxation: Relaxation | None = None
+        self._relaxed: list[tuple[int, int]] = []  # loops in it
+        self._fresh = 0  # loops since the last one
+        self._surprised = False
+        self._redrawing: Redrawing | None = None
+        self._new_graph = False
 
-    def add(
-        self, frame: int, T_map_robot: Float, motion: Float, covariance: Float, seen: Observations
-    ) -> None:
-        """Take a frame: its ``motion`` (3,) since the one before, ``covariance`` in that frame."""
-        self._covariance = se2.propagate(self._covariance, self._step, motion, covariance)
-        self._step = se2.compose(self._step, motion)
-        self._way_m += math.hypot(float(motion[0]), float(motion[1]))
-        moved = math.hypot(float(self._step[0]), float(self._step[1]))
-        if (
-            self.keys
-            and moved < self._numbers.key_m
-            and abs(float(self._step[2])) < self._numbers.key_rad
-        ):
+    @property
+    def edges(self) -> list[Edge]:
+        """Loops found so far."""
+        return list(self._edges.values())
+
+    def work(self) -> None:
+        """Up to ``LoopsConfig.work`` units, and what the last task takes beyond."""
+        if self.way_m < self._numbers.early * self._numbers.long_m or len(self.keys) < 3:
             return
-        self.keys.append(
-            KeyFrame(
-                frame=frame,
-                T_map_robot=T_map_robot,
-                observations=seen,
-                step=self._step,
-                covariance=self._covariance + self._slack,
-                way_m=self._way_m,
-            )
-        )
-        self._step, self._covariance = np.zeros(3), np.zeros((3, 3))
+        spent = 0
+        while spent < self._numbers.work:
+            cost = self._task()
+            if cost == 0:
+                break
+            spent += cost
+
+    def correction(self, poses: Callable[[], Float]) -> Correction | None:
+        """The new map, if one is ready, with all (n, 3) ``poses()`` moved into it."""
+        redrawing = self._redrawing
+        if redrawing is None or not redrawing.done:
+            return None
+        self._redrawing = None
+        last = len(self.keys) - 1
+        T_new_old = se2.compose(redrawing.pose(last), se2.inverse(self.keys[last].T_map_robot))
+        after = np.array([redrawing.pose(k) for k in range(len(self.keys))])
+        moved = self._carried(after, poses())
+        for k, key in enumerate(self.keys):
+            self.keys[k] = replace(key, T_map_robot=after[k])
+        return Correction(T_new_old=T_new_old, cell_map=redrawing.cell_map, poses=moved)
 
     def corrected(self, poses: Float) -> Float:
-        """All (n, 3) online poses, moved with the graph; the same where no loop was found."""
-        if self._way_m < self._numbers.long_m or len(self.keys) < 3:
+        """All (n, 3) poses so far, moved with the graph; the same where no loop was found.
+
+        The first key frame is where it was at first, whatever the map's datum.
+        """
+        if not self._edges or self.way_m < self._numbers.long_m:
             return poses
-        if self._tried < len(self.keys):
-            _log.info("closing loops over %d key frames", len(self.keys))
-            while self._tried < len(self.keys):
-                self._look(self._tried)
-                self._tried += 1
-            self._look_again()
-        if not self.edges:
-            return poses
-        keys = np.array([key.T_map_robot for key in self.keys])
+        after = self._all_poses()
+        T = se2.compose(self._first, se2.inverse(after[0]))
+        return self._carried(np.array([se2.compose(T, pose) for pose in after]), poses)
+
+    def _all_poses(self) -> list[Float]:
+        """By the graph; of key frames that it does not have yet, as they followed online."""
+        last = len(self.poses) - 1
+        return self.poses + [
+            se2.compose(self.poses[last], se2.between(self.keys[last].T_map_robot, key.T_map_robot))
+            for key in self.keys[last + 1 :]
+        ]
+
+    def _carried(self, after: Float, poses: Float) -> Float:
+        before = np.array([key.T_map_robot for key in self.keys])
         frames = np.array([key.frame for key in self.keys])
         at = np.interp(np.arange(len(poses)), frames, np.arange(len(frames)))
-        return carried(keys, np.array(self._poses), at, poses)
+        return carried(before, after, at, poses)
 
-    def _optimise(self) -> None:
-        self._poses = list(optimise(np.array(self._poses), self._chain + self.edges)[0])
+    def _task(self) -> int:
+        """One piece of work; its cost in units, 0 if there is none."""
+        if self._redrawing is not None and not self._redrawing.done:
+            self._redrawing.draw()
+            return DRAWN
+        if self._relaxation is not None:
+            return self._relax(self._relaxation)
+        self.closures.spent = 0
+        if self._searched < len(self.poses):
+            self._search(self._searched)
+            self._searched += 1
+            return 1 + self.closures.spent
+        if self._fresh and (self._surprised or self._fresh >= self._numbers.batch):
+            self._relaxed = list(self._edges)
+            self._relaxation = Relaxation(np.array(self.poses), self._chain + self.edges)
+            return 1
+        if self._ties:
+            self._tie(self._ties.popleft())
+            return 1 + self.closures.spent
+        if len(self.poses) < len(self.keys):
+            self._append(len(self.poses))
+            return 1 + self.closures.spent
+        if self._new_graph:
+            self._follow()
+            return 1
+        return self._look_again()
 
-    def _look(self, j: int) -> None:
-        """Chain key frame ``j`` to those before, and close a loop if it is on one."""
+    def _append(self, j: int) -> None:
+        """Chain key frame ``j`` to those before."""
+        self._tied.append(None)
         if j == 0:
-            self._poses.append(self.keys[0].T_map_robot)
-            self._chained.append(self.keys[0].T_map_robot)
+            self._first = self.keys[0].T_map_robot
+            self.poses.append(self._first)
+            self.closures.chained.append(self.keys[0].T_map_robot)
             return
-        step = self._stepped(j)
+        step = self.closures.step(j)
         self._chain.append(step)
-        self._chained.append(se2.compose(self._chained[-1], step.T_a_b))
-        self._poses.append(se2.compose(self._poses[-1], step.T_a_b))
+        self.poses.append(se2.compose(self.poses[-1], step.T_a_b))
+
+    def _search(self, j: int) -> None:
+        """Close a loop at key frame ``j`` if it is on one that no tie goes on with."""
+        if self._edges:
+            self._ties.append(j)
+        if any(b >= j - self._numbers.every for _, b in list(self._edges)[-self._numbers.batch :]):
+            return
         middle = self._nearest(j)
-        if middle is None:
-            return
-        predicted = se2.between(self._poses[middle], self._poses[j])
-        edge = self._loop(middle, j, predicted, self._gate(j, middle))
-        if edge is None:
-            return
-        self.edges.append(edge)
+        if middle is not None:
+            predicted = se2.between(self.poses[middle], self.poses[j])
+            edge = self.closures.search(middle, j, predicted, self._gate(j, middle))
+            if edge is not None:
+                self._rough[j] = middle, j
+                self._take(edge, predicted)
+
+    def _take(self, edge: Edge, predicted: Float) -> None:
+        """Put a closure into the graph; one that is far off only if another says the same."""
         off = edge.T_a_b - predicted
-        if (
-            math.hypot(off[0], off[1]) > self._numbers.loop_m
-            or abs(se2.wrap(float(off[2]))) > self._numbers.loop_rad
-        ):
-            self._optimise()
+        off_m, off_rad = math.hypot(off[0], off[1]), abs(se2.wrap(float(off[2])))
+        numbers = self._numbers
+        if off_m > numbers.agree_m or off_rad > numbers.agree_rad:
+            agreeing = [one for one in self._pending if self._agree(one, edge)]
+            self._pending.append(edge)
+            if not agreeing:
+                return
+            self._pending = [one for one in self._pending[:-1] if one not in agreeing]
+            for one in agreeing:
+                self._edges[one.a, one.b] = one
+        self._surprised |= off_m > numbers.apply_m or off_rad > numbers.apply_rad
+        self._edges[edge.a, edge.b] = edge
+        self._fresh += 1
 
-    def _stepped(self, j: int) -> Edge:
-        """The step to key frame ``j``, matched to the few before it; as online where it is poor."""
-        key = self.keys[j]
-        step, covariance = key.step, key.covariance
-        cell_map = self._map_of(range(max(0, j - self._numbers.recent), j), j - 1)
-        start = self._matcher.approach(cell_map, key.observations, step, covariance)
-        precision = inverted(covariance)
-        match = self._matcher.climb(cell_map, key.observations, start, step, precision)
-        if match.matched >= self._numbers.good_step:
-            step = match.T_map_robot
-            information = self._numbers.information_share * match.tau * match.information
-            covariance = inverted(information + precision)
-        covariance = covariance + spread(self._numbers.chain_m, self._numbers.chain_rad)
-        return Edge(a=j - 1, b=j, T_a_b=step, information=inverted(covariance))
+    def _agree(self, one: Edge, other: Edge) -> bool:
+        """Whether two closures put the robot at the same place."""
+        if one.b == other.b or self._way(one.b, other.b) > self._numbers.after_m:
+            return False
+        by_one = se2.compose(self.poses[one.a], one.T_a_b)
+        by_one = se2.compose(by_one, se2.between(self.poses[one.b], self.poses[other.b]))
+        by_other = se2.compose(self.poses[other.a], other.T_a_b)
+        off = se2.between(by_one, by_other)
+        near = math.hypot(float(off[0]), float(off[1])) < self._numbers.agree_m
+        return near and abs(float(off[2])) < self._numbers.agree_rad
 
-    def _look_again(self) -> None:
-        """With every pose near its place, tie each key frame to all passages along there."""
-        if not self.edges:
+    def _relax(self, relaxation: Relaxation) -> int:
+        if not relaxation.done:
+            relaxation.round()
+            return 1 + len(self.poses) // 64
+        weights = relaxation.weights[-len(self._relaxed) :].tolist()
+        self.weights = dict(zip(self._relaxed, weights, strict=True))
+        self.poses = list(relaxation.poses)
+        self._relaxation, self._surprised, self._fresh = None, False, 0
+        self._new_graph = True
+        return 1
+
+    def _follow(self) -> None:
+        """Begin a new map if the graph denies places of the present one."""
+        self._new_graph = False
+        if self._new_map is None or self._redrawing is not None:
             return
-        self._optimise()
-        poses = np.array(self._poses)
-        ways = np.array([key.way_m for key in self.keys])
-        edges = []
-        for j in range(len(self.keys)):
-            for middle in self._passages(j, poses, ways):
-                edge = self._tie(middle, j, se2.between(poses[middle], poses[j]))
-                if edge is not None:
-                    edges.append(edge)
-        self.edges = edges or self.edges
-        self._optimise()
+        if self.way_m < self._numbers.long_m:
+            return
+        held = [pair for pair in self._edges if self.weights.get(pair, 0.0) > 0.5]
+        if len({b for _, b in held}) < self._numbers.denying:
+            return
+        near, last = self._numbers.submap, max(b for _, b in held)
+        pairs = np.array(held + [(k - near, k) for k in range(near, last)])
+        online = np.array([key.T_map_robot for key in self.keys[: len(self.poses)]])
+        torn = set(pairs[self._torn(pairs, online, np.array(self.poses)), 1].tolist())
+        if len(torn) < self._numbers.denying:
+            return
+        _log.info("loop closed: the map is torn at %d key frames and drawn anew", len(torn))
+        if self._numbers.datum == "all":
+            self.poses = list(least_moved(np.array(self.poses), online))
+        self._redrawing = Redrawing(self._map_config, self._new_map, self.keys, self.poses)
 
-    def _passages(self, j: int, poses: Float, ways: Float) -> list[int]:
+    def _torn(self, pairs: NDArray[np.int64], online: Float, graph: Float) -> NDArray[np.bool_]:
+        """Whether pairs (n, 2) of key frames lie otherwise in the map than in the graph."""
+        a, b = pairs[:, 0], pairs[:, 1]
+        off = relative(online[a], online[b]) - relative(graph[a], graph[b])
+        far = off[:, 0] ** 2 + off[:, 1] ** 2 > self._numbers.apply_m**2
+        turned = np.abs(se2.wrap_array(off[:, 2])) > self._numbers.apply_rad
+        return np.asarray(far | turned)
+
+    def _tie(self, j: int) -> None:
+        """Tie a key frame to all passages along there."""
+        first, self._tied[j] = self._tied[j] is None, self.poses[j]
+        for middle in self._passages(j):
+            predicted = se2.between(self.poses[middle], self.poses[j])
+            edge = self.closures.tie(middle, j, predicted)
+            if edge is not None:
+                if self._rough.get(j) == (middle, j):
+                    del self._rough[j]
+                self._take(edge, predicted)
+                if first and j % self._numbers.every == 0:
+                    self._later.append((j + 2 * self._numbers.submap, middle))
+                self._tied_to.add(j)
+        self._drop_rough(j)
+
+    def _drop_rough(self, j: int) -> None:
+        """Ties about ``j`` take the place of what was found there by a wide search."""
+        near = range(j - self._numbers.every, j + self._numbers.every + 1)
+        if self._tied_to.intersection(near):
+            for k in near:
+                self._edges.pop(self._rough.pop(k, (-1, -1)), None)
+
+    def _look_again(self) -> int:
+        """Tie a key frame anew that the graph has moved since; the cost, 0 if there is none."""
+        if not self._edges:
+            return 0
+        if self._later and self._later[0][0] < len(self.poses):
+            # what they saw before can now be tied to the passage that came later
+            _, middle = self._later.popleft()
+            self._ties.extend(range(middle - 1, middle + self._numbers.every - 1))
+            return 1
+        for _ in range(len(self.poses)):
+            self._again = (self._again + 1) % len(self.poses)
+            tied, pose = self._tied[self._again], self.poses[self._again]
+            moved = math.inf if tied is None else math.hypot(*(pose - tied)[:2].tolist())
+            if moved > self._numbers.agree_m:
+                self._ties.append(self._again)
+                return 1
+        return 0
+
+    def _way(self, a: int, b: int) -> float:
+        return abs(self.keys[a].way_m - self.keys[b].way_m)
+
+    def _passages(self, j: int) -> list[int]:
         """Middles near key frame ``j``, one of each time the robot came along there."""
-        middles = np.arange(
-            self._numbers.submap, len(poses) - self._numbers.submap, self._numbers.every
-        )
-        middles = middles[np.abs(ways[middles] - ways[j]) > self._numbers.after_m]
+        poses = np.array(self.poses)
+        ways = np.array([key.way_m for key in self.keys[: len(poses)]])
+        numbers = self._numbers
+        middles = np.arange(numbers.submap, len(poses) - numbers.submap, numbers.every)
+        middles = middles[np.abs(ways[middles] - ways[j]) > numbers.after_m]
         apart = poses[middles, :2] - poses[j, :2]
         squares = (apart * apart).sum(axis=1)
         found: list[int] = []
         for k in np.argsort(squares, kind="stable"):
-            if squares[k] > self._numbers.again_m**2 or len(found) == self._numbers.passages:
+            if squares[k] > numbers.again_m**2 or len(found) == numbers.passages:
                 break
             middle = int(middles[k])
-            if all(abs(ways[middle] - ways[other]) > self._numbers.after_m for other in found):
+            if all(abs(ways[middle] - ways[other]) > numbers.after_m for other in found):
                 found.append(middle)
         return found
-
-    def _tie(self, middle: int, j: int, predicted: Float) -> Edge | None:
-        """Key frame ``j`` matched to the map about ``middle``, near where it is predicted."""
-        cell_map, seen = self._submap(middle), self.keys[j].observations
-        start = self._matcher.approach(cell_map, seen, predicted, self._coarse)
-        match = self._matcher.climb(cell_map, seen, start, predicted, inverted(self._coarse))
-        return self._edge(middle, j, match, support(cell_map, seen, match))
 
     def _gate(self, j: int, middle: int) -> float:
         way = self.keys[j].way_m - self.keys[middle].way_m
@@ -213,56 +317,8 @@ class Loops:
                 < self._numbers.after_m
             ):
                 break
-            d = self._poses[middle] - self._poses[j]
+            d = self.poses[middle] - self.poses[j]
             distance = math.hypot(float(d[0]), float(d[1])) - self._gate(j, middle)
             if distance < min(nearest, self._numbers.near_m):
                 best, nearest = middle, distance
         return best
-
-    def _loop(self, middle: int, j: int, predicted: Float, gate: float) -> Edge | None:
-        """Key frame ``j`` matched to the map about ``middle``, in its frame."""
-        cell_map, seen = self._submap(middle), self.keys[j].observations
-        short_term = self._matcher.reward.short_term
-        found: list[tuple[float, Match]] = []
-        about = (predicted, gate, self._numbers.gate_rad)
-        if middle not in self._fields:
-            self._fields[middle] = coarse_field(cell_map, short_term)
-        field = self._fields[middle]
-        for place in places(
-            cell_map, short_term, seen.points_robot, self._numbers.most, about, field
-        ):
-            start = self._matcher.approach(cell_map, seen, place, self._coarse)
-            match = self._matcher.climb(cell_map, seen, start, place, inverted(self._coarse))
-            found.append((support(cell_map, seen, match), match))
-        if not found:
-            return None
-        found.sort(key=lambda one: -one[0])
-        (best, match), others = found[0], found[1:]
-        alike = any(other > self._numbers.alias * best for other, _ in others)
-        return None if alike else self._edge(middle, j, match, best)
-
-    def _edge(self, middle: int, j: int, match: Match, backing: float) -> Edge | None:
-        if backing < self._numbers.good_support or match.matched < self._numbers.good_match:
-            return None
-        information = self._numbers.information_share * match.tau * match.information
-        covariance = inverted(information + self._numbers.loose * np.eye(3))
-        covariance = covariance + spread(self._numbers.loop_m, self._numbers.loop_rad)
-        T_a_b = match.T_map_robot
-        return Edge(a=middle, b=j, T_a_b=T_a_b, information=inverted(covariance), robust=True)
-
-    def _submap(self, middle: int) -> CellMap:
-        """What the key frames about ``middle`` saw, in the frame of that one."""
-        if middle not in self._submaps:
-            about = range(middle - self._numbers.submap, middle + self._numbers.submap + 1)
-            self._submaps[middle] = self._map_of(about, middle)
-        return self._submaps[middle]
-
-    def _map_of(self, members: range, origin: int) -> CellMap:
-        """What some key frames saw, in the frame of one, as the chain puts them."""
-        cell_map = self._new_map()
-        for k in members:
-            key, pose = self.keys[k], se2.between(self._chained[origin], self._chained[k])
-            rasterise(cell_map, key.observations, pose)
-            T_map_laser = se2.compose(pose, key.observations.T_robot_laser)
-            cell_map.integrate(key.observations.view, T_map_laser, self._numbers.look_s, write=True)
-        return cell_map

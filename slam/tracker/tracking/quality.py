@@ -34,6 +34,18 @@ class TrackingQuality:
         self.supports: deque[float] = deque(maxlen=config.remembered)
         self.wholes: deque[float] = deque(maxlen=config.remembered)
         self.tracked_s, self.tracked, self.scans = 0.0, 0, 0
+        self._excused, self._excuses = 0.0, 0
+
+    def relocated(self, support: float) -> None:
+        """A place was accepted that explains so much: as much cannot deny it for some scans."""
+        self.count(False)
+        self._excused = self.config.excused * support
+        self._excuses = self.config.remembered
+
+    def excuses(self, support: float) -> bool:
+        """Whether a denied frame of this support is excused by that; counts such frames."""
+        self._excuses = max(self._excuses - 1, 0)
+        return self._excuses > 0 and support >= self._excused
 
     def resume(
         self, matches: Sequence[float], supports: Sequence[float], tracked_s: float, tracked: int
@@ -77,6 +89,14 @@ class TrackingQuality:
         """Whether a match is so poor that the map in view is to be asked."""
         least = self.config.suspicious if self.suspicious else 0.0
         return self._share(matched) < max(self.freeze_below, least)
+
+    def least_continuous(self) -> float:
+        """Matched share below which a scan does not go on from those before it: carried."""
+        return self.config.continuous * self.usual_match()
+
+    def goes_on(self, scans: int, seconds: float) -> bool:
+        """Whether so many scans in a row that agree with one another outweigh the map's denial."""
+        return scans >= self.config.outdated_scans and seconds >= self.config.outdated_s
 
     def _share(self, matched: float) -> float:
         return matched / max(self.usual_match(), 1e-9)

@@ -2,13 +2,15 @@
 """Lost and found: follow every place the robot may be at, until one alone explains what it sees.
 
 Hypotheses come from dead reckoning and from a search of the whole map; each is carried along by
-odometry and matched to every scan. Nothing is written to the map meanwhile.
+odometry and matched to the scans. Nothing is written to the map meanwhile. A scan does no more of
+this than its budget allows: the search goes on over the scans that follow, and where there are many
+hypotheses, they are matched by turns.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,9 +19,11 @@ from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.tracker.cell_map import CellMap
-from slam.tracker.matching.global_search import places
-from slam.tracker.matching.local_search import SearchWindow
+from slam.tracker.matching.budget import Budget
+from slam.tracker.matching.coarse_map import CoarseMap
+from slam.tracker.matching.local_search import Around, SearchWindow
 from slam.tracker.matching.matcher import Match, Matcher
+from slam.tracker.matching.whole_search import WholeSearch
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracking.config import RelocaliseConfig
 
@@ -48,9 +52,10 @@ def _near(one: Float, other: Float, config: RelocaliseConfig) -> bool:
 class Hypothesis:
     """A place the robot may be at.
 
-    match    of the latest scan there
+    match    of the latest scan that was matched there, carried on by odometry
     support  mean over ``scans`` of matched share times share of the map in view that is confirmed
     seen     mean of the weight that was in view
+    waited   scans since it was matched, ``drift`` (3, 3) what odometry may be off since
     """
 
     match: Match
@@ -60,6 +65,8 @@ class Hypothesis:
     way_m: float = 0.0
     turned_rad: float = 0.0
     elapsed_s: float = 0.0
+    waited: int = 0
+    drift: Float = field(default_factory=lambda: np.zeros((3, 3)))
 
     def tried(self, config: RelocaliseConfig, times: float = 1.0) -> bool:
         """Seen from enough places, or for long enough, ``times`` as much as the least."""
@@ -74,42 +81,127 @@ class Hypothesis:
 
 
 class Relocalisation:
-    """Follows hypotheses from the scan on that found the robot lost."""
+    """Follows hypotheses from the scan on that found the robot lost.
+
+    hypotheses  places that are followed, the best first
+    elapsed_s   since then
+    searches    of the whole map that were finished, all their places tried
+    here        support of the place of dead reckoning in the latest scan
+    spent_ns    work of the latest scan, counted
+    accepted    support of the hypothesis that was accepted, 0 before
+    """
 
     def __init__(self, cell_map: CellMap, matcher: Matcher) -> None:
         self._cell_map = cell_map
         self._matcher = matcher
         self._config = matcher.config.tracking.relocalise
+        self._prices = matcher.config.matching.budget
         self.hypotheses: list[Hypothesis] = []
-        self.elapsed_s = 0.0
+        self.elapsed_s, self.searches, self.here = 0.0, 0, 0.0
+        self.spent_ns, self.accepted, self.went_on = 0.0, 0.0, False
+        self._coarse: CoarseMap | None = None
+        self._search: WholeSearch | None = None
         self._since_search_s = math.inf
+        self._places: list[Float] = []  # that the search found and that are to be tried
+        self._motion, self._drift = np.zeros(3), np.zeros((3, 3))  # since the scan searched for
+
+    def look(self, observations: Observations, prediction: Prediction) -> None:
+        """Take in a frame that is denied: the robot may be lost, and the search begins."""
+        self._go_on(prediction)
+        budget = Budget(self._prices, self._prices.frozen_share)
+        self._look_around(observations, budget)
+        self.spent_ns = budget.spent_ns
 
     def step(
-        self, observations: Observations, prediction: Prediction, here: Match, usual: float
+        self,
+        observations: Observations,
+        prediction: Prediction,
+        here: Match,
+        usual: float,
+        *,
+        carried: bool,
     ) -> Match | None:
         """Take a frame in; the match of the hypothesis that is accepted, or None.
 
         ``here`` is the frame's match by dead reckoning, ``usual`` the support while not lost.
         """
         self.elapsed_s += prediction.elapsed
-        self._since_search_s += prediction.elapsed
-        found = [self._carried(h, observations, prediction) for h in self.hypotheses]
+        self._go_on(prediction)
+        budget = Budget(self._prices, self._prices.lost_share)
+        price = self._prices.climb_ns * max(len(observations.points_robot), 1)
+        most = max(1, int(self._prices.known_share * budget.left_ns / price))
+        turns = sorted(self.hypotheses[1:], key=lambda h: -h.waited)
+        matched = [id(h) for h in (self.hypotheses[:1] + turns)[:most]]
+        found = [
+            self._carried(h, observations, prediction)
+            if id(h) in matched
+            else self._waiting(h, prediction)
+            for h in self.hypotheses
+        ]
         found.append(self._new(observations, here))
-        if self._since_search_s >= self._config.again_s and len(observations.points_robot) > 0:
-            self._since_search_s = 0.0
-            short_term = self._matcher.reward.short_term
-            points, most = observations.points_robot, self._config.most
-            for place in places(self._cell_map, short_term, points, most):
-                match = self._climb(observations, place, coarse(self._config))
-                found.append(self._new(observations, match))
+        self.here = found[-1].support
+        budget.spend(price * len(matched))
+        found += self._tried_places(observations, budget, price)
+        self._look_around(observations, budget)
+        found += self._tried_places(observations, budget, price)
+        self.spent_ns = budget.spent_ns
         self.hypotheses = _kept(found, usual, self._config)
-        return self._accepted(usual, prediction.T_map_robot)
+        return self._accepted(usual, prediction.T_map_robot, carried)
+
+    def elsewhere(self, T_map_robot: Float) -> float:
+        """Support of the best place that is followed and is not this one; 0 where none is."""
+        others = [
+            h.support
+            for h in self.hypotheses
+            if not _near(h.match.T_map_robot, T_map_robot, self._config)
+        ]
+        return max(others, default=0.0)
+
+    def _go_on(self, prediction: Prediction) -> None:
+        """The robot has moved on since the scan that is searched for."""
+        self._since_search_s += prediction.elapsed
+        tracked = float(prediction.T_map_robot[2]) - float(prediction.increment[2])
+        step = turned(prediction.step, -tracked)
+        self._drift = se2.propagate(self._drift, self._motion, prediction.increment, step)
+        self._motion = se2.compose(self._motion, prediction.increment)
+
+    def _look_around(self, observations: Observations, budget: Budget) -> None:
+        """Go on with the search of the whole map, or begin one for this scan."""
+        idle = self._search is None and not self._places
+        if idle and self._since_search_s >= self._config.again_s and len(observations.points_robot):
+            if self._coarse is None:
+                self._coarse = CoarseMap(self._cell_map, self._matcher.reward.short_term)
+            whole = self._matcher.config.matching.whole
+            points = observations.points_robot
+            self._search = WholeSearch(self._coarse, points, self._config.most, whole)
+            self._since_search_s = 0.0
+            self._motion, self._drift = np.zeros(3), np.zeros((3, 3))
+        if self._search is not None and budget.left_ns > 0.0:
+            self._places += self._search.advance(budget)
+            if self._search.done:
+                self._search = None
+                self.searches += not self._places
+
+    def _tried_places(
+        self, observations: Observations, budget: Budget, price: float
+    ) -> list[Hypothesis]:
+        """Hypotheses of the places found, carried on to this scan, as many as the budget allows."""
+        found = []
+        while self._places and budget.left_ns > 0.0:
+            place = self._places.pop(0)
+            covariance = se2.propagate(coarse(self._config), place, self._motion, self._drift)
+            here = se2.compose(place, self._motion)
+            found.append(self._new(observations, self._climb(observations, here, covariance)))
+            few = min(len(observations.points_robot), self._matcher.numbers.climb.few)
+            budget.spend(price + few * self._prices.approach_ns)
+            self.searches += self._search is None and not self._places
+        return found
 
     def _new(self, observations: Observations, match: Match) -> Hypothesis:
         seen = float(observations.weights.sum())
         return Hypothesis(match=match, support=self._support(observations, match), seen=seen)
 
-    def _accepted(self, usual: float, predicted: Float) -> Match | None:
+    def _accepted(self, usual: float, predicted: Float, carried: bool) -> Match | None:
         """The match of the best hypothesis, if it is good and no other is.
 
         The place of dead reckoning goes before places that only look as good: a room may be
@@ -122,31 +214,57 @@ class Relocalisation:
         going_on = [h for h in rivals if _near(h.match.T_map_robot, predicted, config)]
         if going_on:
             best = going_on[0]
-        elif len(rivals) > 1:
+            self.went_on = True
+        elif len(rivals) > 1 or not (carried or self._drifted(best, predicted)):
             return None
+        if best.waited or not (going_on or self.searches):
+            return None  # not sure yet that nothing else explains it
         enough = config.enough_later if best.tried(config, config.later) else config.enough
         enough_seen = best.tried(config) and best.seen >= config.least_weight
-        return best.match if enough_seen and best.support >= enough * usual else None
+        if not enough_seen or best.support < enough * usual:
+            return None
+        self.accepted = best.support
+        return best.match
+
+    def _drifted(self, best: Hypothesis, predicted: Float) -> bool:
+        """Whether drift alone may have led from that place to the one of dead reckoning."""
+        x, y, turn = (best.match.T_map_robot - predicted).tolist()
+        config = self._config
+        return math.hypot(x, y) < config.drift_m and abs(se2.wrap(turn)) < config.drift_rad
 
     def _carried(
         self, old: Hypothesis, observations: Observations, prediction: Prediction
     ) -> Hypothesis:
-        increment = prediction.increment
-        T_map_robot = se2.compose(old.match.T_map_robot, increment)
-        tracked = float(prediction.T_map_robot[2]) - float(increment[2])
-        covariance = turned(prediction.step, float(old.match.T_map_robot[2]) - tracked)
-        match = self._climb(observations, T_map_robot, covariance)
+        moved = self._waiting(old, prediction)
+        match = self._climb(observations, moved.match.T_map_robot, moved.drift)
         support = self._support(observations, match)
         scans = old.scans + 1
         return replace(
-            old,
+            moved,
             match=match,
             support=old.support + (support - old.support) / scans,
             seen=old.seen + (float(observations.weights.sum()) - old.seen) / scans,
             scans=scans,
+            waited=0,
+            drift=np.zeros((3, 3)),
+        )
+
+    def _waiting(self, old: Hypothesis, prediction: Prediction) -> Hypothesis:
+        """Carried on by odometry alone."""
+        increment, before = prediction.increment, old.match.T_map_robot
+        tracked = float(prediction.T_map_robot[2]) - float(increment[2])
+        if old.waited:
+            drift = se2.propagate(old.drift, before, increment, turned(prediction.step, -tracked))
+        else:
+            drift = turned(prediction.step, float(before[2]) - tracked)
+        return replace(
+            old,
+            match=replace(old.match, T_map_robot=se2.compose(before, increment)),
             way_m=old.way_m + math.hypot(float(increment[0]), float(increment[1])),
             turned_rad=old.turned_rad + abs(float(increment[2])),
             elapsed_s=old.elapsed_s + prediction.elapsed,
+            waited=old.waited + 1,
+            drift=drift,
         )
 
     def _climb(self, observations: Observations, T_map_robot: Float, covariance: Float) -> Match:
@@ -180,6 +298,7 @@ def slipped(
     observations: Observations,
     prediction: Prediction,
     usual: float,
+    around: Around | None = None,
 ) -> Match | None:
     """The place around the prediction that explains a frame about as well as ``usual``.
 
@@ -195,7 +314,7 @@ def slipped(
         turn_rad=min(config.pushed_radps * elapsed, config.farthest_rad),
     )
     loose = inverted(slip(config))
-    match = matcher.search(cell_map, observations, prediction.T_map_robot, loose, window)
+    match = matcher.search(cell_map, observations, prediction.T_map_robot, loose, window, around)
     sure = support(cell_map, observations, match) >= config.sure * usual
     return replace(match, slipped=True) if sure else None
 

@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from slam.frames import Float
-from slam.frontend.odometry_prior import Prediction
+from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
 from slam.tracker.uncertainty.covariances import advance, carried, observable
@@ -127,11 +127,22 @@ class PoseCovariance:
         )
         self.covariance = self._drift + self._blind + self._shared
 
-    def dragged(self, covariance: Float) -> None:
-        """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot."""
+    def dragged(self, covariance: Float, now: Float | None = None) -> None:
+        """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot.
+
+        ``now``: (3, 3) that the pose alone is off by more, until the next frame.
+        """
         self._drift = self._drift + covariance
         self.newest_drift = self.newest_drift + covariance
         self.covariance = self.covariance + covariance
+        if now is not None:
+            self.covariance = self.covariance + now
+
+    def turned(self, by: float) -> None:
+        """The map frame was turned by ``by`` rad, and the robot with it."""
+        self._drift, self._blind = turned(self._drift, by), turned(self._blind, by)
+        self._shared, self._geometry = turned(self._shared, by), turned(self._geometry, by)
+        self.covariance = self._drift + self._blind + self._shared
 
     def _fewer(self) -> float:
         """By how much the shared errors of surfaces average out less than in a whole room."""

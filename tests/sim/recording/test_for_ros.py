@@ -5,6 +5,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import re
+import subprocess
+import sys
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -15,7 +19,9 @@ import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from scripts.figures import in_first_frame
 from scripts.verbs.generate import generate
+from scripts.verbs.run import on_log
 from sim.moments import toured
 from sim.recording.bag import FORMAT, BagWriter
 from sim.recording.recipe import RECIPE
@@ -24,12 +30,15 @@ from sim.recording.template import EPOCH_NS
 from sim.recording.verify import regenerate
 from sim.sensors.lidar.registry import scanner_of
 from sim.simulation import Simulation
-from slam import se2
+from slam import create, se2
 from slam.errors import OutputError
+from slam.evaluation import metrics
 from slam.frames import EPOCH, NS_PER_S
 from slam.logs import read_bag
 from slam.logs.bag_laser import mounting
-from slam.trajectory import read_tum
+from slam.trajectory import Trajectory, read_tum, write_tum
+
+REPO = Path(__file__).resolve().parents[3]
 
 
 @pytest.fixture(scope="module")
@@ -186,3 +195,36 @@ def test_a_bag_of_another_format_is_not_called_changed(tmp_path: Path):
     assert "its bag is of format 1, this mobilia writes format 2" in found.why
     with pytest.raises(OutputError, match=r"format 1, .*: choose another --out"):
         generate(["arena"], tmp_path / "data", seconds=0.2, change=0.0)
+
+
+def test_a_run_on_an_episode_has_the_times_of_its_bag(recorded, tmp_path: Path):
+    on_log(["odometry"], recorded.path, tmp_path / "run", overwrite=False, film=False)
+    stamps = read_tum(recorded.path / "trajectory.tum").stamps_ns.tolist()
+    for name in ("odometry", "truth"):
+        assert read_tum(tmp_path / "run" / f"trajectory_{name}.tum").stamps_ns.tolist() == stamps
+
+
+def test_the_commands_for_evo_say_what_the_page_says(recorded, tmp_path: Path):
+    page = (REPO / "docs" / "datasets.md").read_text()
+    commands = re.findall(r"^evo_ape .*$", page, flags=re.MULTILINE)
+    frames = [moment.frame for moment in recorded.moments]
+    odometry = create("odometry")
+    for frame in frames:
+        odometry.update(frame)
+    estimate = odometry.trajectory()
+    truth = Trajectory(stamps_ns=estimate.stamps_ns, poses=np.array([f.truth for f in frames]))
+    write_tum(tmp_path / "trajectory_shunting.tum", estimate, EPOCH_NS)
+    write_tum(tmp_path / "trajectory_truth.tum", in_first_frame(truth), EPOCH_NS)
+    words = {"EP": str(recorded.path), "RUN": str(tmp_path)}
+    found = []
+    for command in commands:
+        program, *rest = re.sub(r"\b(EP|RUN)\b", lambda word: words[word[0]], command).split()
+        done = subprocess.run(
+            [str(Path(sys.executable).with_name(program)), *rest], capture_output=True, text=True,
+            env={**os.environ, "HOME": str(tmp_path)}, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        found.append(float(re.search(r"rmse\s+(\S+)", done.stdout)[1]))
+    wanted = metrics.ate(estimate, truth).value
+    assert len(found) == 3
+    assert found == pytest.approx([wanted] * 3, abs=2e-6)

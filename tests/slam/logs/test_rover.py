@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -151,3 +153,11 @@ def test_a_file_of_comments_and_a_torn_line(tmp_path):
     path.write_text("0 x 1 1 y 1 2 3 4 5\n1 x 2 3 y 1 2")
     stream = read_rover(path, toml)
     assert stream.length == stream.metadata.extra["torn_last_line"] == 1
+
+
+def test_the_description_in_the_docs_is_one(tmp_path):
+    page = (Path(__file__).parents[3] / "docs" / "logs.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    (tmp_path / "rover.toml").write_text(block)
+    made = read_format(tmp_path / "rover.toml")
+    assert (made.first, made.beams, made.odometry.counter) == (24, 682, 65536)

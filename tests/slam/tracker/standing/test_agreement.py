@@ -55,20 +55,46 @@ def test_small_corrections_to_one_side_add_up() -> None:
 def test_only_among_what_has_no_vote_are_the_matches_blamed() -> None:
     agreement = fed(np.tile([SIGMA[0], 0.0, 0.0], (50, 1)))
     assert agreement.dragged(1.0) == 0.0
-    assert 0.3 < agreement.dragged(0.4) < 0.6
-    assert fed(np.zeros((50, 3))).dragged(0.0) == 0.0
+    assert agreement.dragged(0.4) == pytest.approx(0.6, abs=0.01)
+    assert fed(np.zeros((50, 3))).dragged(0.0) < 0.02
     assert fed(np.ones((50, 3)), ALL_VOTE).dragged(0.0) == 0.0
+
+
+def test_the_probability_is_half_of_what_has_no_vote_at_the_ratio_that_says_nothing() -> None:
+    agreement = fed(np.zeros((1, 3)))
+    agreement.ratio = NUMBERS.disagreed
+    assert agreement.dragged(0.3) == pytest.approx(0.35)
+    # each unit of the ratio is a likelihood of exp(3 / 2), for three numbers
+    agreement.ratio = NUMBERS.disagreed + 1.0
+    p = agreement.dragged(0.0)
+    assert p / (1.0 - p) == pytest.approx(math.exp(1.5))
+    agreement.ratio = 1e9
+    assert agreement.dragged(0.3) == pytest.approx(0.7)
 
 
 def test_the_spread_of_both_explanations_is_the_share_of_the_sum_squared() -> None:
     agreement = fed(np.tile([SIGMA[0], -SIGMA[1], 0.0], (100, 1)))
     p = agreement.dragged(0.2)
-    one_frame = agreement.covariance(p)
-    window = agreement._windows[agreement._worst]
-    whole = one_frame * window / STEP_S
-    assert whole[0, 0] + whole[1, 1] == pytest.approx(agreement.off_m(p) ** 2, rel=1e-9)
-    assert whole[0, 1] == pytest.approx(-whole[0, 0], rel=1e-9)
-    assert np.linalg.eigvalsh(one_frame).min() > -1e-15
+    spread = agreement.covariance(p)
+    assert spread[0, 0] + spread[1, 1] == pytest.approx(agreement.off_m(p) ** 2, rel=1e-9)
+    assert spread[0, 1] == pytest.approx(-spread[0, 0], rel=1e-9)
+    assert np.linalg.eigvalsh(spread).min() > -1e-15
+
+
+def test_what_the_window_forgets_stays_in_the_map() -> None:
+    """With the same probability all along, what is left behind adds up to the whole spread."""
+    agreement = fed(np.tile([SIGMA[0], 0.0, 0.0], (100, 1)))
+    whole, left_behind = agreement.covariance(0.5), np.zeros((3, 3))
+    for _ in range(400):
+        left_behind += agreement.left_behind(0.5)
+        prediction = Prediction(
+            T_map_robot=np.zeros(3), increment=np.zeros(3), covariance=np.diag(1e-12 * SIGMA**2),
+            twist=np.zeros(3), elapsed=STEP_S,
+        )  # fmt: skip
+        worst = agreement._worst
+        agreement.take(prediction, np.zeros(3))
+        agreement._worst = worst
+    assert left_behind == pytest.approx(whole, rel=1e-6, abs=1e-15)
 
 
 def test_a_robot_that_was_set_elsewhere_starts_anew() -> None:

@@ -65,3 +65,15 @@ def test_giving_up_lets_the_map_grow_anew():
     quality.give_up()
     assert quality.scans == QUALITY.patience
     assert not quality.suspicious
+
+
+def test_a_place_found_is_not_denied_by_what_it_was_accepted_with() -> None:
+    config = QualityConfig()
+    quality = TrackingQuality(0.6, config)
+    assert not quality.excuses(1.0)
+    quality.relocated(0.8)
+    assert quality.excuses(config.excused * 0.8)
+    assert not quality.excuses(0.9 * config.excused * 0.8)
+    for _ in range(config.remembered):
+        quality.excuses(0.8)
+    assert not quality.excuses(0.8)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from slam import se2
@@ -120,3 +121,37 @@ def blind_turn(last: Frame, *, steps: int, said_rad: float, sd_rad: float) -> li
         scan = Scan(stamp_ns=stamp, ranges=ranges, spec=last.scan.spec)
         out.append(Frame(stamp_ns=stamp, odometry=odometry, scan=scan))
     return out
+
+
+def carried(budget_ms: float) -> tuple[list[str], list[float], Array]:
+    """States of a robot that is carried elsewhere, the work of each scan, the last error."""
+    config = FAST.changed({"matching.budget.budget_ms": budget_ms})
+    world = World2D(np.vstack([arena(), rectangle(-2.0, 1.0, -1.2, 2.2)]))
+    before = frames(world, TURN, rate_hz=5.0, seed=3)
+    system = ShuntingSlam(config)
+    states_of(system, before)
+    drive = Drive((2.0, -2.0, 2.0), ((0.2, 0.3, 8.0),))
+    states, spent = [], []
+    after = going_on(frames(world, drive, rate_hz=5.0, seed=7), before[-1])
+    for frame in after:
+        states.append(system.update(frame.without_truth()).diagnostics["state"])
+        spent.append(0.0)
+        looking = system._relocalisation or system._suspected
+        if looking is not None and states[-1] in ("frozen", "lost"):
+            spent[-1] = looking.spent_ns
+    truth = after[-1].truth
+    assert truth is not None
+    return states, spent, system.trajectory().poses[-1] - np.asarray(truth)
+
+
+@pytest.mark.parametrize("budget_ms", [10.0, 20.0, 1e6])
+def test_no_scan_of_a_lost_robot_does_more_than_its_budget_and_it_is_found(
+    budget_ms: float,
+) -> None:
+    states, spent, off = carried(budget_ms)
+    assert "lost" in states
+    assert states[-1] == "tracking"
+    assert float(np.hypot(off[0], off[1])) < 0.03
+    counted = FAST.matching.budget.lost_share * budget_ms * 1e6
+    match_ns = 361 * FAST.matching.budget.climb_ns + 90 * FAST.matching.budget.approach_ns
+    assert 0.0 < max(spent) <= counted + match_ns  # the item at which it is spent

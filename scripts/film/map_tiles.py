@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A growing map as small pictures of its parts, coarser as more of it is seen at once.
+
+What a film needs of a map is as large as the film, however large the map is: tiles hold the
+largest value of several cells each, and only those that changed are made anew.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam.estimate import Raster
+from slam.frames import Float
+
+Bounds = tuple[float, float, float, float]
+Levels = NDArray[np.uint8]
+TILE = 128  # pixels of a side
+LEAST_PX = 0.5  # of the view for a pixel of a tile; smaller ones are joined, two by two
+
+
+class LevelMap(NamedTuple):
+    """A map in 256 levels: (height, width), m a pixel, pose of the outer corner of the first."""
+
+    levels: Levels
+    resolution_m: float
+    T_map_origin: Float
+
+
+def levels_of(raster: Raster) -> LevelMap:
+    """A whole map so."""
+    levels = (np.nan_to_num(raster.values) * np.float32(255.0)).astype(np.uint8)
+    return LevelMap(levels, raster.resolution_m, raster.T_map_origin)
+
+
+class MapTiles:
+    """``cells`` a side make one pixel of a tile: a power of two that only grows."""
+
+    def __init__(self) -> None:
+        self.cells = 1
+        self._cell_m = 0.0
+        self._tiles: dict[tuple[int, int], Levels] = {}
+
+    def fit(self, scale: float) -> None:
+        """Join pixels until each is at least half a pixel of a view of ``scale`` px a metre."""
+        while self._tiles and self.cells * self._cell_m * scale < LEAST_PX:
+            self._coarsen()
+
+    def aligned(self, bounds: Bounds) -> Bounds:
+        """``bounds`` (m) grown to whole pixels of the tiles."""
+        step = self.cells * self._cell_m
+        if step == 0.0:
+            return bounds
+        low = [math.floor(edge / step + 1e-6) * step for edge in bounds[:2]]
+        high = [math.ceil(edge / step - 1e-6) * step for edge in bounds[2:]]
+        return low[0], low[1], high[0], high[1]
+
+    def put(self, raster: Raster) -> None:
+        """Replace what is there by ``raster``, along the map's axes and in cells of one size.
+
+        Pixels that it covers in part keep no more than that part: ask for ``aligned`` bounds.
+        """
+        self._cell_m = raster.resolution_m
+        x, y, _ = raster.T_map_origin.tolist()
+        columns = math.floor(x / self._cell_m + 0.5)
+        rows = math.floor(y / self._cell_m + 0.5)
+        height = raster.values.shape[0]
+        step = max(self.cells, (1 << 22) // max(raster.values.shape[1], 1))
+        step -= step % self.cells
+        first = 0
+        while first < height:  # a stripe at a time: the memory is that of one
+            last = min(first + step - (rows + first) % self.cells, height)
+            levels = np.nan_to_num(raster.values[first:last]) * np.float32(255.0)
+            pooled, row, column = _pooled(
+                levels.astype(np.uint8), rows + first, columns, self.cells
+            )
+            self._paste(pooled, row, column)
+            first = last
+
+    def whole(self) -> LevelMap | None:
+        """All tiles as one; None before the first."""
+        if not self._tiles:
+            return None
+        rows = [row for row, _ in self._tiles]
+        columns = [column for _, column in self._tiles]
+        top, left = min(rows), min(columns)
+        size = (max(rows) - top + 1) * TILE, (max(columns) - left + 1) * TILE
+        levels = np.zeros(size, np.uint8)
+        for (row, column), tile in self._tiles.items():
+            i, j = (row - top) * TILE, (column - left) * TILE
+            levels[i : i + TILE, j : j + TILE] = tile
+        step = self.cells * self._cell_m
+        origin = np.array([left * TILE * step, top * TILE * step, 0.0])
+        return LevelMap(levels, step, origin)
+
+    def _paste(self, levels: Levels, row: int, column: int) -> None:
+        height, width = levels.shape
+        for a in range(row // TILE, (row + height - 1) // TILE + 1):
+            for b in range(column // TILE, (column + width - 1) // TILE + 1):
+                i0, i1 = max(row, a * TILE), min(row + height, (a + 1) * TILE)
+                j0, j1 = max(column, b * TILE), min(column + width, (b + 1) * TILE)
+                part = levels[i0 - row : i1 - row, j0 - column : j1 - column]
+                if (a, b) not in self._tiles and not part.any():
+                    continue
+                tile = self._tiles.setdefault((a, b), np.zeros((TILE, TILE), np.uint8))
+                tile[i0 - a * TILE : i1 - a * TILE, j0 - b * TILE : j1 - b * TILE] = part
+
+    def _coarsen(self) -> None:
+        before, self._tiles = self._tiles, {}
+        self.cells *= 2
+        half = TILE // 2
+        for (row, column), tile in before.items():
+            small = tile.reshape(half, 2, half, 2).max(axis=(1, 3))
+            at = row // 2, column // 2
+            made = self._tiles.setdefault(at, np.zeros((TILE, TILE), np.uint8))
+            i, j = (row % 2) * half, (column % 2) * half
+            made[i : i + half, j : j + half] = small
+
+
+def _pooled(levels: Levels, row: int, column: int, cells: int) -> tuple[Levels, int, int]:
+    """(largest of each ``cells`` x ``cells``, its first row and column in such blocks)."""
+    if cells == 1:
+        return levels, row, column
+    before = row % cells, column % cells
+    after = tuple(-(n + b) % cells for n, b in zip(levels.shape, before, strict=True))
+    padded = np.pad(levels, ((before[0], after[0]), (before[1], after[1])))
+    height, width = padded.shape
+    blocks = padded.reshape(height // cells, cells, width // cells, cells)
+    return blocks.max(axis=(1, 3)), row // cells, column // cells

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What mkdocs calls while it builds the site (``hooks`` in mkdocs.yml).
+
+The pages in docs/ are read in the repository, too. So some things are written as they must be
+there, and are changed here for the site alone.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mkdocs.structure.files import File
+
+if TYPE_CHECKING:
+    from mkdocs.config.defaults import MkDocsConfig
+    from mkdocs.structure.files import Files
+    from mkdocs.structure.pages import Page
+
+ROOT = Path(__file__).resolve().parents[2]
+OUTSIDE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+RESULTS = "results.md"  # the page of the folder docs/results
+INSTEAD = {"README.md": "index.md", "docs/results": RESULTS, **OUTSIDE}  # which page shows what
+_LINK = re.compile(r"(?<=\]\()([^)\s#]+)")
+_CLIP = re.compile(r'<a href="([^"]+\.mp4)"><img alt="([^"]*)" src="([^"]+)" ?/?></a>')
+_VIDEO = (  # a click or Enter plays it; until then nothing covers the picture but a sign (site.css)
+    r'<span class="clip"><video muted loop playsinline preload="none" tabindex="0" '
+    r'onclick="this.controls=true;this.play();this.onclick=null" '
+    r'onkeydown="if(event.key===\'Enter\'&amp;&amp;this.onclick)this.onclick()" '
+    r'poster="\3" aria-label="\2"><source src="\1" type="video/mp4"></video></span>'
+)
+
+
+def on_files(files: Files, *, config: MkDocsConfig) -> Files:
+    """Add the pages that lie outside docs/, and one that lists the results files."""
+    for name, page in OUTSIDE.items():
+        text = (ROOT / name).read_text(encoding="utf-8")
+        files.append(File.generated(config, page, content=text.replace("](docs/", "](")))
+    files.append(File.generated(config, RESULTS, content=_results()))
+    return files
+
+
+def _results() -> str:
+    names = sorted(path.name for path in (ROOT / "docs" / "results").glob("*.json"))
+    rows = "".join(f"- [{name}](results/{name})\n" for name in names)
+    return f"# Measured results\n\nThe files that the pages quote.\n\n{rows}"
+
+
+def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Links to files at the root, and to the folder of results, lead to their pages."""
+    del config, files
+    folder = posixpath.dirname(page.file.src_uri)
+
+    def at_root(link: re.Match[str]) -> str:
+        target = posixpath.normpath(posixpath.join("docs", folder, link[1]))
+        if target not in INSTEAD or page.file.src_uri in OUTSIDE.values():  # those are done
+            return link[1]
+        return posixpath.relpath(INSTEAD[target], folder or ".")
+
+    return _LINK.sub(at_root, markdown)
+
+
+def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """A picture that links to a clip becomes the clip, with the picture until it is played."""
+    del page, config, files
+    return _CLIP.sub(_VIDEO, html)

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measures between key frames: steps of the chain, and closures found by matching little maps.
+
+Each key frame is matched to the few before it: matched to the whole map, as it was online, a step
+would hide the drift that a loop is to correct. A closure is a match to the little map of another
+stretch of the way, searched for in a window (``search``) or started from a prediction (``tie``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam import se2
+from slam.frames import Float
+from slam.frontend.odometry_prior import inverted
+from slam.posegraph import Edge
+from slam.tracker.cell_map import CellMap
+from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.global_search import coarse_field, places
+from slam.tracker.matching.matcher import Match, Matcher
+from slam.tracker.rasterise import rasterise
+from slam.tracker.tracking.keys import KeyFrame
+from slam.tracker.tracking.relocalise import coarse, spread, support
+
+# What things cost, in units of drawing one key frame; measured on a log of 5 cm and 180 beams.
+DRAWN, MATCHED, SEARCHED = 1, 3, 16
+
+
+def draw(cell_map: CellMap, key: KeyFrame, pose: Float, look_s: float) -> None:
+    """Let a map see a key frame from ``pose`` (3,) for so many s."""
+    rasterise(cell_map, key.observations, pose)
+    T_map_laser = se2.compose(pose, key.observations.T_robot_laser)
+    cell_map.integrate(key.observations.view, T_map_laser, look_s, write=True)
+
+
+class Closures:
+    """Matches key frames to others; ``spent`` counts what that cost, in units.
+
+    chained  where the steps alone lead, (3,) of each key frame that was stepped to
+    """
+
+    def __init__(
+        self,
+        config: TrackerConfig,
+        matcher: Matcher,
+        new_map: Callable[[], CellMap],
+        keys: list[KeyFrame],
+    ) -> None:
+        """``new_map`` makes an empty map for what a few key frames saw."""
+        self._new_map, self._matcher, self._keys = new_map, matcher, keys
+        self._numbers = config.loops
+        self._coarse = coarse(config.tracking.relocalise)
+        self.chained: list[Float] = []
+        self.spent = 0
+        self._submaps: dict[int, CellMap] = {}
+        self._fields: dict[int, NDArray[np.uint8]] = {}  # of those that were searched
+
+    def step(self, j: int) -> Edge:
+        """The step to key frame ``j``, matched to the few before it; as online where it is poor."""
+        key = self._keys[j]
+        step, covariance = key.step, key.covariance
+        cell_map = self._map_of(range(max(0, j - self._numbers.recent), j), j - 1)
+        start = self._matcher.approach(cell_map, key.observations, step, covariance)
+        precision = inverted(covariance)
+        match = self._matcher.climb(cell_map, key.observations, start, step, precision)
+        self.spent += MATCHED
+        if match.matched >= self._numbers.good_step:
+            step = match.T_map_robot
+            information = self._numbers.information_share * match.tau * match.information
+            covariance = inverted(information + precision)
+        covariance = covariance + spread(self._numbers.chain_m, self._numbers.chain_rad)
+        self.chained.append(se2.compose(self.chained[-1], step))
+        return Edge(a=j - 1, b=j, T_a_b=step, information=inverted(covariance))
+
+    def tie(self, middle: int, j: int, predicted: Float) -> Edge | None:
+        """Key frame ``j`` matched to the map about ``middle``, near where it is predicted."""
+        cell_map, seen = self._submap(middle), self._keys[j].observations
+        start = self._matcher.approach(cell_map, seen, predicted, self._coarse)
+        match = self._matcher.climb(cell_map, seen, start, predicted, inverted(self._coarse))
+        self.spent += MATCHED + DRAWN
+        return self._edge(middle, j, match, support(cell_map, seen, match))
+
+    def search(self, middle: int, j: int, predicted: Float, gate: float) -> Edge | None:
+        """The same, searched for up to ``gate`` m around; None where two places look alike."""
+        cell_map, seen = self._submap(middle), self._keys[j].observations
+        short_term = self._matcher.reward.short_term
+        found: list[tuple[float, Match]] = []
+        about = (predicted, gate, self._numbers.gate_rad)
+        if middle not in self._fields:
+            self._fields[middle] = coarse_field(cell_map, short_term)
+        field = self._fields[middle]
+        self.spent += SEARCHED
+        for place in places(
+            cell_map, short_term, seen.points_robot, self._numbers.most, about, field
+        ):
+            start = self._matcher.approach(cell_map, seen, place, self._coarse)
+            match = self._matcher.climb(cell_map, seen, start, place, inverted(self._coarse))
+            found.append((support(cell_map, seen, match), match))
+            self.spent += MATCHED + DRAWN
+        if not found:
+            return None
+        found.sort(key=lambda one: -one[0])
+        (best, match), others = found[0], found[1:]
+        alike = any(other > self._numbers.alias * best for other, _ in others)
+        return None if alike else self._edge(middle, j, match, best)
+
+    def _edge(self, middle: int, j: int, match: Match, backing: float) -> Edge | None:
+        if backing < self._numbers.good_support or match.matched < self._numbers.good_match:
+            return None
+        information = self._numbers.information_share * match.tau * match.information
+        covariance = inverted(information + self._numbers.loose * np.eye(3))
+        covariance = covariance + spread(self._numbers.loop_m, self._numbers.loop_rad)
+        T_a_b = match.T_map_robot
+        return Edge(a=middle, b=j, T_a_b=T_a_b, information=inverted(covariance), robust=True)
+
+    def _submap(self, middle: int) -> CellMap:
+        """What the key frames about ``middle`` saw, in the frame of that one."""
+        if middle not in self._submaps:
+            about = range(middle - self._numbers.submap, middle + self._numbers.submap + 1)
+            self._submaps[middle] = self._map_of(about, middle)
+        return self._submaps[middle]
+
+    def _map_of(self, members: Iterable[int], origin: int) -> CellMap:
+        """What some key frames saw, in the frame of one, as the chain puts them."""
+        cell_map = self._new_map()
+        for k in members:
+            pose = se2.between(self.chained[origin], self.chained[k])
+            draw(cell_map, self._keys[k], pose, self._numbers.look_s)
+            self.spent += DRAWN
+        return cell_map

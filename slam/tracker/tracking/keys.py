@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Key frames of long runs: one each metre or half a radian, with the motion between them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float
+from slam.frontend.observations import Observations
+from slam.tracker.tracking.config import LoopsConfig
+from slam.tracker.tracking.relocalise import spread
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class KeyFrame:
+    """One frame that is kept.
+
+    frame         its index among all frames
+    T_map_robot   (3,) online; moved with each correction of the map
+    step          (3,) motion since the previous key frame online, (3, 3) covariance in that frame
+    way_m         driven up to here
+    start_s       s since the first frame
+    written       whether the map took it in
+    """
+
+    frame: int
+    T_map_robot: Float
+    observations: Observations
+    step: Float
+    covariance: Float
+    way_m: float
+    start_s: float
+    written: bool
+
+
+class KeyFrames:
+    """Collects key frames from the motions between frames."""
+
+    def __init__(self, config: LoopsConfig) -> None:
+        self._config = config
+        self._slack = spread(config.slack_m, config.slack_rad)
+        self.keys: list[KeyFrame] = []
+        self.way_m, self.elapsed_s = 0.0, 0.0
+        self._step: Float = np.zeros(3)
+        self._covariance: Float = np.zeros((3, 3))
+
+    def add(  # noqa: PLR0913 (the facts of one frame)
+        self,
+        frame: int,
+        T_map_robot: Float,
+        motion: Float,
+        covariance: Float,
+        seen: Observations,
+        *,
+        elapsed: float = 0.0,
+        written: bool = True,
+    ) -> None:
+        """Take a frame: its ``motion`` (3,) since the one before, ``covariance`` in that frame.
+
+        ``elapsed`` s after the one before; ``written``: the map took it in.
+        """
+        self._covariance = se2.propagate(self._covariance, self._step, motion, covariance)
+        self._step = se2.compose(self._step, motion)
+        self.way_m += math.hypot(float(motion[0]), float(motion[1]))
+        self.elapsed_s += elapsed
+        moved = math.hypot(float(self._step[0]), float(self._step[1]))
+        near = moved < self._config.key_m and abs(float(self._step[2])) < self._config.key_rad
+        if self.keys and near:
+            return
+        self.keys.append(
+            KeyFrame(
+                frame=frame,
+                T_map_robot=T_map_robot,
+                observations=seen,
+                step=self._step,
+                covariance=self._covariance + self._slack,
+                way_m=self.way_m,
+                start_s=self.elapsed_s,
+                written=written,
+            )
+        )
+        self._step, self._covariance = np.zeros(3), np.zeros((3, 3))

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Play, pause, step and seek, and the pace, without a world and without a wall clock."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from scripts.live.inbox import MOST_WAITING, Inbox
+from scripts.live.pace import Pace
+from scripts.live.playback import KEPT_S, Playback
+from scripts.live.requests import Run, Seek, Speed, Step
+from slam.errors import InvalidValueError, SlamFailedError
+
+
+def moments(seconds: float, step: float = 0.5) -> Any:
+    for k in range(round(seconds / step) + 1):
+        yield SimpleNamespace(seconds=k * step, number=k, stamp_ns=k)
+
+
+def shown(playback: Playback) -> float:
+    assert playback.shown is not None
+    return playback.shown.seconds
+
+
+def test_seeking_back_shows_the_same_moments_again_and_then_goes_on():
+    playback = Playback(moments(10.0))
+    first = [playback.advance() for _ in range(9)]
+    assert playback.do(Seek(back_s=2.0)) == "2.00 s is shown, the present is 4.00 s"
+    assert playback.looks_back
+    assert shown(playback) == 2.0
+    again = [playback.advance() for _ in range(5)]
+    assert again[:4] == first[5:]
+    assert again[4] is not None
+    assert again[4].seconds == 4.5
+    assert not playback.looks_back
+
+
+def test_only_the_last_minute_is_kept():
+    playback = Playback(moments(100.0))
+    while playback.advance() is not None:
+        pass
+    assert playback.ended
+    assert playback.resting
+    with pytest.raises(InvalidValueError, match=r"seek: 39.00 s is not kept, only 40.00 to 100.00"):
+        playback.do(Seek(time_s=39.0))
+    playback.do(Seek(time_s=0.0, nearest=True))
+    assert shown(playback) == 100.0 - KEPT_S
+    playback.do(Seek(time_s=1e6, nearest=True))
+    assert shown(playback) == 100.0
+
+
+def test_a_step_goes_on_by_so_many_scans_and_pauses():
+    playback = Playback(moments(10.0))
+    playback.advance()
+    playback.do(Step(scans=3))
+    while not playback.resting:
+        playback.advance()
+    assert shown(playback) == 1.5
+    assert not playback.playing
+    playback.do(Run(playing=True))
+    assert not playback.resting
+
+
+def test_a_slam_that_fails_ends_the_run_but_not_the_view():
+    def source():
+        yield from moments(1.0)
+        raise SlamFailedError("SLAM 'x', scan 3, raised y")
+
+    playback = Playback(source())
+    while playback.advance() is not None:
+        pass
+    assert playback.why == "SLAM 'x', scan 3, raised y"
+    playback.do(Seek(time_s=0.0))
+    assert shown(playback) == 0.0
+
+
+def test_what_cannot_be_is_refused():
+    with pytest.raises(InvalidValueError, match="speed must lie in"):
+        Playback(moments(1.0), speed=0.0)
+    playback = Playback(moments(1.0))
+    with pytest.raises(InvalidValueError, match="speed must lie in"):
+        playback.do(Speed(factor=1e9))
+    with pytest.raises(InvalidValueError, match="nothing has been shown yet"):
+        playback.do(Seek(back_s=0.0))
+
+
+def test_the_pace_waits_for_what_is_early_and_never_runs_after_what_is_late():
+    now = [100.0]
+    pace = Pace(lambda: now[0])
+    assert pace.wait_s(0.0, 1.0) == 0.0
+    assert pace.wait_s(0.5, 1.0) == pytest.approx(0.5)
+    now[0] = 100.5
+    assert pace.wait_s(0.5, 1.0) == 0.0
+    now[0] = 103.0  # a scan has taken long
+    assert pace.wait_s(0.6, 1.0) == 0.0
+    assert pace.wait_s(0.7, 1.0) == pytest.approx(0.1)
+    assert pace.wait_s(0.8, 2.0) == 0.0  # another speed: from here on
+    assert pace.wait_s(1.8, 2.0) == pytest.approx(0.5)
+
+
+def test_an_inbox_that_is_full_says_so():
+    inbox = Inbox()
+    for _ in range(MOST_WAITING):
+        inbox.put(Run(playing=True))
+    with pytest.raises(InvalidValueError, match="64 requests wait already"):
+        inbox.put(Run(playing=True))
+    inbox.refuse("a" * 1000)
+    assert inbox.refused() == "a" * 300
+    assert inbox.refused() is None

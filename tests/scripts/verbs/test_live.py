@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia live``: what it refuses before anything is built, and when it warns."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from scripts.live import sdk, view
+from scripts.verbs.live import _serve
+from slam.errors import InvalidValueError
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("live", "name exactly one of a scene, --log and --bag"),
+        ("live arena --log x.log", "name exactly one of a scene, --log and --bag"),
+        ("live aren", "Did you mean 'arena'"),
+        ("live arena --slam shuntin", "Did you mean 'shunting'"),
+        ("live arena --port 70000", "--port must lie in 0..65535, got 70000"),
+        ("live arena --speed 1000", "--speed must lie in [0.05, 20], got 1000"),
+    ],
+)
+def test_what_cannot_be_served_is_said_in_one_line(called, words, said):
+    ended = called(*words.split())
+    assert ended.returncode == 1
+    assert said in " ".join(ended.stderr.split())
+
+
+def test_without_the_sdk_it_says_what_to_install(called, monkeypatch):
+    monkeypatch.setitem(sys.modules, "foxglove", None)
+    ended = called("live", "arena")
+    assert ended.returncode == 1
+    assert "pip install 'mobilia[live]'" in ended.stderr
+
+
+@pytest.mark.parametrize(("host", "warned"), [("127.0.0.1", False), ("0.0.0.0", True)])
+def test_an_address_that_others_reach_is_warned_of(host, warned, monkeypatch, capsys):
+    closed = []
+
+    class Once:
+        port = 8765
+
+        def __init__(self, *_: object) -> None:
+            pass
+
+        def turn(self) -> None:
+            raise InvalidValueError("enough")
+
+        def close(self) -> None:
+            closed.append(True)
+
+    monkeypatch.setattr(view, "View", Once)
+    session = SimpleNamespace(run=lambda: iter(()))
+    found = sdk.Sdk(None, None, None, None)
+    with pytest.raises(InvalidValueError, match="enough"):
+        _serve(found, (session, (0, 1)), (host, 8765), playing=True, speed=1.0)
+    printed = " ".join(capsys.readouterr().out.split())
+    assert f"ws://{host}:8765" in printed
+    assert ("There is no password" in printed) is warned
+    assert closed == [True]

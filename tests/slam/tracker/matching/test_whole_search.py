@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The search of the whole map: bounded work a scan, and the answers of a search in one go."""
+
+from __future__ import annotations
+
+import copy
+import math
+
+import numpy as np
+import pytest
+
+from slam.frontend.observations import Observations, from_scan
+from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.tracker.matching import coarse_map, planes, whole_search
+from slam.tracker.matching.budget import Budget
+from slam.tracker.matching.coarse_map import CoarseMap
+from slam.tracker.matching.config import BudgetConfig
+from slam.tracker.matching.global_search import places
+from slam.tracker.matching.whole_search import WholeSearch
+from tests.world2d import World2D, frames, laser, office, office_loop
+
+CONFIG = ShuntingConfig(cell_m=0.05)
+STREAM = frames(World2D(office()), office_loop(), rate_hz=2.0, spec=laser(181), seed=3)
+
+
+@pytest.fixture(scope="module")
+def slam() -> ShuntingSlam:
+    system = ShuntingSlam(CONFIG)
+    for frame in STREAM[:90]:
+        system.update(frame.without_truth())
+    return system
+
+
+def seen_at(k: int) -> Observations:
+    scan = STREAM[k].scan
+    assert scan is not None
+    return from_scan(scan, np.zeros(3), CONFIG)
+
+
+def searched(slam: ShuntingSlam, k: int, share: float) -> tuple[WholeSearch, list, list[float]]:
+    """The search of one scan, its answers in order, and what each call spent."""
+    coarse = CoarseMap(slam.cell_map, 0.3)
+    search = WholeSearch(coarse, seen_at(k).points_robot, 6, CONFIG.matching.whole)
+    found, spent = [], []
+    while not search.done:
+        budget = Budget(CONFIG.matching.budget, share)
+        found += search.advance(budget)
+        spent.append(budget.spent_ns)
+    return search, found, spent
+
+
+@pytest.mark.parametrize("blocks", [1 << 20, 1])  # bounded by blocks of 8 x 8, or 64 x 64, cells
+def test_over_many_scans_the_answers_are_those_of_one_search(
+    slam: ShuntingSlam, blocks: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(coarse_map, "MOST_BLOCKS", blocks)
+    for k in range(0, 90, 15):
+        at_once = places(slam.cell_map, 0.3, seen_at(k).points_robot, 6)
+        for share in (1e-3, 0.03, 1.0):
+            search, found, _ = searched(slam, k, share)
+            np.testing.assert_array_equal(np.array(found), np.array(at_once))
+            assert not search.advance(Budget(CONFIG.matching.budget, 1.0))  # given once
+
+
+def test_no_scan_does_more_than_its_budget_and_one_item(slam: ShuntingSlam) -> None:
+    """The largest items: a tile of the map, the candidates' places, some thousand blocks."""
+    share = 0.01
+    allowed = share * CONFIG.matching.budget.budget_ms * 1e6
+    prices = CONFIG.matching.budget
+    tile = prices.cell_ns * coarse_map.TILE[0] * coarse_map.TILE[1]
+    headings = math.tau / CONFIG.matching.whole.finest_rad
+    candidates = 2 * prices.place_ns * headings * CONFIG.matching.whole.points
+    blocks = prices.order_ns * (100_000 + 2 * whole_search.SORTED * whole_search.BATCH)
+    for k in (0, 30, 60):
+        _, found, spent = searched(slam, k, share)
+        assert found
+        assert len(spent) > 5
+        assert max(spent) <= allowed + max(tile, candidates, blocks)
+
+
+def test_what_is_spent_is_what_is_done(slam: ShuntingSlam, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nodes are counted where they are opened, not where they are allowed."""
+    opened, whole = [], whole_search.open_nodes
+
+    def counted(*args):  # type: ignore[no-untyped-def]
+        queue, nodes = args[6], args[10]
+        before = int(queue.counts[planes.OPENED])
+        done = whole(*args)
+        opened.append((int(queue.counts[planes.OPENED]) - before, nodes))
+        return done
+
+    monkeypatch.setattr(whole_search, "open_nodes", counted)
+    search, _, _ = searched(slam, 45, 0.02)
+    assert all(done <= allowed for done, allowed in opened)
+    assert search.evaluations >= 64 * sum(done for done, _ in opened)
+
+
+def test_it_goes_on_alike_in_a_copy(slam: ShuntingSlam) -> None:
+    coarse = CoarseMap(slam.cell_map, 0.3)
+    search = WholeSearch(coarse, seen_at(45).points_robot, 6, CONFIG.matching.whole)
+    for _ in range(10):
+        search.advance(Budget(CONFIG.matching.budget, 0.01))
+    other = copy.deepcopy(search)
+    answers = []
+    for one in (search, other):
+        found = []
+        while not one.done:
+            found += one.advance(Budget(CONFIG.matching.budget, 0.05))
+        answers.append(np.array(found))
+    np.testing.assert_array_equal(answers[0], answers[1])
+
+
+def test_an_empty_map_and_an_empty_scan_have_no_answer(slam: ShuntingSlam) -> None:
+    empty = CoarseMap(ShuntingSlam(CONFIG).cell_map, 0.3)
+    assert WholeSearch(empty, seen_at(0).points_robot, 6, CONFIG.matching.whole).done
+    whole = CoarseMap(slam.cell_map, 0.3)
+    assert WholeSearch(whole, np.zeros((0, 2)), 6, CONFIG.matching.whole).done
+
+
+def test_a_budget_is_counted_down() -> None:
+    budget = Budget(BudgetConfig(budget_ms=10.0), 0.5)
+    assert budget.left_ns == 5e6
+    assert budget.times(2e6) == 2
+    budget.spend(4.5e6)
+    assert budget.times(2e6) == 1  # once more, and a little too much
+    budget.spend(2e6)
+    assert budget.times(2e6) == 0

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The site: every page has its place, the gallery shows all there is, and its check finds faults.
+
+``make docs`` builds it (mkdocs is no part of the test environment).
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import typer
+import yaml
+
+import scenes
+from scripts.benchmark.tracks import TRACKS
+from scripts.cli import app
+from scripts.experiments.gallery import with_clips
+from scripts.site.check import faults, main
+from scripts.site.columns import as_markdown
+
+REPO = Path(__file__).resolve().parents[1]
+DOCS = REPO / "docs"
+CONFIG = yaml.safe_load((REPO / "mkdocs.yml").read_text())
+GENERATED = {"contributing.md", "changelog.md", "results.md"}  # by scripts/site/hooks.py
+JOBS = ["start.md", *(f"jobs/my_{job}.md" for job in ("slam", "dataset", "log", "policy", "scene"))]
+GALLERY = (DOCS / "gallery.md").read_text()
+
+
+def in_nav(entry: object) -> list[str]:
+    if isinstance(entry, dict):
+        (entry,) = entry.values()
+    return [entry] if isinstance(entry, str) else [page for one in entry for page in in_nav(one)]
+
+
+def test_every_page_has_one_place_in_the_navigation():
+    pages = [page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")]
+    assert sorted(in_nav(CONFIG["nav"])) == sorted([*pages, *GENERATED]), "see nav in mkdocs.yml"
+
+
+def test_the_site_is_strict_and_has_no_fonts_from_elsewhere():
+    assert CONFIG["strict"] is True
+    assert CONFIG["theme"]["font"] is False
+    assert not {"extra_javascript", "google_analytics", "repo_url"} & CONFIG.keys()
+
+
+def test_every_documented_module_is_there():
+    found = [name for page in (DOCS / "api").glob("*.md")
+             for name in re.findall(r"^::: ([\w.]+)$", page.read_text(), re.MULTILINE)]  # fmt: skip
+    assert len(found) == len(set(found)) > 30
+    for name in found:
+        assert (REPO / f"{name.replace('.', '/')}.py").is_file(), name
+        assert f"`{name}`" in (DOCS / "api" / "index.md").read_text(), name
+
+
+def test_the_gallery_shows_every_scene_and_every_track():
+    sections = {
+        part.partition("\n")[0]: part for part in re.split(r"^### ", GALLERY, flags=re.M)[1:]
+    }
+    assert set(sections) == {*scenes.names(), *(name.removesuffix("-v1") for name in TRACKS)}
+    for name in scenes.names():
+        assert f"(pictures/scene_{name}.png)" in sections[name]
+        assert f"--scene {name} " in sections[name]
+    for name, track in TRACKS.items():
+        section = sections[name.removesuffix("-v1")]
+        assert f"(pictures/gallery/track_{name}.png)" in section
+        assert track.about[1:] in section
+        assert f"{track.axis}: {', '.join(says.split()[0] for says in track.says)}." in section
+        assert f"--tracks {name.removesuffix('-v1')}\n" in section
+
+
+def test_the_gallery_links_the_clips_that_are_there(tmp_path: Path):
+    assert with_clips(GALLERY, DOCS / "pictures" / "gallery") == GALLERY
+    without = with_clips(GALLERY, tmp_path)
+    assert ".mp4" not in without
+    (tmp_path / "scene_arena.mp4").touch()
+    linked = "[![arena](pictures/scene_arena.png)](pictures/gallery/scene_arena.mp4)"
+    assert linked in with_clips(without, tmp_path).splitlines()
+
+
+GOOD = """<html><head><link rel="canonical" href="https://example.org/a">
+<link rel="stylesheet" href="a.css">
+<style>p { background: url(data:image/png;base64,AA==) }</style></head><body><h1 id="top">x</h1>
+<a href="https://example.org">elsewhere</a><a href="#top">up</a><a href="other.html#there">on</a>
+<img src="a%20b.png"></body></html>"""
+WRONG = {
+    '<script src="https://cdn.example.org/x.js"></script>': "loads https://cdn.example.org/x.js",
+    '<link rel="stylesheet" href="//fonts.example.org/f.css">': "loads //fonts.example.org/f.css",
+    '<link rel="preconnect" href="https://example.org">': "loads https://example.org",
+    '<img src="http://example.org/p.png">': "loads http://example.org/p.png",
+    '<img srcset="a.css 1x, https://example.org/p.png 2x">': "loads https://example.org/p.png",
+    '<video poster="https://example.org/p.png"></video>': "loads https://example.org/p.png",
+    "<p style=\"background: url('https://example.org/p.png')\">": "loads https://example.org/p.png",
+    "<style>@import 'https://example.org/f.css';</style>": "loads https://example.org/f.css",
+    '<a href="gone.html">gone</a>': "links to gone.html",
+    '<a href="other.html#gone">gone</a>': "links to other.html#gone",
+    '<a href="#gone">gone</a>': "links to #gone",
+    '<img src="gone.png">': "links to gone.png",
+}
+
+
+def built(folder: Path, page: str) -> Path:
+    (folder / "index.html").write_text(page)
+    (folder / "other.html").write_text('<h2 id="there">x</h2>')
+    (folder / "a.css").write_text("p { color: red }")
+    (folder / "a b.png").touch()
+    return folder
+
+
+def test_a_sound_site_has_no_faults(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    site = built(tmp_path, GOOD)
+    assert list(faults(site)) == []
+    assert main([str(site)]) == 0
+    assert "2 pages" in capsys.readouterr().out
+    assert main([str(tmp_path / "nowhere")]) == 2
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_fault_is_named(tmp_path: Path, wrong: str, capsys: pytest.CaptureFixture[str]):
+    site = built(tmp_path, GOOD.replace("</body>", f"{wrong}</body>"))
+    (fault,) = faults(site)
+    assert fault.startswith(f"index.html {WRONG[wrong]}")
+    assert main([str(site)]) == 1
+    assert fault in capsys.readouterr().err
+
+
+def test_a_stylesheet_that_loads_from_elsewhere_is_named(tmp_path: Path):
+    site = built(tmp_path, GOOD)
+    (site / "a.css").write_text("@font-face { src: url(https://example.org/f.woff2) }")
+    assert list(faults(site)) == ["a.css loads https://example.org/f.woff2"]
+
+
+def blocks(page: str, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", (DOCS / page).read_text(), flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("page", [*JOBS, "gallery.md"])
+def test_the_commands_are_commands(page: str):
+    """Their verbs, arguments and options are there; other tests run them."""
+    group = typer.main.get_command(app)
+    text = "".join(blocks(page, "sh")).replace("\\\n", " ")
+    lines = text.splitlines()
+    commands = [shlex.split(line)[1:] for line in lines if line.startswith("mobilia ")]
+    assert commands or page == "jobs/my_policy.md"
+    for verb, *words in commands:
+        group.commands[verb].make_context(verb, words)
+    others = {shlex.split(line)[0] for line in lines} - {"mobilia"}
+    assert others <= {"make", "source", "python"}
+
+
+def test_the_code_of_the_jobs_is_that_of_pages_whose_code_is_run():
+    assert blocks("jobs/my_slam.md", "python") == blocks("bring_your_own.md", "python")[:1]
+    run = blocks("extending.md", "xml")[0], blocks("extending.md", "python")[0]
+    assert (*blocks("jobs/my_scene.md", "xml"), *blocks("jobs/my_scene.md", "python")) == run
+
+
+@pytest.mark.parametrize("block", range(3))
+def test_the_policy_blocks_run(block: int, capsys: pytest.CaptureFixture[str]):
+    code = blocks("jobs/my_policy.md", "python")[block].replace("range(200)", "range(5)")
+    exec(code, {})
+    assert capsys.readouterr().out.strip()
+
+
+def test_columns_of_a_docstring_become_a_list():
+    text = """A camera.
+
+    with Camera() as camera:
+        camera.render()
+
+width, height  px
+shadows        of the sun;
+               half the cost
+
+Raises an error. It has  two blanks, and stays.
+For example
+    camera.close()"""
+    assert as_markdown(text).splitlines() == [
+        "A camera.", "", "    with Camera() as camera:", "        camera.render()", "",
+        "- `width`, `height`: px", "- `shadows`: of the sun; half the cost", "",
+        "Raises an error. It has  two blanks, and stays.", "For example", "", "    camera.close()",
+    ]  # fmt: skip
