@@ -7,7 +7,8 @@ PPO of Stable-Baselines3 learns in the scene with its pose by odometry, at a dyn
 1 over the first half. Then it drives on seeds that it was not trained on, with the true pose, that
 of the SLAM and that of the wheels, at five levels of dynamism. The built-in driver without
 avoidance does the same with the true pose. Prints a table, and writes results, the learning curve
-and the page. ``--weights FILE`` keeps the network; with ``--steps 0`` it is read from there.
+and the page. ``--weights FILE`` keeps the network while it learns, and its episodes beside it in a
+file of JSON; with ``--steps 0`` both are read from there.
 """
 
 from __future__ import annotations
@@ -40,12 +41,13 @@ LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
 DRIVER = "driver"
 GROWN = 0.5  # share of the training after which the dynamism may be anything up to 1
 MEAN_OF = 100  # episodes of the mean in the curve
+TOLD, KEPT = 256, 2048  # steps of a room after which a line is printed, and the network is kept
 
 Row = dict[str, Any]
 
 
-def train(wanted: argparse.Namespace, weights: Path) -> tuple[int, list[Row]]:
-    """Train and write the weights: steps taken, and a row for each episode."""
+def train(wanted: argparse.Namespace, weights: Path) -> None:
+    """Train and write the weights, and beside them what the training took, episode by episode."""
     import torch
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
@@ -61,13 +63,21 @@ def train(wanted: argparse.Namespace, weights: Path) -> tuple[int, list[Row]]:
     episodes: list[Row] = []
     began = time.perf_counter()
 
+    def keep(steps: int) -> None:
+        torch.save(model.policy.state_dict(), weights)
+        taken = {"steps": steps, "seconds": time.perf_counter() - began}
+        rows = {str(k): row for k, row in enumerate(episodes)}
+        write(weights.with_suffix(".json"), taken, {"episodes": rows})
+
     def note(found: dict[str, Any], _globals: dict[str, Any]) -> bool:
         steps = found["self"].num_timesteps
         for info in found["infos"]:
             if "episode" in info:
                 told = {key: float(info["episode"][key]) for key in ("r", "l")}
                 episodes.append({"step": steps, "reached": bool(info["is_success"]), **told})
-        if steps // wanted.rooms % 256 == 0:
+        if steps // wanted.rooms % KEPT == 0:
+            keep(steps)
+        if steps // wanted.rooms % TOLD == 0:
             env.env_method("set_level", min(1.0, steps / (GROWN * wanted.steps)))
             last = [row["reached"] for row in episodes[-MEAN_OF:]]
             share = f"{np.mean(last):.0%}" if last else "-"
@@ -76,13 +86,12 @@ def train(wanted: argparse.Namespace, weights: Path) -> tuple[int, list[Row]]:
                   file=sys.stderr, flush=True)  # fmt: skip
         return True
 
+    weights.parent.mkdir(parents=True, exist_ok=True)
     try:
         model.learn(wanted.steps, callback=note)
+        keep(int(model.num_timesteps))
     finally:
         env.close()
-    weights.parent.mkdir(parents=True, exist_ok=True)
-    torch.save(model.policy.state_dict(), weights)
-    return int(model.num_timesteps), episodes
 
 
 def evaluate(wanted: argparse.Namespace, weights: Path) -> dict[str, Row]:
@@ -210,14 +219,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(wanted: argparse.Namespace, first: Row, weights: Path) -> str:
     if wanted.steps == 0 and not weights.is_file():
         raise InvalidValueError(f"--steps 0 needs a file of --weights, got {wanted.weights}")
-    log = weights.with_suffix(".json")  # what the training took
-    training: Row = json.loads(log.read_text()) if log.is_file() else {"steps": 0, "seconds": 0.0}
     if wanted.steps:
-        began = time.perf_counter()
-        steps, episodes = train(wanted, weights)
-        training = {"steps": steps, "seconds": time.perf_counter() - began}
-        picture(episodes, wanted.picture)
-        write(log, training, {})
+        train(wanted, weights)
+    training: Row = json.loads(weights.with_suffix(".json").read_text(encoding="utf-8"))
+    picture(list(training.pop("episodes").values()), wanted.picture)
     cells = evaluate(wanted, weights)
     text = f"{_told(wanted, first, training)}\n\n{markdown(cells, wanted.seeds)}"
     write(wanted.results, {**first, "training": training}, {"cells": cells})
