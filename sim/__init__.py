@@ -2,7 +2,8 @@
 """The moving world: importing it registers an environment ``mobilia/<Scene>-v2`` for each scene.
 
 The number is the version of the world (``sim.core.versions``); ids of older ones say what became
-of it.
+of it. ``mobilia/<Scene>Goal-v2`` is the same with a random goal, the shaped reward and four scans
+to a step: ready to train.
 """
 
 from functools import partial
@@ -32,4 +33,10 @@ for _scene in OWN:  # "random-rooms" is mobilia/RandomRooms-v2
             entry_point="sim.gym.env:MobiliaEnv",
             vector_entry_point="sim.gym.vector:MobiliaVectorEnv",
             kwargs={"scene": _scene},
+        )
+        register(
+            id=f"mobilia/{_name}Goal-v{_version}",
+            entry_point="sim.gym.env:MobiliaEnv",
+            vector_entry_point="sim.gym.vector:MobiliaVectorEnv",
+            kwargs={"scene": _scene, "goal": "random", "reward": "shaped", "frame_skip": 4},
         )

@@ -28,6 +28,7 @@ EXTRAS = {  # what each is for; how to get them follows from their names
     "guests": "SLAMs of others to compare with",
     "yag": "YAG SLAM",
     "rerun": "render --rerun",
+    "rl": "scripts.experiments.train_policy",
     "cluster": "--cluster",
 }
 PROGRAMS = {"icp-slam": "the SLAM icp-slam", "rbpf-slam": "the SLAM rbpf-slam"}

@@ -28,6 +28,7 @@ STREAMS = (
     "tags",
     "loads",
     "change",
+    "goals",
 )
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -12,23 +12,31 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from scenes.crowd import crowd_of
+from scenes.mounting import HIGHEST, LOWEST
+from scenes.registry import check_name
 from scenes.scan_plane import SCAN_HEIGHT
-from sim.core.checks import instance, number, one_of, switch, whole_numbers
+from scenes.scene import within
+from sim.core.checks import instance, number, one_of, switch, whole, whole_numbers
+from sim.core.contacts import Contact
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.gym.actions import clipped
+from sim.gym.goals import GOAL_RADIUS_M, Goal, Ground, goal_of
 from sim.gym.observation import Observation, observed, space_of
 from sim.gym.options import checked_seed, episode
 from sim.gym.pose_source import PoseSource
+from sim.gym.reward import REWARDS, Task
 from sim.sensors.lidar.device import ScanResult
 from sim.sensors.lidar.registry import ScannerConfig, scanner_of
+from sim.sensors.odometry.config import preset
 from sim.simulation import Simulation
+from sim.world.world import World
 from slam.errors import InvalidValueError, MobiliaError
 from slam.frames import LaserSpec
 from slam.system import SlamSystem
 
 V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
-GOAL_RADIUS_M = 0.4
+MOST_SCANS = 1000  # of one step
 VIEWS = ("top", "follow", "persp")  # as in ``sim.view.pictures``, which needs OpenGL to import
 MAX_PX = 8192  # edge of a picture
 
@@ -39,6 +47,8 @@ class ResetNeededError(MobiliaError, gymnasium.error.ResetNeeded):
 
 class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """A robot with a laser scanner in a room that does not sit still; a step is one whole scan.
+
+    With ``frame_skip`` it is so many scans under one command.
 
     ### Action space
     ``Box(-1, 1, (2,), float32)``: forward speed (times 0.8 m/s) and turn rate (times 1.2 rad/s,
@@ -64,20 +74,31 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     | `trusted`  | ()    | uint8   | 0 while the SLAM does not trust its own estimate            |
     | `goal`     | (2,)  | float64 | m, the goal as seen from `pose` (x ahead, y left); 0 if none |
 
+    With the argument ``goal`` all of these, by odometry where there is no ``pose_source``, and
+
+    | key          | shape | type    | meaning                                                   |
+    |--------------|-------|---------|-----------------------------------------------------------|
+    | `goal_polar` | (2,)  | float64 | range m and bearing rad (left > 0) of the goal from `pose` |
+
     ### Info
     Truth, only here (but for ``pose_source="truth"``): `pose` (3,) m, m, rad of the robot in the
     world; `frame`, the ``slam`` frame of the scan (with truth; give a SLAM
-    ``frame.without_truth()``); `contacts`, names of what the robot touched during the step;
-    `hard_collision`; `beam_time` (n,) s of each beam since the reset; `movers` name -> (x, y,
-    heading) of everything that can move; `goal_distance` m or None.
+    ``frame.without_truth()``); `contacts`, names of what the robot touched during the step, and
+    `hard_collision`, whether hard; `beam_time` (n,) s of each beam since the reset; `movers` name
+    -> (x, y, heading) of everything that can move; `goal` (x, y) m in the world and `goal_distance`
+    m, or None; `is_success`, whether the goal is reached.
 
     ### Reward
-    Metres of progress towards the goal during the step when ``options["goal"]`` gave one, else 0.
+    0 without a goal, else by ``reward`` (``sim.gym.reward``):
+    "progress": m by which the straight line to the goal got shorter during the step;
+    "sparse": 1 in the step that reaches the goal, else 0;
+    "shaped": m by which the way to it on the static layout got shorter (near walls counted up to
+    three times), 10 for reaching it, -5 for a step with a hard collision, -0.1 for each second.
 
     ### Episode end
     ``terminated`` within 0.4 m of the goal, or (``terminate_on_collision``) on a hard collision;
-    ``truncated`` after ``time_limit_s``. A step after the end goes on in the same room; one before
-    the first reset raises ``ResetNeededError``.
+    ``truncated`` after ``time_limit_s``. A step of several scans ends with its episode. A step
+    after the end goes on in the same room; one before the first reset raises ``ResetNeededError``.
 
     ### Arguments
     ``scene``, ``dynamism``, ``motion``, ``change``, ``crowd``, ``laser``, ``scan_height_m``,
@@ -85,6 +106,9 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     ``pose_source``: None, "odometry", "shunting", any other SLAM's name, "module:Class", a
     ``SlamSystem``, or "truth"; it takes every scan and is reset with the environment, a failure of
     it is a ``SlamFailedError``. Reward and the end of an episode go by the truth in any case;
+    ``goal``: None; "random", in each episode another one on floor that the robot can reach
+    (``sim.gym.goals``), from the stream "goals" of the seed; or (x, y) m in the world;
+    ``reward`` "progress", "sparse" or "shaped"; ``frame_skip`` scans to a step under one command;
     ``render_mode`` "rgb_array" (3D, needs OpenGL), "map" (2D, needs nothing) or None; ``view``
     "top", "follow" or "persp" for the former; ``render_size`` (width, height) px.
 
@@ -94,7 +118,8 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     | key                       | meaning                                                       |
     |---------------------------|---------------------------------------------------------------|
-    | `goal`                    | (x, y) m within 10 km: reward and end of the episode          |
+    | `goal`                    | "random", or (x, y) m: reward and end of the episode; refused  |
+    |                           | where the robot cannot get to, with the nearest place it can  |
     | `start`                   | (x, y, heading) of the robot; refused where it does not fit   |
     | `n_chairs`, `n_people`    | counts, for scenes that have them                             |
     | `scene`                   | any options of the scene recipe, e.g. ``{"n_chairs": 8}``     |
@@ -140,6 +165,9 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         terminate_on_collision: bool = False,
         labels: bool = False,
         pose_source: str | SlamSystem | None = None,
+        goal: str | Sequence[float] | None = None,
+        reward: str = "progress",
+        frame_skip: int = 1,
         render_mode: str | None = None,
         view: str = "top",
         render_size: tuple[int, int] = (640, 480),
@@ -153,8 +181,13 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         switch("terminate_on_collision", terminate_on_collision)
         switch("labels", labels)
         instance("scene", scene, str)
+        check_name(scene)
         Dynamism.of(dynamism, motion=motion, change=change)
         instance("odometry", odometry, str)
+        preset(odometry)
+        within("scan_height_m", scan_height_m, LOWEST, HIGHEST)
+        one_of("reward", reward, REWARDS)
+        whole("frame_skip", frame_skip, 1, MOST_SCANS)
         width, height = whole_numbers("render_size", render_size, "(width, height) in px", MAX_PX)
         self.render_mode = render_mode
         self.time_limit_s = time_limit_s
@@ -170,18 +203,22 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "odometry": odometry,
             "labels": labels,
         }
+        self._goal, self._reward, self._scans = goal_of("goal", goal), reward, int(frame_skip)
+        if self._goal is not None and pose_source is None:
+            pose_source = "odometry"
         self._pose_source = None if pose_source is None else PoseSource(pose_source)
         self._view, self._size = view, (width, height)
         self._renderer: Any = None
         self._simulation: Simulation | None = None
-        self._goal: tuple[float, float] | None = None
-        self.goal_distance: float | None = None  # m, if this episode has a goal
+        self._task: Task | None = None
+        self.contacts: list[Contact] = []  # what the robot touched during the last step
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self._set_space(self._settings["laser"].spec())
 
     def _set_space(self, spec: LaserSpec) -> None:
         self._n_beams = spec.n_beams
-        self.observation_space = space_of(spec, believing=self._pose_source is not None)
+        believing, polar = self._pose_source is not None, self._goal is not None
+        self.observation_space = space_of(spec, believing=believing, polar=polar)
 
     @property
     def simulation(self) -> Simulation:
@@ -194,48 +231,89 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Build the scene anew and take a first scan standing still."""
-        plan = episode(self._settings, options)
+        plan = episode(self._settings, options, self._goal)
         super().reset(seed=checked_seed(seed))
         own = Seeds(int(self.np_random.integers(2**31)), **plan.seeds)
         simulation = Simulation(seed=own, **plan.settings)
+        task = self._task_of(plan.goal, simulation.world)
         self._close_renderer()
-        self._simulation, self._goal = simulation, plan.goal
+        self._simulation, self._task = simulation, task
         if self._simulation.spec.n_beams != self._n_beams:
             self._set_space(self._simulation.spec)
         if self._pose_source is not None:
             self._pose_source.reset(self._simulation.world.robot_pose())
-        scan = self._simulation.sense()
-        self.goal_distance = self._goal_distance()
+        scan = self._sense()
+        self.contacts = simulation.contacts
+        if task is not None:
+            task.begin(*self._place())
         return self._observation(scan), self._info()
+
+    def _task_of(self, goal: Goal | str | None, world: World) -> Task | None:
+        if goal is None:
+            return None
+        ground = Ground(world)
+        if isinstance(goal, str):
+            there = ground.drawn(world.seeds.generator("goals"))
+        else:
+            there = ground.checked(goal)
+        return Task(there, self._reward, ground)
 
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """One scan under the given command."""
+        """``frame_skip`` scans under the given command, fewer where the episode ends."""
         observation, reward, terminated, truncated = self.act(action)
         return observation, reward, terminated, truncated, self._info()
 
     def act(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool]:
         """``step`` without the info."""
         v, omega = clipped(action)
-        simulation = self.simulation
-        simulation.world.set_command(v * V_MAX_MPS, omega * OMEGA_MAX_RADPS)
-        scan = simulation.sense()
-        before, self.goal_distance = self.goal_distance, self._goal_distance()
-        reward, terminated = 0.0, False
-        if before is not None and self.goal_distance is not None:
-            reward = before - self.goal_distance
-            terminated = self.goal_distance < GOAL_RADIUS_M
-        if self.terminate_on_collision and any(c.hard for c in simulation.contacts):
-            terminated = True
-        truncated = simulation.world.time_ns * 1e-9 >= self.time_limit_s
+        world, task = self.simulation.world, self._task
+        start_ns = world.time_ns
+        world.set_command(v * V_MAX_MPS, omega * OMEGA_MAX_RADPS)
+        touched: list[Contact] = []
+        for _ in range(self._scans):
+            scan = self._sense()
+            touched += self.simulation.contacts
+            hard = any(contact.hard for contact in touched)
+            terminated = task is not None and task.reached(*self._place())
+            terminated |= self.terminate_on_collision and hard
+            truncated = world.time_ns * 1e-9 >= self.time_limit_s
+            if terminated or truncated:
+                break
+        self.contacts, reward = touched, 0.0
+        if task is not None:
+            seconds = (world.time_ns - start_ns) * 1e-9
+            reward = task.reward(*self._place(), hard=hard, seconds=seconds)
         return self._observation(scan), reward, terminated, truncated
 
-    def _goal_distance(self) -> float | None:
-        if self._goal is None:
-            return None
+    def _sense(self) -> ScanResult:
+        """One scan more, of which the source of the pose hears too."""
+        scan = self.simulation.sense()
+        if self._pose_source is not None:
+            frame = self.simulation.frame
+            assert frame is not None  # a scan was just taken
+            self._pose_source.take(frame)
+        return scan
+
+    def _place(self) -> tuple[float, float]:
         x, y, _ = self.simulation.world.robot_pose().tolist()
-        return math.hypot(x - self._goal[0], y - self._goal[1])
+        return x, y
+
+    @property
+    def goal(self) -> Goal | None:
+        """(x, y) m in the world, if this episode has a goal."""
+        return None if self._task is None else self._task.goal
+
+    @property
+    def goal_distance(self) -> float | None:
+        """True m to the goal in a straight line, if this episode has one."""
+        return None if self._task is None else self._task.distance
+
+    @property
+    def is_success(self) -> bool:
+        """Whether the robot is truly at its goal."""
+        return self._task is not None and self._task.distance < GOAL_RADIUS_M
 
     def _observation(self, scan: ScanResult) -> Observation:
         """What the robot knows by the scan that was just taken."""
@@ -249,24 +327,23 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "time": np.array(simulation.world.time_ns * 1e-9),
         }
         if self._pose_source is not None:
-            frame = simulation.frame
-            assert frame is not None  # a scan was just taken
-            self._pose_source.take(frame)
-            observation |= self._pose_source.observation(self._goal)
+            polar = self._goal is not None
+            observation |= self._pose_source.observation(self.goal, polar=polar)
         return observation
 
     def _info(self) -> dict[str, Any]:
         world, frame = self.simulation.world, self.simulation.frame
         assert frame is not None  # a scan was just taken
-        contacts = self.simulation.contacts
         return {
             "pose": world.robot_pose(),
             "frame": frame,
             "beam_time": frame.stamp + self.simulation.spec.beam_time_offsets,
-            "contacts": tuple(contact.name for contact in contacts),
-            "hard_collision": any(contact.hard for contact in contacts),
+            "contacts": tuple(contact.name for contact in self.contacts),
+            "hard_collision": any(contact.hard for contact in self.contacts),
             "movers": dict(zip(world.mover_names, world.mover_poses(), strict=True)),
+            "goal": self.goal,
             "goal_distance": self.goal_distance,
+            "is_success": self.is_success,
         }
 
     def render(self) -> NDArray[np.uint8] | None:

@@ -18,10 +18,13 @@ _MAX_TICKS = 2**40
 Observation = dict[str, Any]  # arrays by name; Gymnasium types Dict spaces so
 
 
-def space_of(spec: LaserSpec, *, believing: bool) -> spaces.Dict:
-    """The space of an environment's observations; ``believing``: with a ``pose_source``."""
+def space_of(spec: LaserSpec, *, believing: bool, polar: bool = False) -> spaces.Dict:
+    """The space of an environment's observations.
+
+    ``believing``: with a ``pose_source``; ``polar``: with range and bearing of the goal.
+    """
     n = spec.n_beams
-    believed = PoseSource.space() if believing else {}
+    believed = PoseSource.space(polar=polar) if believing else {}
     return spaces.Dict(
         {
             "ranges": spaces.Box(0.0, np.float32(spec.range_max), (n,), np.float32),

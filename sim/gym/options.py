@@ -14,6 +14,7 @@ import numpy as np
 from scenes.crowd import crowd_of
 from sim.core.checks import numbers
 from sim.core.dynamism import Dynamism
+from sim.gym.goals import Goal, goal_of
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from slam.errors import InvalidValueError
@@ -23,20 +24,25 @@ OPTIONS = (
     "crowd", "moving_share", "rates", "scan_height_m", "resolution_deg", "noise_std_m", "laser",
 )  # fmt: skip
 
-FAR_M = 1e4  # of a goal from the world's origin: the observation space tells no more
-
 
 @dataclass(frozen=True, kw_only=True)
 class Episode:
-    """One episode: arguments of ``Simulation`` but the seed, overrides of streams, the goal."""
+    """One episode: arguments of ``Simulation`` but the seed, overrides of streams, the goal.
+
+    ``goal``: (x, y) m, "random" or None.
+    """
 
     settings: dict[str, Any]
     seeds: dict[str, int]
-    goal: tuple[float, float] | None
+    goal: Goal | str | None
 
 
-def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> Episode:
-    """``settings`` of the environment with the ``options`` of one reset put in.
+def episode(
+    settings: Mapping[str, Any],
+    options: Mapping[str, Any] | None,
+    goal: Goal | str | None = None,
+) -> Episode:
+    """``settings`` and ``goal`` of the environment with the ``options`` of one reset put in.
 
     Raises ``InvalidValueError`` naming the option that is unknown or has a value it cannot have.
     """
@@ -65,13 +71,10 @@ def episode(settings: Mapping[str, Any], options: Mapping[str, Any] | None) -> E
     merged["laser"] = _laser(merged["laser"], given)
     if "start" in given:
         merged["start"] = _finite("start", given["start"], 3, "(x m, y m, heading rad)")
-    goal = _finite("goal", given["goal"], 2, "(x, y) in m") if "goal" in given else None
-    if goal is not None and max(map(abs, goal)) > FAR_M:
-        raise InvalidValueError(f"option goal must lie within {FAR_M:g} m, got {given['goal']!r}")
     return Episode(
         settings=merged,
         seeds=mapping("seeds", given.get("seeds")),
-        goal=None if goal is None else (goal[0], goal[1]),
+        goal=goal_of("option goal", given.get("goal", goal)),
     )
 
 

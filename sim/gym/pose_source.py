@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -44,14 +45,18 @@ class PoseSource:
         self._trusted = True
 
     @staticmethod
-    def space() -> dict[str, spaces.Space[Any]]:
-        """What ``observation`` adds to an observation."""
+    def space(*, polar: bool = False) -> dict[str, spaces.Space[Any]]:
+        """What ``observation`` adds; with ``polar`` range and bearing of the goal too."""
         low, high = np.array([-_FAR_M, -_FAR_M, -np.pi]), np.array([_FAR_M, _FAR_M, np.pi])
-        return {
+        believed: dict[str, spaces.Space[Any]] = {
             "pose": spaces.Box(low, high, (3,), np.float64),
             "trusted": spaces.Box(0, 1, (), np.uint8),
             "goal": spaces.Box(-3.0 * _FAR_M, 3.0 * _FAR_M, (2,), np.float64),
         }
+        if polar:
+            low, high = np.array([0.0, -np.pi]), np.array([5.0 * _FAR_M, np.pi])
+            believed["goal_polar"] = spaces.Box(low, high, (2,), np.float64)
+        return believed
 
     def reset(self, T_world_start: Float) -> None:
         """A new episode from there; the SLAM forgets everything."""
@@ -76,14 +81,20 @@ class PoseSource:
         x, y = min(max(x, -_FAR_M), _FAR_M), min(max(y, -_FAR_M), _FAR_M)
         self._pose = np.array([x, y, se2.wrap(theta)])
 
-    def observation(self, goal: tuple[float, float] | None) -> dict[str, Any]:
+    def observation(
+        self, goal: tuple[float, float] | None, *, polar: bool = False
+    ) -> dict[str, Any]:
         """The believed pose in the frame of the start, and the goal (world) as seen from it."""
         there = _NO_GOAL
         if goal is not None:
             of_start = se2.transform(se2.inverse(self._start), np.array(goal))
             there = se2.transform(se2.inverse(self._pose), of_start)
-        return {
+        believed = {
             "pose": self._pose.copy(),
             "trusted": np.array(self._trusted, dtype=np.uint8),
             "goal": there.copy(),
         }
+        if polar:
+            x, y = there.tolist()
+            believed["goal_polar"] = np.array([math.hypot(x, y), math.atan2(y, x)])
+        return believed

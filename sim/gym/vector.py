@@ -49,9 +49,10 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
     and without options.
 
     ### Infos
-    ``pose`` (n, 3), ``goal_distance`` (n,) NaN without a goal, ``hard_collision`` (n,), and with
-    ``frames`` also ``frame`` (n,) objects; all with a mask of the same name and a leading "_", here
-    always true.
+    ``pose`` (n, 3), ``goal`` (n, 2) and ``goal_distance`` (n,) NaN without a goal,
+    ``hard_collision`` (n,), ``is_success`` (n,), and with ``frames`` also ``frame`` (n,) objects;
+    all with a mask of the same name and a leading "_", here always true. They are of the new
+    episode where "same_step" began one; ``infos["final_info"]`` has those of the old one.
 
     ``settings`` are those of ``MobiliaEnv``, ``pose_source`` by name only, so that each room has a
     SLAM of its own; rendering is left to the single environment.
@@ -173,12 +174,14 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
 
     def _start_over(self) -> dict[str, Any]:
         """Reset the rooms that ended; the last observations of their old episodes."""
-        final = np.full(self.num_envs, None, dtype=object)
+        final, of_old = np.full(self.num_envs, None, dtype=object), self._infos()
         for i in np.flatnonzero(self._ended).tolist():
             final[i] = {name: np.array(stacked[i]) for name, stacked in self._seen.items()}
             self._restart(i, None, None)
         ended, self._ended = self._ended, np.zeros(self.num_envs, dtype=np.bool_)
-        return {"final_obs": final, "_final_obs": ended}
+        return {
+            "final_obs": final, "_final_obs": ended, "final_info": of_old, "_final_info": ended,
+        }  # fmt: skip
 
     def _observations(self) -> Observation:
         return {name: stacked.copy() for name, stacked in self._seen.items()}
@@ -188,8 +191,10 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         distances = [env.goal_distance for env in self.envs]
         infos: dict[str, Any] = {
             "pose": np.array([s.world.robot_pose() for s in simulations]),
+            "goal": np.array([env.goal or (np.nan, np.nan) for env in self.envs]),
             "goal_distance": np.array([np.nan if d is None else d for d in distances]),
-            "hard_collision": np.array([any(c.hard for c in s.contacts) for s in simulations]),
+            "hard_collision": np.array([any(c.hard for c in env.contacts) for env in self.envs]),
+            "is_success": np.array([env.is_success for env in self.envs]),
         }
         if self._frames:
             infos["frame"] = np.empty(n, dtype=object)

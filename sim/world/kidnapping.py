@@ -71,7 +71,7 @@ class Kidnapping:
         """
         ranks = np.random.default_rng([self._seed, turn]).random(len(self._visited))
         places = np.array(self._visited)[np.argsort(ranks, kind="stable")]
-        robot, discs = world.bodies.robot, _discs(world)
+        robot, discs = world.bodies.robot, hull_discs(world)
         assert robot is not None
         apart = places[:, None, :2] - discs[None, :, :2]
         gaps = np.sqrt((apart * apart).sum(axis=2)) - discs[:, 2]
@@ -91,11 +91,11 @@ class Kidnapping:
         self._noted_ns, self._done = int(words["noted_ns"]), int(words["done"])
 
 
-def _discs(world: World) -> Float:
+def hull_discs(world: World, *, doors: bool = True) -> Float:
     """(k, 3) x, y, radius m of all hulls of what moves but the robot; of a door, all its swing."""
     rows = []
     for mover, pose in zip(world.scene.movers, world.mover_poses().tolist(), strict=True):
-        if mover.group == "robot":
+        if mover.group == "robot" or (mover.group == "door" and not doors):
             continue
         long = mover.group != "door" and kind_of(mover.kind).half_length_m > 0.0
         for x, y, radius in hulls(mover.kind) if long else ((0.0, 0.0, mover.radius),):

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Goals of an environment: drawn on floor that the robot can reach, or checked to lie there."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from sim.core.checks import numbers
+from sim.driving.navgrid import NavGrid
+from sim.world.kidnapping import hull_discs
+from sim.world.world import World
+from slam.errors import InvalidValueError
+from slam.frames import Float
+
+GOAL_RADIUS_M = 0.4  # m from the goal at which it counts as reached
+FAR_M = 1e4  # m, of a goal from the world's origin: the observation space tells no more
+RANDOM = "random"
+NEAR_M = 1.5  # m in a straight line from the start to a random goal, at least
+WAY_M = 15.0  # m of way from the start to a random goal, at most; those near walls count up to 3
+ROOM_M = 0.1  # m beside the robot that stands at a random goal, at least
+_AJAR_M = 0.03  # m, half the thickness of a door's leaf
+_BLOCKED = 1e6  # cost of a cell that cannot be reached (``NavGrid.cost_to``)
+
+Goal = tuple[float, float]
+
+
+def goal_of(name: str, value: Any) -> Goal | str | None:
+    """None, "random" or (x, y) m, both finite and within 10 km; else ``InvalidValueError``."""
+    if value is None or (isinstance(value, str) and value == RANDOM):
+        return value
+    x, y = numbers(name, value, 2, "'random' or (x, y) in m")
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise InvalidValueError(f"{name} must be finite, got {value!r}")
+    if max(abs(x), abs(y)) > FAR_M:
+        raise InvalidValueError(f"{name} must lie within {FAR_M:g} m, got {value!r}")
+    return x, y
+
+
+class Ground:
+    """The floor of a world that has just been built, and the way from its robot to a goal."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._radius = float(world.scene.movers[-1].radius)
+        self._start = world.robot_pose()
+        self._layout = NavGrid(world.scene.bounds, world.scene.obstacles, self._radius)
+
+    def checked(self, goal: Goal) -> Goal:
+        """``goal``, where the robot can get to on the static layout, shut doors left aside.
+
+        Raises ``InvalidValueError`` with the nearest free place for one elsewhere.
+        """
+        grid = self._layout
+        ways = grid.cost_to(self._start[:2])
+        if grid.cost_near(ways, *goal) < _BLOCKED:
+            return goal
+        points, free = _centres(grid), (ways < _BLOCKED) & (grid.clearance >= self._radius)
+        gaps = np.where(free, np.hypot(points[..., 0] - goal[0], points[..., 1] - goal[1]), np.inf)
+        x, y = points[np.unravel_index(int(np.argmin(gaps)), gaps.shape)].tolist()
+        nearest = f"; the nearest is ({x:.2f}, {y:.2f})" if free.any() else ""
+        raise InvalidValueError(
+            f"goal ({goal[0]:g}, {goal[1]:g}) does not lie on free floor that the robot can reach "
+            f"from ({self._start[0]:.2f}, {self._start[1]:.2f}){nearest}"
+        )
+
+    def drawn(self, rng: np.random.Generator) -> Goal:
+        """A goal evenly over the floor that the robot can reach as everything stands now.
+
+        At least ``NEAR_M`` away and at most ``WAY_M`` of way, with ``ROOM_M`` beside the robot and
+        out of the swing of doors. Where a room is too small or too full for that, the farthest
+        tenth of the floor that can be reached takes its place. ``InvalidValueError`` where the
+        robot cannot go anywhere.
+        """
+        discs = hull_discs(self._world)
+        points = _centres(self._layout)
+        away = np.hypot(points[..., 0] - self._start[0], points[..., 1] - self._start[1])
+        for things in (self._things(), np.zeros((0, 5))):
+            grid = self._layout.with_boxes(things)
+            ways = grid.cost_to(self._start[:2])
+            free = (ways < _BLOCKED) & (grid.clearance >= self._radius + ROOM_M)
+            for x, y, radius in discs.tolist() if len(things) else ():
+                gap = np.hypot(points[..., 0] - x, points[..., 1] - y) - radius
+                free &= gap >= self._radius + ROOM_M
+            fit = free & (away >= NEAR_M) & (ways <= WAY_M)
+            if not fit.any() and free.any():
+                fit = free & (away >= np.quantile(away[free], 0.9))
+            if fit.any():
+                at = np.argwhere(fit)
+                i, j = at[int(rng.integers(len(at)))]
+                x, y = points[i, j].tolist()
+                return x, y
+        raise InvalidValueError(
+            f"scene '{self._world.scene.name}' has no floor for a random goal that the robot can "
+            f"reach from ({self._start[0]:.2f}, {self._start[1]:.2f})"
+        )
+
+    def _things(self) -> Float:
+        """(k, 5) boxes as large as everything that stands about, and the leaves of doors."""
+        rows = []
+        for mover, (x, y, yaw) in zip(
+            self._world.scene.movers, self._world.mover_poses().tolist(), strict=True
+        ):
+            if mover.group == "door":
+                half = 0.5 * float(mover.radius)
+                rows.append(
+                    (x + half * math.cos(yaw), y + half * math.sin(yaw), half, _AJAR_M, yaw)
+                )
+        for x, y, radius in hull_discs(self._world, doors=False).tolist():
+            half = 0.5 * math.sqrt(math.pi) * radius  # of a square as large as the disc
+            rows.append((x, y, half, half, 0.0))
+        return np.array(rows, dtype=np.float64).reshape(-1, 5)
+
+    def way(self, goal: Goal) -> Way:
+        """To measure what is left to ``goal``."""
+        return Way(self._layout, goal)
+
+
+class Way:
+    """m of way to a goal on the static layout, those near walls counted up to three times."""
+
+    def __init__(self, grid: NavGrid, goal: Goal) -> None:
+        self._grid = grid
+        self._costs = grid.cost_to(np.array(goal))
+        self._left = math.inf
+
+    def left(self, x: float, y: float) -> float:
+        """From (x, y); where nothing can be told there, what was told last."""
+        grid = self._grid
+        i0, j0 = math.floor((y - grid.y0) / grid.cell), math.floor((x - grid.x0) / grid.cell)
+        best = math.inf
+        for i in range(max(0, i0 - 1), min(self._costs.shape[0], i0 + 2)):
+            for j in range(max(0, j0 - 1), min(self._costs.shape[1], j0 + 2)):
+                cost = float(self._costs[i, j])
+                if cost < _BLOCKED:
+                    cx, cy = grid.x0 + (j + 0.5) * grid.cell, grid.y0 + (i + 0.5) * grid.cell
+                    best = min(best, cost + math.hypot(cx - x, cy - y))
+        if math.isfinite(best):
+            self._left = best
+        return self._left
+
+
+def _centres(grid: NavGrid) -> Float:
+    """(rows, columns, 2) m of the middles of the cells."""
+    rows, columns = grid.clearance.shape
+    x = grid.x0 + (np.arange(columns) + 0.5) * grid.cell
+    y = grid.y0 + (np.arange(rows) + 0.5) * grid.cell
+    return np.stack(np.meshgrid(x, y), axis=-1)
