@@ -191,7 +191,13 @@ class Tracker(abc.ABC):
             match, state = self._recover(self._relocalisation, observations, prediction)
             return prediction, match, state
         match = _near(self._match(observations, prediction), prediction)
-        match = self._rival.decided(self.cell_map, stamp_ns, observations, prediction, match)
+        quality = self._quality
+        if quality.suspicious and match.matched < quality.least_continuous():
+            self._rival.forget()  # it was carried farther than a second pose may be off
+        else:
+            match = self._rival.decided(
+                self.cell_map, stamp_ns, observations, prediction, match, quality.usual_whole()
+            )
         if match.slipped:
             prediction = replace(prediction, covariance=slip(self._numbers.relocalise))
         return prediction, match, "tracking"
