@@ -142,7 +142,7 @@ class LoopsConfig(Settings):
     loop_m: float = number(0.03, "m", "added deviation of a loop", low=1e-6)
     loop_rad: float = number(0.003, "rad", "added deviation of a loop", low=1e-6)
     early: float = number(0.5, "share", "of long_m from which on key frames are chained", high=1.0)
-    corrects: int = number(1, "1", "1: map and pose follow the graph; 0: past poses alone", high=1)
+    corrects: int = number(0, "1", "1: map and pose follow the graph; 0: past poses alone", high=1)
     work: int = number(
         48, "units", "of work a scan; one: a key frame drawn, a third of a match",
         "docs/loops.md", low=1, high=MANY,

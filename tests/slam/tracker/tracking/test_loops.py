@@ -181,7 +181,7 @@ def long_ring() -> tuple[list[Frame], np.ndarray]:
 def test_a_ring_of_335_m_closes_while_driving() -> None:
     """Pose, map and past follow; each move is announced; nothing is left to the end."""
     stream, truth = long_ring()
-    slam = ShuntingSlam({"loops.datum": "first"})
+    slam = ShuntingSlam({"loops.datum": "first", "loops.corrects": 1})
     loops, tasks = slam._loops, [0]
     task = loops._task
 
