@@ -99,7 +99,8 @@ def publish(folder: Path, docs: Path, results: Path, commit: str) -> None:
     board = json.loads(source.read_text(encoding="utf-8"))
     text = told(board)
     if commit:
-        first = f'{{\n "commit": {json.dumps(commit)},\n'
+        command = f"mobilia benchmark --slam {' '.join(board['slams'])}"
+        first = f'{{\n "command": {json.dumps(command)},\n "commit": {json.dumps(commit)},\n'
         copied = source.read_text(encoding="utf-8").replace("{\n", first, 1)
     else:
         copied = source.read_text(encoding="utf-8")
