@@ -107,7 +107,7 @@ def test_without_odometry_it_is_that_of_a_constant_velocity(tmp_path, caplog):
     [
         ("column = 1", "column = 0", r"time.column must be a whole number from 1 .*, got 0"),
         ("column = 1", "column = true", "time.column must be a whole number"),
-        ("column = 1", "colum = 1", "time.column must be .*got nothing"),
+        ("column = 1", "kolumns = 1", "time.column must be .*got nothing"),
         ('unit = "us"', 'unit = "hours"', "time.unit must be one of s, ms, us, ns, got 'hours'"),
         ("counter = 65536", "count = 65536", r"\[odometry\] unknown key 'count'; known: counter"),
         ("track = 33.0", "track = inf", "odometry.track must be a number from"),
