@@ -32,7 +32,7 @@ from scripts.experiments.measured import add_options, head, seeds_of, table
 from scripts.figures import save, styled
 from scripts.marks import fill_page
 from scripts.result_files import write
-from slam.errors import InvalidValueError, MobiliaError
+from slam.errors import InvalidValueError, LogFormatError, MobiliaError
 
 MARK = "train_policy"
 PAGE, PICTURE = Path("docs/gymnasium.md"), Path("docs/pictures/policy_curve.png")
@@ -41,6 +41,7 @@ LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
 DRIVER = "driver"
 GROWN = 0.5  # share of the training after which the dynamism may be anything up to 1
 MEAN_OF = 100  # episodes of the mean in the curve
+_CURVE = ("step", "reached", "r")  # of each episode
 TOLD, KEPT = 256, 2048  # steps of a room after which a line is printed, and the network is kept
 
 Row = dict[str, Any]
@@ -186,6 +187,19 @@ def _told(wanted: argparse.Namespace, first: Row, training: Row) -> str:
     )
 
 
+def _training(path: Path) -> Row:
+    """What ``train`` wrote beside the weights; ``LogFormatError`` where it is something else."""
+    try:
+        found: Row = json.loads(path.read_text(encoding="utf-8"))
+        rows = found["episodes"].values()
+        numbers = [found["steps"], found["seconds"], *(row[k] for row in rows for k in _CURVE)]
+        if rows and all(isinstance(value, int | float) for value in numbers):
+            return found
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise LogFormatError(f"{path}: not what a training left ({error!r:.200})") from error
+    raise LogFormatError(f"{path}: not the episodes of a training")
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene", default="arena")
@@ -221,7 +235,7 @@ def _run(wanted: argparse.Namespace, first: Row, weights: Path) -> str:
         raise InvalidValueError(f"--steps 0 needs a file of --weights, got {wanted.weights}")
     if wanted.steps:
         train(wanted, weights)
-    training: Row = json.loads(weights.with_suffix(".json").read_text(encoding="utf-8"))
+    training = _training(weights.with_suffix(".json"))
     picture(list(training.pop("episodes").values()), wanted.picture)
     cells = evaluate(wanted, weights)
     text = f"{_told(wanted, first, training)}\n\n{markdown(cells, wanted.seeds)}"
