@@ -66,7 +66,7 @@ def train(wanted: argparse.Namespace, weights: Path) -> None:
 
     def keep(steps: int) -> None:
         torch.save(model.policy.state_dict(), weights)
-        taken = {"steps": steps, "seconds": time.perf_counter() - began}
+        taken = {"steps": steps, "asked": wanted.steps, "seconds": time.perf_counter() - began}
         rows = {str(k): row for k, row in enumerate(episodes)}
         write(weights.with_suffix(".json"), taken, {"episodes": rows})
 
@@ -144,8 +144,11 @@ def markdown(cells: dict[str, Row], n: int) -> str:
 
 
 @styled()
-def picture(episodes: Sequence[Row], path: Path) -> None:
-    """The learning curve: share of goals reached, and reward, over the last episodes."""
+def picture(episodes: Sequence[Row], path: Path, asked: int | None = None) -> None:
+    """The learning curve: share of goals reached, and reward, over the last episodes.
+
+    ``asked``: steps that the training was to take, where that is known.
+    """
     figure = Figure(figsize=(6.4, 3.4))
     axes = figure.add_subplot()
     steps = np.array([row["step"] for row in episodes]) / 1e3
@@ -160,8 +163,10 @@ def picture(episodes: Sequence[Row], path: Path) -> None:
     beside.spines["right"].set_visible(True)
     lines = [*axes.get_lines(), *beside.get_lines()]
     axes.legend(lines, [str(line.get_label()) for line in lines], loc="lower right")
-    axes.set_title(f"means of {MEAN_OF} episodes; dynamism up to 1 from "
-                   f"{GROWN * steps[-1]:.0f} thousand steps", fontsize=9)  # fmt: skip
+    words = f"means of {MEAN_OF} episodes"
+    if asked is not None:
+        words += f"; dynamism up to 1 from {GROWN * asked / 1e3:.0f} thousand steps on"
+    axes.set_title(words, fontsize=9)
     save(figure, path)
 
 
@@ -196,8 +201,8 @@ def _training(path: Path) -> Row:
         if rows and all(isinstance(value, int | float) for value in numbers):
             return found
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise LogFormatError(f"{path}: not what a training left ({error!r:.200})") from error
-    raise LogFormatError(f"{path}: not the episodes of a training")
+        raise LogFormatError(path, f"not what a training left ({error!r:.200})") from error
+    raise LogFormatError(path, "not the episodes of a training")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -236,7 +241,7 @@ def _run(wanted: argparse.Namespace, first: Row, weights: Path) -> str:
     if wanted.steps:
         train(wanted, weights)
     training = _training(weights.with_suffix(".json"))
-    picture(list(training.pop("episodes").values()), wanted.picture)
+    picture(list(training.pop("episodes").values()), wanted.picture, training.get("asked"))
     cells = evaluate(wanted, weights)
     text = f"{_told(wanted, first, training)}\n\n{markdown(cells, wanted.seeds)}"
     write(wanted.results, {**first, "training": training}, {"cells": cells})
