@@ -32,7 +32,7 @@ from scripts.experiments.measured import add_options, head, seeds_of, table
 from scripts.figures import save, styled
 from scripts.marks import fill_page
 from scripts.result_files import write
-from slam.errors import InvalidValueError, MobiliaError
+from slam.errors import InvalidValueError, LogFormatError, MobiliaError
 
 MARK = "train_policy"
 PAGE, PICTURE = Path("docs/gymnasium.md"), Path("docs/pictures/policy_curve.png")
@@ -41,6 +41,7 @@ LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
 DRIVER = "driver"
 GROWN = 0.5  # share of the training after which the dynamism may be anything up to 1
 MEAN_OF = 100  # episodes of the mean in the curve
+_CURVE = ("step", "reached", "r")  # of each episode
 TOLD, KEPT = 256, 2048  # steps of a room after which a line is printed, and the network is kept
 
 Row = dict[str, Any]
@@ -65,7 +66,7 @@ def train(wanted: argparse.Namespace, weights: Path) -> None:
 
     def keep(steps: int) -> None:
         torch.save(model.policy.state_dict(), weights)
-        taken = {"steps": steps, "seconds": time.perf_counter() - began}
+        taken = {"steps": steps, "asked": wanted.steps, "seconds": time.perf_counter() - began}
         rows = {str(k): row for k, row in enumerate(episodes)}
         write(weights.with_suffix(".json"), taken, {"episodes": rows})
 
@@ -143,8 +144,11 @@ def markdown(cells: dict[str, Row], n: int) -> str:
 
 
 @styled()
-def picture(episodes: Sequence[Row], path: Path) -> None:
-    """The learning curve: share of goals reached, and reward, over the last episodes."""
+def picture(episodes: Sequence[Row], path: Path, asked: int | None = None) -> None:
+    """The learning curve: share of goals reached, and reward, over the last episodes.
+
+    ``asked``: steps that the training was to take, where that is known.
+    """
     figure = Figure(figsize=(6.4, 3.4))
     axes = figure.add_subplot()
     steps = np.array([row["step"] for row in episodes]) / 1e3
@@ -159,8 +163,10 @@ def picture(episodes: Sequence[Row], path: Path) -> None:
     beside.spines["right"].set_visible(True)
     lines = [*axes.get_lines(), *beside.get_lines()]
     axes.legend(lines, [str(line.get_label()) for line in lines], loc="lower right")
-    axes.set_title(f"means of {MEAN_OF} episodes; dynamism up to 1 from "
-                   f"{GROWN * steps[-1]:.0f} thousand steps", fontsize=9)  # fmt: skip
+    words = f"means of {MEAN_OF} episodes"
+    if asked is not None:
+        words += f"; dynamism up to 1 from {GROWN * asked / 1e3:.0f} thousand steps on"
+    axes.set_title(words, fontsize=9)
     save(figure, path)
 
 
@@ -184,6 +190,19 @@ def _told(wanted: argparse.Namespace, first: Row, training: Row) -> str:
         "\n\n"
         f"`{first['command']}`"
     )
+
+
+def _training(path: Path) -> Row:
+    """What ``train`` wrote beside the weights; ``LogFormatError`` where it is something else."""
+    try:
+        found: Row = json.loads(path.read_text(encoding="utf-8"))
+        rows = found["episodes"].values()
+        numbers = [found["steps"], found["seconds"], *(row[k] for row in rows for k in _CURVE)]
+        if rows and all(isinstance(value, int | float) for value in numbers):
+            return found
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise LogFormatError(path, f"not what a training left ({error!r:.200})") from error
+    raise LogFormatError(path, "not the episodes of a training")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -221,8 +240,8 @@ def _run(wanted: argparse.Namespace, first: Row, weights: Path) -> str:
         raise InvalidValueError(f"--steps 0 needs a file of --weights, got {wanted.weights}")
     if wanted.steps:
         train(wanted, weights)
-    training: Row = json.loads(weights.with_suffix(".json").read_text(encoding="utf-8"))
-    picture(list(training.pop("episodes").values()), wanted.picture)
+    training = _training(weights.with_suffix(".json"))
+    picture(list(training.pop("episodes").values()), wanted.picture, training.get("asked"))
     cells = evaluate(wanted, weights)
     text = f"{_told(wanted, first, training)}\n\n{markdown(cells, wanted.seeds)}"
     write(wanted.results, {**first, "training": training}, {"cells": cells})

@@ -10,6 +10,7 @@ import pytest
 
 from scripts.experiments import train_policy
 from scripts.experiments.goal_policies import drive
+from slam.errors import LogFormatError
 
 
 def test_the_driver_reaches_goals_where_nothing_is_in_the_way():
@@ -36,6 +37,16 @@ def test_weights_are_wanted_where_nothing_is_trained(tmp_path, capsys):
     files = ["--results", str(tmp_path / "r.json"), "--no-page", "--steps", "0"]
     assert train_policy.main(files) == 1
     assert "--steps 0 needs a file of --weights" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"episodes": {}, "steps": 1, "seconds": 1}'])
+def test_a_file_that_no_training_left_is_refused(tmp_path, text):
+    (tmp_path / "w.pt").write_bytes(b"")
+    (tmp_path / "w.json").write_text(text)
+    wanted = ["--steps", "0", "--weights", str(tmp_path / "w.pt"), "--no-page"]
+    wanted = train_policy._parser().parse_args(wanted)
+    with pytest.raises(LogFormatError, match=r"w\.json: not"):
+        train_policy._run(wanted, {}, wanted.weights)
 
 
 @pytest.mark.skipif(

@@ -26,6 +26,7 @@ def test_pooled_is_the_least_of_each_group():
         np.testing.assert_array_equal(wrappers.pooled(ranges, n), expected)
 
 
+@pytest.mark.filterwarnings("ignore:.*is different from the unwrapped version:UserWarning")
 def test_wrapped_and_stacked_it_is_still_an_environment():
     env = wrappers.GoalVector(wrappers.LidarMinPooling(make(**SETTINGS), 24))
     assert env.observation_space.shape == (27,)
