@@ -230,7 +230,9 @@ def _without(value: object) -> object:
 
 
 def _timing(key: str) -> bool:
-    return key in ("timing", "wall_s", "slam_ms_per_scan", "real_time_factor") or "ms_" in key
+    return (
+        key in ("timing", "cost", "wall_s", "slam_ms_per_scan", "real_time_factor") or "ms_" in key
+    )
 
 
 def each_alone(names: Iterable[str]) -> dict[str, set[str]]:

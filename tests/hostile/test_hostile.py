@@ -41,6 +41,7 @@ OPEN_NOTHING = {
     "bench": "scenes of ours",
     "doctor": "the installed packages",
     "sensor-card": "scenes of ours",
+    "live": "logs and bags by the readers of run --log; its scene and SLAM are typed",
     "reproduce": "logs by the readers of run --log; its results, of which it takes numbers",
 }
 Words = list[str]

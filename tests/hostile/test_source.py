@@ -25,6 +25,7 @@ IMPORTERS = {
     "sim/view/camera.py": "the GL libraries, by constants",
     "scripts/workers.py": "Dask",
     "scripts/film/rerun_log.py": "Rerun",
+    "scripts/live/sdk.py": "the Foxglove SDK, by constants",
     "scripts/verbs/reproduce.py": "experiments of ours",
     "scripts/paper/runs.py": "jobs of ours",
 }

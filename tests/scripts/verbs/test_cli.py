@@ -141,7 +141,8 @@ def test_verify_tells_a_wrong_path_from_a_damaged_result(tmp_path: Path, called)
 
 
 def test_a_damaged_log_is_named_and_nothing_is_written(tmp_path: Path, called):
-    (tmp_path / "torn.log").write_text("FLASER 3 1.0 1.0 1.0 0 0 0 0 0 0 1.0 host 1.0\nFLASER 3 1.")
+    line = "FLASER 3 1.0 1.0 1.0 0 0 0 0 0 0 1.0 host 1.0"
+    (tmp_path / "torn.log").write_text(f"{line}\nFLASER 3 1.\n{line}\n")
     (tmp_path / "noise.log").write_bytes(bytes(range(256)) * 20)
     before = sorted(p.name for p in tmp_path.iterdir())
     for name in ("torn.log", "noise.log"):
