@@ -162,7 +162,7 @@ class Board:
              *(lost_from_words(self.row(t.name, slam)) for slam in self.slams)]
             for t in self.tracks
         ]  # fmt: skip
-        parts.append(_table(heads, lines, left=1))
+        parts.append(markdown_table(heads, lines, left=1))
         for track in self.tracks:
             parts += self._section(track)
         return "\n\n".join(parts) + "\n"
@@ -201,7 +201,7 @@ class Board:
         return [
             f"## {track.name}",
             " ".join(sentences),
-            _table(["SLAM", *(name for name, _ in _CELLS)], lines, left=1),
+            markdown_table(["SLAM", *(name for name, _ in _CELLS)], lines, left=1),
         ]
 
 
@@ -264,7 +264,8 @@ def lost_from_words(row: Row | None) -> str:
     return "–" if row is None else _from(row)
 
 
-def _table(heads: Sequence[str], lines: Sequence[Sequence[str]], *, left: int) -> str:
+def markdown_table(heads: Sequence[str], lines: Sequence[Sequence[str]], *, left: int) -> str:
+    """A table whose first ``left`` columns are words."""
     rule = [*["---"] * left, *["---:"] * (len(heads) - left)]
     rows = ("| " + " | ".join(word.replace("|", "/") for word in row) + " |"
             for row in (heads, rule, *lines))  # fmt: skip

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from scripts.benchmark import picture
+from scripts.benchmark.board import markdown_table
 from scripts.benchmark.scores import SILENT, TRACKING
-from scripts.experiments.measured import table
 from scripts.marks import fill_page
 from scripts.metrics.row import digits
 from scripts.result_files import RESULTS, ROOT
@@ -89,7 +89,7 @@ def told(board: dict[str, Any]) -> str:
     )
     if left:
         made += f" Left out, because the oracle was lost or off there: {', '.join(left)}."
-    return f"{table(HEADS, rows(board))}\n\n{made}"
+    return f"{markdown_table(HEADS, rows(board), left=1)}\n\n{made}"
 
 
 def publish(folder: Path, docs: Path, results: Path, commit: str) -> None:

@@ -26,7 +26,9 @@ from slam.tracker.tracking.keys import KeyFrame
 from slam.tracker.tracking.relocalise import coarse, spread, support
 
 # What things cost, in units of drawing one key frame; measured on a log of 5 cm and 180 beams.
-DRAWN, MATCHED, SEARCHED = 1, 3, 16
+DRAWN = 1  # the unit
+MATCHED = 3
+SEARCHED = 16
 
 
 def draw(cell_map: CellMap, key: KeyFrame, pose: Float, look_s: float) -> None:
