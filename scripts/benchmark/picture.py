@@ -85,17 +85,18 @@ def shown_name(slam: str) -> str:
 def _order(lost: Lost) -> list[str]:
     """Who is lost most comes first, the controls last."""
     ranked = sorted(lost.shares, key=lambda slam: -float(np.nan_to_num(lost.mean(slam)).sum()))
-    return sorted(ranked, key=_is_control)
+    return sorted(ranked, key=is_control)
 
 
-def _is_control(slam: str) -> bool:
+def is_control(slam: str) -> bool:
+    """Whether it is in every table, and no contestant."""
     return slam in (ODOMETRY, ORACLE)
 
 
 def _look(slam: str, k: int) -> dict[str, Any]:
     if slam == ORACLE:
         return {"color": "#202020", "ls": "--", "marker": "", "lw": 1.6}
-    if _is_control(slam):
+    if is_control(slam):
         return {"color": _CONTROL, "ls": ":", "marker": "", "lw": 1.6}
     wide = 2.4 if slam == "shunting" else 1.4
     return {"color": _COLORS[k % len(_COLORS)], "ls": "-", "lw": wide, "ms": 4.5, "mec": "white",

@@ -89,7 +89,17 @@ def told(board: dict[str, Any]) -> str:
     )
     if left:
         made += f" Left out, because the oracle was lost or off there: {', '.join(left)}."
-    return f"{markdown_table(HEADS, rows(board), left=1)}\n\n{made}"
+    return f"{markdown_table(HEADS, rows(board), left=1)}\n\n{made}\n\n{_broken(board)}"
+
+
+def _broken(board: dict[str, Any]) -> str:
+    """How many SLAMs lose half of their runs at the top, track by track; controls aside."""
+    by_track: dict[str, list[bool]] = {}
+    for row in board["leaderboard"].values():
+        if not picture.is_control(picture.shown_name(row["slam"])):
+            by_track.setdefault(row["track"], []).append(float(row["lost_at_top"]) >= 0.5)
+    said = (f"`{name}` {sum(lost)} of {len(lost)}" for name, lost in by_track.items())
+    return f"SLAMs that lose half of their runs or more at level 1: {', '.join(said)}."
 
 
 def publish(folder: Path, docs: Path, results: Path, commit: str) -> None:

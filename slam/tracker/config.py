@@ -19,7 +19,7 @@ from slam.settings import Settings, number, word
 from slam.tracker.map_config import MapConfig
 from slam.tracker.matching.config import MatchingConfig
 from slam.tracker.standing.config import ALL_VOTE, StandingConfig
-from slam.tracker.tracking.config import NOT_CORRECTED, LoopsConfig, TrackingConfig
+from slam.tracker.tracking.config import LoopsConfig, TrackingConfig
 from slam.tracker.uncertainty.config import UncertaintyConfig
 
 SEEDS = "training seeds"
@@ -152,7 +152,6 @@ class TrackerConfig(Settings):
             "objective": "log",
             "freeze_below": 0.0,
             "standing": ALL_VOTE,
-            "loops": NOT_CORRECTED,
         }
         return cls(**(printed | changes))
 

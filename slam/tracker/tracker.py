@@ -195,9 +195,7 @@ class Tracker(abc.ABC):
         if quality.suspicious and match.matched < quality.least_continuous():
             self._rival.forget()  # it was carried farther than a second pose may be off
         else:
-            match = self._rival.decided(
-                self.cell_map, stamp_ns, observations, prediction, match, quality.usual_whole()
-            )
+            match = self._rival.decided(self.cell_map, stamp_ns, observations, prediction, match)
         if match.slipped:
             prediction = replace(prediction, covariance=slip(self._numbers.relocalise))
         return prediction, match, "tracking"

@@ -82,9 +82,6 @@ class StandingConfig(Settings):
     )
     rival_gain: float = number(0.1, "overlap", "least gain of a new second pose", SEEDS)
     rival_scans: int = number(3, "scans", "at least, that a second pose is ahead", SEEDS, low=1)
-    rival_enough: float = number(
-        0.65, "share", "of the usual support by the map, that a second pose has", SEEDS
-    )
     rival_s: float = number(0.4, "s", "at least, that a second pose is ahead", SEEDS)
     undecided_s: float = number(2.0, "s", "then the first pose stays", SEEDS)
 

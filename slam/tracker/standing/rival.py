@@ -23,7 +23,6 @@ from slam.tracker.matching.local_search import SearchWindow, search
 from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.rasterise import rasterise
 from slam.tracker.standing.recent import Standing
-from slam.tracker.tracking.relocalise import support
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,13 +67,8 @@ class Rival:
         observations: Observations,
         prediction: Prediction,
         match: Match,
-        usual: float,
     ) -> Match:
-        """``match``, or that of the second pose (``slipped``) once it has explained more.
-
-        ``usual``: support by the map, which the second pose must have about as well. Where neither
-        has it, the robot was carried away or the map is outdated.
-        """
+        """``match``, or that of the second pose (``slipped``) once it has explained more."""
         if self._config.fallen == 0.0 or not len(observations.points_robot):
             return match
         if self._second is not None:
@@ -87,7 +81,7 @@ class Rival:
             )
         if self._second is None:
             self._learn(match.rewarded, prediction.elapsed)
-        return self._decide(match, cell_map, observations, usual)
+        return self._decide(match)
 
     def _has_fallen(self, observations: Observations, match: Match) -> bool:
         """Among a few things alone nothing is decided: all of them may have moved."""
@@ -172,9 +166,7 @@ class Rival:
         seen = replace(observations, votes=votes)
         return self._matcher.climb(cell_map, seen, start, start, precision)
 
-    def _decide(
-        self, match: Match, cell_map: CellMap, observations: Observations, usual: float
-    ) -> Match:
+    def _decide(self, match: Match) -> Match:
         config, second = self._config, self._second
         if second is None:
             return match
@@ -182,9 +174,7 @@ class Rival:
         tried = second.scans >= config.rival_scans and second.elapsed_s >= config.rival_s
         if ahead and tried:
             self._second = None
-            everyone = replace(observations, votes=None)
-            supported = support(cell_map, everyone, second.match) >= config.rival_enough * usual
-            return replace(second.match, slipped=True) if supported else match
+            return replace(second.match, slipped=True)
         if not ahead or second.elapsed_s > config.undecided_s:
             self._second = None
         return match

@@ -162,6 +162,3 @@ class LoopsConfig(Settings):
     apply_rad: float = number(0.02, "rad", "the same of the turn between them", low=1e-6)
     loose: float = number(1.0, "1/m², 1/rad²", "prior information of a loop's match", low=1e-6)
     information_share: float = number(0.3, "share", "of a match's information, used in the graph")
-
-
-NOT_CORRECTED = LoopsConfig(corrects=0)

@@ -84,6 +84,7 @@ def test_a_leaderboard_is_published(board, tmp_path):
     assert page.index("`oracle`") < page.index("`mine`")
     assert "2 tracks that count" in page
     assert "`c-v1`" in page
+    assert "`a-v1` 1 of 1, `b-v1` 0 of 1" in page
     assert json.loads((docs / "leaderboard.json").read_text())["commit"] == "abc"
     assert (docs / "leaderboard.md").is_file()
     assert (docs / "pictures" / "benchmark.png").is_file()

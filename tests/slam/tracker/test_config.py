@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("9034668f50e2", "534de338944d")),
-        (OccupancyConfig, ["grid"], ("efd395d09646", "605833a2ebd3")),
+        (ShuntingConfig, [], ("20cefa3d14c0", "a93de9194c8d")),
+        (OccupancyConfig, ["grid"], ("61b33c9e62bd", "0f364709d996")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

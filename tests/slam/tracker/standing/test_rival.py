@@ -67,7 +67,7 @@ class Asked:
             elapsed=STEP_S,
         )  # fmt: skip
         match = self.matcher.climb(ROOM, self.seen, T, T, inverted(PRIOR))
-        return match, self.rival.decided(ROOM, 0, self.seen, prediction, match, 0.0)
+        return match, self.rival.decided(ROOM, 0, self.seen, prediction, match)
 
     def settled(self) -> Asked:
         """After 10 s at the right place."""
