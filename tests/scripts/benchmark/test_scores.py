@@ -25,7 +25,8 @@ def runs(slam: str, lost: list[list[int]], *, error_m: float = 0.01, **more) -> 
         {
             "slam": slam, "dynamism": level, "seed": 720 + k, "lost": is_lost, "failure": None,
             "outcome": "lost" if is_lost else "finished", "ate_unaligned_m": error_m + 0.1 * level,
-            "error_tracking_m": error_m, "silent_share": 0.25 * is_lost, "ms_per_scan_p50": 2.0,
+            "error_tracking_m": error_m, "rpe_m_per_m": error_m + 0.1 * level,
+            "silent_share": 0.25 * is_lost, "ms_per_scan_p50": 2.0,
             "ms_per_scan_p999": 9.0, "peak_memory_mb": 10.0, **more,
         }
         for k, seed in enumerate(lost)
@@ -81,12 +82,26 @@ def test_a_row_sums_up_its_runs():
     row = scores.score(TRACK, "mine", runs("mine", HALF))
     assert (row["seeds"], row["runs"], row["lost_runs"], row["failed_runs"]) == (6, 30, 15, 0)
     assert row["lost_at_top"] == 1.0
-    assert row["spearman"] == pytest.approx(1.0)
+    assert (row["spearman"], row["spearman_ate"]) == pytest.approx((1.0, 1.0))
     assert row["silent_share"] == pytest.approx(0.25 * 15 / 30)
     assert (row["error_tracking_m"], row["error_tracking_m_runs"]) == (0.01, 30)
     assert (row["ms_per_scan_p50"], row["ms_per_scan_p999"]) == (2.0, 9.0)
     claims_nothing = scores.score(TRACK, "mine", runs("mine", HALF, silent_share=None))
     assert claims_nothing["silent_share"] is None
+
+
+def test_drift_weighs_every_seed_alike():
+    """One seed that slips by 100 times the usual does not outweigh five that get twice as bad."""
+    rows = runs("mine", KEPT)
+    for row in rows:
+        row["rpe_m_per_m"] = 0.01 * (1.0 + row["dynamism"])
+    rows[0]["rpe_m_per_m"] = 0.02  # seed 720 at level 0
+    by_level = scores.drift_by_level(rows)
+    assert by_level[0.0] == pytest.approx(0.01 * 2.0 ** (1 / 6))
+    assert by_level[1.0] == pytest.approx(0.02)
+    assert scores.spearman(by_level) == pytest.approx(1.0)
+    rows[-1] |= {"outcome": "raised", "rpe_m_per_m": None}
+    assert scores.drift_by_level(rows)[1.0] == math.inf
 
 
 def test_a_track_counts_while_its_oracle_is_near_and_never_lost():
