@@ -105,45 +105,48 @@ def _crowds(kind: str, *counts: int) -> tuple[str, ...]:
 
 
 def _of(unit: str, *counts: float) -> tuple[str, ...]:
-    return tuple(f"{n:g} {unit}" for n in counts)
+    return tuple(f"{n:g} {_ONE.get(unit, unit) if n == 1 else unit}" for n in counts)
 
 
+_ONE = {"people": "person", "boards": "board", "trains": "train", "beds": "bed"}
 _QUIET: Sets = {"n_chairs": 0, "n_people": 0}  # nobody but the crowd
 _SCATTERED: Sets = {  # chairs at rest are most of what is in reach
     "motion": 0.0, "crowd": "none", "n_people": 0, "n_chairs": 60, "clutter": 0.1,
     "range_mode": "8m",
 }  # fmt: skip
+_BEDS = ((1, 2), (2, 4), (4, 6), (6, 8))  # and doctors
+_CARRIED = ((2, 75), (4, 60), (6, 40), (8, 25))  # people, and s from one time to the next
 _ALL = (
     Track(
         name="tour-guide-v1",
         about="the robot leads visitors through a museum; they walk with it, all round it",
-        scene="gallery", axis="people who walk with the robot", says=_of("people", 0, 2, 4, 8, 12),
-        sets=_each(motion=1.0, change=0.0, crowd=_crowds("escorts", 0, 2, 4, 8, 12), **_QUIET),
+        scene="gallery", axis="people who walk with the robot", says=_of("people", 0, 2, 5, 9, 14),
+        sets=_each(motion=1.0, change=0.0, crowd=_crowds("escorts", 0, 2, 5, 9, 14), **_QUIET),
     ),
     Track(
         name="rush-hour-v1",
         about="streams of people cross a station hall",
-        scene="station", axis="people in the streams", says=_of("people", 0, 15, 30, 45, 60),
+        scene="station", axis="people in the streams", says=_of("people", 0, 15, 35, 60, 80),
         seconds=90.0, odometry=GOOD_ODOMETRY,
         sets=_each(
-            motion=LEVELS, change=0.0, crowd=_crowds("streams", 0, 15, 30, 45, 60),
+            motion=LEVELS, change=0.0, crowd=_crowds("streams", 0, 15, 35, 60, 80),
         ),
     ),
     Track(
         name="busy-chairs-v1",
         about="chairs roll about in a flat and hardly rest",
-        scene="apartment", axis="share of 36 chairs on the move at any time",
-        says=_of("% of 36 chairs", 0, 25, 50, 75, 100), seconds=120.0,
+        scene="apartment", axis="share of 80 chairs on the move at any time",
+        says=_of("% of 80 chairs", 0, 25, 50, 75, 100), seconds=120.0,
         sets=_each(
-            motion=0.0, change=0.0, crowd="none", n_people=0, n_chairs=36, moving_share=LEVELS,
+            motion=0.0, change=0.0, crowd="none", n_people=0, n_chairs=80, moving_share=LEVELS,
         ),
     ),
     Track(
         name="moving-boards-v1",
         about="partitions of 1.6 m are pushed about",
-        scene="gallery", axis="boards on castors", says=_of("boards", 0, 2, 4, 7, 10),
+        scene="gallery", axis="boards on castors", says=_of("boards", 0, 1, 3, 6, 10),
         seconds=120.0,
-        sets=_each(motion=1.0, change=0.0, crowd=_crowds("boards", 0, 2, 4, 7, 10), **_QUIET),
+        sets=_each(motion=1.0, change=0.0, crowd=_crowds("boards", 0, 1, 3, 6, 10), **_QUIET),
     ),
     Track(
         name="moving-day-v1",
@@ -162,57 +165,59 @@ _ALL = (
     Track(
         name="classroom-break-v1",
         about="the lesson is over: pupils in groups, chairs pushed back",
-        scene="classroom", axis="pupils in groups", says=_of("pupils", 0, 4, 8, 12, 16),
-        sets=_each(motion=LEVELS, change=0.0, crowd=_crowds("groups", 0, 4, 8, 12, 16)),
+        scene="classroom", axis="pupils in groups", says=_of("pupils", 0, 4, 10, 18, 28),
+        sets=_each(motion=LEVELS, change=0.0, crowd=_crowds("groups", 0, 4, 10, 18, 28)),
     ),
     Track(
         name="warehouse-shift-v1",
         about="trains of trolleys, pickers on foot, pallets that are gone when the robot is back",
         scene="warehouse", axis="trains of two trolleys, two pickers for each",
-        says=_of("trains", 0, 1, 2, 4, 6), odometry=GOOD_ODOMETRY,
+        says=_of("trains", 0, 1, 2, 3, 5), odometry=GOOD_ODOMETRY,
         sets=_each(
             motion=LEVELS, change=LEVELS,
-            crowd=("none", *(f"trains:{n},streams:{2 * n}" for n in (1, 2, 4, 6))),
+            crowd=("none", *(f"trains:{n},streams:{2 * n}" for n in (1, 2, 3, 5))),
         ),
     ),
     Track(
         name="ward-round-v1",
         about="doctors walk with the robot from bed to bed, and beds are pushed past them",
-        scene="gallery", axis="beds on the move, two doctors for each",
-        says=_of("beds", 0, 1, 2, 3, 4),
+        scene="gallery", axis="beds on the move, and doctors",
+        says=("nobody", *(f"{_of('beds', a)[0]}, {b} doctors" for a, b in _BEDS)),
         sets=_each(
             motion=1.0, change=0.0, **_QUIET,
-            crowd=("none", *(f"beds:{n},escorts:{2 * n}" for n in (1, 2, 3, 4))),
+            crowd=("none", *(f"beds:{a},escorts:{b}" for a, b in _BEDS)),
         ),
     ),
     Track(
         name="slow-scans-v1",
         about="two scans a second, 35 cm of way between them, among people",
         scene="office", axis="people, half of them walk with the robot",
-        says=_of("people", 0, 2, 4, 6, 8), seconds=90.0, every=19,
+        says=_of("people", 0, 2, 4, 8, 12), seconds=90.0, every=19,
         sets=_each(
             motion=LEVELS, change=0.0,
-            crowd=("none", *(f"escorts:{n},streams:{n}" for n in (1, 2, 3, 4))),
+            crowd=("none", *(f"escorts:{n},streams:{n}" for n in (1, 2, 4, 6))),
         ),
     ),
     Track(
         name="kidnapped-in-a-crowd-v1",
-        about="among people the robot is carried away, once, and its wheels do not know",
-        scene="apartment", axis="people who walk about", says=_of("people", 0, 2, 4, 6, 8),
+        about="among people the robot is carried away, and its wheels do not know",
+        scene="apartment", axis="people who walk about, and s from one time to the next",
+        says=("nobody, never", *(f"{n} people, {at} s" for n, at in _CARRIED)),
         seconds=90.0,
         sets=_each(
-            motion=LEVELS, change=0.0, n_people=0, kidnap_every_s=60.0,
-            crowd=("none", *(f"escorts:{n},streams:{n}" for n in (1, 2, 3, 4))),
+            motion=LEVELS, change=0.0, n_people=0,
+            kidnap_every_s=(None, *(float(at) for _, at in _CARRIED)),
+            crowd=("none", *(f"escorts:{n // 2},streams:{n // 2}" for n, _ in _CARRIED)),
         ),
     ),
     Track(
         name="no-walls-v1",
         about="walls that no beam meets: chairs at rest are all there is, and people walk between",
-        scene="arena", axis="people who walk with the robot", says=_of("people", 0, 2, 4, 6, 8),
+        scene="arena", axis="people who walk with the robot", says=_of("people", 0, 1, 2, 4, 6),
         oracle="oracle(shunting,moving)",
         sets=_each(
-            motion=1.0, change=0.0, moving_share=0.0, n_chairs=24, walls="none",
-            crowd=_crowds("escorts", 0, 2, 4, 6, 8),
+            motion=1.0, change=0.0, moving_share=0.0, n_chairs=40, walls="none",
+            crowd=_crowds("escorts", 0, 1, 2, 4, 6),
         ),
     ),
 )  # fmt: skip

@@ -15,18 +15,18 @@ from slam.errors import InvalidValueError, UnknownNameError
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "benchmark.md"
 
 PUBLISHED = {
-    "tour-guide-v1": "e50d06e0c6a8",
-    "rush-hour-v1": "1230cd569120",
-    "busy-chairs-v1": "107970e75a9d",
-    "moving-boards-v1": "edcf765b5bc0",
+    "tour-guide-v1": "5af2086d9b4e",
+    "rush-hour-v1": "4005dac13643",
+    "busy-chairs-v1": "fbce4241b9fe",
+    "moving-boards-v1": "71c0bb1aaac7",
     "moving-day-v1": "e56db9f29148",
     "overnight-v1": "db955dddc953",
-    "classroom-break-v1": "158c3d245256",
-    "warehouse-shift-v1": "45b08ba33073",
-    "ward-round-v1": "c2863c9346b4",
-    "slow-scans-v1": "7ab6a0bbb49b",
-    "kidnapped-in-a-crowd-v1": "19ffe08bbf05",
-    "no-walls-v1": "5c8f20504f66",
+    "classroom-break-v1": "b4d0c7adc550",
+    "warehouse-shift-v1": "21fa0464f874",
+    "ward-round-v1": "c1d8b80a51eb",
+    "slow-scans-v1": "d32ae5599c18",
+    "kidnapped-in-a-crowd-v1": "d239ebe263d8",
+    "no-walls-v1": "d11c3e575a0a",
 }
 
 
