@@ -182,7 +182,7 @@ _ALL = (
         name="ward-round-v1",
         about="doctors walk with the robot from bed to bed, and beds are pushed past them",
         scene="gallery", axis="beds on the move, and doctors",
-        says=("nobody", *(f"{_of('beds', a)[0]}, {b} doctors" for a, b in _BEDS)),
+        says=("0 beds", *(f"{_of('beds', a)[0]}, {b} doctors" for a, b in _BEDS)),
         sets=_each(
             motion=1.0, change=0.0, **_QUIET,
             crowd=("none", *(f"beds:{a},escorts:{b}" for a, b in _BEDS)),
@@ -202,7 +202,7 @@ _ALL = (
         name="kidnapped-in-a-crowd-v1",
         about="among people the robot is carried away, and its wheels do not know",
         scene="apartment", axis="people who walk about, and s from one time to the next",
-        says=("nobody, never", *(f"{n} people, {at} s" for n, at in _CARRIED)),
+        says=("0 people, never", *(f"{n} people, {at} s" for n, at in _CARRIED)),
         seconds=90.0,
         sets=_each(
             motion=LEVELS, change=0.0, n_people=0,

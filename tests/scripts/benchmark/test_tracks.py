@@ -23,9 +23,9 @@ PUBLISHED = {
     "overnight-v1": "db955dddc953",
     "classroom-break-v1": "b4d0c7adc550",
     "warehouse-shift-v1": "21fa0464f874",
-    "ward-round-v1": "c1d8b80a51eb",
+    "ward-round-v1": "c74472c61c54",
     "slow-scans-v1": "d32ae5599c18",
-    "kidnapped-in-a-crowd-v1": "d239ebe263d8",
+    "kidnapped-in-a-crowd-v1": "e73cb0e804eb",
     "no-walls-v1": "d11c3e575a0a",
 }
 
