@@ -33,7 +33,8 @@ from slam.tracker.standing.recent import Standing
 from slam.tracker.standing.rival import Rival
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.quality import TrackingQuality
-from slam.tracker.tracking.relocalise import Relocalisation, coarse, slip, slipped
+from slam.tracker.tracking.relocalise import Relocalisation, coarse
+from slam.tracker.tracking.shove import best_around, is_denied, slip
 from slam.tracker.tracking.verdict import Verdict
 from slam.tracker.tracking.wake import Wake
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
@@ -227,12 +228,18 @@ class Tracker(abc.ABC):
             )
             if found.score > match.score:
                 match = found
-        if match.matched >= poor or not self._quality.is_worth_searching_near():
+        quality = self._quality
+        votes = observations.votes
+        few = self._numbers.relocalise.few_vote
+        silenced = votes is not None and len(votes) > 0 and float(votes.mean()) < few
+        if not (match.matched < poor or silenced) or not quality.is_worth_searching_near():
             return match
-        everyone = replace(observations, votes=None)
-        usual = self._quality.usual_whole()
-        shoved = slipped(cell_map, self._matcher, everyone, prediction, usual, around)
-        return match if shoved is None else shoved
+        everyone, limits = replace(observations, votes=None), self._numbers.relocalise
+        there = best_around(cell_map, self._matcher, everyone, prediction, around)
+        usual = quality.usual_whole()
+        if there is None or not is_denied(cell_map, limits, everyone, match, there, usual):
+            return match
+        return replace(there, slipped=True)
 
     def _recover(
         self, recovery: Relocalisation, observations: Observations, prediction: Prediction

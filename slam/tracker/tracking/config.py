@@ -24,7 +24,7 @@ class QualityConfig(Settings):
     )
     give_up_s: float = number(60.0, "s", "of relocalising; then go on from odometry")
     worth_searching: float = number(
-        0.6, "share", "least usual support of a map to search in", high=1.0
+        0.35, "share", "least usual support of a map to search in", high=1.0
     )
     grown_s: float = number(10.0, "s", "of tracking: a grown map, with grown_scans")
     grown_scans: int = number(10, "frames", "tracked: a grown map, with grown_s", low=0, high=MANY)
@@ -58,7 +58,12 @@ class RelocaliseConfig(Settings):
     enough: float = number(0.8, "share", "of the usual support: accepts a hypothesis")
     enough_later: float = number(0.65, "share", "the same, for one followed for long (later)")
     later: float = number(3.0, "ratio", "of the least evidence: then followed for long")
-    hopeless: float = number(0.6, "share", "of the usual, or the best, support: less is dropped")
+    enough_last: float = number(
+        0.45, "share", "the same, for one alone that was followed for longer still (last)", SEEDS
+    )
+    last: float = number(5.0, "ratio", "of the least evidence: then for longer still", SEEDS)
+    alone: float = number(0.7, "share", "of the best support: no other has more", SEEDS)
+    hopeless: float = number(0.4, "share", "of the usual, or the best, support: less is dropped")
     alias: float = number(0.9, "share", "of the best support: another is a rival, wait")
     scans: int = number(5, "frames", "least, with one of on_m, on_rad, on_s", low=1, high=MANY)
     on_m: float = number(0.3, "m", "least distance driven with a hypothesis", low=1e-6)
@@ -72,13 +77,22 @@ class RelocaliseConfig(Settings):
         40.0, "weight",
         "in view from which on a frame can deny the map or identify a place: 4 m of surface",
     )  # fmt: skip
+    least_near: float = number(
+        20.0, "weight", "the same around the place of dead reckoning: 2 m of surface", SEEDS
+    )
+    few_vote: float = number(
+        0.3, "vote", "mean vote: below, a place around where all agree is looked for", SEEDS
+    )
     slipped_m: float = number(0.2, "m", "deviation of a motion that odometry missed", low=1e-6)
     slipped_rad: float = number(0.2, "rad", "the same of its turn", low=1e-6)
     pushed_mps: float = number(2.0, "m/s", "largest speed of a motion that odometry missed")
     pushed_radps: float = number(3.5, "rad/s", "largest turn rate of a motion that odometry missed")
     farthest_m: float = number(0.6, "m", "farthest that such a motion is searched", high=20.0)
-    farthest_rad: float = number(0.5, "rad", "farthest turn that is searched", high=3.2)
-    sure: float = number(0.9, "share", "of the usual support at the place then found")
+    farthest_rad: float = number(1.0, "rad", "farthest turn that is searched", high=3.2)
+    sure: float = number(0.65, "share", "of the usual support at the place then found", SEEDS)
+    denied_here: float = number(
+        0.5, "share", "of that place's support: most that the place of dead reckoning has", SEEDS
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,7 +21,6 @@ from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
-from slam.tracker.matching.local_search import Around, SearchWindow
 from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.matching.whole_search import WholeSearch
 from slam.tracker.rasterise import rasterise
@@ -38,14 +37,13 @@ def coarse(config: RelocaliseConfig) -> Float:
     return spread(config.coarse_m, math.radians(config.coarse_deg))
 
 
-def slip(config: RelocaliseConfig) -> Float:
-    """Covariance (3, 3) of a motion that odometry did not see."""
-    return spread(config.slipped_m, config.slipped_rad)
-
-
 def _near(one: Float, other: Float, config: RelocaliseConfig) -> bool:
+    return _within(one, other, config.same_m, config.same_rad)
+
+
+def _within(one: Float, other: Float, m: float, rad: float) -> bool:
     x, y, turn = (one - other).tolist()
-    return bool(x * x + y * y < config.same_m**2 and abs(se2.wrap(turn)) < config.same_rad)
+    return bool(x * x + y * y < m**2 and abs(se2.wrap(turn)) < rad)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -211,26 +209,39 @@ class Relocalisation:
             return None
         best, config = self.hypotheses[0], self._config
         rivals = [h for h in self.hypotheses if h.support > config.alias * best.support]
-        going_on = [h for h in rivals if _near(h.match.T_map_robot, predicted, config)]
+        going_on = [h for h in rivals if self._shoved(h, predicted)]
+        going_on.sort(key=lambda h: not _near(h.match.T_map_robot, predicted, config))
         if going_on:
             best = going_on[0]
-            self.went_on = True
+            self.went_on = _near(best.match.T_map_robot, predicted, config)
         elif len(rivals) > 1 or not (carried or self._drifted(best, predicted)):
             return None
         if best.waited or not (going_on or self.searches):
             return None  # not sure yet that nothing else explains it
-        enough = config.enough_later if best.tried(config, config.later) else config.enough
+        known = bool(going_on) or best.tried(config, config.later)
+        enough = config.enough_later if known else config.enough
+        if best.tried(config, config.last) and self._alone(best):
+            enough = config.enough_last
         enough_seen = best.tried(config) and best.seen >= config.least_weight
         if not enough_seen or best.support < enough * usual:
             return None
         self.accepted = best.support
         return best.match
 
+    def _alone(self, best: Hypothesis) -> bool:
+        """Whether nothing else explains nearly as much, though less than usual is explained."""
+        others = (h.support for h in self.hypotheses if h is not best)
+        return max(others, default=0.0) <= self._config.alone * best.support
+
     def _drifted(self, best: Hypothesis, predicted: Float) -> bool:
         """Whether drift alone may have led from that place to the one of dead reckoning."""
-        x, y, turn = (best.match.T_map_robot - predicted).tolist()
         config = self._config
-        return math.hypot(x, y) < config.drift_m and abs(se2.wrap(turn)) < config.drift_rad
+        return _within(best.match.T_map_robot, predicted, config.drift_m, config.drift_rad)
+
+    def _shoved(self, one: Hypothesis, predicted: Float) -> bool:
+        """Whether a shove alone may have done so."""
+        config = self._config
+        return _within(one.match.T_map_robot, predicted, config.farthest_m, config.farthest_rad)
 
     def _carried(
         self, old: Hypothesis, observations: Observations, prediction: Prediction
@@ -290,33 +301,6 @@ def support(cell_map: CellMap, observations: Observations, match: Match) -> floa
     cell_map.release()
     total = confirmed + contradicted
     return match.matched * confirmed / total if total > 0.0 else 0.0
-
-
-def slipped(
-    cell_map: CellMap,
-    matcher: Matcher,
-    observations: Observations,
-    prediction: Prediction,
-    usual: float,
-    around: Around | None = None,
-) -> Match | None:
-    """The place around the prediction that explains a frame about as well as ``usual``.
-
-    A robot that is shoved, or whose wheels slip, moves far beyond what its odometry says; under
-    that prior the right place is out of reach. None where too little is in view to decide.
-    """
-    config = matcher.config.tracking.relocalise
-    if float(observations.weights.sum()) < config.least_weight:
-        return None
-    elapsed = prediction.elapsed
-    window = SearchWindow(
-        reach_m=min(config.pushed_mps * elapsed, config.farthest_m),
-        turn_rad=min(config.pushed_radps * elapsed, config.farthest_rad),
-    )
-    loose = inverted(slip(config))
-    match = matcher.search(cell_map, observations, prediction.T_map_robot, loose, window, around)
-    sure = support(cell_map, observations, match) >= config.sure * usual
-    return replace(match, slipped=True) if sure else None
 
 
 def _kept(found: list[Hypothesis], usual: float, config: RelocaliseConfig) -> list[Hypothesis]:

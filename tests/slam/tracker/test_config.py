@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("20cefa3d14c0", "a93de9194c8d")),
-        (OccupancyConfig, ["grid"], ("61b33c9e62bd", "0f364709d996")),
+        (ShuntingConfig, [], ("1c684e5b3e92", "d1a57ceabf1a")),
+        (OccupancyConfig, ["grid"], ("8f7ae8fb3cc0", "5d650fd216c0")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
