@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import abc
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -25,7 +24,6 @@ from slam.path import PosePath
 from slam.tracker import map_file as memory
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
-from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
 from slam.tracker.standing.agreement import Agreement
@@ -34,7 +32,8 @@ from slam.tracker.standing.rival import Rival
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.quality import TrackingQuality
 from slam.tracker.tracking.relocalise import Relocalisation, coarse
-from slam.tracker.tracking.shove import best_around, is_denied, slip
+from slam.tracker.tracking.scan_matching import ScanMatching
+from slam.tracker.tracking.shove import slip
 from slam.tracker.tracking.verdict import Verdict
 from slam.tracker.tracking.wake import Wake
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
@@ -72,6 +71,7 @@ class Tracker(abc.ABC):
         self._pose_covariance = PoseCovariance(self.config)
         self._odometry_noise = OdometryNoise.of_beams(self.config)
         self._quality = TrackingQuality(self.config.freeze_below, self._numbers.quality)
+        self._matching = ScanMatching(self.config, self._matcher, self._quality)
         self._relocalisation: Relocalisation | None = None
         self._suspected: Relocalisation | None = None  # while frozen
         self._wake: Wake | None = None  # while frozen or lost
@@ -204,42 +204,9 @@ class Tracker(abc.ABC):
     def _match(
         self, observations: Observations, prediction: Prediction, wake: CellMap | None = None
     ) -> Match:
-        """Climb from the prediction; search around it when that is vague or finds too little.
-
-        ``wake``: to match to in the place of the map.
-        """
+        """By scan matching; ``wake``: to match to in the place of the map."""
         cell_map = self.cell_map if wake is None else wake
-        predicted = prediction.T_map_robot
-        prior = prediction.prior
-        precision = inverted(prior)
-        start = self._matcher.approach(cell_map, observations, predicted, prior)
-        match = self._matcher.climb(cell_map, observations, start, predicted, precision)
-        numbers = self.config.matching.local
-        near, widest = SearchWindow.about(prior, numbers), SearchWindow.widest(numbers)
-        good = numbers.good_share * self._quality.usual_match()
-        poor = numbers.widest_share * good
-        vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > numbers.vague_cells * self.config.cell_m
-        around = self._matcher.around(cell_map)
-        for window, wanted in ((near, vague or match.matched < good), (widest, True)):
-            if not wanted or (window is widest and match.matched >= poor):
-                break
-            found = self._matcher.search(
-                cell_map, observations, predicted, precision, window, around
-            )
-            if found.score > match.score:
-                match = found
-        quality = self._quality
-        votes = observations.votes
-        few = self._numbers.relocalise.few_vote
-        silenced = votes is not None and len(votes) > 0 and float(votes.mean()) < few
-        if not (match.matched < poor or silenced) or not quality.is_worth_searching_near():
-            return match
-        everyone, limits = replace(observations, votes=None), self._numbers.relocalise
-        there = best_around(cell_map, self._matcher, everyone, prediction, around)
-        usual = quality.usual_whole()
-        if there is None or not is_denied(cell_map, limits, everyone, match, there, usual):
-            return match
-        return replace(there, slipped=True)
+        return self._matching.match(cell_map, observations, prediction)
 
     def _recover(
         self, recovery: Relocalisation, observations: Observations, prediction: Prediction
