@@ -18,7 +18,7 @@ PUBLISHED = {
     "tour-guide-v1": "5af2086d9b4e",
     "rush-hour-v1": "4005dac13643",
     "busy-chairs-v1": "fbce4241b9fe",
-    "moving-boards-v1": "71c0bb1aaac7",
+    "moving-boards-v1": "2189a64a32cf",
     "moving-day-v1": "e56db9f29148",
     "overnight-v1": "db955dddc953",
     "classroom-break-v1": "b4d0c7adc550",
