@@ -114,7 +114,8 @@ _SCATTERED: Sets = {  # chairs at rest are most of what is in reach
     "motion": 0.0, "crowd": "none", "n_people": 0, "n_chairs": 60, "clutter": 0.1,
     "range_mode": "8m",
 }  # fmt: skip
-_BEDS = ((1, 2), (2, 4), (4, 6), (6, 8))  # and doctors
+_BEDS = ((1, 2), (1, 5), (2, 8), (3, 12))  # and doctors
+_TRAINS = ((1, 2), (2, 4), (3, 7), (4, 10))  # and pickers
 _CARRIED = ((2, 75), (4, 60), (6, 40), (8, 25))  # people, and s from one time to the next
 _ALL = (
     Track(
@@ -170,12 +171,13 @@ _ALL = (
     ),
     Track(
         name="warehouse-shift-v1",
-        about="trains of trolleys, pickers on foot, pallets that are gone when the robot is back",
-        scene="warehouse", axis="trains of two trolleys, two pickers for each",
-        says=_of("trains", 0, 1, 2, 3, 5), odometry=GOOD_ODOMETRY,
+        about="trains of trolleys, pickers beside the robot, pallets gone when it is back",
+        scene="warehouse", axis="trains of two trolleys, and pickers",
+        says=("0 trains", *(f"{_of('trains', a)[0]}, {b} pickers" for a, b in _TRAINS)),
+        odometry=GOOD_ODOMETRY,
         sets=_each(
             motion=LEVELS, change=LEVELS,
-            crowd=("none", *(f"trains:{n},streams:{2 * n}" for n in (1, 2, 3, 5))),
+            crowd=("none", *(f"trains:{a},streams:{a},escorts:{b}" for a, b in _TRAINS)),
         ),
     ),
     Track(
