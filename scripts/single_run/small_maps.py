@@ -10,7 +10,7 @@ from slam.maps import MAX_PIXELS
 from slam.replay import Track
 from slam.strips import MapStrips
 
-MOST_CELLS = 1600  # along the longer side: as many as our pictures have pixels
+MOST_CELLS = 800  # along the longer side; a picture of a map drops cells where it has more
 
 
 @dataclass(frozen=True, eq=False)
