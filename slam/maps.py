@@ -19,6 +19,7 @@ from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.estimate import Raster
 from slam.files import part_of, put, replacing, sync, sync_names, unfinished, write_bytes
+from slam.strips import MapStrips, of_raster
 
 OCCUPIED_THRESHOLD = 0.65
 # ROS 1's value. nav2's map_saver writes 0.25, with which a map_server takes the unknown gray 205
@@ -32,25 +33,25 @@ _STOPS_RGB = np.array([[252, 250, 245], [233, 160, 76], [22, 33, 58]], dtype=np.
 _GAP = rb"\s+(?:#[^\n]*\n\s*)*"  # PGM allows comments between the words of its header
 _PGM_HEADER = re.compile(rb"P5" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)" + _GAP + rb"255\s")
 _MAX_HEADER_BYTES = 4096
-_MAX_PIXELS = 1 << 28  # 490 m square at 3 cm cells
+MAX_PIXELS = 1 << 28  # 490 m square at 3 cm cells
 _MAX_YAML_BYTES = 1 << 16
 _EDITED = ": the sum differs (after a change on purpose, delete the two lines of sums in the YAML)"
 _IMAGE_SUM, _FIELDS_SUM = "sha256 of the image:", "sha256 of the lines below:"
 
 
-def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
+def write_map(stem: Path, map_: Raster | MapStrips) -> tuple[Path, Path]:
     """``<stem>.pgm`` and ``<stem>.yaml``; returns the two paths.
 
     Values above 0.65 are occupied (black), below 0.196 free, all between and NaN unknown: what a
     map_server in "trinary" mode makes of them. Two comments at the head of the YAML, which a
-    map_server skips, hold sums of the image and of the fields, for ``read_map``. Raises
-    ``OutputError`` when they cannot be written and ``InvalidValueError`` for a raster without
-    cells.
+    map_server skips, hold sums of the image and of the fields, for ``read_map``. The image is
+    written a strip at a time. Raises ``OutputError`` when they cannot be written and
+    ``InvalidValueError`` for a map without cells or with more than ``MAX_PIXELS``.
     """
-    _check_cells(raster)
+    raster = of_raster(map_) if isinstance(map_, Raster) else map_
+    height, width = raster.shape
+    _check_cells(height * width, raster.shape)
     pgm, yaml = stem.with_name(stem.name + ".pgm"), stem.with_name(stem.name + ".yaml")
-    height, width = raster.values.shape
-    header = f"P5\n{width} {height}\n255\n".encode("ascii")
     x, y, yaw = raster.T_map_origin.tolist()
     lines = [
         f"image: {pgm.name}",
@@ -61,15 +62,32 @@ def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
         f"occupied_thresh: {OCCUPIED_THRESHOLD}",
         f"free_thresh: {FREE_THRESHOLD}",
     ]
-    image, fields = header + _gray(raster)[::-1].tobytes(), "\n".join(lines) + "\n"
-    sums = f"# {_IMAGE_SUM} {_sha256(image)}\n# {_FIELDS_SUM} {_sha256(fields.encode())}\n"
-    with replacing(yaml) as new_yaml:
+    fields = "\n".join(lines) + "\n"
+    with replacing(yaml) as new_yaml, replacing(pgm) as new_pgm:  # the image is in place first
+        image_sum = _write_pgm(new_pgm, raster)
+        sums = f"# {_IMAGE_SUM} {image_sum}\n# {_FIELDS_SUM} {_sha256(fields.encode())}\n"
         new_yaml.write_text(sums + fields, encoding="utf-8")
-        with replacing(pgm) as new_pgm:  # the image is in place first
-            new_pgm.write_bytes(image)
-            _keep_earlier(yaml, pgm)
+        _keep_earlier(yaml, pgm)
     _kept(pgm).unlink(missing_ok=True)
     return pgm, yaml
+
+
+def _write_pgm(path: Path, map_: MapStrips) -> str:
+    """Write the image, highest y first; its sum."""
+    height, width = map_.shape
+    digest = hashlib.sha256()
+    with path.open("wb") as file:
+        header = f"P5\n{width} {height}\n255\n".encode("ascii")
+        digest.update(header)
+        file.write(header)
+        for first, last in reversed(list(map_.strips())):
+            strip = np.full((last - first, width), UNKNOWN, np.uint8)
+            for column, values in map_.pieces(first, last):
+                strip[:, column : column + values.shape[1]] = _gray(values)
+            image = strip[::-1].tobytes()
+            digest.update(image)
+            file.write(image)
+    return digest.hexdigest()
 
 
 def _keep_earlier(yaml: Path, pgm: Path) -> None:
@@ -146,9 +164,9 @@ def write_png(path: Path, raster: Raster, *, scale: int = 1) -> None:
 
     Raises ``OutputError`` when it cannot be written, ``InvalidValueError`` for no cells.
     """
-    _check_cells(raster)
     if scale < 1:
         raise InvalidValueError(f"scale must be >= 1 pixel per cell, got {scale}")
+    _check_cells(raster.values.size * scale**2, raster.values.shape)
     image = raster_image(raster).repeat(scale, axis=0).repeat(scale, axis=1)
     ok, data = cv2.imencode(".png", np.ascontiguousarray(image[..., ::-1]))
     if not ok:
@@ -156,15 +174,15 @@ def write_png(path: Path, raster: Raster, *, scale: int = 1) -> None:
     write_bytes(path, data.tobytes())
 
 
-def _check_cells(raster: Raster) -> None:
-    if raster.values.size == 0:
-        raise InvalidValueError(f"a map file needs a cell, got shape {raster.values.shape}")
+def _check_cells(count: int, shape: tuple[int, ...]) -> None:
+    if not 0 < count <= MAX_PIXELS:
+        raise InvalidValueError(f"a map file needs 1 to {MAX_PIXELS} cells, got shape {shape}")
 
 
-def _gray(raster: Raster) -> NDArray[np.uint8]:
-    gray = np.full(raster.values.shape, UNKNOWN, dtype=np.uint8)
-    gray[raster.values > OCCUPIED_THRESHOLD] = OCCUPIED  # false for NaN
-    gray[raster.values < FREE_THRESHOLD] = FREE
+def _gray(values: NDArray[np.float32]) -> NDArray[np.uint8]:
+    gray = np.full(values.shape, UNKNOWN, dtype=np.uint8)
+    gray[values > OCCUPIED_THRESHOLD] = OCCUPIED  # false for NaN
+    gray[values < FREE_THRESHOLD] = FREE
     return gray
 
 
@@ -225,7 +243,7 @@ def _sha256(data: bytes) -> str:
 
 
 def _read_pgm(path: Path, image_sum: str | None) -> NDArray[np.uint8]:
-    data = bytes_of(path, _MAX_PIXELS + _MAX_HEADER_BYTES)
+    data = bytes_of(path, MAX_PIXELS + _MAX_HEADER_BYTES)
     if image_sum is not None and _sha256(data) != image_sum:
         raise LogFormatError(path, f"is not the image that was written{_EDITED}")
     header = _PGM_HEADER.match(data[:_MAX_HEADER_BYTES])
@@ -233,6 +251,6 @@ def _read_pgm(path: Path, image_sum: str | None) -> NDArray[np.uint8]:
         raise LogFormatError(path, "not a binary PGM image of 8 bits (P5, maximum 255)")
     width, height = int(header[1][:9]), int(header[2][:9])
     pixels: NDArray[Any] = np.frombuffer(data, dtype=np.uint8, offset=header.end())
-    if not 0 < width * height <= _MAX_PIXELS or len(pixels) != width * height:
+    if not 0 < width * height <= MAX_PIXELS or len(pixels) != width * height:
         raise LogFormatError(path, f"{width} x {height} pixels expected, found {len(pixels)}")
     return pixels.reshape(height, width)

@@ -23,8 +23,10 @@ from slam.errors import (
 from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame, Stream
 from slam.oracle import shown
+from slam.strips import MapStrips, of_parts, of_raster
 from slam.system import (
     CanSave,
+    ChangesInParts,
     HasChanges,
     HasLandmarks,
     MapsInParts,
@@ -223,6 +225,43 @@ class Track:
             return self.map()
         with self._named("map_part()"), judged():
             return as_map(system.map_part(bounds))
+
+    def map_strips(self) -> MapStrips | None:
+        """The map now, a strip at a time where the system ``MapsInParts``; raises as ``map``."""
+        system = self.system
+        if not isinstance(system, MapsInParts):
+            raster = self.map()
+            return None if raster is None else of_raster(raster)
+        with self._named("map_squares()"), judged():
+            squares = system.map_squares()
+        return of_parts(self.map_part, squares)
+
+    def changes_strips(self) -> tuple[MapStrips, MapStrips] | None:
+        """What appeared and what is gone lately, so; raises as ``changes``."""
+        system = self.system
+        if not isinstance(system, MapsInParts) or not isinstance(system, ChangesInParts):
+            known = self.changes()
+            return None if known is None else (of_raster(known.appeared), of_raster(known.gone))
+        with self._named("map_squares()"), judged():
+            squares = system.map_squares()
+        appeared, gone = of_parts(self._appeared, squares), of_parts(self._gone, squares)
+        return None if appeared is None or gone is None else (appeared, gone)
+
+    def changes_part(self, bounds: tuple[float, float, float, float]) -> Changes | None:
+        """The changes within ``bounds`` of a system that has ``ChangesInParts``."""
+        system = self.system
+        if not isinstance(system, ChangesInParts):
+            return self.changes()
+        with self._named("changes_part()"), judged():
+            return system.changes_part(bounds)
+
+    def _appeared(self, bounds: tuple[float, float, float, float]) -> Raster | None:
+        part = self.changes_part(bounds)
+        return None if part is None else part.appeared
+
+    def _gone(self, bounds: tuple[float, float, float, float]) -> Raster | None:
+        part = self.changes_part(bounds)
+        return None if part is None else part.gone
 
     def landmarks(self) -> Landmarks | None:
         """Its landmarks, None for a system without; raises ``SlamFailedError`` as ``map`` does."""

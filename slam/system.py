@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError
-from slam.estimate import Changes, Estimate, Landmarks, Raster
+from slam.estimate import Changes, Estimate, Landmarks, MapSquares, Raster
 from slam.frames import Frame
 from slam.names import first_line, join_folders, refuse_code
 from slam.settings import Settings
@@ -39,8 +39,8 @@ from slam.trajectory import Trajectory
 from slam.variants import inside, oracle_of, parsed
 
 __all__ = [
-    "CanSave", "Changes", "Estimate", "HasChanges", "HasLandmarks", "Landmarks", "MapsInParts",
-    "Raster",
+    "CanSave", "Changes", "ChangesInParts", "Estimate", "HasChanges", "HasLandmarks", "Landmarks",
+    "MapSquares", "MapsInParts", "Raster",
     "RunsAtTheEnd", "SaysCells", "SlamSystem", "config_of", "create", "describe", "names",
     "refuse_at_the_end", "register", "register_prefix", "told",
 ]  # fmt: skip
@@ -93,12 +93,24 @@ class CanSave(Protocol):
 
 @runtime_checkable
 class MapsInParts(Protocol):
-    """Optional: a map that can be had in part. The film of a long log draws what has changed."""
+    """Optional: a map that can be had in part. The film of a long log draws what has changed, and
+    files and pictures of a large map are made without holding it as one raster."""
 
     def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
         """The cells of ``map()`` within xmin, ymin, xmax, ymax, m in the map frame, and their
         neighbours up to one cell, NaN where nothing is; None where nothing can be.
         """
+
+    def map_squares(self) -> MapSquares:
+        """Where ``map()`` has cells; none of them for an empty map."""
+
+
+@runtime_checkable
+class ChangesInParts(Protocol):
+    """Optional, beside ``MapsInParts``: changes that can be had in part."""
+
+    def changes_part(self, bounds: tuple[float, float, float, float]) -> Changes | None:
+        """The cells of ``changes()`` within ``bounds``, as ``map_part`` those of ``map()``."""
 
 
 @runtime_checkable

@@ -49,6 +49,7 @@ class Show:
     seen        the space that scans have swept; series, trails  errors and paths by track;
                 unsure  when the primary track did not trust itself
     changed     where the map may have changed since it was drawn last
+    filmed      whether ``paint`` will be called
     """
 
     replay: Replay
@@ -59,6 +60,7 @@ class Show:
     truth_name: str = "truth"
     pace: Pace = field(default_factory=Pace)
     size: Size = SIZE
+    filmed: bool = True
     seen: SeenSpace = field(default_factory=SeenSpace)
     series: dict[str, Series] = field(default_factory=dict)
     trails: dict[str, Trail] = field(default_factory=dict)
@@ -124,7 +126,7 @@ class Show:
                 error[2] = se2.wrap(float(error[2]))
             self.series.setdefault(name, Series()).add(seconds, error, estimate.covariance)
         self._note_trust(seconds)
-        if frame.scan is not None and self.stage.bounds is None:
+        if self.filmed and frame.scan is not None and self.stage.bounds is None:
             self.changed.add(frame.scan, self.track().estimates[-1].T_map_robot)
         return seconds
 

@@ -1,49 +1,118 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run costs: processor time of the SLAM and of the pictures, and memory."""
+"""What a run costs, stage by stage: processor time and memory."""
 
 from __future__ import annotations
 
 import resource
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
 
 from scripts.console import console
+from slam.frames import Frame, Stream
 from slam.replay import Replay
 
 _UNIT = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss, bytes
+_STATUS, _RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
+# What a run consists of: the log read or the room simulated, the SLAMs, files of the map, pictures,
+# film, and what else happens at a scan.
+INPUT, SLAM, MAP, PICTURES, FILM, REST = "input", "slam", "map", "pictures", "film", "rest"
+_SCANS = "scans"  # updates of the SLAM, and what else happens at a scan
+STAGES = (INPUT, SLAM, MAP, PICTURES, FILM, REST)
 
 
 class Costs:
-    """Processor seconds since it was made, of this process and of ffmpeg."""
+    """Processor seconds of the stages that are marked, and the most memory in each.
+
+    Film is drawn, and input read, between two updates of the SLAM; each second counts once.
+    """
 
     def __init__(self) -> None:
-        self._start_s = _spent_s()
-        self._at_end_s = 0.0
+        self._spent_s: defaultdict[str, float] = defaultdict(float)
+        self._most: defaultdict[str, int] = defaultdict(int)
+        self._open = [REST]
+        self._since_s = time.process_time()
+        _peak()
 
     @contextmanager
-    def slam(self) -> Iterator[None]:
-        """What happens in here is the SLAM's: closing loops at the end."""
-        start_s = time.process_time()
+    def stage(self, name: str) -> Iterator[None]:
+        """What happens in here is of that stage, but for other stages within."""
+        self._lap()
+        self._open.append(name)
         try:
             yield
         finally:
-            self._at_end_s += time.process_time() - start_s
+            self._lap()
+            self._open.pop()
+
+    def scans(self) -> AbstractContextManager[None]:
+        """The replay: updates are the SLAM's, input and film are marked within."""
+        return self.stage(_SCANS)
+
+    @contextmanager
+    def beside(self, name: str) -> Iterator[None]:
+        """Processes that begin and end in here, ffmpeg, are of that stage."""
+        before_s = _children_s()
+        try:
+            yield
+        finally:
+            spent_s = _children_s() - before_s
+            if spent_s > 0.0:  # a stage that there was not is none of 0 s
+                self._spent_s[name] += spent_s
+
+    def reading(self, stream: Stream) -> Stream:
+        """``stream``, its frames made at the cost of ``INPUT``."""
+
+        def frames() -> Iterator[Frame]:
+            source = iter(stream)
+            while True:
+                start_s = time.process_time()
+                frame = next(source, None)
+                self._moved(time.process_time() - start_s, INPUT)
+                if frame is None:
+                    return
+                yield frame
+
+        return replace(stream, frames=frames)
 
     def block(self, replay: Replay) -> dict[str, Any]:
-        """For ``results.json``: s, s and MB."""
+        """For ``results.json``: s and MB, of all and of each stage."""
+        self._lap()
         updates_s = sum(sum(track.durations_s) for track in replay.tracks.values())
-        slam_s = updates_s + self._at_end_s
-        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _UNIT
+        most = {**self._most, SLAM: max(self._most[SLAM], self._most[_SCANS])}
+        spent = {**self._spent_s, SLAM: self._spent_s[SLAM] + updates_s}
+        spent[REST] += max(spent.pop(_SCANS, 0.0) - updates_s, 0.0)
+        pictures_s = sum(spent.get(name, 0.0) for name in (MAP, PICTURES, FILM, REST))
         return {
-            "slam_s": round(slam_s, 1),
-            "pictures_s": round(max(_spent_s() - self._start_s - slam_s, 0.0), 1),
-            "memory_mb": round(most / 1e6),
+            "slam_s": round(spent[SLAM], 1),
+            "pictures_s": round(pictures_s, 1),
+            "input_s": round(spent.get(INPUT, 0.0), 1),
+            "memory_mb": round(max(most.values()) / 1e6),
+            "stages": {
+                name: {"s": round(spent[name], 2), "memory_mb": round(most[name] / 1e6)}
+                for name in STAGES
+                if name in spent
+            },
         }
+
+    def _lap(self) -> None:
+        """What was used since the last lap is the open stage's."""
+        now_s, name = time.process_time(), self._open[-1]
+        self._spent_s[name] += now_s - self._since_s
+        self._since_s = now_s
+        self._most[name] = max(self._most[name], _peak())
+
+    def _moved(self, seconds: float, name: str) -> None:
+        """Count these of the open stage's as another's."""
+        self._spent_s[self._open[-1]] -= seconds
+        self._spent_s[name] += seconds
 
 
 def say(block: dict[str, Any]) -> None:
@@ -55,6 +124,18 @@ def say(block: dict[str, Any]) -> None:
     console.print(escape(words), highlight=False, soft_wrap=True)
 
 
-def _spent_s() -> float:
+def _peak() -> int:
+    """The most memory since it was asked last, bytes; where no kernel says so, since the start."""
+    with suppress(OSError):
+        most = next(
+            (line for line in _STATUS.read_text().splitlines() if line.startswith("VmHWM")), ""
+        )
+        _RESET.write_text("5")  # proc(5): the peak is what is held now
+        if most:
+            return int(most.split()[1]) * 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _UNIT
+
+
+def _children_s() -> float:
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return time.process_time() + children.ru_utime + children.ru_stime
+    return children.ru_utime + children.ru_stime

@@ -8,6 +8,7 @@ import time
 from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import imageio.v2 as imageio
 from rich.markup import escape
 
 from scripts import figures
-from scripts.console import console, working
+from scripts.console import console, note, working
 from scripts.film import FPS
 from scripts.film.encode import Pace, film, require_ffmpeg
 from scripts.film.render import shoot, watched
@@ -23,13 +24,13 @@ from scripts.film.show import Show
 from scripts.names import file_name
 from scripts.output import machine, whole_folder, write_recipe
 from scripts.single_run import score
-from scripts.single_run.costs import Costs, say
-from scripts.single_run.small_maps import small_changes, small_map
+from scripts.single_run.costs import FILM, MAP, PICTURES, SLAM, Costs, say
+from scripts.single_run.small_maps import Drawn, drawn, for_file
 from slam.files import write_text
 from slam.frames import EPOCH, Stream
 from slam.maps import write_map
 from slam.replay import Replay
-from slam.trajectory import write_tum
+from slam.trajectory import Trajectory, write_tum
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +44,7 @@ class Outputs:
     film: bool = True
     film_fps: float = FPS
     pace: Pace | None = None  # of the film; None: real time, or faster for it to last a minute
+    costs: Costs | None = None  # what reading has cost; None: counted from here on
 
 
 def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
@@ -59,18 +61,22 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         command=outputs.command,
         settings=outputs.settings,
     ) as folder:
-        costs = Costs()
+        costs, show.filmed = outputs.costs or Costs(), outputs.film
         show.pace = outputs.pace or Pace.within_a_minute(show.duration_s, outputs.film_fps)
         reel = film(folder / "film.mp4", show.pace.fps) if outputs.film else nullcontext()
         started = time.perf_counter()
-        with reel as opened:
-            for _ in watched(shoot(stream, show, opened), stream, show.title):
+        with costs.beside(FILM), reel as opened, costs.scans():
+            frames = shoot(costs.reading(stream), show, opened, partial(costs.stage, FILM))
+            for _ in watched(frames, stream, show.title):
                 pass
         wall_s = time.perf_counter() - started
-        with costs.slam(), working("closing loops, scoring"):
+        with costs.stage(SLAM), working("closing loops, scoring"):
             results = score.results(replay, wall_s, machine())
-        with working("drawing map, paths and errors"):
-            _draw(folder, replay, show, int(stream.metadata.extra.get(EPOCH, 0)))
+        with costs.stage(MAP), working("writing map and paths"):
+            _write_paths(folder, replay, int(stream.metadata.extra.get(EPOCH, 0)))
+            in_pictures = _write_map(folder, show)
+        with costs.stage(PICTURES), working("drawing map, paths and errors"):
+            _draw(folder, show, in_pictures)
             if opened is not None and opened.last is not None:
                 imageio.imwrite(folder / "poster.png", opened.last)
         results["cost"] = costs.block(replay)
@@ -82,35 +88,48 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
     return results
 
 
-def _draw(folder: Path, replay: Replay, show: Show, epoch_ns: int) -> None:
-    """Maps, trajectories and their pictures."""
-    online = {name: track.online() for name, track in replay.tracks.items()}
-    world_truth = replay.truth()
-    truth = figures.in_first_frame(world_truth) if world_truth is not None else None
-    primary = replay.tracks[show.primary]
-    raster = primary.map()
-    truth_name = show.truth_name
-    for name, track in online.items():
-        write_tum(folder / f"trajectory_{file_name(name)}.tum", track, epoch_ns)
-        final = replay.tracks[name].final()
+def _write_paths(folder: Path, replay: Replay, epoch_ns: int) -> None:
+    for name, track in replay.tracks.items():
+        write_tum(folder / f"trajectory_{file_name(name)}.tum", track.online(), epoch_ns)
+        final = track.final()
         if final is not None:
             write_tum(folder / f"trajectory_{file_name(name)}_final.tum", final, epoch_ns)
+    truth = _truth(replay)
     if truth is not None:
         write_tum(folder / "trajectory_truth.tum", truth, epoch_ns)
-        figures.errors(folder / "errors.png", online, truth)
-    small = None
-    if raster is not None:
-        write_map(folder / "map", show.seen.merge(raster))
-        small = small_map(raster)
-        del raster  # a large one has its gigabyte
-    figures.trajectories(folder / "trajectories.png", online, truth, small, truth_name)
-    own, changes_png = online[show.primary], folder / "changes.png"
-    if small is not None:
-        figures.map_picture(folder / "map.png", small, own, show.last_points_map)
+
+
+def _truth(replay: Replay) -> Trajectory | None:
+    world_truth = replay.truth()
+    return None if world_truth is None else figures.in_first_frame(world_truth)
+
+
+def _write_map(folder: Path, show: Show) -> Drawn | None:
+    """The map for a map_server and the SLAM's own; what pictures show of it, where it has one."""
+    primary = show.track()
+    found = drawn(primary)
+    if found is not None:
+        cells, said = for_file(show.seen.merge(found.cells))
+        write_map(folder / "map", cells)
+        if said:
+            note(said)
     primary.save(folder / "map.npz")
-    changes = primary.changes()
-    if small is not None and changes is not None:
-        figures.changes_picture(changes_png, small, small_changes(changes), own)
+    return found
+
+
+def _draw(folder: Path, show: Show, found: Drawn | None) -> None:
+    """Trajectories, errors, the map and what changed in it."""
+    online = {name: track.online() for name, track in show.replay.tracks.items()}
+    truth, own = _truth(show.replay), online[show.primary]
+    if truth is not None:
+        figures.errors(folder / "errors.png", online, truth)
+    raster = None if found is None else found.map
+    figures.trajectories(folder / "trajectories.png", online, truth, raster, show.truth_name)
+    if found is None:
+        return
+    figures.map_picture(folder / "map.png", found.map, own, show.last_points_map)
+    if found.changes is not None:
+        figures.changes_picture(folder / "changes.png", found.map, found.changes, own)
 
 
 _WORTH_OPENING = ("film.mp4", "map.png", "changes.png", "trajectories.png", "errors.png")

@@ -1,38 +1,59 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Large maps in as many cells as a picture has pixels: drawn whole, they take all the memory."""
+"""Large maps for files and pictures, in as many cells as those have room for."""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
 
 from slam.estimate import Changes, Raster
+from slam.maps import MAX_PIXELS
+from slam.replay import Track
+from slam.strips import MapStrips
 
-MOST_CELLS = 2400  # along the longer side: more than our pictures have pixels
-_STRIPE = 64  # rows of the result that are made at a time
+MOST_CELLS = 800  # along the longer side; a picture of a map drops cells where it has more
 
 
-def small_map(raster: Raster, most: int = MOST_CELLS) -> Raster:
-    """``raster`` in fewer cells, each the largest of several: a thin wall stays one.
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A map and its changes as pictures show them.
 
-    The same object where it has no more than ``most`` cells along its longer side.
+    n   so many cells a side are one
     """
-    n = -(-max(raster.values.shape) // most)
-    if n <= 1:
-        return raster
-    stripes = []
-    for first in range(0, raster.values.shape[0], n * _STRIPE):
-        part = raster.values[first : first + n * _STRIPE]
-        padded = np.pad(part, [(0, -size % n) for size in part.shape], constant_values=np.nan)
-        height, width = padded.shape
-        blocks = padded.reshape(height // n, n, width // n, n)
-        stripes.append(np.fmax.reduce(np.fmax.reduce(blocks, axis=3), axis=1))
-    return Raster(
-        values=np.vstack(stripes),
-        resolution_m=n * raster.resolution_m,
-        T_map_origin=raster.T_map_origin,
+
+    cells: MapStrips
+    map: Raster
+    changes: Changes | None
+    n: int
+
+
+def drawn(track: Track, most: int = MOST_CELLS) -> Drawn | None:
+    """What is known of a track's map in at most ``most`` cells along its longer side, each the
+    largest of several: a thin wall stays. None where nothing is known.
+
+    Raises as ``Track.map`` does.
+    """
+    cells = track.map_strips()
+    known = None if cells is None else cells.known()
+    if cells is None or known is None:
+        return None
+    part = cells.cut(known)
+    n = max(-(-max(part.shape) // most), 1)
+    changes, found = None, track.changes_strips()
+    if found is not None:
+        same = [layer.cut(known) if layer.shape == cells.shape else layer for layer in found]
+        appeared, gone = (layer.joined(n).whole() for layer in same)
+        changes = Changes(appeared=appeared, gone=gone)
+    return Drawn(part, part.joined(n).whole(), changes, n)
+
+
+def for_file(cells: MapStrips) -> tuple[MapStrips, str]:
+    """A map that fits into one image file, and what to say where its cells had to be joined."""
+    fitting = cells.within(MAX_PIXELS)
+    if fitting is cells:
+        return cells, ""
+    height, width = cells.shape
+    return fitting, (
+        f"map.pgm has cells of {fitting.resolution_m:g} m instead of {cells.resolution_m:g} m: "
+        f"the map is {width * cells.resolution_m:.0f} m x {height * cells.resolution_m:.0f} m, "
+        f"and an image has {MAX_PIXELS} cells at most."
     )
-
-
-def small_changes(changes: Changes, most: int = MOST_CELLS) -> Changes:
-    """Both layers so."""
-    return Changes(appeared=small_map(changes.appeared, most), gone=small_map(changes.gone, most))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -16,9 +16,6 @@ from scripts.oracle_option import Oracles, with_oracles
 from scripts.scanner_option import Scanner
 from scripts.set_option import Set
 from slam.errors import InvalidValueError
-
-if TYPE_CHECKING:
-    from scripts.film.footage import Footage
 
 
 def run(
@@ -82,8 +79,8 @@ def run(
     if log is None and (strict or text_format is not None):
         raise InvalidValueError("--strict and --format are about a --log")
     if log is not None:
-        footage = _opened(log, strict, text_format)
-        on_log(slam, log, footage, out or Path("out") / f"run-{run_name(log)}", overwrite, film)
+        folder = out or Path("out") / f"run-{run_name(log)}"
+        on_log(slam, log, folder, overwrite, film, strict=strict, text_format=text_format)
     elif scene is not None:
         from scripts.single_run.live import on_scene, tour
         from scripts.single_run.session import Outputs
@@ -96,20 +93,25 @@ def run(
         )
 
 
-def _opened(path: Path, strict: bool, text_format: Path | None) -> Footage:
-    from scripts.film.footage import of_log
-
-    with working(f"reading {path.name}"):
-        return of_log(path, strict=strict, text_format=text_format)
-
-
 def on_log(
-    names: list[str], path: Path, footage: Footage, out: Path, overwrite: bool, film: bool
+    names: list[str],
+    path: Path,
+    out: Path,
+    overwrite: bool,
+    film: bool,
+    *,
+    strict: bool = False,
+    text_format: Path | None = None,
 ) -> dict[str, Any]:
     """Run SLAMs on a recorded log."""
     from scripts.film.encode import Pace
+    from scripts.film.footage import of_log
+    from scripts.single_run.costs import INPUT, Costs
     from scripts.single_run.session import Outputs, run_session
 
+    costs = Costs()
+    with costs.stage(INPUT), working(f"reading {path.name}"):
+        footage = of_log(path, strict=strict, text_format=text_format)
     show = footage.show(names)
     settings = {
         "slams": list(show.replay.tracks),
@@ -127,5 +129,6 @@ def on_log(
             overwrite=overwrite,
             film=film,
             pace=Pace.of_log(footage.duration_s, footage.stream.length or 1),
+            costs=costs,
         ),
     )

@@ -7,7 +7,7 @@ wants both, so whoever writes such a map keeps this beside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import cv2
 import numpy as np
@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.errors import InvalidValueError
-from slam.estimate import Raster
 from slam.frames import Float, Scan
 from slam.frontend.config import FRONTEND
+from slam.strips import MapStrips, Piece, Span, runs
 
 # Black or slanted surfaces give no return either: beyond this a silent beam says nothing.
 FREE_WITHOUT_RETURN_M = FRONTEND.view.silent_m
@@ -55,51 +55,71 @@ class SeenSpace:
     def _occupied_tiles(self) -> Iterator[tuple[int, int]]:
         return (key for key, tile in self._tiles.items() if tile.any())
 
-    def merge(self, raster: Raster) -> Raster:
-        """``raster`` with 0 where it was unknown and something has been seen; at least its extent.
+    def merge(self, map_: MapStrips) -> MapStrips:
+        """``map_`` with 0 where it was unknown and something has been seen, the unknown rim left
+        out.
 
-        Only rasters aligned with the map's axes.
+        Only maps along the map frame's axes. What is seen later is not in it.
         """
-        x, y, yaw = raster.T_map_origin.tolist()
+        x, y, yaw = map_.T_map_origin.tolist()
         if yaw != 0.0:
-            raise InvalidValueError(f"merge needs a raster along the map's axes, got yaw {yaw} rad")
-        step, size = raster.resolution_m, _CHUNK * self.resolution_m
-        height, width = raster.values.shape
+            raise InvalidValueError(f"merge needs a map along the map's axes, got yaw {yaw} rad")
+        step, size = map_.resolution_m, _CHUNK * self.resolution_m
+        height, width = map_.shape
         keys = np.array(list(self._occupied_tiles()), dtype=int).reshape(-1, 2)
         if len(keys) == 0:
-            return raster
+            return map_
         corner = np.array([x, y])
         opposite = corner + np.array([width, height]) * step
         low = np.minimum(corner, keys.min(axis=0)[::-1] * size)
         high = np.maximum(opposite, (keys.max(axis=0)[::-1] + 1) * size)
         before = np.ceil((corner - low) / step - 1e-9).astype(int)
         after = np.ceil((high - opposite) / step - 1e-9).astype(int)
-        margins = ((int(before[1]), int(after[1])), (int(before[0]), int(after[0])))
-        values = np.pad(raster.values, margins, constant_values=np.nan)
+        first_row, first_column = int(before[1]), int(before[0])
+        shape = height + first_row + int(after[1]), width + first_column + int(after[0])
         origin = corner - before * step
-        seen = self._sample(origin, values.shape, step)
-        values[np.isnan(values) & seen] = 0.0
-        return _cropped(values, origin, step)
+        ours = self._cells(origin[1], shape[0], step), self._cells(origin[0], shape[1], step)
+        in_row = {row: np.sort(keys[keys[:, 0] == row, 1]).tolist() for row in set(keys[:, 0])}
 
-    def _sample(self, origin: Float, shape: tuple[int, ...], step: float) -> NDArray[np.bool_]:
-        """(height, width) whether the centre of each cell has been seen."""
-        i = np.floor((origin[1] + (np.arange(shape[0]) + 0.5) * step) / self.resolution_m)
-        j = np.floor((origin[0] + (np.arange(shape[1]) + 0.5) * step) / self.resolution_m)
-        rows, columns = i.astype(int), j.astype(int)
-        seen = np.zeros(shape, dtype=np.bool_)
-        for (row, column), tile in self._tiles.items():
-            a = np.flatnonzero(rows // _CHUNK == row)
-            b = np.flatnonzero(columns // _CHUNK == column)
-            if len(a) and len(b):
-                part = tile[np.ix_(rows[a] % _CHUNK, columns[b] % _CHUNK)]
-                seen[np.ix_(a, b)] = part.astype(np.bool_)
-        return seen
+        def pieces(first: int, last: int) -> Iterator[Piece]:
+            rows, columns = ours[0][first:last], ours[1]
+            a, b = max(first, first_row), min(last, first_row + height)
+            there = [] if a >= b else map_.pieces(a - first_row, b - first_row)
+            known = [(column + first_column, values) for column, values in there]
+            seen = list(_tiles_met(rows, columns, in_row))
+            spans = [(column, column + values.shape[1]) for column, values in known]
+            for left, right in runs(spans + [span for _, _, span in seen]):
+                out = np.full((last - first, right - left), np.nan, np.float32)
+                for column, values in known:
+                    if left <= column < right:
+                        end = column - left + values.shape[1]
+                        out[a - first : b - first, column - left : end] = values
+                for key, (i0, i1), (j0, j1) in seen:
+                    if left <= j0 < right:
+                        at = np.ix_(rows[i0:i1] % _CHUNK, columns[j0:j1] % _CHUNK)
+                        part = out[i0:i1, j0 - left : j1 - left]
+                        part[np.isnan(part) & (self._tiles[key][at] != 0)] = 0.0
+                yield left, out
+
+        T_map_origin = np.array([*origin, 0.0])
+        whole = MapStrips(shape=shape, resolution_m=step, T_map_origin=T_map_origin, pieces=pieces)
+        known = whole.known()
+        return map_ if known is None else whole.cut(known)
+
+    def _cells(self, edge: float, count: int, step: float) -> NDArray[np.int64]:
+        """Our cells, along one axis, in which the centres of ``count`` others from ``edge`` lie."""
+        centres = edge + (np.arange(count) + 0.5) * step
+        cells: NDArray[np.int64] = np.floor(centres / self.resolution_m).astype(np.int64)
+        return cells
 
 
-def _cropped(values: NDArray[np.float32], origin: Float, step: float) -> Raster:
-    """Without the empty rim."""
-    known = ~np.isnan(values)
-    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
-    part = values[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    corner = origin + np.array([columns[0], rows[0]]) * step
-    return Raster(values=part, resolution_m=step, T_map_origin=np.array([*corner, 0.0]))
+def _tiles_met(
+    rows: NDArray[np.int64], columns: NDArray[np.int64], in_row: Mapping[int, Sequence[int]]
+) -> Iterator[tuple[tuple[int, int], Span, Span]]:
+    """Tiles with any of ``rows`` and ``columns`` (rising), and which of these they have."""
+    for row in range(int(rows[0]) // _CHUNK, int(rows[-1]) // _CHUNK + 1):
+        i0, i1 = np.searchsorted(rows, (row * _CHUNK, (row + 1) * _CHUNK)).tolist()
+        for column in in_row.get(row, ()):
+            j0, j1 = np.searchsorted(columns, (column * _CHUNK, (column + 1) * _CHUNK)).tolist()
+            if i0 < i1 and j0 < j1:
+                yield (row, column), (i0, i1), (j0, j1)

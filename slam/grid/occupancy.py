@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import njit
+from slam.estimate import MapSquares
 from slam.frames import Float
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
 from slam.grid.config import OccupancyConfig
@@ -235,3 +236,7 @@ class OccupancySlam(Tracker):
         grid = self.cell_map
         assert isinstance(grid, Grid)
         return grid.probabilities(bounds)
+
+    def map_squares(self) -> MapSquares:
+        """Where cells were seen."""
+        return self.cell_map.squares()

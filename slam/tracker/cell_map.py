@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError
+from slam.estimate import SQUARE, MapSquares
 from slam.frontend.visibility import View
 from slam.tracker.cells import SIDE, Cells, dense, forget_impressions, living, no_cells, with_room
 from slam.tracker.config import TrackerConfig
@@ -128,6 +129,12 @@ class CellMap(abc.ABC):
             return None
         (i0, j0), (i1, j1) = places.min(axis=0).tolist(), (places.max(axis=0) + 1).tolist()
         return i0 * SIDE, j0 * SIDE, i1 * SIDE, j1 * SIDE
+
+    def squares(self) -> MapSquares:
+        """Where blocks live."""
+        _, places = living(self.cells)
+        found = np.unique(places[:, ::-1] * SIDE // SQUARE, axis=0)
+        return MapSquares(self.cell, found.astype(np.int64))
 
     def raster_extent(
         self, bounds: tuple[float, float, float, float] | None = None

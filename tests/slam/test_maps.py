@@ -197,6 +197,6 @@ def test_a_raster_without_cells_is_no_map(tmp_path):
         lambda: maps.write_map(tmp_path / "m", empty),
         lambda: maps.write_png(tmp_path / "m.png", empty),
     ):
-        with pytest.raises(InvalidValueError, match="needs a cell"):
+        with pytest.raises(InvalidValueError, match="needs 1 to"):
             write()
     assert list(tmp_path.iterdir()) == []

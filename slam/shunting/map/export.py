@@ -29,21 +29,27 @@ def existence(
     return _raster(network, values, extent)
 
 
-def changes(network: Network) -> Changes | None:
+def changes(
+    network: Network, bounds: tuple[float, float, float, float] | None = None
+) -> Changes | None:
     """What appeared and what is gone; None for an empty network or one without a trace.
 
     A constant input I holds x at I / (A + I), so A x / (1 - x) is the input that x speaks of.
+    ``bounds`` and errors as of ``existence``.
     """
-    extent = network.raster_extent()
+    extent = network.raster_extent(bounds)
     if extent is None or network.config.trace_s == 0.0:
         return None
-    x, y = _dense(network, extent)
-    lately = np.minimum(np.float32(network.config.decay_per_s) * x / (1.0 - x), np.float32(1.0))
     reach = network.config.map.beside_cells
+    rim = 0 if bounds is None else reach  # what is beside the part counts as well
+    x, y = _dense(network, (extent[0] - rim, extent[1] - rim, extent[2] + rim, extent[3] + rim))
+    lately = np.minimum(np.float32(network.config.decay_per_s) * x / (1.0 - x), np.float32(1.0))
     appeared, gone = lately - _around(y, reach), y - _around(lately, reach)
     for layer in (appeared, gone):
         np.maximum(layer, np.float32(0.0), out=layer)
         layer[(x == 0.0) & (y == 0.0)] = np.nan
+    inner = np.s_[rim : x.shape[0] - rim, rim : x.shape[1] - rim]
+    appeared, gone = appeared[inner], gone[inner]
     return Changes(appeared=_raster(network, appeared, extent), gone=_raster(network, gone, extent))
 
 

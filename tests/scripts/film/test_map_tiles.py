@@ -10,9 +10,10 @@ from scripts.film.changed import Changed
 from scripts.film.encode import LAPSE_FPS, MOST_PICTURES, Pace
 from scripts.film.map_pane import View, raster_picture
 from scripts.film.map_tiles import TILE, MapTiles
-from scripts.single_run.small_maps import small_map
+from scripts.single_run.small_maps import drawn, for_file
 from slam import create
 from slam.replay import Track
+from slam.strips import of_raster
 from slam.system import MapsInParts, Raster
 from tests.world2d import World2D, frames, laser, office, office_loop
 
@@ -103,16 +104,39 @@ def test_the_parts_of_a_slam_are_those_of_its_map():
     assert odometry.map_part((0.0, 0.0, 1.0, 1.0)) is None
 
 
-def test_a_small_map_keeps_thin_walls_and_its_extent():
+class Kept:
+    """A SLAM that has this map."""
+
+    def __init__(self, raster: Raster) -> None:
+        self.raster = raster
+
+    def map(self) -> Raster:
+        return self.raster
+
+
+def test_a_map_in_pictures_keeps_thin_walls_and_its_extent():
     raster = made(1001, 530)
-    small = small_map(raster, most=300)
-    assert max(small.values.shape) <= 300
-    assert small.resolution_m == pytest.approx(4 * CELL)
-    assert np.nanmax(small.values) == np.nanmax(raster.values)
+    found = drawn(Track("kept", Kept(raster)), most=300)
+    assert max(found.map.values.shape) <= 300
+    assert found.map.resolution_m == pytest.approx(4 * CELL)
+    assert found.changes is None
+    assert np.nanmax(found.map.values) == np.nanmax(raster.values)
     blocks = raster.values[:1000, :528].reshape(250, 4, 132, 4)
     largest = np.fmax.reduce(np.fmax.reduce(blocks, axis=3), axis=1)
-    np.testing.assert_array_equal(small.values[:250, :132], largest)
-    assert small_map(raster, most=1001) is raster
+    np.testing.assert_array_equal(found.map.values[:250, :132], largest)
+    np.testing.assert_array_equal(
+        drawn(Track("kept", Kept(raster)), most=1001).map.values, raster.values
+    )
+    assert drawn(Track("none", create("odometry"))) is None
+
+
+def test_a_map_too_large_for_an_image_has_coarser_cells_and_says_so(monkeypatch):
+    strips = of_raster(made(1000, 500))
+    assert for_file(strips) == (strips, "")
+    monkeypatch.setattr("scripts.single_run.small_maps.MAX_PIXELS", 125_000)
+    fitting, said = for_file(strips)
+    assert fitting.shape == (500, 250)
+    assert "cells of 0.1 m instead of 0.05 m: the map is 25 m x 50 m" in said
 
 
 def test_the_film_of_a_long_log_has_a_bounded_number_of_pictures():

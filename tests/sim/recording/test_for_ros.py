@@ -20,7 +20,6 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from scripts.figures import in_first_frame
-from scripts.film.footage import of_log
 from scripts.verbs.generate import generate
 from scripts.verbs.run import on_log
 from sim.moments import toured
@@ -199,8 +198,7 @@ def test_a_bag_of_another_format_is_not_called_changed(tmp_path: Path):
 
 
 def test_a_run_on_an_episode_has_the_times_of_its_bag(recorded, tmp_path: Path):
-    footage = of_log(recorded.path)
-    on_log(["odometry"], recorded.path, footage, tmp_path / "run", overwrite=False, film=False)
+    on_log(["odometry"], recorded.path, tmp_path / "run", overwrite=False, film=False)
     stamps = read_tum(recorded.path / "trajectory.tum").stamps_ns.tolist()
     for name in ("odometry", "truth"):
         assert read_tum(tmp_path / "run" / f"trajectory_{name}.tum").stamps_ns.tolist() == stamps

@@ -11,6 +11,7 @@ import pytest
 from slam.errors import InvalidValueError
 from slam.frames import LaserSpec, Scan
 from slam.frontend.seen_space import SeenSpace
+from slam.strips import of_raster
 from slam.system import Raster
 
 SPEC = LaserSpec(n_beams=181, angle_min=-math.pi / 2, angle_increment=math.radians(1.0))
@@ -32,7 +33,7 @@ def blank(extent: float = 0.3, step: float = 0.1) -> Raster:
 
 @pytest.mark.parametrize("pose", [(0.0, 0.0, 0.0), (3.3, -17.2, 2.0), (-40.0, 12.0, -1.0)])
 def test_a_half_disc_of_free_space_has_its_area_and_place(pose):
-    raster = half_disc(4.0, pose).merge(blank())
+    raster = half_disc(4.0, pose).merge(of_raster(blank())).whole()
     free = np.argwhere(raster.values == 0.0)
     area = len(free) * raster.resolution_m**2
     assert area == pytest.approx(math.pi * 16.0 / 2.0, rel=0.05)
@@ -46,7 +47,7 @@ def test_what_is_there_stays_and_what_was_not_seen_stays_unknown():
     values = np.full((60, 60), np.nan, np.float32)
     values[10, 20], values[5, 55] = 0.9, 0.8  # the second lies behind the robot's sight
     raster = Raster(values=values, resolution_m=0.1, T_map_origin=np.array([-1.0, -1.0, 0.0]))
-    merged = half_disc(2.0, (0.0, 0.0, 0.0)).merge(raster)
+    merged = half_disc(2.0, (0.0, 0.0, 0.0)).merge(of_raster(raster)).whole()
     assert np.nanmax(merged.values) == np.float32(0.9)
     assert (merged.values == np.float32(0.8)).sum() == 1
     assert np.isnan(merged.values).any()
@@ -57,12 +58,12 @@ def test_errors_and_missing_returns_claim_little():
     ranges[::2] = np.nan
     seen = SeenSpace(0.1)
     seen.add(Scan(stamp_ns=0, ranges=ranges, spec=SPEC), np.zeros(3))
-    free = (seen.merge(blank()).values == 0.0).sum() * 0.01
+    free = (seen.merge(of_raster(blank())).whole().values == 0.0).sum() * 0.01
     assert free < 0.6 * math.pi * 30.0**2 / 2.0
 
 
 def test_nothing_seen_changes_nothing():
-    raster = blank()
-    assert SeenSpace().merge(raster) is raster
+    strips = of_raster(blank())
+    assert SeenSpace().merge(strips) is strips
     with pytest.raises(InvalidValueError, match="resolution_m"):
         SeenSpace(0.0)
