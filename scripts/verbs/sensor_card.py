@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mobilia sensor-card``: a simulated scanner measured against its data sheet, row by row."""
+"""``mobilia sensor-card``: a simulated scanner beside its data sheet, or beside a real log."""
 
 from __future__ import annotations
 
@@ -22,13 +22,30 @@ def sensor_card(
     scanner: Annotated[
         str, typer.Option(help="Which one, by name: utm30lx, tim561, ... (mobilia list).")
     ] = "lms221",
+    log: Annotated[
+        list[Path] | None,
+        typer.Option(help="A real log to set it beside; several are taken for one scanner's."),
+    ] = None,
+    text_format: Annotated[
+        Path | None,
+        typer.Option("--format", help="TOML file that says which columns of a text log hold what."),
+    ] = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Refuse a log that would have to be repaired.")
+    ] = False,
 ) -> None:
-    """Measure a simulated scanner against its data sheet; with --out, as a page.
+    """Measure a simulated scanner against its data sheet, or with --log beside a real one.
 
-    The LMS-221's page has figures; that of another scanner is sensor_card_NAME.md.
+    The LMS-221's page has figures; that of another scanner is sensor_card_NAME.md. With --log,
+    noise, mixed pixels, lost beams and rounding are measured on the log and on simulated scans
+    by the same code. The LMS-221 then takes the log's angle between beams.
 
     [bold]mobilia sensor-card --scanner utm30lx[/bold]
+    [bold]mobilia sensor-card --log robot.log[/bold]
     """
+    if log:
+        beside_log(log, scanner, out, text_format=text_format, strict=strict)
+        return
     from scripts.card import page, stated  # mujoco: only once the environment is known good
     from scripts.card import rows as sensor_rows
     from sim.sensors.lidar.registry import DEFAULT, describe
@@ -55,3 +72,31 @@ def sensor_card(
     broken = [row.what for row in rows if not row.kept]
     if broken:
         raise MobiliaError(f"the scanner departs from its data sheet: {'; '.join(broken)}")
+
+
+def beside_log(
+    logs: list[Path], scanner: str, out: Path | None, *, text_format: Path | None, strict: bool
+) -> None:
+    """Print the two cards side by side; with ``out``, also write them as real_scanner_log.md."""
+    from scripts.card.real import table
+    from scripts.card.real.beside import like, real_card, simulated_card
+    from sim.sensors.lidar.registry import scanner_of
+
+    scanner_of(scanner)  # an unknown name is said before anything is read
+    with working("measuring the log"):
+        real = {"log": real_card(logs, text_format=text_format, strict=strict)}
+    name = like(real["log"], scanner)
+    with working("simulating and measuring"):
+        ours = {name: simulated_card(name)}
+    title = "value (95 % interval, whole stretches drawn again); ≠: the intervals do not meet"
+    shown = Table(*map(escape, table.headings(real, ours)), title=title, title_justify="left")
+    for line in table.lines(real, ours):
+        shown.add_row(*table.cells(line))
+    console.print(shown)
+    for what, card in {**real, **ours}.items():
+        note(f"{what}: {table.amount(card)}")
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        text = f"# {', '.join(log.name for log in logs)} beside {name}\n\n"
+        write_text(out / "real_scanner_log.md", f"{text}{table.markdown(real, ours)}\n")
+        note(f"wrote {out / 'real_scanner_log.md'}")

@@ -40,7 +40,7 @@ OPEN_NOTHING = {
     "config": "numbers of ours",
     "bench": "scenes of ours",
     "doctor": "the installed packages",
-    "sensor-card": "scenes of ours",
+    "sensor-card": "scenes of ours; logs by the readers of run --log",
     "live": "logs and bags by the readers of run --log; its scene and SLAM are typed",
     "reproduce": "logs by the readers of run --log; its results, of which it takes numbers",
 }

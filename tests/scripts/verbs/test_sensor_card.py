@@ -1,18 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every row of the sensor card holds; the page and its pictures are written, and small."""
+"""Every row of the sensor card holds; the page and its pictures are written, and small.
+
+Beside a real log, simulated scans are measured by the same code.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from scripts.card import rows as sensor_rows
 from scripts.card import stated
+from scripts.card.real import beside, table
+from scripts.card.real.picture import draw
+from scripts.card.real.simulated import simulated
 from scripts.verbs.sensor_card import sensor_card
+from sim.sensors.lidar.registry import scanner_of
 from sim.sensors.lidar.sheet import NOT_STATED, sheet_of
-from slam.errors import InvalidValueError, MobiliaError, UnknownNameError
+from slam.errors import InvalidValueError, LogFormatError, MobiliaError, UnknownNameError
+from slam.evaluation.scanner.card import ScannerCard, measure
+from slam.evaluation.scanner.figures import Figure
 
 
 @pytest.mark.parametrize(
@@ -80,3 +90,105 @@ def test_a_scanner_without_a_data_sheet_has_no_card() -> None:
         sensor_card(scanner="scanner")
     with pytest.raises(UnknownNameError, match="Did you mean 'tim561'"):
         sensor_card(scanner="tim562")
+
+
+# -- beside real logs -----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def cards() -> dict[str, ScannerCard]:
+    """Of the LMS-221 as its data sheet has it, and with less noise, in one small scene."""
+    made = {}
+    for noise_m in (0.010, 0.0047):
+        scanner = scanner_of("lms221", resolution_deg=1.0, noise_m=noise_m)
+        small = simulated(scanner, scenes=("arena",), places=9, driven_s=3.0)
+        made[f"{noise_m:g}"] = measure(small.stream)
+        mix, beams = beside.between_that_mix(small)
+        assert 0 < mix <= beams
+    return made
+
+
+def test_our_scanner_measured_like_a_log_has_the_noise_it_is_given(
+    cards: dict[str, ScannerCard],
+) -> None:
+    """Of 10 mm with two roundings, the flicker shows one: 9.6 mm, as on the sensor card."""
+    usual, less = cards["0.01"], cards["0.0047"]
+    assert usual.standing_stretches >= 9
+    assert usual.blocks >= 1
+    assert usual.figures["step"].value == 0.01
+    assert usual.figures["standing.square"].value == pytest.approx(0.0096, rel=0.06)
+    analog = 0.0047**2 - 2 * 0.01**2 / 12
+    assert less.figures["standing.square"].value == pytest.approx(
+        (analog + 0.01**2 / 12) ** 0.5, rel=0.06
+    )
+    assert usual.figures["standing.square"].value > 2 * less.figures["standing.square"].value
+
+
+def test_cards_side_by_side_as_table_and_picture(
+    cards: dict[str, ScannerCard], tmp_path: Path
+) -> None:
+    real, ours = {"less": cards["0.0047"]}, {"usual": cards["0.01"]}
+    text = table.markdown(real, ours)
+    (row,) = (
+        line for line in text.splitlines() if line.startswith("| noise of a standing robot |")
+    )
+    assert f"| {table.DIFFERS} |" in row
+    assert "range, 2 to 4 m" not in text
+    assert any("2 to 4 m" in line.what for line in table.lines(real, ours))
+    assert {line.verdicts for line in table.lines(ours, ours)} <= {("",), (table.AGREES,)}
+    draw(tmp_path / "cards.png", real, ours)
+    assert (tmp_path / "cards.png").stat().st_size > 20_000
+
+
+def test_a_cell() -> None:
+    made = Figure(value=0.00371, low=0.0035, high=0.0039, n=9, stretches=4)
+    assert table.cell(made, "mm") == "3.7 (3.5 to 3.9)"
+    assert table.cell(replace(made, low=np.nan), "mm") == "3.7"
+    assert (
+        table.cell(replace(made, value=0.0002, low=0.0, high=0.0004), "%") == "0.02 (0.00 to 0.04)"
+    )
+    assert table.cell(replace(made, value=0.0), "%") == "0"
+    assert table.cell(replace(made, value=np.nan), "%") == table.NONE
+
+
+def flaser(path: Path) -> Path:
+    """A CARMEN log of a robot that stands before a wall, in four places, with 5 mm of noise."""
+    rng, lines = np.random.default_rng(0), []
+    angles = np.deg2rad(np.arange(180) - 90.0)
+    for k in range(48):
+        place = 2.0 + k // 12
+        ranges = np.minimum(place / np.maximum(np.cos(angles), 1e-3), 20.0)
+        sent = np.round(ranges + 0.005 * rng.standard_normal(180), 2)
+        pose = f"{k // 12}.0 0.0 0.0"
+        words = " ".join(f"{r:.2f}" for r in sent)
+        lines.append(f"FLASER 180 {words} {pose} {pose} {0.2 * k:.1f} robot {0.2 * k:.1f}\n")
+    path.write_text("".join(lines))
+    return path
+
+
+def test_a_log_beside_simulated_scans(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    cards: dict[str, ScannerCard],
+) -> None:  # fmt: skip
+    monkeypatch.setenv("COLUMNS", "200")
+    asked = []
+    monkeypatch.setattr(beside, "simulated_card", lambda name: asked.append(name) or cards["0.01"])
+    sensor_card(log=[flaser(tmp_path / "robot.log")], out=tmp_path / "out")
+    assert asked == ["lms221(resolution_deg=1)"]
+    page = (tmp_path / "out" / "real_scanner_log.md").read_text()
+    (row,) = (
+        line for line in page.splitlines() if line.startswith("| noise of a standing robot |")
+    )
+    value = float(row.split("|")[3].split("(")[0])
+    assert value == pytest.approx((5.0**2 + 10.0**2 / 12) ** 0.5, rel=0.08)
+    assert table.DIFFERS in row
+    assert "4 standing stretches (40 scans)" in page
+    sensor_card(log=[tmp_path / "robot.log"], scanner="tim561")
+    assert asked[-1] == "tim561"
+
+
+def test_a_log_that_is_none_and_a_scanner_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(LogFormatError, match="no such file"):
+        sensor_card(log=[tmp_path / "nothing.log"])
+    with pytest.raises(UnknownNameError, match="Did you mean 'tim561'"):
+        sensor_card(log=[tmp_path / "nothing.log"], scanner="tim562")

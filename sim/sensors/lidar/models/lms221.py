@@ -27,6 +27,7 @@ TURNS_PER_S = 75
 MIRROR_FROM_DEG = -90.0  # where a turn of the mirror begins, whatever the field of view
 TIMER_UNIT = 0.010  # m, resolution of the time measurement in every range mode (TD p34, TL 10-10)
 
+NOISE_M = 0.010  # m, one sigma of what is sent, 1 to 20 m (TD p34)
 PULSE_M = 1.0  # m, length of a pulse (TL p110)
 LMS221_SPOT = disc(aperture=0.008, divergence=0.00595)  # 16 mm + 11.9 mrad, TL p114
 
@@ -114,7 +115,7 @@ class Lms221Config:
     resolution_deg: float = 0.5
     fov_deg: int = 180
     range_mode: str = "80m"
-    noise_std_m: float = 0.010
+    noise_std_m: float = NOISE_M
     quantise: bool = True
     effects: RangeEffects = field(default_factory=RangeEffects)
 
@@ -214,7 +215,17 @@ class Lms221Config:
 
 @register("lms221")
 def lms221(
-    *, resolution_deg: float = 0.5, fov_deg: int = 180, range_mode: str = "80m"
+    *,
+    resolution_deg: float = 0.5,
+    fov_deg: int = 180,
+    range_mode: str = "80m",
+    noise_m: float = NOISE_M,
 ) -> Lms221Config:
-    """SICK LMS-221: 180 degrees, 0.5 degrees interlaced, 37.5 Hz, 80 m; the default."""
-    return Lms221Config(resolution_deg=resolution_deg, fov_deg=fov_deg, range_mode=range_mode)
+    """SICK LMS-221: 180 degrees, 0.5 degrees interlaced, 37.5 Hz, 80 m; the default.
+
+    noise_m  statistical error of what is sent, one sigma, rounding included: what the data sheet
+             states, unless said otherwise. Real logs of its family have less (docs/real_scanner.md)
+    """
+    return Lms221Config(
+        resolution_deg=resolution_deg, fov_deg=fov_deg, range_mode=range_mode, noise_std_m=noise_m
+    )

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How real is the simulated LMS-221? ``python -m scripts.experiments.real_scanner``.
+
+Measures public logs of SICK scanners and simulated scans by the same code, fills the tables of
+``docs/real_scanner.md`` and draws its picture.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from scripts.card.real import table
+from scripts.card.real.beside import between_that_mix, real_card
+from scripts.card.real.picture import draw
+from scripts.card.real.simulated import simulated
+from scripts.marks import fill_page
+from sim.sensors.lidar.registry import scanner_of
+from slam.errors import MobiliaError
+from slam.evaluation.scanner.card import ScannerCard, measure
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE, PICTURE = "docs/real_scanner.md", "docs/pictures/real_scanner.png"
+LOGS_1_DEG = {
+    "Wean Hall": ("wean_hall/robotdata1.log.xz", "wean_hall/robotdata2.log.xz"),
+    "Intel": ("intel/intel-corrected.log.xz",),
+    "FHW museum": ("fhw_museum/fhw-corrected.log.xz",),
+}
+LOGS_HALF_DEG = {"MIT CSAIL": ("mit_csail/csail-corrected.log.xz",)}
+OURS_1_DEG = {
+    "simulated, 1°": "lms221(resolution_deg=1)",
+    "simulated, 1°, noise_m=0.0047": "lms221(resolution_deg=1, noise_m=0.0047)",
+}
+OURS_HALF_DEG = {"simulated, 0.5°": "lms221(resolution_deg=0.5)"}
+Cards = dict[str, ScannerCard]
+
+
+def real_cards(data: Path, logs: Mapping[str, tuple[str, ...]]) -> Cards:
+    """One card a name."""
+    return {name: real_card([data / path for path in paths]) for name, paths in logs.items()}
+
+
+def our_cards(scanners: Mapping[str, str]) -> tuple[Cards, list[str]]:
+    """One card a name, and a line for each about the ranges between two sides."""
+    cards, said = {}, []
+    for name, scanner in scanners.items():
+        made = simulated(scanner_of(scanner))
+        cards[name] = measure(made.stream)
+        mix, beams = between_that_mix(made)
+        share = f"{100.0 * mix / beams:.0f} %" if beams else "none"
+        said.append(
+            f"- `{scanner}`: of {beams} ranges between two sides, {share} are mixed pixels by the "
+            "simulator's truth; the others are of thin things that stand there."
+        )
+    return cards, said
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Fill the page, draw the picture."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, default=os.environ.get("MOBILIA_DATA"),
+                        help="folder of the logs; default MOBILIA_DATA")  # fmt: skip
+    parser.add_argument("--root", type=Path, default=ROOT, help="folder of docs/")
+    wanted = parser.parse_args(arguments)
+    if wanted.data is None:
+        parser.error("--data is missing, and MOBILIA_DATA is not set")
+    try:
+        one, half = real_cards(wanted.data, LOGS_1_DEG), real_cards(wanted.data, LOGS_HALF_DEG)
+        ours_one, said = our_cards(OURS_1_DEG)
+        ours_half, said_half = our_cards(OURS_HALF_DEG)
+        page = wanted.root / PAGE
+        fill_page(page, "one-degree", table.markdown(one, ours_one))
+        fill_page(page, "half-degree", table.markdown(half, ours_half))
+        fill_page(page, "between", "\n".join([*said, *said_half]))
+        draw(wanted.root / PICTURE, {**one, **half}, {**ours_one, **ours_half})
+    except MobiliaError as error:
+        print(f"real_scanner: {error}", file=sys.stderr)
+        return 2
+    print(f"wrote {page} and {wanted.root / PICTURE}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

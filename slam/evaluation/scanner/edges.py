@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What lies between the two surfaces of an edge: nothing, a mixed pixel, or a lost beam.
+
+A mixed pixel is a range where nothing is: the spot lights the edge and what is behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slam.evaluation.scanner.figures import NOTHING, Figure, ratio
+from slam.evaluation.scanner.stretches import Stretch
+from slam.frames import Float
+
+SIDE = 3  # beams on either side that lie together
+FLAT_M = 0.15  # m between the nearest and the farthest of a side
+CLEAR_M = 0.1  # m from both sides, from which a range is of neither
+DEPTH_BINS_M = ((0.4, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 20.0))  # from side to side
+LEAST_EDGES = 30  # below which a bin says nothing
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edges:
+    """Of edges with at most one beam between the sides; by their depth, in ``DEPTH_BINS_M``.
+
+    between  share with a range between the sides
+    lost     share with a beam without a return
+    place    mean of where those ranges lie: 0 at the near side, 1 at the far side
+    """
+
+    between: tuple[Figure, ...]
+    lost: Figure
+    place: Figure
+
+
+def edges(stretches: Sequence[Stretch]) -> Edges:
+    """Of all scans that are looked at."""
+    found = [np.concatenate([_edges(scan) for scan in part.looked_at()]) for part in stretches]
+
+    def share(low: float, high: float) -> Figure:
+        own = [e[(e[:, 0] >= low) & (e[:, 0] < high)] for e in found]
+        made = ratio([float((e[:, 1] == 1.0).sum()) for e in own], [len(e) for e in own])
+        return made if made.n >= LEAST_EDGES else NOTHING
+
+    mixed = [e[e[:, 1] == 1.0, 2] for e in found]
+    return Edges(
+        between=tuple(share(low, high) for low, high in DEPTH_BINS_M),
+        lost=ratio([float((e[:, 1] == 2.0).sum()) for e in found], [len(e) for e in found]),
+        place=ratio([float(m.sum()) for m in mixed], [len(m) for m in mixed]),
+    )
+
+
+def mixed_beams(ranges: Float) -> NDArray[np.int64]:
+    """(k,) numbers of the beams between two sides, in (n,) ranges m."""
+    found = _edges(ranges)
+    beams: NDArray[np.int64] = found[found[:, 1] == 1.0, 3].astype(np.int64)
+    return beams
+
+
+def _edges(ranges: Float) -> Float:
+    """(k, 4): depth m; 0 clean, 1 between, 2 lost; its place 0..1; number of the beam between."""
+    windows = np.lib.stride_tricks.sliding_window_view(ranges, SIDE)
+    low, high = windows.min(axis=1), windows.max(axis=1)  # NaN where one did not return
+    flat = high - low <= FLAT_M
+    rows = []
+    for gap in (0, 1):
+        n = len(low) - SIDE - gap
+        a, b = np.arange(n), np.arange(n) + SIDE + gap
+        near_right = low[a] < low[b]
+        near, far = np.where(near_right, high[a], high[b]), np.where(near_right, low[b], low[a])
+        depth = far - near
+        edge = flat[a] & flat[b] & (depth >= DEPTH_BINS_M[0][0]) & (depth < DEPTH_BINS_M[-1][1])
+        at = a[edge] + SIDE
+        depth, near, far = depth[edge], near[edge], far[edge]
+        own = ranges[at] if gap else np.full(len(at), np.nan)
+        kind = np.zeros(len(at))
+        if gap:
+            kind = np.where(np.isnan(own), 2.0, 0.0)
+            kind[(own > near + CLEAR_M) & (own < far - CLEAR_M)] = 1.0
+            depth, near, own, at = (v[kind > 0.0] for v in (depth, near, own, at))
+            kind = kind[kind > 0.0]
+        rows.append(np.stack([depth, kind, (own - near) / depth, at.astype(float)], axis=1))
+    return np.concatenate(rows)
