@@ -83,7 +83,10 @@ class Costs:
         return replace(stream, frames=frames)
 
     def block(self, replay: Replay) -> dict[str, Any]:
-        """For ``results.json``: s and MB, of all and of each stage."""
+        """For ``results.json``: s and MB, of all and of each stage.
+
+        Where frames are made between scans, as in simulation, both have the same memory.
+        """
         self._lap()
         updates_s = sum(sum(track.durations_s) for track in replay.tracks.values())
         most = {**self._most, SLAM: max(self._most[SLAM], self._most[_SCANS])}
@@ -96,7 +99,10 @@ class Costs:
             "input_s": round(spent.get(INPUT, 0.0), 1),
             "memory_mb": round(max(most.values()) / 1e6),
             "stages": {
-                name: {"s": round(spent[name], 2), "memory_mb": round(most[name] / 1e6)}
+                name: {
+                    "s": round(spent[name], 2),
+                    "memory_mb": round(most.get(name, most[SLAM]) / 1e6),
+                }
                 for name in STAGES
                 if name in spent
             },
