@@ -114,8 +114,9 @@ def test_noise_of_a_standing_robot_is_what_was_put_in(sigma, step):
     noise, sent = card.figures["standing"], math.hypot(sigma, step / math.sqrt(12.0))
     assert card.standing_stretches == 16
     assert noise.value == pytest.approx(sent, rel=0.06)
-    assert 0.97 * noise.low <= sent <= 1.03 * noise.high
-    assert noise.high - noise.low < 0.2 * sent + 1e-9
+    if sigma > 0.0:  # rounding alone is the same in every stretch, and has no interval
+        assert 0.97 * noise.low <= sent <= 1.03 * noise.high
+        assert noise.high - noise.low < 0.2 * sent + 1e-9
     assert card.figures["step"].value == step
 
 
