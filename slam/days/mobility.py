@@ -51,14 +51,19 @@ class MobilityMap:
 
     @cached_property
     def mobility(self) -> Raster | None:
-        """How uncertain each place is without a look: 4 u (1 - u) of its usual share u.
+        """How much each place differs from one sighting to the next, on average.
 
-        0: always so, wall or free floor; 1: as often taken as not.
+        0: always so, wall or free floor; 1: never twice the same. NaN where it was seen once only.
         """
-        if not len(self.history):
-            return None
-        share = self._habits._overall()
-        return self._raster(4.0 * share * (1.0 - share))
+        _, values = self.history.table()
+        last = np.full(values.shape[1:], np.nan)
+        steps, pairs = np.zeros(len(last)), np.zeros(len(last))
+        for row in values.astype(np.float64):
+            both = ~np.isnan(row) & ~np.isnan(last)
+            steps[both] += np.abs(row - last)[both]
+            pairs += both
+            last = np.where(np.isnan(row), last, row)
+        return self._raster(np.where(pairs > 0, steps / np.maximum(pairs, 1.0), np.nan))
 
     @cached_property
     def stays_h(self) -> Float:

@@ -12,6 +12,7 @@ from slam.days.changes import between
 from slam.days.config import EvidenceConfig
 from slam.days.evidence import SessionGrid, Snapshot
 from slam.days.history import History
+from slam.days.mobility import MobilityMap
 from slam.errors import InvalidValueError
 from tests.world2d import Drive, World2D, frames, rectangle
 
@@ -98,3 +99,18 @@ def test_a_history_keeps_its_newest_sessions_in_order():
     np.testing.assert_array_equal(history.times_s, [2.0, 3.0])
     with pytest.raises(InvalidValueError, match="must begin after the last"):
         history.with_session(session)
+
+
+def test_mobility_is_how_much_a_place_differs_from_one_sighting_to_the_next():
+    """A wall that is seen in half of the looks, always, has not changed; a door that swings has."""
+    cells = np.array([[0, 0], [1, 0], [2, 0]], np.int32)
+    history = History(cell_m=CELL)
+    for time_s, shares in ((1.0, (0.5, 1.0)), (2.0, (0.5, 0.0)), (3.0, (0.5, 1.0))):
+        shares = np.array([*shares, 0.0], np.float32)
+        known = slice(0, 2 if time_s < 3.0 else 3)
+        history = history.with_session(
+            Snapshot(time_s=time_s, cells=cells[known], standing=shares[known])
+        )
+    raster = MobilityMap(history).mobility
+    np.testing.assert_array_equal(raster.values, [[0.0, 1.0, np.nan]])
+    assert MobilityMap(History(cell_m=CELL)).mobility is None
