@@ -24,6 +24,7 @@ from scripts.verbs.doctor import doctor
 from scripts.verbs.drive import drive
 from scripts.verbs.export import export
 from scripts.verbs.generate import generate
+from scripts.verbs.lifelong import lifelong
 from scripts.verbs.listing import listing
 from scripts.verbs.live import live
 from scripts.verbs.render import render
@@ -66,6 +67,7 @@ app.command("drive", cls=ManyValues)(drive)
 app.command("blame", cls=ManyValues)(blame)
 app.command("live", cls=ManyValues)(live)
 app.command("report", cls=Verb)(report)
+app.command("lifelong", cls=Verb)(lifelong)
 
 
 @app.callback()

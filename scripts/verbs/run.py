@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +16,9 @@ from scripts.oracle_option import Oracles, with_oracles
 from scripts.scanner_option import Scanner
 from scripts.set_option import Set
 from slam.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from scripts.days.one import Maps
 
 
 def run(
@@ -63,6 +66,17 @@ def run(
         bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
     ] = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
+    map_in: Annotated[
+        Path | None,
+        typer.Option(help="Begin anywhere in this map of days before (docs/days.md); with --log."),
+    ] = None,
+    map_out: Annotated[
+        Path | None, typer.Option(help="Keep the map, this session included; with --log.")
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(help="When the session began, 2026-05-04T09:00; default the log's clock."),
+    ] = None,
     oracle: Oracles = None,
     set_: Set = None,
 ) -> None:
@@ -78,9 +92,16 @@ def run(
     check(slam, scene)
     if log is None and (strict or text_format is not None):
         raise InvalidValueError("--strict and --format are about a --log")
+    if log is None and (map_in or map_out or at):
+        raise InvalidValueError("--map-in, --map-out and --at are about a --log")
     if log is not None:
+        from scripts.days.one import Maps
+
+        maps = Maps(map_in=map_in, map_out=map_out, at=at)
         folder = out or Path("out") / f"run-{run_name(log)}"
-        on_log(slam, log, folder, overwrite, film, strict=strict, text_format=text_format)
+        on_log(
+            slam, log, folder, overwrite, film, strict=strict, text_format=text_format, maps=maps
+        )
     elif scene is not None:
         from scripts.single_run.live import on_scene, tour
         from scripts.single_run.session import Outputs
@@ -102,8 +123,10 @@ def on_log(
     *,
     strict: bool = False,
     text_format: Path | None = None,
+    maps: Maps | None = None,
 ) -> dict[str, Any]:
-    """Run SLAMs on a recorded log."""
+    """Run SLAMs on a recorded log; the first of them in a map of days before, if ``maps`` says."""
+    from scripts.days.one import kept, session_of
     from scripts.film.encode import Pace
     from scripts.film.footage import of_log
     from scripts.single_run.costs import INPUT, Costs
@@ -113,13 +136,17 @@ def on_log(
     with costs.stage(INPUT), working(f"reading {path.name}"):
         footage = of_log(path, strict=strict, text_format=text_format)
     show = footage.show(names)
+    session = None
+    if maps is not None and maps.given:
+        session = session_of(show.primary, maps, footage.stream)
+        show.replay.tracks[show.primary].system = session
     settings = {
         "slams": list(show.replay.tracks),
         "log": path.name,
         "log_sha256": hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None,
         "log_facts": dict(footage.stream.metadata.extra),
     }
-    return run_session(
+    results = run_session(
         footage.stream,
         show,
         Outputs(
@@ -132,3 +159,6 @@ def on_log(
             costs=costs,
         ),
     )
+    if session is not None and maps is not None:
+        kept(session, maps)
+    return results

@@ -5,6 +5,9 @@ A NumPy archive (.npz) without pickled objects. ``header`` is JSON text with ``f
 and ``state``; ``places`` (n, 2) are the blocks' indices (x, y); ``x``, ``y``, ``age`` and
 ``facing`` (n, 8, 8) their cells. The header's ``sha256`` is the sum of all the rest; maps of
 before it have none, which is said in the log. Older readers refuse newer versions.
+
+Version 2 has more arrays, which the header names as ``extra``: what a package above keeps beside
+the map. A map without any is written as version 1, and one of version 1 is read as one without.
 """
 
 from __future__ import annotations
@@ -13,6 +16,8 @@ import dataclasses
 import hashlib
 import json
 import logging
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -29,9 +34,13 @@ from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import FREE_COUNT, SIDE, living
 from slam.tracker.config import TrackerConfig
 
-FORMAT, VERSION = "mobilia shunting memory", 1
+FORMAT, VERSION = "mobilia shunting memory", 2
+PLAIN = 1  # version of a map without extra arrays
 Config = TypeVar("Config", bound=TrackerConfig)
 _ARRAYS = ("places", "x", "y", "age", "facing")
+_WORDS = {"format", "version", "config", "config_sha256", "state", "sha256"}
+_EXTRA = re.compile(r"[a-z]{1,20}_[a-z_]{1,40}")
+MOST_EXTRA = 20  # arrays
 # What a file may claim.
 MAX_BYTES = 1 << 30  # of all arrays: 1.2 million blocks, 70 000 m^2 of cells of 3 cm
 FARTHEST = 1 << 20  # blocks from the origin: 250 km
@@ -87,12 +96,21 @@ def _positive(name: str, value: object, kinds: tuple[type, ...]) -> None:
         )
 
 
-def save(path: Path, cell_map: CellMap, state: State) -> None:
-    """Write both; the file appears whole or not at all. Raises ``OutputError``."""
+def save(
+    path: Path,
+    cell_map: CellMap,
+    state: State,
+    extra: Mapping[str, NDArray[Any]] | None = None,
+) -> None:
+    """Write all; the file appears whole or not at all. Raises ``OutputError``.
+
+    ``extra`` arrays have names such as ``day_cells``.
+    """
+    extra = extra or {}
     slots, places = living(cell_map.cells)
     header: dict[str, Any] = {
         "format": FORMAT,
-        "version": VERSION,
+        "version": VERSION if extra else PLAIN,
         "config": cell_map.config.as_words(),
         "config_sha256": cell_map.config.sha256(),
         "state": dataclasses.asdict(state)
@@ -106,6 +124,9 @@ def save(path: Path, cell_map: CellMap, state: State) -> None:
         "age": cell_map.kept(slots),
         "facing": cells.facing[slots],
     }
+    if extra:
+        header["extra"] = sorted(extra)
+        arrays |= extra
     header["sha256"] = _sum(header, arrays)
     with replacing(path) as temporary, temporary.open("wb") as file:
         content: Any = {"header": np.array(json.dumps(header)), **arrays}
@@ -116,7 +137,7 @@ def _sum(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> str:
     """Of the header but its own entry, and of all arrays."""
     rest = {name: value for name, value in header.items() if name != "sha256"}
     found = hashlib.sha256(json.dumps(rest, sort_keys=True).encode())
-    for name in _ARRAYS:
+    for name in (*_ARRAYS, *header.get("extra", ())):
         array = np.ascontiguousarray(arrays[name])
         found.update(f"{name} {array.dtype.str} {array.shape}".encode())
         found.update(array.tobytes())
@@ -144,8 +165,8 @@ def read(path: Path, kind: type[Config]) -> tuple[Config, State, dict[str, NDArr
 
 
 def _whole(path: Path) -> tuple[dict[str, Any], State, dict[str, NDArray[Any]]]:
-    arrays = read_arrays(path, ("header", *_ARRAYS), max_bytes=MAX_BYTES)
-    header = _header(path, arrays.pop("header"))
+    header = _header(path, read_arrays(path, ("header",), max_bytes=MAX_BYTES)["header"])
+    arrays = read_arrays(path, (*_ARRAYS, *header.get("extra", ())), max_bytes=MAX_BYTES)
     _check(path, arrays)
     if "sha256" not in header:
         _log.warning("%s: a map of before sums; damage to it would not be noticed", path)
@@ -171,16 +192,37 @@ def _header(path: Path, text: NDArray[Any]) -> dict[str, Any]:
         raise LogFormatError(path, f"not a whole {FORMAT}: its header: {error}") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise LogFormatError(path, f"not a {FORMAT}")
-    if header.get("version") != VERSION:
+    version = header.get("version")
+    if isinstance(version, bool) or version not in (PLAIN, VERSION):
         raise LogFormatError(
-            path, f"version {header.get('version')!r} of a {FORMAT}; {VERSION} is known"
+            path, f"version {version!r} of a {FORMAT}; {PLAIN} and {VERSION} are known"
         )
-    unknown = sorted(
-        set(header) - {"format", "version", "config", "config_sha256", "state", "sha256"}
-    )
+    unknown = sorted(set(header) - _WORDS - ({"extra"} if version == VERSION else set()))
     if unknown:
         raise LogFormatError(path, f"damaged {FORMAT}: its header has {unknown[0][:40]!r}")
+    _check_extra(path, header.get("extra", []), version)
     return header
+
+
+def _check_extra(path: Path, names: object, version: int) -> None:
+    """Names of arrays, each once, none of them one of the map's own."""
+    good = isinstance(names, list) and bool(names) == (version == VERSION)
+    if not good or not all(isinstance(n, str) and _EXTRA.fullmatch(n) for n in names):  # type: ignore[attr-defined]
+        raise LogFormatError(path, f"damaged {FORMAT}: extra must name arrays, got {names!r:.60}")
+    assert isinstance(names, Sequence)
+    if len(set(names)) != len(names) or len(names) > MOST_EXTRA:
+        raise LogFormatError(
+            path, f"damaged {FORMAT}: extra must name up to {MOST_EXTRA} arrays, each once"
+        )
+
+
+def read_extra(path: Path) -> dict[str, NDArray[Any]]:
+    """The arrays that lie beside the map, none in a map of version 1; raises as ``check`` does.
+
+    Their shapes and values are for the reader to check.
+    """
+    header, _, arrays = _whole(path)
+    return {name: arrays[name] for name in header.get("extra", ())}
 
 
 def _check(path: Path, arrays: dict[str, NDArray[Any]]) -> None:

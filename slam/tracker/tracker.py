@@ -438,8 +438,33 @@ class Tracker(abc.ABC):
         """Dense short-term x and long-term y of the cells centred in the rectangle (map, m)."""
         return self.cell_map.window(xmin, ymin, xmax, ymax)
 
-    def save(self, path: Path) -> None:
-        """Write map, knobs and pose to a file for ``load``; raises ``OutputError``."""
+    def place(self, T_map_robot: Float, covariance: Float) -> None:
+        """Take the next frame near this pose in the map, off by as much as ``covariance`` says.
+
+        For a map that was loaded: odometry and clock begin anew.
+        """
+        self._T_map_robot, self._resumed, self._before = T_map_robot, covariance, None
+        self._pose_covariance.resumed(covariance)
+
+    def usual_support(self) -> float:
+        """Of all returns where the robot was not lost: what a place must explain to be right."""
+        return self._quality.usual_whole()
+
+    def matched(self, observations: Observations, T_map_robot: Float, covariance: Float) -> Match:
+        """The match to the map as it is, from this pose on, off by as much as that."""
+        start = self._matcher.approach(self.cell_map, observations, T_map_robot, covariance)
+        precision = inverted(covariance)
+        return self._matcher.climb(self.cell_map, observations, start, T_map_robot, precision)
+
+    def relocalisation(self) -> Relocalisation:
+        """A search for the robot in the map as it is now."""
+        return Relocalisation(self.cell_map, self._matcher)
+
+    def save(self, path: Path, extra: Mapping[str, NDArray[Any]] | None = None) -> None:
+        """Write map, knobs and pose to a file for ``load``; raises ``OutputError``.
+
+        ``extra`` arrays lie beside them, for ``map_file.read_extra``.
+        """
         state = memory.State(
             kind=type(self).__name__,
             T_map_robot=self._T_map_robot,
@@ -449,7 +474,7 @@ class Tracker(abc.ABC):
             tracked_s=self._quality.tracked_s,
             tracked=self._quality.tracked,
         )
-        memory.save(path, self.cell_map, state)
+        memory.save(path, self.cell_map, state, extra)
 
     @classmethod
     def load(cls, path: Path) -> Self:

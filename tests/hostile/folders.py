@@ -90,12 +90,13 @@ class Hostile:
         write_recipe(folder, "run", settings)
         return folder
 
-    def episode(self, scene: str = SCENE) -> Path:
-        """A whole one, whose sums are right, but for the scene."""
+    def episode(self, scene: str = SCENE, session: int | None = None) -> Path:
+        """A whole one, whose sums are right, but for the scene and the session."""
         folder = self.path / "episode"
         shutil.copytree(self.whole, folder)
         real = read_recipe(folder / RECIPE)
-        recipes.write_recipe(folder / RECIPE, replace(real.recipe, scene=scene), real.result)
+        other = replace(real.recipe, scene=scene, session=session)
+        recipes.write_recipe(folder / RECIPE, other, real.result)
         write_sums(folder)
         return folder
 

@@ -65,6 +65,13 @@ def _bag_run(h: Hostile) -> Words:
     return ["odometry", "--log", str(h.bag()), "--no-film", "--out", "out"]
 
 
+def _map_run(h: Hostile) -> Words:
+    names = ("header", "places", "x", "y", "age", "facing", "day_cells")
+    there = h.pickled(h.path / "m.npz", *names)
+    log = h.episode("arena")
+    return ["shunting", "--log", str(log), "--map-in", str(there), "--no-film", "--out", "out"]
+
+
 ROWS = [
     Row("benchmark", "submission: a command as SLAM",
         lambda h: ["--merge", str(h.submission()), "--tracks", "tour-guide", "--slam", "odometry",
@@ -97,6 +104,9 @@ ROWS = [
     Row("verify", "episode made again: a module as scene",
         lambda h: [str(h.episode()), "--regenerate", "1"], REFUSED),
     Row("run", "bag: YAML with objects", _bag_run),
+    Row("run", "map of days: arrays of objects", _map_run, "holds objects"),
+    Row("lifelong", "dataset of sessions: a module as scene",
+        lambda h: [str(h.episode(session=0).parent), "--slam", "odometry", "--out", "life"]),
     Row("export", "episode: a module as scene", lambda h: [str(h.episode()), "--to", "tum"]),
     Row("export", "bag: YAML with objects", lambda h: [str(h.bag()), "--to", "npz"]),
     Row("report", "comparison: names of code, arrays of objects", lambda h: [str(h.report())]),

@@ -114,14 +114,15 @@ class Relocalisation:
         self,
         observations: Observations,
         prediction: Prediction,
-        here: Match,
+        here: Match | None,
         usual: float,
         *,
         carried: bool,
     ) -> Match | None:
         """Take a frame in; the match of the hypothesis that is accepted, or None.
 
-        ``here`` is the frame's match by dead reckoning, ``usual`` the support while not lost.
+        ``here`` is the frame's match by dead reckoning, None where nobody says where the robot
+        started; ``usual`` the support while not lost.
         """
         self.elapsed_s += prediction.elapsed
         self._go_on(prediction)
@@ -136,15 +137,16 @@ class Relocalisation:
             else self._waiting(h, prediction)
             for h in self.hypotheses
         ]
-        found.append(self._new(observations, here))
-        self.here = found[-1].support
+        if here is not None:
+            found.append(self._new(observations, here))
+            self.here = found[-1].support
         budget.spend(price * len(matched))
         found += self._tried_places(observations, budget, price)
         self._look_around(observations, budget)
         found += self._tried_places(observations, budget, price)
         self.spent_ns = budget.spent_ns
         self.hypotheses = _kept(found, usual, self._config)
-        return self._accepted(usual, prediction.T_map_robot, carried)
+        return self._accepted(usual, None if here is None else prediction.T_map_robot, carried)
 
     def elsewhere(self, T_map_robot: Float) -> float:
         """Support of the best place that is followed and is not this one; 0 where none is."""
@@ -199,7 +201,7 @@ class Relocalisation:
         seen = float(observations.weights.sum())
         return Hypothesis(match=match, support=self._support(observations, match), seen=seen)
 
-    def _accepted(self, usual: float, predicted: Float, carried: bool) -> Match | None:
+    def _accepted(self, usual: float, predicted: Float | None, carried: bool) -> Match | None:
         """The match of the best hypothesis, if it is good and no other is.
 
         The place of dead reckoning goes before places that only look as good: a room may be
@@ -209,12 +211,17 @@ class Relocalisation:
             return None
         best, config = self.hypotheses[0], self._config
         rivals = [h for h in self.hypotheses if h.support > config.alias * best.support]
-        going_on = [h for h in rivals if self._shoved(h, predicted)]
-        going_on.sort(key=lambda h: not _near(h.match.T_map_robot, predicted, config))
-        if going_on:
+        going_on: list[Hypothesis] = []
+        if predicted is not None:
+            there = predicted
+            going_on = [h for h in rivals if self._shoved(h, there)]
+            going_on.sort(key=lambda h: not _near(h.match.T_map_robot, there, config))
+        if going_on and predicted is not None:
             best = going_on[0]
             self.went_on = _near(best.match.T_map_robot, predicted, config)
-        elif len(rivals) > 1 or not (carried or self._drifted(best, predicted)):
+        elif len(rivals) > 1 or not (
+            carried or predicted is None or self._drifted(best, predicted)
+        ):
             return None
         if best.waited or not (going_on or self.searches):
             return None  # not sure yet that nothing else explains it
@@ -310,5 +317,5 @@ def _kept(found: list[Hypothesis], usual: float, config: RelocaliseConfig) -> li
         if not any(one.same_as(other, config) for other in kept):
             kept.append(one)
     kept.sort(key=lambda h: -h.support)
-    least = config.hopeless * max(usual, kept[0].support)
+    least = config.hopeless * max(usual, kept[0].support if kept else 0.0)
     return [h for h in kept if h.support >= least]

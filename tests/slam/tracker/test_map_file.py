@@ -119,7 +119,9 @@ def rewritten(source: Path, target: Path, **changes: Any) -> Path:
 @pytest.mark.parametrize(
     ("changes", "match"),
     [
-        ({"version": 2}, "version 2 of a mobilia shunting memory; 1 is known"),
+        ({"version": 3}, "version 3 of a mobilia shunting memory; 1 and 2 are known"),
+        ({"version": 2}, "extra must name arrays"),
+        ({"extra": []}, "its header has 'extra'"),
         ({"format": "somebody's"}, "not a mobilia shunting memory"),
         ({"config": {"cell_m": -1.0}}, "cell_m"),
         ({"config": {"cellm": 0.05}}, "cellm"),

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""SLAMs over the sessions of a building: each session is localised in the map of those before."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scripts.comparison.maps import NEAR_M, Believed, StaticDistance
+from scripts.comparison.recording import Recording
+from scripts.comparison.sight import clearance
+from scripts.days.sessions import Drive
+from scripts.days.truth import Still, still_things
+from scripts.names import file_name
+from slam import se2
+from slam.days.evidence import Snapshot
+from slam.days.session import Session, keep
+from slam.errors import SlamFailedError
+from slam.frames import Float
+from slam.replay import Track
+from slam.system import SlamSystem, create
+from slam.tracker.tracker import Tracker
+
+RIGHT_M, RIGHT_RAD = 0.5, 0.35  # of the true pose: the place that was found is the right one
+COLUMNS = (
+    "slam", "session", "time_of_day", "map", "found_after_s", "place", "rmse_m", "worst_m",
+    "tracked", "ghost_rate", "recall", "map_kb", "memory_mb", "load_s", "ms_per_scan",
+)  # fmt: skip
+"""Of lifelong.csv. The last two are about the machine."""
+
+
+@dataclass(eq=False)
+class Building:
+    """What one SLAM knows of a building.
+
+    map         its file, written from session to session
+    anew        it cannot load a map: every session is the first
+    T_map_world the frame of the first session's map; None before, or without truth
+    snapshots   what each session that fitted saw, by its number
+    """
+
+    name: str
+    map: Path
+    anew: bool = False
+    T_map_world: Float | None = None
+    snapshots: dict[int, Snapshot] = field(default_factory=dict)
+
+
+def started(names: Sequence[str], folder: Path) -> list[Building]:
+    """Buildings of which nothing is known."""
+    return [
+        Building(name=n, map=folder / f"map_{file_name(n)}.npz", anew=not _has_days(create(n)))
+        for n in names
+    ]
+
+
+def _has_days(system: SlamSystem) -> bool:
+    return isinstance(system, Tracker)
+
+
+def rows(buildings: Sequence[Building], drives: Iterator[Drive]) -> Iterator[dict[str, Any]]:
+    """A row (``COLUMNS``) for each session and SLAM, as they are done."""
+    for drive in drives:
+        for building in buildings:
+            yield _anew(building, drive) if building.anew else _merged(building, drive)
+
+
+def _merged(building: Building, drive: Drive) -> dict[str, Any]:
+    """A session in the map so far, merged into it if it fits."""
+    system = create(building.name)
+    assert isinstance(system, Tracker)
+    before = time.process_time()
+    first = not building.map.exists()
+    if first:
+        session = Session(system, time_s=drive.time_s)
+    else:
+        session = Session.open(building.map, type(system), time_s=drive.time_s)
+    loaded_s = time.process_time() - before
+    track = Track(building.name, session)
+    row = _row(building, drive, "new" if first else "kept", track)
+    if "place" in row:
+        return row
+    if first and drive.frames[0].truth is not None:
+        building.T_map_world = se2.inverse(drive.frames[0].truth)
+    state = session.state
+    row["found_after_s"] = state.found_after_s
+    row["tracked"] = state.tracked
+    written = keep(session, building.map)
+    if state.fits:
+        building.snapshots[drive.number] = session.known().sessions[-1]
+    row["map"] = "new" if first else "merged" if state.fits else written.name
+    row["load_s"] = loaded_s
+    row["map_kb"] = written.stat().st_size / 1e3
+    row["memory_mb"] = sum(a.nbytes for a in session.tracker.cell_map.cells) / 1e6
+    searched = sum(e.diagnostics.get("state") == "searching" for e in track.estimates)
+    row |= _errors(building.T_map_world, drive, track, searched)
+    if state.found_after_s is not None:
+        row |= _map_scores(building.T_map_world, drive, track)
+    return row
+
+
+def _anew(building: Building, drive: Drive) -> dict[str, Any]:
+    """A session on its own: the SLAM cannot load a map."""
+    track = Track(building.name, create(building.name))
+    row = _row(building, drive, "anew", track)
+    if "place" in row:
+        return row
+    truth = drive.frames[0].truth
+    T_map_world = None if truth is None else se2.inverse(truth)
+    row |= _errors(T_map_world, drive, track, 0)
+    row["place"] = ""
+    return row | _map_scores(T_map_world, drive, track)
+
+
+def _row(building: Building, drive: Drive, state: str, track: Track) -> dict[str, Any]:
+    """Let it see every frame; the row so far, with ``place`` "failed" if it failed."""
+    row: dict[str, Any] = dict.fromkeys(COLUMNS)
+    row |= {"slam": building.name, "session": drive.number, "time_of_day": drive.time_of_day}
+    row["map"] = state
+    failure: SlamFailedError | None = track.survive(drive.frames)
+    if failure is not None:
+        return row | {"place": "failed", "map": "kept" if state == "kept" else state}
+    del row["place"]
+    row["ms_per_scan"] = 1e3 * float(np.median(track.durations_s))
+    return row
+
+
+def _errors(T_map_world: Float | None, drive: Drive, track: Track, searched: int) -> dict[str, Any]:
+    """Of the poses from the scan on that found the start; ``place`` is where that was."""
+    if searched == len(track.estimates):
+        return {"place": "not found"}
+    if T_map_world is None or drive.frames[0].truth is None:
+        return {"place": ""}
+    off = np.array(
+        [
+            se2.between(se2.compose(T_map_world, frame.truth), estimate.T_map_robot)
+            for frame, estimate in zip(drive.frames, track.estimates, strict=True)
+            if frame.truth is not None
+        ]
+    )[searched:]
+    away = np.hypot(off[:, 0], off[:, 1])
+    right = away[0] < RIGHT_M and abs(off[0, 2]) < RIGHT_RAD
+    return {
+        "place": "right" if right else "wrong",
+        "rmse_m": float(np.sqrt((away**2).mean())),
+        "worst_m": float(away.max()),
+    }
+
+
+def _map_scores(T_map_world: Float | None, drive: Drive, track: Track) -> dict[str, Any]:
+    """Ghosts and recall of the map at the end of a simulated session."""
+    recording, raster = drive.recording, track.map()
+    if recording is None or raster is None or T_map_world is None:
+        return {}
+    believed = Believed(raster, se2.inverse(T_map_world))
+    occupied = believed.occupied()
+    near = StaticDistance(recording.static_map)(occupied)
+    near = np.minimum(near, clearance(occupied, recording, len(recording.frames) - 1))
+    held = [believed.holds(thing.points) for thing in _standing(recording)]
+    return {
+        "ghost_rate": float((near > NEAR_M).mean()) if len(occupied) else None,
+        "recall": float(np.mean(held)) if held else None,
+    }
+
+
+def _standing(recording: Recording) -> list[Still]:
+    """Movable things that stood still in the session and were seen, still there at its end."""
+    ends = recording.poses[-1]
+    return [
+        thing
+        for thing in still_things(recording)
+        if math.dist(ends[thing.row, :2].tolist(), thing.pose[:2]) < NEAR_M and len(thing.points)
+    ]

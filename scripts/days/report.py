@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What changed between the sessions of a building, in words, pictures and scores."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from scripts.days.lifelong import Building
+from scripts.days.pictures import changes_picture, mobility_picture
+from scripts.days.sessions import Drive
+from scripts.days.truth import LEAST_M, ChangeScore, changed_spots, scored
+from sim.recording.tables import table
+from slam.days.changes import Change, between
+from slam.days.evidence import Snapshot
+from slam.days.history import History
+from slam.days.mobility import MobilityMap
+from slam.days.session import read_history
+from slam.files import write_text
+
+HOURS = (9.0, 19.0)  # of the day that the picture of mobility looks ahead to
+_COLUMNS = (
+    "from_session", "to_session", "change", "x_m", "y_m", "from_x_m", "from_y_m", "size_m",
+    "angle_deg", "confidence",
+)  # fmt: skip
+
+
+def changes_page(folder: Path, building: Building, drives: Mapping[int, Drive]) -> str:
+    """Pictures and changes.csv into ``folder``, and the page's part on one SLAM's changes.
+
+    Each session is compared with the one before that fitted; scored where it was simulated.
+    """
+    history = read_history(building.map) if building.map.exists() else None
+    if history is None or len(building.snapshots) < 2:
+        return ""
+    numbers = sorted(building.snapshots)
+    found, scores = {}, []
+    for first, second in pairwise(numbers):
+        pair = building.snapshots[first], building.snapshots[second]
+        found[first, second] = between(*pair, history.cell_m)
+        score = _score(found[first, second], building, drives, (first, second), history.cell_m)
+        scores += [] if score is None else [score]
+    write_text(folder / "changes.csv", table(_COLUMNS, _rows(found)))
+    mobility_picture(folder / "mobility.png", MobilityMap(history), HOURS)
+    last = max(found)
+    pair = building.snapshots[last[0]], building.snapshots[last[1]]
+    titles = f"session {last[0]}", f"session {last[1]}"
+    changes_picture(folder / "changes.png", pair, titles, history.cell_m, found[last])
+    return _words(building.name, last, found[last], scores, history)
+
+
+def _rows(found: Mapping[tuple[int, int], Sequence[Change]]) -> list[list[object]]:
+    rows: list[list[object]] = []
+    for (first, second), changes in found.items():
+        for c in changes:
+            before = ("", "") if c.before is None else (f"{c.before[0]:.3f}", f"{c.before[1]:.3f}")
+            rows.append(
+                [first, second, c.kind, f"{c.at[0]:.3f}", f"{c.at[1]:.3f}", *before,
+                 f"{c.size_m:.2f}", f"{c.angle_deg:.0f}", f"{c.confidence:.3f}"]
+            )  # fmt: skip
+    return rows
+
+
+def _score(
+    changes: Sequence[Change],
+    building: Building,
+    drives: Mapping[int, Drive],
+    numbers: tuple[int, int],
+    cell_m: float,
+) -> ChangeScore | None:
+    first, second = (drives[n].recording for n in numbers)
+    if first is None or second is None or building.T_map_world is None:
+        return None
+    snapshots: tuple[Snapshot, Snapshot] = (
+        building.snapshots[numbers[0]], building.snapshots[numbers[1]],
+    )  # fmt: skip
+    truth = changed_spots(first, second, snapshots, cell_m, building.T_map_world)
+    return scored(changes, truth)
+
+
+def summed(scores: Sequence[ChangeScore]) -> str:
+    """Precision, recall and position error of all, in words."""
+    listed, right = sum(s.listed for s in scores), sum(s.right for s in scores)
+    seen, told = sum(s.seen for s in scores), sum(s.told for s in scores)
+    off = [m for s in scores for m in s.off_m]
+    if not listed or not seen:
+        return "too few changes to score"
+    error = f", median position error {100.0 * float(np.median(off)):.0f} cm" if off else ""
+    return (
+        f"precision {right / listed:.2f} ({right} of {listed} places listed), recall "
+        f"{told / seen:.2f} ({told} of {seen} places that both sessions saw){error}"
+    )
+
+
+def _words(
+    name: str,
+    numbers: tuple[int, int],
+    changes: Sequence[Change],
+    scores: Sequence[ChangeScore],
+    history: History,
+) -> str:
+    text = f"\n## What changed, by {name}\n\n"
+    if scores:
+        text += f"Of things of at least {LEAST_M:g} m, from each session to the next: "
+        text += f"{summed(scores)}.\n\n"
+    text += f"From session {numbers[0]} to session {numbers[1]}:\n\n"
+    text += "![before and after](changes.png)\n\n"
+    text += "| change | at, m | size, m | confidence |\n|---|---|---|---|\n"
+    for c in changes:
+        came = "" if c.before is None else f" from {c.before[0]:.2f}, {c.before[1]:.2f}"
+        turned = f", by {c.angle_deg:+.0f}°" if c.kind == "door" else ""
+        text += (
+            f"| {c.kind}{turned} | {c.at[0]:.2f}, {c.at[1]:.2f}{came} | {c.size_m:.2f} "
+            f"| {c.confidence:.2f} |\n"
+        )
+    text += (
+        f"\n## How its places change, from {len(history)} sessions\n\n![mobility](mobility.png)\n"
+    )
+    return text

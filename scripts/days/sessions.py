@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sessions of one building, from a dataset of ``mobilia generate --sessions`` or made here."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from scripts.comparison.recording import Recording, load, record
+from sim.recording.recipe import RECIPE, Recipe, read_recipe
+from sim.world.times_of_day import clock_s, time_of
+from slam.errors import InvalidValueError, LogFormatError
+from slam.frames import Frame
+from slam.logs import open_log
+
+EVERY = 5  # of the scans of a simulated session one in so many is kept: 7.5 a second
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drive:
+    """One session.
+
+    recording  what a simulated one also holds: what stood where, what each beam met; else None
+    """
+
+    number: int
+    time_s: float
+    time_of_day: str
+    frames: Sequence[Frame]
+    recording: Recording | None = None
+
+
+def simulated(recipe: Recipe, sessions: int, first_seconds: float) -> Iterator[Drive]:
+    """Sessions 0, 1, ... of a building; the first, which maps it, lasts ``first_seconds``."""
+    for number in range(sessions):
+        seconds = first_seconds if number == 0 else recipe.seconds
+        wanted = replace(recipe, session=number, seconds=seconds)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "session.npz"
+            record(path, every=EVERY, **_words(wanted))
+            drive = load(path)
+        yield _drive(number, drive.frames, drive)
+
+
+def _words(recipe: Recipe) -> dict[str, object]:
+    return {name: getattr(recipe, name) for name in recipe.__dataclass_fields__}
+
+
+def _drive(number: int, frames: Sequence[Frame], recording: Recording | None = None) -> Drive:
+    return Drive(
+        number=number,
+        time_s=clock_s(number),
+        time_of_day=time_of(number).name,
+        frames=frames,
+        recording=recording,
+    )
+
+
+def recorded(folder: Path) -> list[tuple[int, Path]]:
+    """Numbers and folders of the episodes of a dataset of sessions, in order.
+
+    Raises ``LogFormatError`` for a folder without any, or with sessions of several buildings.
+    """
+    found: dict[int, Path] = {}
+    buildings = set()
+    for path in sorted(p.parent for p in folder.glob(f"*/{RECIPE}")):
+        recipe = read_recipe(path / RECIPE).recipe
+        if recipe.session is None:
+            continue
+        if recipe.session in found:
+            raise LogFormatError(folder, f"holds session {recipe.session} twice")
+        found[recipe.session] = path
+        buildings.add((recipe.scene, recipe.seed, recipe.share_changed))
+    if not found:
+        raise LogFormatError(
+            folder, "holds no sessions: mobilia generate SCENE --sessions 10 makes some"
+        )
+    if len(buildings) > 1:
+        raise LogFormatError(folder, f"holds sessions of {len(buildings)} buildings, not of one")
+    return sorted(found.items())
+
+
+def read(folder: Path) -> Iterator[Drive]:
+    """The sessions of a dataset, in order."""
+    for number, path in recorded(folder):
+        yield _drive(number, list(open_log(path).frames()))
+
+
+def checked_count(sessions: int) -> int:
+    """At least two; ``InvalidValueError`` otherwise."""
+    if sessions < 2:
+        raise InvalidValueError(f"--sessions must be >= 2, got {sessions}")
+    return sessions

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What ``mobilia lifelong`` prints and writes: a table, lifelong.csv, lifelong.json, a page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.markup import escape
+from rich.table import Table
+
+from scripts.days.lifelong import COLUMNS
+from sim.recording.tables import table
+from slam.files import write_text
+
+Row = Mapping[str, Any]
+_FORMS = {
+    "found_after_s": "{:.1f}", "rmse_m": "{:.3f}", "worst_m": "{:.3f}", "tracked": "{:.2f}",
+    "ghost_rate": "{:.3f}", "recall": "{:.2f}", "map_kb": "{:.0f}", "memory_mb": "{:.2f}",
+    "load_s": "{:.2f}", "ms_per_scan": "{:.2f}",
+}  # fmt: skip
+_PRINTED = {
+    "session": "session", "time_of_day": "time", "map": "map", "found_after_s": "found, s",
+    "place": "place", "rmse_m": "rmse, m", "ghost_rate": "ghosts", "recall": "recall",
+    "map_kb": "kB", "ms_per_scan": "ms",
+}  # fmt: skip
+_SHOWN = (
+    "session", "time_of_day", "map", "found_after_s", "place", "rmse_m", "worst_m", "ghost_rate",
+    "recall", "map_kb", "ms_per_scan",
+)  # fmt: skip
+
+
+def words(column: str, value: object) -> str:
+    """A cell as text, "" for none."""
+    return "" if value is None else _FORMS.get(column, "{}").format(value)
+
+
+def printed(slam: str, rows: Sequence[Row]) -> Table:
+    """One SLAM's sessions."""
+    found = Table(
+        title=escape(slam), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0),
+        pad_edge=False, caption=escape(verdict(rows)), caption_justify="left",
+    )  # fmt: skip
+    for heading in _PRINTED.values():
+        found.add_column(heading, overflow="fold", min_width=len(heading))
+    for row in rows:
+        found.add_row(*(escape(words(column, row[column])) for column in _PRINTED))
+    return found
+
+
+def verdict(rows: Sequence[Row]) -> str:
+    """How many sessions were found, and whether the last is as good as the second."""
+    if all(row["map"] == "anew" for row in rows):
+        return "cannot load a map: every session starts anew, in a frame of its own"
+    later = [row for row in rows if row["map"] != "new"]
+    found = [row for row in later if row["found_after_s"] is not None]
+    soon = sum(row["found_after_s"] <= 10.0 for row in found)
+    wrong = sum(row["place"] == "wrong" for row in later)
+    text = (
+        f"{len(found)} of {len(later)} sessions found, {soon} within 10 s, {wrong} at a wrong place"
+    )
+    measured = [row["rmse_m"] for row in rows if row["rmse_m"] is not None]
+    if len(measured) > 1 and measured[0]:
+        text += f"; error of the last session {measured[-1] / measured[0]:.2f} of the first's"
+    return text
+
+
+def write(folder: Path, rows: Sequence[Row], settings: Mapping[str, Any], changes: str) -> None:
+    """lifelong.csv, lifelong.json and lifelong.md; ``changes`` is the page's part on them."""
+    cells = [[words_exactly(row[column]) for column in COLUMNS] for row in rows]
+    write_text(folder / "lifelong.csv", table(COLUMNS, cells))
+    whole = {"schema": 1, "settings": dict(settings), "rows": [dict(row) for row in rows]}
+    write_text(folder / "lifelong.json", json.dumps(whole, indent=2) + "\n")
+    write_text(folder / "lifelong.md", page(rows, settings) + changes)
+
+
+def words_exactly(value: object) -> str:
+    """A field of the CSV: numbers with all that they hold."""
+    return "" if value is None else repr(value) if isinstance(value, float) else str(value)
+
+
+def page(rows: Sequence[Row], settings: Mapping[str, Any]) -> str:
+    """The tables of all SLAMs as Markdown."""
+    building = ", ".join(f"{key} {value}" for key, value in settings.items())
+    parts = [f"# A building over {len({r['session'] for r in rows})} sessions\n\n{building}\n"]
+    for slam in dict.fromkeys(row["slam"] for row in rows):
+        own = [row for row in rows if row["slam"] == slam]
+        head = "| " + " | ".join(c.replace("_", " ") for c in _SHOWN) + " |\n"
+        rule = "|" + "---|" * len(_SHOWN) + "\n"
+        body = "".join("| " + " | ".join(words(c, row[c]) for c in _SHOWN) + " |\n" for row in own)
+        parts.append(f"\n## {slam}\n\n{verdict(own)}\n\n{head}{rule}{body}")
+    return "".join(parts)

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Will the door be open, will something stand there? Ours against four rivals, on true sessions.
+
+``python -m scripts.experiments.habits --seeds 12``.
+
+The truth of sessions is a function of scene, seed, change and number, so nothing is simulated.
+Places are the doors (open or not), and wherever a chair or a board stood in an earlier session
+(one stands within 0.3 m, or not). A predictor sees four in five places a session, two sightings in
+a hundred are wrong. From session 10 on, it says after each session how likely every place is taken
+(a door: open) in the next five. A building's score is the mean over its places and sessions; the
+intervals are of the mean over buildings, by bootstrap. ``--first-seed 100`` and above were not used
+to choose anything.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes import build
+from sim.core.seeds import Seeds
+from sim.world.sessions import Days
+from sim.world.times_of_day import clock_s
+from slam.days.habits import Habits
+from slam.days.predictions import Predictor, brier, log_score
+from slam.days.rivals import FreMEn, LastSeen, Mean, PersistenceFilter
+from slam.evaluation.statistics import bootstrap_draws, central_interval
+from slam.frames import Float
+
+SESSIONS, FIRST, AHEAD = 40, 10, 5
+SEEN, WRONG = 0.8, 0.02  # of the places a session; of the sightings
+NEAR_M = 0.3  # a thing so near to a place takes it
+OPEN_RAD = 0.2  # a door turned by more is open
+GROUPS = ("doors", "chairs", "boards")
+SPANS_H = ((0.0, 6.0), (6.0, 12.0), (12.0, 25.0))
+PREDICTORS: Mapping[str, Callable[[int], Predictor]] = {
+    "habits": Habits,
+    "last seen": LastSeen,
+    "mean": Mean,
+    "persistence": PersistenceFilter,
+    "fremen": FreMEn,
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Truth:
+    """One building: (sessions, n) whether each place is taken, its group, when each session is."""
+
+    taken: NDArray[np.bool_]
+    groups: NDArray[np.int64]
+    times_s: Float
+
+
+def truth(scene: str, seed: int, change: float, crowd: str) -> Truth:
+    """All sessions of a building."""
+    seeds = Seeds(seed)
+    options: dict[str, Any] = {"crowd": crowd} if crowd else {}
+    days = Days(build(scene, seed=seeds.integer("layout"), **options), seeds, change)
+    arranged = [days.arrangement(k) for k in range(SESSIONS)]
+    doors = sorted(arranged[0].angles)
+    columns = [np.array([[a.angles[d] > OPEN_RAD for d in doors] for a in arranged])]
+    groups = [0] * len(doors)
+    kinds = {m.name: m.kind for m in days.scene.movers}
+    for group, word in ((1, "chair"), (2, "board")):
+        names = sorted(n for n in arranged[0].poses if kinds[n].startswith(word))
+        stands = [[p[:2] for n in names if (p := a.poses[n]) is not None] for a in arranged]
+        places = _places(stands)
+        columns.append(_taken(stands, places))
+        groups += [group] * len(places)
+    times = np.array([clock_s(k) for k in range(SESSIONS)])
+    return Truth(
+        taken=np.concatenate(columns, axis=1),
+        groups=np.array(groups, dtype=np.int64),
+        times_s=times,
+    )
+
+
+def _places(stands: Sequence[Sequence[tuple[float, float]]]) -> list[tuple[float, float]]:
+    found: list[tuple[float, float]] = []
+    for session in stands:
+        for at in session:
+            if all(math.dist(at, other) > NEAR_M for other in found):
+                found.append(at)
+    return found
+
+
+def _taken(
+    stands: Sequence[Sequence[tuple[float, float]]], places: Sequence[tuple[float, float]]
+) -> NDArray[np.bool_]:
+    rows = [
+        [any(math.dist(at, place) <= NEAR_M for at in session) for place in places]
+        for session in stands
+    ]
+    return np.array(rows, dtype=np.bool_).reshape(len(stands), len(places))
+
+
+def sightings(known: Truth, seed: int) -> Float:
+    """(sessions, n) what a robot sees of it."""
+    rng = np.random.default_rng(seed)
+    shape = known.taken.shape
+    seen, wrong = rng.random(shape) < SEEN, rng.random(shape) < WRONG
+    return np.where(seen, (known.taken ^ wrong).astype(np.float64), np.nan)
+
+
+def scores(
+    known: Truth, seen: Float, make: Callable[[int], Predictor]
+) -> Iterator[tuple[int, int, float, float]]:
+    """(group, span, Brier, log score) of every prediction of a place that was once seen taken."""
+    predictor, ever = make(seen.shape[1]), known.groups == 0
+    for k in range(SESSIONS - 1):
+        predictor.see(float(known.times_s[k]), seen[k])
+        ever = ever | (np.nan_to_num(seen[k]) > 0.5)
+        if k < FIRST - 1:
+            continue
+        for later in range(k + 1, min(k + 1 + AHEAD, SESSIONS)):
+            hours = (known.times_s[later] - known.times_s[k]) / 3600.0
+            span = next(i for i, (low, high) in enumerate(SPANS_H) if low < hours <= high)
+            told = predictor.probability(float(known.times_s[later]))
+            came = known.taken[later].astype(np.float64)
+            each = zip(brier(told, came), log_score(told, came), known.groups, ever, strict=True)
+            yield from ((int(g), span, float(b), float(s)) for b, s, g, e in each if e)
+
+
+def table(scene: str, seeds: Sequence[int], change: float, crowd: str) -> dict[str, Float]:
+    """By predictor: (buildings, groups, spans + 1, 2) mean Brier and log scores, last span: all."""
+    found: dict[str, list[Float]] = {name: [] for name in PREDICTORS}
+    for seed in seeds:
+        known = truth(scene, seed, change, crowd)
+        seen = sightings(known, seed)
+        for name, make in PREDICTORS.items():
+            sums = np.zeros((len(GROUPS), len(SPANS_H) + 1, 3))
+            for group, span, b, s in scores(known, seen, make):
+                sums[group, [span, -1]] += (b, s, 1.0)
+            with np.errstate(invalid="ignore"):
+                found[name].append(sums[..., :2] / sums[..., 2:])
+    return {name: np.array(rows) for name, rows in found.items()}
+
+
+def interval(values: Float) -> tuple[float, float, float]:
+    """Mean over buildings and its 95 % interval; NaN of nothing."""
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return math.nan, math.nan, math.nan
+    low, high = central_interval(values[bootstrap_draws(len(values))].mean(axis=1).tolist())
+    return float(values.mean()), low, high
+
+
+def lines(found: Mapping[str, Float]) -> Iterator[str]:
+    """The table, a row for each group, span and predictor."""
+    spans = [f"{low:g} to {high:g} h" for low, high in SPANS_H] + ["all"]
+    yield "| places | ahead | predictor | Brier | 95 % | log score | habits less its | 95 % |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for group, place in enumerate(GROUPS):
+        for span, ahead in enumerate(spans):
+            for name, rows in found.items():
+                b, low, high = interval(rows[:, group, span, 0])
+                if math.isnan(b):
+                    continue
+                s, _, _ = interval(rows[:, group, span, 1])
+                d, d_low, d_high = interval(
+                    found["habits"][:, group, span, 0] - rows[:, group, span, 0]
+                )
+                gap = "" if name == "habits" else f"{d:+.4f} | {d_low:+.4f} to {d_high:+.4f}"
+                yield (
+                    f"| {place} | {ahead} | {name} | {b:.4f} | {low:.4f} to {high:.4f} | {s:.3f} "
+                    f"| {gap or ' | '} |"
+                )
+
+
+def behind(found: Mapping[str, Float]) -> Iterator[str]:
+    """Where ours is not ahead: its Brier score is larger, or the interval of the gap holds 0."""
+    spans = [f"{low:g} to {high:g} h" for low, high in SPANS_H] + ["all"]
+    for group, place in enumerate(GROUPS):
+        for span, ahead in enumerate(spans):
+            for name, rows in found.items():
+                if name == "habits":
+                    continue
+                d, low, high = interval(
+                    found["habits"][:, group, span, 0] - rows[:, group, span, 0]
+                )
+                if not math.isnan(d) and high >= 0.0:
+                    gap = f"{d:+.4f} ({low:+.4f} to {high:+.4f})"
+                    yield f"not ahead of {name}: {place}, {ahead}: {gap}"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--scene", default="random-rooms")
+    parser.add_argument("--seeds", type=int, default=12, help="buildings")
+    parser.add_argument("--first-seed", type=int, default=100)
+    parser.add_argument("--change", type=float, default=0.3)
+    parser.add_argument("--crowd", default="boards:3", help="of the scene; boards stand in it")
+    given = parser.parse_args()
+    seeds = range(given.first_seed, given.first_seed + given.seeds)
+    found = table(given.scene, seeds, given.change, given.crowd)
+    print(f"{given.scene}, change {given.change:g}, {given.seeds} buildings, seeds from {seeds[0]}")
+    for line in (*lines(found), *behind(found)):
+        print(line)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia lifelong``: SLAMs over the sessions of a building, each in the map of those before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from scripts.console import console, note, working
+from scripts.knobs import CrowdOption, Motion, options_with
+from scripts.names import check
+from scripts.scanner_option import Scanner
+from slam.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from scripts.days.sessions import Drive
+    from sim.recording.recipe import Recipe
+
+
+def lifelong(
+    folder: Annotated[
+        Path | None,
+        typer.Argument(help="A dataset of [bold]mobilia generate --sessions[/bold]."),
+    ] = None,
+    slam: Annotated[str, typer.Option(help="SLAMs, by name, with commas.")] = "shunting,occupancy",
+    scene: Annotated[
+        str | None, typer.Option(help="Or a scene, whose sessions are simulated here.")
+    ] = None,
+    sessions: Annotated[int, typer.Option(help="How many of them.")] = 10,
+    change: Annotated[
+        float, typer.Option(help="Share of things and doors put elsewhere between two sessions.")
+    ] = 0.3,
+    dynamism: Annotated[float, typer.Option(help="How much the room moves in a session.")] = 0.5,
+    motion: Motion = None,
+    crowd: CrowdOption = None,
+    seconds: Annotated[float, typer.Option(help="Length of a simulated session, s.")] = 60.0,
+    first_seconds: Annotated[
+        float | None, typer.Option(help="Of the first one, which maps the building; default three.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of the building.")] = 0,
+    scanner: Scanner = "full",
+    out: Annotated[Path | None, typer.Option(help="Folder to write; default out/lifelong.")] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
+    ] = False,
+) -> None:
+    """Let SLAMs live in a building: each session starts anywhere in the map of those before.
+
+    [bold]mobilia lifelong --scene random-rooms --sessions 10 --change 0.3[/bold]
+
+    [bold]mobilia lifelong out/days --slam shunting,occupancy,kiss-icp[/bold]
+    """
+    if (folder is None) == (scene is None):
+        raise InvalidValueError("name exactly one of FOLDER and --scene")
+    names = [name.strip() for name in slam.split(",") if name.strip()]
+    if not names:
+        raise InvalidValueError("--slam must name at least one SLAM")
+    check(names, *([scene] if scene else []))
+    from scripts.days import sessions as days
+    from sim.recording.recipe import Recipe
+
+    if folder is not None:
+        days.recorded(folder)  # complains before anything is written
+        _write(names, days.read(folder), {"dataset": folder.name}, out, overwrite)
+        return
+    assert scene is not None
+    recipe = Recipe(
+        scene=scene, seed=seed, dynamism=dynamism, motion=motion, change=change, seconds=seconds,
+        scanner=scanner, session=days.checked_count(sessions) - 1, options=options_with(crowd),
+    )  # fmt: skip
+    drives = days.simulated(recipe, sessions, first_seconds or 3.0 * seconds)
+    _write(names, drives, _settings(recipe, sessions, first_seconds), out, overwrite)
+
+
+def _settings(recipe: Recipe, sessions: int, first_seconds: float | None) -> dict[str, Any]:
+    return {
+        "scene": recipe.scene, "seed": recipe.seed, "dynamism": recipe.dynamism,
+        "motion": recipe.motion, "change": recipe.change, "sessions": sessions,
+        "seconds": recipe.seconds, "first_seconds": first_seconds or 3.0 * recipe.seconds,
+        "scanner": recipe.scanner, "options": dict(recipe.options),
+    }  # fmt: skip
+
+
+def _write(
+    names: list[str],
+    drives: Iterator[Drive],
+    settings: dict[str, Any],
+    out: Path | None,
+    overwrite: bool,
+) -> None:
+    from scripts.days import lifelong as life
+    from scripts.days import tables
+    from scripts.days.report import changes_page
+    from scripts.output import whole_folder, write_recipe
+
+    settings = {"slams": names, **settings}
+    path = out or Path("out") / "lifelong"
+    with whole_folder(path, overwrite=overwrite, command="lifelong", settings=settings) as folder:
+        buildings = life.started(names, folder)
+        kept: dict[int, Drive] = {}
+        rows = []
+        with working("living through the sessions"):
+            for row in life.rows(buildings, _noted(drives, kept)):
+                rows.append(row)
+        pages = [changes_page(folder, b, kept) for b in buildings if not b.anew][:1]
+        tables.write(folder, rows, settings, "".join(pages))
+        write_recipe(folder, "lifelong", settings)
+    for name in names:
+        console.print(tables.printed(name, [row for row in rows if row["slam"] == name]))
+    note(f"open {escape(str(path / 'lifelong.md'))} first")
+
+
+def _noted(drives: Iterator[Drive], kept: dict[int, Drive]) -> Iterator[Drive]:
+    """The same, each also kept for the comparison of sessions."""
+    for drive in drives:
+        kept[drive.number] = drive
+        yield drive

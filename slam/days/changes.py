@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What changed between two sessions: things that appeared, are gone or moved, doors that turned.
+
+Only places that both sessions saw can tell. Places where something stood in one and nothing in the
+other are joined to objects; one that is gone and one of about its size that appeared nearby are
+taken for the same thing, moved. Two thin ones that share an end are a door, before and after.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from slam.days.config import ChangeConfig, DaysConfig
+from slam.days.evidence import Snapshot
+from slam.days.history import dense
+from slam.frames import Float
+
+KINDS = ("appeared", "gone", "moved", "door")
+_FULL = 6.0  # places of an object that make its extent certain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """One thing that is otherwise than in the session before.
+
+    kind        one of ``KINDS``
+    at          (x, y) m in the map: where it stands, or stood if it is gone; a door's hinge
+    before      (x, y) m where a moved thing stood; None for the others
+    size_m      longest side of what was seen of it
+    angle_deg   by which a door turned, counter-clockwise; 0 for the others
+    confidence  in [0, 1]: how clear both sessions are about its places, less for few of them
+    """
+
+    kind: str
+    at: tuple[float, float]
+    size_m: float
+    confidence: float
+    before: tuple[float, float] | None = None
+    angle_deg: float = 0.0
+
+    def spots(self) -> list[tuple[float, float]]:
+        """Every place that changed: two of a moved thing."""
+        return [self.at] if self.before is None else [self.before, self.at]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Piece:
+    """Places that changed together: ``points`` (n, 2) m, ``ends`` (2, 2) of its longest line."""
+
+    points: Float
+    confidence: float
+    centre: Float
+    ends: Float
+    size_m: float
+    thick_m: float
+
+
+def between(
+    before: Snapshot, after: Snapshot, cell_m: float, config: ChangeConfig | None = None
+) -> list[Change]:
+    """The changes from one session to a later one, the surest first."""
+    config = config or DaysConfig().change
+    if not len(before.cells) or not len(after.cells):
+        return []
+    low, old, new = _together(before, after)
+    gone = _pieces(old, new, low, cell_m, config)
+    come = _pieces(new, old, low, cell_m, config)
+    found = [*_doors(gone, come, config), *_moved(gone, come, config)]
+    for kind, rest in (("gone", gone), ("appeared", come)):
+        found += [
+            Change(kind=kind, at=_point(p.centre), size_m=p.size_m, confidence=p.confidence)
+            for p in rest
+        ]
+    return sorted(found, key=lambda c: (-c.confidence, c.at))
+
+
+def _together(
+    before: Snapshot, after: Snapshot
+) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
+    """Corner, and both shares as images, NaN where unseen."""
+    cells, inverse = np.unique(
+        np.concatenate([before.cells, after.cells]), axis=0, return_inverse=True
+    )
+    values = np.full((2, len(cells)), np.nan, np.float32)
+    n = len(before.cells)
+    values[0, inverse.ravel()[:n]] = before.standing
+    values[1, inverse.ravel()[n:]] = after.standing
+    low, images = dense(cells, values)
+    return low, images[0], images[1]
+
+
+def _pieces(
+    there: NDArray[np.float32],
+    other: NDArray[np.float32],
+    low: NDArray[np.int64],
+    cell_m: float,
+    config: ChangeConfig,
+) -> list[_Piece]:
+    """What stands in one image where the other is empty, joined to pieces."""
+    with np.errstate(invalid="ignore"):
+        stands, still = there >= config.stands, other >= config.stands
+        empty = other <= config.empty
+    changed = (stands & empty & ~_grown(still, config.slack_m / cell_m)).astype(np.uint8)
+    joined = _grown(changed > 0, 0.5 * config.join_m / cell_m).astype(np.uint8)
+    count, labels = cv2.connectedComponents(joined, connectivity=8)
+    pieces = []
+    for label in range(1, count):
+        j, i = np.nonzero((labels == label) & (changed > 0))
+        points: Float = (np.stack([i, j], axis=1) + low).astype(np.float64) * cell_m + 0.5 * cell_m
+        clear = float((there[j, i] - other[j, i]).mean())
+        piece = _piece(points, clear * (1.0 - math.exp(-3.0 * len(i) / _FULL)), cell_m)
+        if piece.size_m >= config.least_m:
+            pieces.append(piece)
+    return pieces
+
+
+def _grown(image: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
+    n = max(0, math.floor(cells + 1e-9))
+    y, x = np.mgrid[-n : n + 1, -n : n + 1]
+    disc = (x * x + y * y <= cells * cells + 1e-9).astype(np.uint8)
+    return np.asarray(cv2.dilate(image.astype(np.uint8), disc) > 0)
+
+
+def _piece(points: Float, confidence: float, cell_m: float) -> _Piece:
+    centre = points.mean(axis=0)
+    off = points - centre
+    _, _, axes = np.linalg.svd(off, full_matrices=False) if len(off) > 1 else (0, 0, np.eye(2))
+    along = off @ axes[0]
+    across = off @ np.array([-axes[0][1], axes[0][0]])
+    middle = centre + 0.5 * (along.min() + along.max()) * axes[0]
+    half = 0.5 * (along.max() - along.min() + cell_m)
+    return _Piece(
+        points=points,
+        confidence=min(max(confidence, 0.0), 1.0),
+        centre=middle,
+        ends=np.array([middle - half * axes[0], middle + half * axes[0]]),
+        size_m=float(2.0 * half),
+        thick_m=float(across.max() - across.min() + cell_m),
+    )
+
+
+def _doors(gone: list[_Piece], come: list[_Piece], config: ChangeConfig) -> list[Change]:
+    """Thin pieces of a leaf's length that share an end; they are taken off both lists."""
+    found = []
+    for old in list(gone):
+        for new in list(come):
+            hinge = _hinge(old, new, config)
+            if hinge is None:
+                continue
+            (x, y), turned, length = hinge
+            found.append(
+                Change(
+                    kind="door",
+                    at=(x, y),
+                    size_m=length,
+                    confidence=min(old.confidence, new.confidence),
+                    angle_deg=math.degrees(turned),
+                )
+            )
+            gone.remove(old)
+            come.remove(new)
+            break
+    return found
+
+
+def _hinge(
+    old: _Piece, new: _Piece, config: ChangeConfig
+) -> tuple[tuple[float, float], float, float] | None:
+    """Where two leaves' lines meet, the angle between them, and the leaf's length, m.
+
+    None where they are no door. Next to the hinge the two overlap, so neither piece reaches it.
+    """
+    if any(p.thick_m > config.leaf_thick * p.size_m for p in (old, new)):
+        return None
+    apart = np.linalg.norm(old.ends[:, None] - new.ends[None], axis=2)
+    a, b = np.unravel_index(int(np.argmin(apart)), apart.shape)
+    if apart[a, b] > config.hinge_m:
+        return None
+    hinge = _meeting(old.ends[[a, 1 - a]], new.ends[[b, 1 - b]], config.hinge_m)
+    first, second = old.ends[1 - a] - hinge, new.ends[1 - b] - hinge
+    length = 0.5 * float(np.linalg.norm(first) + np.linalg.norm(second))
+    if not config.leaf_least_m <= length <= config.leaf_most_m:
+        return None
+    cross = float(first[0] * second[1] - first[1] * second[0])
+    return _point(hinge), math.atan2(cross, float(first @ second)), length
+
+
+def _meeting(old: Float, new: Float, near_m: float) -> Float:
+    """Where the lines of two pieces (near end, far end) meet, if that is near; else between."""
+    along, other = old[0] - old[1], new[0] - new[1]
+    cross = float(along[0] * other[1] - along[1] * other[0])
+    between_ends = np.asarray(0.5 * (old[0] + new[0]))
+    if abs(cross) < 1e-6:
+        return between_ends
+    off = new[1] - old[1]
+    met = old[1] + along * float(off[0] * other[1] - off[1] * other[0]) / cross
+    far = max(np.linalg.norm(met - old[0]), np.linalg.norm(met - new[0]))
+    return np.asarray(met) if far <= near_m else between_ends
+
+
+def _moved(gone: list[_Piece], come: list[_Piece], config: ChangeConfig) -> list[Change]:
+    """Pairs of about one size, the nearest first; they are taken off both lists."""
+    pairs = sorted(
+        (float(np.linalg.norm(old.centre - new.centre)), a, b)
+        for a, old in enumerate(gone)
+        for b, new in enumerate(come)
+        if min(old.size_m, new.size_m) >= config.alike * max(old.size_m, new.size_m)
+    )
+    found, left, right = [], dict(enumerate(gone)), dict(enumerate(come))
+    for apart, a, b in pairs:
+        if apart > config.moved_m or a not in left or b not in right:
+            continue
+        old, new = left.pop(a), right.pop(b)
+        found.append(
+            Change(
+                kind="moved",
+                at=_point(new.centre),
+                before=_point(old.centre),
+                size_m=max(old.size_m, new.size_m),
+                confidence=min(old.confidence, new.confidence),
+            )
+        )
+    gone[:], come[:] = list(left.values()), list(right.values())
+    return found
+
+
+def _point(xy: Float) -> tuple[float, float]:
+    return float(xy[0]), float(xy[1])

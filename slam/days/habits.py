@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Habits of places: each relaxes towards what is usual there at that hour.
+
+A place is a chain of two states, taken and empty, whose rates of emergence and of going depend on
+the hour and add up to a constant r. The expectation of such a chain is
+
+    p(t) = u(t) + (x - u(s)) exp(-r (t - s))
+
+where x is what was seen at s, and u the usual share at an hour. The usual share of a place at an
+hour is the weighted mean of its sightings at about that hour, drawn to the place's overall share
+(moved by what the hour does to the whole building), as by some sightings more.
+
+Which r, and how much of an hour, is a matter of the place: each of a few ``Tempo``s predicts every
+sighting from those before it. How well it does is its weight at that place, and how common a tempo
+is in the building is learnt along with it (expectation maximisation).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from slam.days.config import DaysConfig, HabitConfig
+from slam.days.history import hour_of
+from slam.days.predictions import HOUR_S, Sightings, log_score
+from slam.frames import Float
+
+_ROUNDS = 20  # of expectation maximisation
+_NEVER = 1e9  # sightings: the hour counts for nothing
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tempo:
+    """A way in which places change.
+
+    rate       r, 1/s; 0: what was last seen counts for ever, infinite: not at all
+    hourly     sightings that an hour's share is drawn to the overall share by
+    building   share of the building's own rhythm that the overall share is moved by
+    """
+
+    rate: float
+    hourly: float
+    building: float
+
+
+HOURS = (3.0, 8.0, 20.0, 60.0, 200.0, 0.0)  # of relaxing; 0: at once
+TEMPOS = tuple(
+    Tempo(rate=math.inf if h == 0.0 else 1.0 / (h * HOUR_S), hourly=hourly, building=building)
+    for h, (hourly, building) in product(HOURS, ((1.0, 0.0), (4.0, 0.0), (4.0, 1.0), (_NEVER, 0.0)))
+)
+
+
+def relaxed(
+    usual_then: Float, usual_now: Float, seen: Float, rate: float, elapsed_s: Float
+) -> Float:
+    """The chain's expectation ``elapsed_s`` after ``seen``; ``usual_then``: at that time."""
+    if math.isinf(rate):
+        return usual_then
+    left = np.exp(-rate * elapsed_s)
+    return np.clip(usual_then + (seen - usual_now) * left, 0.0, 1.0)
+
+
+def near_hours(hours: Float, hour: float, width: float) -> Float:
+    """Weights in [0, 1] of sightings at ``hours`` for what is usual at ``hour``."""
+    off = np.abs((hours - hour + 12.0) % 24.0 - 12.0)
+    return np.asarray(np.maximum(1.0 - off / width, 0.0))
+
+
+class Habits(Sightings):
+    """Two-state chains with hours, a tempo for each place."""
+
+    def __init__(self, n: int, config: HabitConfig | None = None) -> None:
+        super().__init__(n)
+        self.config = config or DaysConfig().habit
+        self.last = np.full(n, np.nan)
+        self.last_s = np.full(n, np.nan)
+        self.scores = np.zeros((len(TEMPOS), n))  # log likelihood of the sightings so far
+        self._before: dict[float, tuple[Float, ...]] = {}
+
+    def see(self, time_s: float, values: Float) -> None:
+        """Score every tempo by it, then take it in."""
+        values = self.checked(time_s, values)
+        if self.times_s:
+            told = self._by_tempo(time_s)
+            known = ~np.isnan(values)
+            lost = values * log_score(told, np.ones(self.n))
+            lost = lost + (1.0 - values) * log_score(told, np.zeros(self.n))
+            self.scores[:, known] -= lost[:, known]
+        super().see(time_s, values)
+        known = ~np.isnan(values)
+        self.last = np.where(known, values, self.last)
+        self.last_s = np.where(known, time_s, self.last_s)
+        self._before.clear()
+
+    def weights(self) -> Float:
+        """(tempos, n) of each tempo at each place; they add up to 1."""
+        common = np.full(len(TEMPOS), 1.0 / len(TEMPOS))
+        likely = np.exp(self.scores - self.scores.max(axis=0, initial=-math.inf))
+        for _ in range(_ROUNDS):
+            each = common[:, None] * likely
+            each /= each.sum(axis=0)
+            if self.n:
+                common = (each.sum(axis=1) + 1.0) / (self.n + len(TEMPOS))
+        return np.asarray(each)
+
+    def probability(self, time_s: float) -> Float:
+        """Mean over the tempos by their weights."""
+        told = (self.weights() * self._by_tempo(time_s)).sum(axis=0)
+        return np.asarray(np.clip(told, self.config.least, 1.0 - self.config.least))
+
+    def usual(self, hour: float) -> Float:
+        """(n,) what is usual at that hour, whatever was last seen."""
+        weights = self.weights()
+        return np.asarray(
+            sum(w * self._usual(hour, t) for w, t in zip(weights, TEMPOS, strict=True))
+        )
+
+    def stays_s(self) -> Float:
+        """(n,) mean time for which a place stays as it is, s, by its tempos; up to 1e9."""
+        rates = np.array([min(t.rate, 1.0 / HOUR_S) for t in TEMPOS])
+        return np.asarray(1.0 / np.maximum((self.weights() * rates[:, None]).sum(axis=0), 1e-9))
+
+    def _by_tempo(self, time_s: float) -> Float:
+        """(tempos, n)."""
+        hour, unseen = float(hour_of(time_s)), np.isnan(self.last)
+        rows = []
+        for tempo in TEMPOS:
+            then = self._usual(hour, tempo)
+            now = self._usual_when_seen(tempo)
+            elapsed = np.where(unseen, math.inf, time_s - self.last_s)
+            seen = np.where(unseen, now, self.last)
+            rows.append(relaxed(then, now, seen, tempo.rate, elapsed))
+        return np.array(rows)
+
+    def _usual_when_seen(self, tempo: Tempo) -> Float:
+        """At each place's last sighting, what was usual at that hour."""
+        found = self._overall()
+        for time_s in np.unique(self.last_s[~np.isnan(self.last_s)]):
+            at = self.last_s == time_s
+            found = np.where(at, self._usual(float(hour_of(time_s)), tempo), found)
+        return found
+
+    def _overall(self) -> Float:
+        """Share of each place, drawn to that of all."""
+        table = self.table()
+        known = ~np.isnan(table)
+        everywhere = (np.nansum(table) + 1.0) / (known.sum() + 2.0)
+        prior = self.config.prior
+        return np.asarray(
+            (np.nansum(table, axis=0) + prior * everywhere) / (known.sum(axis=0) + prior)
+        )
+
+    def _about(self, hour: float) -> tuple[Float, ...]:
+        """Overall share, that moved by the hour, and sightings about that hour: sum and number."""
+        key = round(hour, 6)
+        if key not in self._before:
+            table = self.table()
+            overall = self._overall()
+            near = near_hours(hour_of(np.array(self.times_s)), hour, 24.0 / self.config.bins)
+            known = ~np.isnan(table)
+            count = near @ known
+            taken = near @ np.nan_to_num(table)
+            pull = 4.0 * float(overall.mean()) if self.n else 0.0
+            came = (taken.sum() + pull) / (count.sum() + 4.0)
+            wont = ((count * overall).sum() + pull) / (count.sum() + 4.0)
+            shift = _logit(np.array(came)) - _logit(np.array(wont))
+            moved = 1.0 / (1.0 + np.exp(-(_logit(overall) + shift)))
+            self._before[key] = (overall, moved, taken, count)
+        return self._before[key]
+
+    def _usual(self, hour: float, tempo: Tempo) -> Float:
+        if not self.times_s:
+            return np.full(self.n, 0.5)
+        overall, moved, taken, count = self._about(hour)
+        base = overall + tempo.building * (moved - overall)
+        return np.asarray((taken + tempo.hourly * base) / (count + tempo.hourly))
+
+
+def _logit(p: Float) -> Float:
+    p = np.clip(p, 1e-6, 1.0 - 1e-6)
+    return np.asarray(np.log(p / (1.0 - p)))

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where in the map of the days before a session starts.
+
+The robot maps on its own, in a frame that begins where it stands, while the known map is searched
+for what it sees. A place counts when it alone explains the present scan and the kept ones as well.
+Nothing is written to the known map meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from slam import se2
+from slam.days.config import SearchConfig
+from slam.estimate import Estimate
+from slam.frames import Float, Frame, to_s
+from slam.frontend.observations import Observations, observe
+from slam.frontend.odometry_prior import Prediction
+from slam.tracker.rasterise import rasterise
+from slam.tracker.tracker import Tracker
+from slam.tracker.tracking.relocalise import coarse, spread
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Kept:
+    """A scan of the search: what it saw, where in its own frame, and s since the one before."""
+
+    observations: Observations
+    T_own_robot: Float
+    elapsed: float
+
+
+class StartSearch:
+    """Maps alone and searches the known map, until the start is found.
+
+    alone  the SLAM that maps meanwhile    denied  places found that the kept scans denied
+    """
+
+    def __init__(self, known: Tracker, config: SearchConfig) -> None:
+        self._known, self._config = known, config
+        self.alone = type(known)(known.config)
+        self.elapsed_s, self.denied = 0.0, 0
+        self._search = known.relocalisation()
+        self._before: tuple[int, Float] | None = None
+        self._kept: list[Kept] = []
+        self._kept_s = 0.0
+
+    def take(self, frame: Frame) -> tuple[Estimate, Float | None]:
+        """The estimate in the session's own frame, and T_map_own (3,) when the place is found."""
+        estimate = self.alone.update(frame)
+        now, pose = frame.stamp_ns, estimate.T_map_robot
+        before_ns, before = self._before or (now, pose)
+        elapsed = to_s(now - before_ns)
+        self._before = (now, pose)
+        self.elapsed_s += elapsed
+        observations = observe(frame, self._twist(frame, before, pose, elapsed), self._known.config)
+        if not estimate.converged or not len(observations.points_robot):
+            self._begin_again(estimate)
+            return estimate, None
+        self._keep(observations, pose, elapsed)
+        prediction = Prediction(
+            T_map_robot=pose,
+            increment=se2.between(before, pose),
+            covariance=spread(self._config.step_m, self._config.step_rad),
+            twist=np.zeros(3),
+            elapsed=elapsed,
+        )
+        usual = self._known.usual_support()
+        match = self._search.step(observations, prediction, None, usual, carried=True)
+        if match is None:
+            return estimate, None
+        T_map_own = se2.compose(match.T_map_robot, se2.inverse(pose))
+        if not self._agrees(T_map_own, usual):
+            self.denied += 1
+            self._search = self._known.relocalisation()
+            return estimate, None
+        return estimate, T_map_own
+
+    def _begin_again(self, estimate: Estimate) -> None:
+        """Its own map is in doubt: motion and kept scans are worth nothing from before."""
+        if estimate.diagnostics.get("state") == "lost":
+            self._search = self._known.relocalisation()
+            self._kept.clear()
+
+    @staticmethod
+    def _twist(frame: Frame, before: Float, pose: Float, elapsed: float) -> Float:
+        if frame.odometry.twist is not None:
+            return np.asarray(frame.odometry.twist)
+        return se2.between(before, pose) / elapsed if elapsed > 0.0 else np.zeros(3)
+
+    def _keep(self, observations: Observations, pose: Float, elapsed: float) -> None:
+        """Keep the scan if the robot has moved on; the oldest go."""
+        self._kept_s += elapsed
+        if self._kept:
+            x, y, turn = se2.between(self._kept[-1].T_own_robot, pose).tolist()
+            config = self._config
+            if math.hypot(x, y) < config.buffer_m and abs(turn) < config.buffer_rad:
+                return
+        self._kept.append(Kept(observations=observations, T_own_robot=pose, elapsed=self._kept_s))
+        self._kept_s = 0.0
+        del self._kept[: -self._config.buffer]
+
+    def _agrees(self, T_map_own: Float, usual: float) -> bool:
+        """Whether the kept scans that the known map has a say on agree with the start there.
+
+        Where the session began in a room that the map does not know, only later ones are.
+        """
+        config = self._config
+        asked = self._kept[:: max(1, len(self._kept) // config.asked)]
+        said = [support for one in asked if (support := self._support(one, T_map_own)) is not None]
+        enough = len(said) > 0 and len(said) >= config.said * len(asked)
+        return enough and float(np.mean(said)) >= config.agreed * usual
+
+    def _support(self, one: Kept, T_map_own: Float) -> float | None:
+        """Of a kept scan; None where next to nothing of the known map is in its view."""
+        known, observations = self._known, one.observations
+        covariance = coarse(known.config.tracking.relocalise)
+        at = se2.compose(T_map_own, one.T_own_robot)
+        match = known.matched(observations, at, covariance)
+        rasterise(known.cell_map, observations, match.T_map_robot)
+        T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
+        confirmed, contradicted, _ = known.cell_map.integrate(
+            observations.view, T_map_laser, 0.0, write=False
+        )
+        known.cell_map.release()
+        total = confirmed + contradicted
+        if total < self._config.in_view * float(observations.weights.sum()):
+            return None
+        return match.matched * confirmed / total
+
+    def merge(self, T_map_own: Float) -> int:
+        """Let the known map see the kept scans from where they were; how many."""
+        known, cell_map = self._known, self._known.cell_map
+        for one in self._kept:
+            at = se2.compose(T_map_own, one.T_own_robot)
+            rasterise(cell_map, one.observations, at)
+            T_map_laser = se2.compose(at, one.observations.T_robot_laser)
+            step = min(max(one.elapsed, 1e-3), known.config.map.longest_look_s)
+            cell_map.integrate(one.observations.view, T_map_laser, step, write=True)
+        return len(self._kept)

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The score of a list of changes, by hand, and what the tables of a building say."""
+
+from __future__ import annotations
+
+import pytest
+
+from scripts.days.lifelong import COLUMNS
+from scripts.days.report import summed
+from scripts.days.tables import page, verdict
+from scripts.days.truth import Spot, scored
+from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
+from slam.days.changes import Change
+
+
+def spot(x, name, *, came=False, seen=True):
+    return Spot(at=(x, 0.0), name=name, came=came, seen=seen)
+
+
+def change(kind, x, size=0.5, before=None, angle=0.0):
+    at = None if before is None else (before, 0.0)
+    return Change(kind=kind, at=(x, 0.0), size_m=size, confidence=0.9, before=at, angle_deg=angle)
+
+
+def test_a_moved_thing_counts_at_both_its_places():
+    truth = [spot(0.0, "chair0"), spot(2.0, "chair0", came=True)]
+    score = scored([change("moved", 2.1, before=0.2)], truth)
+    assert (score.listed, score.right, score.seen, score.told) == (2, 2, 2, 2)
+    assert sorted(score.off_m) == pytest.approx([0.1, 0.2])
+
+
+def test_what_nobody_could_see_is_not_missed_and_what_is_not_there_is_wrong():
+    truth = [spot(0.0, "chair0"), spot(5.0, "chair1", seen=False), spot(8.0, "chair2")]
+    score = scored([change("gone", 0.1), change("appeared", 3.0)], truth)
+    assert (score.listed, score.right, score.seen, score.told) == (2, 1, 2, 1)
+    assert "precision 0.50 (1 of 2 places listed), recall 0.50 (1 of 2 places" in summed([score])
+    assert "median position error 10 cm" in summed([score])
+
+
+def test_small_pieces_may_tell_a_true_change_and_are_no_false_ones():
+    score = scored([change("gone", 0.1, size=0.3), change("gone", 9.0, size=0.3)], [spot(0.0, "a")])
+    assert (score.listed, score.seen, score.told) == (0, 1, 1)
+
+
+def test_a_door_tells_both_places_of_its_leaf():
+    truth = [spot(0.45, "door0"), spot(-0.45, "door0", came=True)]
+    score = scored([change("door", 0.0, size=0.9, angle=90.0)], truth)
+    assert (score.listed, score.right, score.told) == (1, 1, 2)
+
+
+def row(session, **values):
+    return {**dict.fromkeys(COLUMNS), "slam": "s", "session": session, "map": "merged", **values}
+
+
+def test_the_verdict_counts_sessions_found_and_the_last_error_against_the_first():
+    rows = [
+        row(0, map="new", found_after_s=0.0, place="right", rmse_m=0.02),
+        row(1, found_after_s=0.8, place="right", rmse_m=0.02),
+        row(2, found_after_s=12.0, place="right", rmse_m=0.03),
+        row(3, map="m.apart1.npz", place="not found"),
+    ]
+    said = verdict(rows)
+    assert said.startswith("2 of 3 sessions found, 1 within 10 s, 0 at a wrong place")
+    assert "1.50 of the first's" in said
+    assert "| 3 |" in page(rows, {"scene": "office"})
+    assert "anew" in verdict([row(0, map="anew"), row(1, map="anew")])
+
+
+def test_sessions_follow_the_clock():
+    times = [clock_s(k) for k in range(MOST_SESSIONS)]
+    assert times == sorted(set(times))
+    assert times[0] == 9.0 * 3600.0
+    assert times[5] - times[0] == 24.0 * 3600.0
+    assert (times[4] / 3600.0) % 24.0 == time_of(4).hour - 24.0

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia lifelong`` and the sessions of ``mobilia run``: what is refused, a small building."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+
+from scripts.days.one import Maps, session_of
+from slam.errors import InvalidValueError
+from slam.frames import Stream, StreamMetadata
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("lifelong", "name exactly one of FOLDER and --scene"),
+        ("lifelong --scene aren", "Did you mean 'arena'"),
+        ("lifelong --scene arena --slam shuntin", "Did you mean 'shunting'"),
+        ("lifelong --scene arena --slam ,", "--slam must name at least one SLAM"),
+        ("lifelong --scene arena --sessions 1", "--sessions must be >= 2, got 1"),
+        ("lifelong docs", "docs: holds no sessions"),
+        ("run shunting --scene arena --map-out m.npz", "--map-in, --map-out and --at are about"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(called, words, said):
+    ended = called(*words.split())
+    assert ended.returncode == 1
+    assert said in " ".join(ended.stderr.split())
+
+
+def test_the_time_of_a_session_is_given_or_the_logs_own():
+    stream = Stream(
+        metadata=StreamMetadata(source="test", extra={"epoch_ns": 5_000_000_000}), frames=list
+    )
+    maps = Maps(map_out="m.npz", at="1970-01-02T01:00")
+    assert session_of("shunting", maps, stream).time_s == 25.0 * 3600.0
+    assert session_of("shunting", Maps(map_out="m.npz"), stream).time_s == 5.0
+    with pytest.raises(InvalidValueError, match="--at must be a time such as"):
+        session_of("shunting", Maps(map_out="m.npz", at="nine"), stream)
+    with pytest.raises(InvalidValueError, match="--at is about"):
+        Maps(at="1970-01-02T01:00")
+    with pytest.raises(InvalidValueError, match="'odometry' cannot go on in a map"):
+        session_of("odometry", Maps(map_out="m.npz"), stream)
+
+
+def test_a_small_building_is_lived_in(called, tmp_path):
+    out = tmp_path / "life"
+    words = "--sessions 2 --seconds 12 --first-seconds 30 --change 0.2 --motion 0"
+    slams = "shunting,odometry"
+    ended = called("lifelong", "--scene", "arena", "--slam", slams, *words.split(), "--out", out)
+    assert ended.returncode == 0, ended.stderr
+    rows = list(csv.DictReader((out / "lifelong.csv").read_text().splitlines()))
+    assert [(r["slam"], r["session"]) for r in rows] == [
+        ("shunting", "0"), ("odometry", "0"), ("shunting", "1"), ("odometry", "1"),
+    ]  # fmt: skip
+    assert [r["map"] for r in rows] == ["new", "anew", "merged", "anew"]
+    assert rows[2]["place"] == "right"
+    assert float(rows[2]["rmse_m"]) < 0.1
+    assert json.loads((out / "lifelong.json").read_text())["settings"]["change"] == 0.2
+    assert {"changes.csv", "changes.png", "mobility.png", "lifelong.md", "map_shunting.npz"} <= {
+        p.name for p in out.iterdir()
+    }
+    assert "every session starts anew" in (out / "lifelong.md").read_text()
