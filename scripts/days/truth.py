@@ -25,7 +25,7 @@ ELSEWHERE_M, TURNED_RAD = 0.4, 0.4  # what is off by more stands elsewhere; of a
 SEEN_BEAMS = 20  # that must have met a thing where it stands for it to be seen
 SEEN_SHARE = 0.5  # of a thing's place that the other session must have seen
 HIT_M = 0.45  # a listed place this near to a true one is it
-_UNCOUNTED = ("person", "person_coat", "robot")
+_UNCOUNTED = "robot"  # beside people
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,7 +57,7 @@ def still_things(recording: Recording) -> list[Still]:
     found = []
     sights = [Sight(recording, k).points for k in range(len(recording.frames))]
     for row, kind in enumerate(recording.kinds):
-        if kind in _UNCOUNTED or kind.startswith("person"):
+        if kind == _UNCOUNTED or kind.startswith("person"):
             continue
         pose = np.median(recording.poses[:, row], axis=0)
         off = recording.poses[:, row] - pose

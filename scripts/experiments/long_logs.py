@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scripts.console import console
-from scripts.verbs.run import on_log
+from scripts.single_run.recorded import Log, on_log
 from slam import se2
 from slam.frames import Float
 
@@ -110,7 +110,7 @@ def write(path: Path, scans: int, metres: float, name: str, seed: int = 0) -> No
 def table(log: Path, slam: str, film: bool) -> bool:
     """Print the stages of one run; whether pictures cost less than the SLAM."""
     with tempfile.TemporaryDirectory() as folder, console.capture():
-        result = on_log([slam], log, Path(folder) / "run", overwrite=False, film=film)
+        result = on_log([slam], Log(path=log), Path(folder) / "run", overwrite=False, film=film)
     cost, distance_m = result["cost"], result["distance_m"]
     driven = "" if distance_m is None else f", {distance_m:.0f} m driven"
     well = bool(cost["pictures_s"] <= cost["slam_s"])
@@ -148,7 +148,13 @@ def warm(slam: str) -> None:
     """Load and compile all that the first run in a process loads and compiles."""
     with tempfile.TemporaryDirectory() as folder, console.capture():
         write(Path(folder) / "warm.log", 20, 20.0, "corner")
-        on_log([slam], Path(folder) / "warm.log", Path(folder) / "out", overwrite=False, film=True)
+        on_log(
+            [slam],
+            Log(path=Path(folder) / "warm.log"),
+            Path(folder) / "out",
+            overwrite=False,
+            film=True,
+        )
 
 
 if __name__ == "__main__":

@@ -3,22 +3,17 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from scripts.console import working
 from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check, run_name
 from scripts.oracle_option import Oracles, with_oracles
 from scripts.scanner_option import Scanner
 from scripts.set_option import Set
 from slam.errors import InvalidValueError
-
-if TYPE_CHECKING:
-    from scripts.days.one import Maps
 
 
 def run(
@@ -96,12 +91,12 @@ def run(
         raise InvalidValueError("--map-in, --map-out and --at are about a --log")
     if log is not None:
         from scripts.days.one import Maps
+        from scripts.single_run.recorded import Log, on_log
 
         maps = Maps(map_in=map_in, map_out=map_out, at=at)
         folder = out or Path("out") / f"run-{run_name(log)}"
-        on_log(
-            slam, log, folder, overwrite, film, strict=strict, text_format=text_format, maps=maps
-        )
+        recorded = Log(path=log, strict=strict, text_format=text_format)
+        on_log(slam, recorded, folder, overwrite=overwrite, film=film, maps=maps)
     elif scene is not None:
         from scripts.single_run.live import on_scene, tour
         from scripts.single_run.session import Outputs
@@ -112,53 +107,3 @@ def run(
         on_scene(
             slam, settings, Outputs(folder=folder, command="run", overwrite=overwrite, film=film)
         )
-
-
-def on_log(
-    names: list[str],
-    path: Path,
-    out: Path,
-    overwrite: bool,
-    film: bool,
-    *,
-    strict: bool = False,
-    text_format: Path | None = None,
-    maps: Maps | None = None,
-) -> dict[str, Any]:
-    """Run SLAMs on a recorded log; the first of them in a map of days before, if ``maps`` says."""
-    from scripts.days.one import kept, session_of
-    from scripts.film.encode import Pace
-    from scripts.film.footage import of_log
-    from scripts.single_run.costs import INPUT, Costs
-    from scripts.single_run.session import Outputs, run_session
-
-    costs = Costs()
-    with costs.stage(INPUT), working(f"reading {path.name}"):
-        footage = of_log(path, strict=strict, text_format=text_format)
-    show = footage.show(names)
-    session = None
-    if maps is not None and maps.given:
-        session = session_of(show.primary, maps, footage.stream)
-        show.replay.tracks[show.primary].system = session
-    settings = {
-        "slams": list(show.replay.tracks),
-        "log": path.name,
-        "log_sha256": hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None,
-        "log_facts": dict(footage.stream.metadata.extra),
-    }
-    results = run_session(
-        footage.stream,
-        show,
-        Outputs(
-            folder=out,
-            command="run",
-            settings=settings,
-            overwrite=overwrite,
-            film=film,
-            pace=Pace.of_log(footage.duration_s, footage.stream.length or 1),
-            costs=costs,
-        ),
-    )
-    if session is not None and maps is not None:
-        kept(session, maps)
-    return results

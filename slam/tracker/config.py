@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self
 from slam.errors import InvalidValueError
 from slam.frontend.config import FrontendConfig
 from slam.frontend.corner_config import CornerConfig
+from slam.frontend.range_error_config import RangeErrorConfig
 from slam.landmarks.hypotheses import Gates
 from slam.settings import Settings, number, word
 from slam.tracker.map_config import MapConfig
@@ -115,6 +116,7 @@ class TrackerConfig(Settings):
     uncertainty: UncertaintyConfig = field(default=UncertaintyConfig())
     features: FeaturesConfig = field(default=FeaturesConfig())
     standing: StandingConfig = field(default=StandingConfig())
+    range_error: RangeErrorConfig = field(default=RangeErrorConfig())
 
     def __post_init__(self) -> None:
         super().__post_init__()

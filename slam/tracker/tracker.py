@@ -20,10 +20,12 @@ from slam.frames import Float, Frame, Odometry
 from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.frontend.range_error import RangeError
 from slam.path import PosePath
 from slam.tracker import map_file as memory
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
+from slam.tracker.learnt_ranges import LearntRanges
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
 from slam.tracker.standing.agreement import Agreement
@@ -84,6 +86,9 @@ class Tracker(abc.ABC):
         self._rival = Rival(self._matcher, self._standing)
         self._vote, self._dragged = 1.0, 0.0
         self._trusted = True  # the pose of the frame before
+        empty = partial(self._new_map, self.config)
+        learns = self.config.range_error.learn == "on"
+        self._ranges = LearntRanges(self.config, self._matcher, empty) if learns else None
         self._path = PosePath()
 
     @staticmethod
@@ -107,7 +112,8 @@ class Tracker(abc.ABC):
         self._path.check_order(frame.stamp_ns)
         self._correct()
         prediction = self._predict(frame.odometry)  # 1 odometry prior
-        observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
+        seen = frame if self._ranges is None else self._ranges.seen(frame)
+        observations = observe(seen, prediction.twist, self.config)  # 2 de-skewed points, view
         votes = self._standing.votes(
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
         )
@@ -124,6 +130,9 @@ class Tracker(abc.ABC):
         self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
         if state == "tracking" or self._wake is not None:
             self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
+        if self._ranges is not None:
+            tracked = state == "tracking" and not match.slipped
+            self._ranges.learn(frame, prediction.twist, match.T_map_robot, tracked=tracked)
         return self._report(frame, match, state)
 
     def _first(self, frame: Frame) -> Estimate:
@@ -149,6 +158,8 @@ class Tracker(abc.ABC):
         if not self._trusted or lost or self._resumed is not None:
             return
         correction = self._loops.correction(self._path.poses)
+        if correction is None and self._ranges is not None:
+            correction = self._ranges.correction(self._loops, self._path.poses)
         if correction is None:
             return
         self.cell_map = correction.cell_map
@@ -159,6 +170,8 @@ class Tracker(abc.ABC):
         self._corrected_by[2] = se2.wrap(float(self._corrected_by[2]))
         self._path.replace(correction.poses)
         self._standing.moved(T)
+        if self._ranges is not None:
+            self._ranges.forget_views()
         self._pose_covariance.turned(float(T[2]))
         self._rival.forget()
         self._agreement.forget()
@@ -422,6 +435,11 @@ class Tracker(abc.ABC):
         """Whether the crowd may have carried the robot far."""
         doubtful_m = self.config.standing.doubtful_m
         return 0.0 < doubtful_m < self._agreement.off_m(self._dragged)
+
+    @property
+    def learnt_error(self) -> RangeError | None:
+        """What is known of the scanner's systematic error; None where that is switched off."""
+        return None if self._ranges is None else self._ranges.error
 
     def displace(self, by: Float) -> None:
         """For experiments: from now on the pose is believed to be off by ``by`` (3,), map frame.

@@ -20,8 +20,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from scripts.figures import in_first_frame
+from scripts.single_run.recorded import Log, on_log
 from scripts.verbs.generate import generate
-from scripts.verbs.run import on_log
 from sim.moments import toured
 from sim.recording.bag import FORMAT, BagWriter
 from sim.recording.recipe import RECIPE
@@ -198,7 +198,7 @@ def test_a_bag_of_another_format_is_not_called_changed(tmp_path: Path):
 
 
 def test_a_run_on_an_episode_has_the_times_of_its_bag(recorded, tmp_path: Path):
-    on_log(["odometry"], recorded.path, tmp_path / "run", overwrite=False, film=False)
+    on_log(["odometry"], Log(path=recorded.path), tmp_path / "run", overwrite=False, film=False)
     stamps = read_tum(recorded.path / "trajectory.tum").stamps_ns.tolist()
     for name in ("odometry", "truth"):
         assert read_tum(tmp_path / "run" / f"trajectory_{name}.tum").stamps_ns.tolist() == stamps

@@ -13,14 +13,15 @@ TOP = [
     "cell_m", "decay_per_s", "lateral_sum", "lateral_reach_cells", "threshold", "trace_s",
     "short_term_weight", "reward", "reward_exponent", "objective", "range_m", "freeze_below",
     "frontend", "map", "matching", "tracking", "loops", "uncertainty", "features", "standing",
+    "range_error",
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("1c684e5b3e92", "d1a57ceabf1a")),
-        (OccupancyConfig, ["grid"], ("8f7ae8fb3cc0", "5d650fd216c0")),
+        (ShuntingConfig, [], ("9d0202222b1e", "8d6eb22afeb8")),
+        (OccupancyConfig, ["grid"], ("9c5f69bfb9f0", "73643ae8023a")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
