@@ -17,11 +17,12 @@ from scenes.scene import Scene
 from scripts.closed_loop.runs import Driven
 from scripts.figures import COLORS, color_of, save, styled
 from sim.view.floorplan import FloorPlan
-from sim.view.mapview import MapView
+from sim.view.mapview import Float, MapView, Picture
 from sim.world.world import World
 
 Row = dict[str, Any]
 PX_PER_M = 40
+PALE = 0.35  # of the colour of what can move
 ASIDE = 0.05  # of the level's axis beyond its first and last point
 MARKS = {"reached": "#168c5a", "wrong": "#ce2c3c", "given up": "#8a8f98", "failed": "#20242c"}
 
@@ -85,7 +86,7 @@ def paths(path: Path, rows: Sequence[Sequence[Driven]], axis: str = "dynamism") 
     for r, runs in enumerate(rows):
         world = World(runs[0].identity["scene"], seed=runs[0].identity["seed"], dynamism=0.0)
         size = (round((xmax - xmin + 0.6) * PX_PER_M), round((ymax - ymin + 0.6) * PX_PER_M))
-        room = MapView(world.scene, *size).draw(world.mover_poses())
+        room = _room(MapView(world.scene, *size), world.mover_poses())
         plan = FloorPlan(world.scene, *size)
         for c, run in enumerate(runs):
             _panel(axes[r, c], run, room, plan, world.scene)
@@ -94,6 +95,13 @@ def paths(path: Path, rows: Sequence[Sequence[Driven]], axis: str = "dynamism") 
             axes[r, c].set_title(f"{who['slam']}, {level}, seed {who['seed']}", fontsize=9)
     figure.legend(handles=_legend(), loc="outside lower center", ncols=7, frameon=False)
     save(figure, path)
+
+
+def _room(view: MapView, poses: Float) -> Picture:
+    """What stays, and pale what may not: it stood there at the start, the robot drove later."""
+    still = view.draw(np.full_like(poses, np.nan)).astype(np.float64)
+    whole = view.draw(poses).astype(np.float64)
+    return np.round(still + PALE * (whole - still)).astype(np.uint8)
 
 
 def _panel(ax: Axes, run: Driven, room: Any, plan: FloorPlan, scene: Scene) -> None:
@@ -117,7 +125,7 @@ def _legend() -> list[Line2D]:
         Line2D([], [], color=COLORS["truth"], label="true path"),
         Line2D([], [], color="#1f61be", ls=":", label="believed path"),
     ]
-    lines += [Line2D([], [], ls="", label="furniture and people: at the start")]
+    lines += [Line2D([], [], ls="", label="pale: what can move, at the start")]
     return lines + [
         Line2D([], [], color=color, marker="o", ls="", label=outcome)
         for outcome, color in MARKS.items()

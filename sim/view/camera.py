@@ -6,7 +6,7 @@
 
 Made of MuJoCo's classic renderer calls, on a GL context of the library that ``sim.view.gl`` found,
 so that it works whatever ``MUJOCO_GL`` was when mujoco was imported. A camera belongs to the thread
-that made it.
+that made it. People between a camera that rides on the robot and the robot are drawn as glass.
 """
 
 from __future__ import annotations
@@ -30,6 +30,11 @@ MAX_SIZE = 4096
 SMALL = 480  # px; up to this height, fewer facets do (a third of the cost)
 PEOPLE_GROUP = 2
 SHADOW_M = 0.25  # radius; smaller things throw no shadow, but for those that make up people
+GLASS = 0.15  # opacity of people in the way of a camera
+BESIDE_M = 0.5  # from its line of sight, seen from above; a person is 0.25 m to each side
+BEHIND_M = 0.4  # from the camera back: a head there still fills the picture
+PERSON_M = 0.6  # from a torso's middle to the farthest part of a limb, seen from above
+_NO_COLOUR = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's default: the material's counts
 LOOK_AT_M = 0.7  # height of the middle of a close-up
 EDGE = 24  # grey levels between neighbours that make an edge
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
@@ -80,6 +85,9 @@ class Camera:
         self._soft = samples == 0
         small = (model.geom_rbound > 0.0) & (model.geom_rbound < SHADOW_M)
         self._shadeless = small & (model.geom_group != PEOPLE_GROUP)
+        self._people = np.flatnonzero(model.geom_group == PEOPLE_GROUP)
+        roots = np.unique(model.body_rootid[model.geom_bodyid[self._people]])
+        self._torsos = roots[model.body_mocapid[roots] < 0]  # limbs are mocap bodies of their own
 
     def render(self, data: mujoco.MjData, camera: str = "persp") -> NDArray[np.uint8]:
         """A fresh (height, width, 3) RGB picture of ``data``, whose kinematics must be up to date.
@@ -138,7 +146,10 @@ class Camera:
     def _update(self, data: mujoco.MjData) -> None:
         """Fill the scene; the model is as before afterwards."""
         model, before = self._model, self._model.geom_castshadow.copy()
+        colours = model.geom_rgba.copy()
         model.geom_castshadow[self._shadeless] = 0
+        glass = self._in_the_way(data)
+        model.geom_rgba[glass] = self._colours(glass) * (1.0, 1.0, 1.0, GLASS)
         everything = mujoco.mjtCatBit.mjCAT_ALL
         try:
             mujoco.mjv_updateScene(
@@ -146,6 +157,36 @@ class Camera:
             )
         finally:
             model.geom_castshadow[:] = before
+            model.geom_rgba[:] = colours
+
+    def _in_the_way(self, data: mujoco.MjData) -> NDArray[np.int64]:
+        """Geoms of people between the camera and the body that it rides on; none for others."""
+        number = self._view.fixedcamid
+        fixed = self._view.type == mujoco.mjtCamera.mjCAMERA_FIXED
+        body = self._model.cam_bodyid[number] if fixed else 0
+        if body == 0 or not len(self._torsos):
+            return np.zeros(0, np.int64)
+        eye, torsos = data.cam_xpos[number, :2], data.xpos[self._torsos, :2]
+        way = data.xpos[body, :2] - eye
+        far = float(np.hypot(*way))
+        if far < BEHIND_M:  # from above
+            return np.zeros(0, np.int64)
+        along = (torsos - eye) @ (way / far)
+        aside = np.abs((torsos - eye) @ (np.array([-way[1], way[0]]) / far))
+        between = (along > -BEHIND_M) & (along < far) & (aside < BESIDE_M)
+        parts = data.geom_xpos[self._people, None, :2] - torsos[between]
+        near = (np.hypot(parts[..., 0], parts[..., 1]) < PERSON_M).any(axis=1)
+        found: NDArray[np.int64] = self._people[near]
+        return found
+
+    def _colours(self, geoms: NDArray[np.int64]) -> NDArray[np.float32]:
+        """(n, 4) of geoms: their own, else their material's."""
+        model = self._model
+        material = model.geom_matid[geoms]
+        colours: NDArray[np.float32] = model.geom_rgba[geoms]
+        of_material = (colours == _NO_COLOUR).all(axis=1) & (material >= 0)
+        colours[of_material] = model.mat_rgba[material[of_material]]
+        return colours
 
     def close(self) -> None:
         """Give the GL context back; a second call does nothing."""

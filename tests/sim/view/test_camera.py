@@ -191,3 +191,52 @@ def test_the_camera_closes_without_a_word(world):
         for _ in range(3):
             with Camera(world[0], 32, 32, samples=0) as camera:
                 assert camera.render(world[1], "top").shape == (32, 32, 3)
+
+
+CROWDED = """
+<mujoco>
+  <worldbody>
+    <light pos="0 0 5" dir="0 0 -1"/>
+    <body name="robot">
+      <geom type="box" size="0.3 0.3 0.2" pos="0 0 0.2" rgba="1 0 0 1" mass="1"/>
+      <camera name="follow" pos="-1.9 0 2.3" xyaxes="0 -1 0 0.63 0 0.777" fovy="55"/>
+    </body>
+    <body name="person" pos="-1 0 0">
+      <joint type="slide" axis="1 0 0"/>
+      <joint type="slide" axis="0 1 0"/>
+      <geom type="capsule" size="0.2" fromto="0 0 0.9 0 0 1.6" group="2" rgba="0 1 0 1" mass="1"/>
+    </body>
+    <body name="leg" mocap="true" pos="-1 0.1 0">
+      <geom type="capsule" size="0.1" fromto="0 0 0 0 0 0.8" group="2" rgba="0 1 0 1" mass="1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.usefixtures("_needs_gl")
+def test_nobody_hides_the_robot_from_the_camera_that_follows_it():
+    model = mujoco.MjModel.from_xml_string(CROWDED)
+    data = mujoco.MjData(model)
+    colours = model.geom_rgba.copy()
+
+    def seen(dx: float, dy: float) -> tuple[float, float]:
+        """The share of the robot's red in the picture, and the brightest of a person's green."""
+        data.qpos[:] = dx, dy
+        data.mocap_pos[0] = -1.0 + dx, dy + 0.1, 0.0
+        mujoco.mj_forward(model, data)
+        with Camera(model, 160, 90, shadows=False) as camera:
+            picture = camera.render(data, "follow").astype(int)
+        red = (picture[..., 0] > picture[..., 1] + 25) & (picture[..., 0] > 60)
+        green = picture[..., 1][picture[..., 1] > 4 * picture[..., 0]]
+        return float(red.mean()), int(green.max(initial=0))
+
+    alone, _ = seen(20.0, 0.0)
+    assert alone > 0.01
+    _, solid = seen(0.5, 1.2)  # who is not in the way stays as he is
+    assert solid > 60
+    for dx in (0.0, -0.4, -0.9, 0.4):  # half way, at the camera, beside the robot
+        red, glass = seen(dx, 0.0)
+        assert red > 0.9 * alone
+        assert glass < 0.6 * solid
+    np.testing.assert_array_equal(model.geom_rgba, colours)
