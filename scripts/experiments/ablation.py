@@ -5,7 +5,8 @@
 recordings it runs over.
 
 A cell: drift (RPE per metre, cm/m, geometric mean over levels and seeds), and the runs lost. The
-last column is the geometric mean over the tracks. "oracle" sees no returns from what can move.
+last column is the geometric mean over the tracks, but for those on which the robot is carried off:
+there, drift is the way that it was carried. "oracle" sees no returns from what can move.
 """
 
 from __future__ import annotations
@@ -113,7 +114,8 @@ def table(results: Sequence[Result]) -> str:
             own = [r for r in results if (r.run.track, r.run.slam) == (track, wanted)]
             logs = [math.log(max(one.drift, LEAST_DRIFT)) for one in own]
             mean = math.exp(sum(logs) / len(logs))
-            means.append(math.log(mean))
+            if not any(sets.get("kidnap_every_s") for sets in TRACKS[track].sets):
+                means.append(math.log(mean))
             cells.append(f"{CM * mean:.2f}, {sum(one.lost for one in own)} of {len(own)}")
         lines.append([title, *cells, f"{CM * math.exp(sum(means) / len(means)):.2f}"])
     return markdown_table(["taken out", *tracks, "all"], lines, left=1)
