@@ -165,8 +165,8 @@ class Habits(Sightings):
             taken = near @ np.nan_to_num(table)
             pull = 4.0 * float(overall.mean()) if self.n else 0.0
             came = (taken.sum() + pull) / (count.sum() + 4.0)
-            wont = ((count * overall).sum() + pull) / (count.sum() + 4.0)
-            shift = _logit(np.array(came)) - _logit(np.array(wont))
+            habitual = ((count * overall).sum() + pull) / (count.sum() + 4.0)
+            shift = _logit(np.array(came)) - _logit(np.array(habitual))
             moved = 1.0 / (1.0 + np.exp(-(_logit(overall) + shift)))
             self._before[key] = (overall, moved, taken, count)
         return self._before[key]
