@@ -25,7 +25,6 @@ from slam.frontend.deskew import end_points
 from slam.frontend.polar import polar
 from slam.frontend.range_error_config import RangeErrorConfig
 
-PINNED_M = 1e-5  # deviation of what is unobservable: none
 STEEPEST_TAN2 = 9.0  # 72 degrees: beyond it, the term of incidence grows no further
 
 
@@ -258,7 +257,7 @@ class RangeError:
         scale = self.config.knot_m * np.arange(self.knots)
         shares = self.reach / self.reach.sum()
         pinned = np.append(shares * scale, 0.0)
-        return np.outer(pinned, pinned) / (PINNED_M**2 * float(shares @ scale**2))
+        return np.outer(pinned, pinned) / (self.config.pinned_m**2 * float(shares @ scale**2))
 
 
 class RangeCorrection:

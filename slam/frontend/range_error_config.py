@@ -24,6 +24,9 @@ class RangeErrorConfig(Settings):
     sigma_tan2_m: float = number(
         0.002, "m", "of the error per squared tangent of the incidence before any scan", low=1e-7
     )
+    pinned_m: float = number(
+        1e-5, "m", "deviation of what is unobservable: none", "numerical guard", low=1e-7
+    )
     steepest_deg: float = number(
         72.0, "deg", "incidence beyond which nothing is learnt", high=85.0, low=10.0
     )

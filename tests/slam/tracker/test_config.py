@@ -20,8 +20,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("9d0202222b1e", "8d6eb22afeb8")),
-        (OccupancyConfig, ["grid"], ("9c5f69bfb9f0", "73643ae8023a")),
+        (ShuntingConfig, [], ("5af22c4642f9", "00665fe5d367")),
+        (OccupancyConfig, ["grid"], ("6001edf7e1cf", "af6b4b1f3e03")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
