@@ -25,8 +25,6 @@ from slam.frontend.deskew import end_points
 from slam.frontend.polar import polar
 from slam.frontend.range_error_config import RangeErrorConfig
 
-STEEPEST_TAN2 = 9.0  # 72 degrees: beyond it, the term of incidence grows no further
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sights:
@@ -152,7 +150,7 @@ class RangeError:
 
     def design(self, ranges: Float, facing: Float) -> Float:
         """(n, knots + 1) of the basis functions."""
-        tan2 = np.minimum(1.0 / np.maximum(facing**2, 1e-6) - 1.0, STEEPEST_TAN2)
+        tan2 = np.minimum(1.0 / np.maximum(facing**2, 1e-6) - 1.0, self.config.most_tan2)
         return np.column_stack([hats(ranges, self.knots, self.config.knot_m), tan2])
 
     def at(self, ranges: Float, coefficients: Float | None = None) -> Float:

@@ -24,6 +24,9 @@ class RangeErrorConfig(Settings):
     sigma_tan2_m: float = number(
         0.002, "m", "of the error per squared tangent of the incidence before any scan", low=1e-7
     )
+    most_tan2: float = number(
+        9.0, "1", "squared tangent of the incidence beyond which its term grows no further: 72°"
+    )
     pinned_m: float = number(
         1e-5, "m", "deviation of what is unobservable: none", "numerical guard", low=1e-7
     )

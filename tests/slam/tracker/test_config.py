@@ -20,8 +20,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("5af22c4642f9", "00665fe5d367")),
-        (OccupancyConfig, ["grid"], ("6001edf7e1cf", "af6b4b1f3e03")),
+        (ShuntingConfig, [], ("3a5fe10d43c6", "bf919bff9b08")),
+        (OccupancyConfig, ["grid"], ("a411685c69f0", "0a3bed9c618e")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
