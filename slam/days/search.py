@@ -21,7 +21,7 @@ from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracker import Tracker
-from slam.tracker.tracking.relocalise import coarse, spread
+from slam.tracker.tracking.relocalise import coarse, in_view, spread
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,12 +120,7 @@ class StartSearch:
         covariance = coarse(known.config.tracking.relocalise)
         at = se2.compose(T_map_own, one.T_own_robot)
         match = known.matched(observations, at, covariance)
-        rasterise(known.cell_map, observations, match.T_map_robot)
-        T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
-        confirmed, contradicted, _ = known.cell_map.integrate(
-            observations.view, T_map_laser, 0.0, write=False
-        )
-        known.cell_map.release()
+        confirmed, contradicted = in_view(known.cell_map, observations, match)
         total = confirmed + contradicted
         if total < self._config.in_view * float(observations.weights.sum()):
             return None

@@ -209,23 +209,18 @@ class Relocalisation:
         """
         if not self.hypotheses:
             return None
-        best, config = self.hypotheses[0], self._config
+        best, config, self.went_on = self.hypotheses[0], self._config, False
         rivals = [h for h in self.hypotheses if h.support > config.alias * best.support]
-        going_on: list[Hypothesis] = []
-        if predicted is not None:
-            there = predicted
-            going_on = [h for h in rivals if self._shoved(h, there)]
-            going_on.sort(key=lambda h: not _near(h.match.T_map_robot, there, config))
-        if going_on and predicted is not None:
-            best = going_on[0]
-            self.went_on = _near(best.match.T_map_robot, predicted, config)
+        going_on = None if predicted is None else self._going_on(rivals, predicted)
+        if going_on is not None:
+            best = going_on
         elif len(rivals) > 1 or not (
             carried or predicted is None or self._drifted(best, predicted)
         ):
             return None
-        if best.waited or not (going_on or self.searches):
+        if best.waited or (going_on is None and not self.searches):
             return None  # not sure yet that nothing else explains it
-        known = bool(going_on) or best.tried(config, config.later)
+        known = going_on is not None or best.tried(config, config.later)
         enough = config.enough_later if known else config.enough
         if best.tried(config, config.last) and self._alone(best):
             enough = config.enough_last
@@ -234,6 +229,15 @@ class Relocalisation:
             return None
         self.accepted = best.support
         return best.match
+
+    def _going_on(self, rivals: list[Hypothesis], predicted: Float) -> Hypothesis | None:
+        """The place of dead reckoning, else the best of those that a shove leads to."""
+        config = self._config
+        for one in rivals:
+            if _near(one.match.T_map_robot, predicted, config):
+                self.went_on = True
+                return one
+        return next((one for one in rivals if self._shoved(one, predicted)), None)
 
     def _alone(self, best: Hypothesis) -> bool:
         """Whether nothing else explains nearly as much, though less than usual is explained."""
@@ -300,14 +304,20 @@ def support(cell_map: CellMap, observations: Observations, match: Match) -> floa
     The second factor distinguishes a corridor from the room beside it: there the beams pass where
     walls are known to be.
     """
+    confirmed, contradicted = in_view(cell_map, observations, match)
+    total = confirmed + contradicted
+    return match.matched * confirmed / total if total > 0.0 else 0.0
+
+
+def in_view(cell_map: CellMap, observations: Observations, match: Match) -> tuple[float, float]:
+    """What of the trace in view a frame confirms there, and what it contradicts; writes nothing."""
     rasterise(cell_map, observations, match.T_map_robot)
     T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
     confirmed, contradicted, _ = cell_map.integrate(
         observations.view, T_map_laser, 0.0, write=False
     )
     cell_map.release()
-    total = confirmed + contradicted
-    return match.matched * confirmed / total if total > 0.0 else 0.0
+    return confirmed, contradicted
 
 
 def _kept(found: list[Hypothesis], usual: float, config: RelocaliseConfig) -> list[Hypothesis]:
