@@ -154,6 +154,7 @@ class TrackerConfig(Settings):
             "objective": "log",
             "freeze_below": 0.0,
             "standing": ALL_VOTE,
+            "loops": LoopsConfig(corrects=0),
         }
         return cls(**(printed | changes))
 

@@ -240,7 +240,13 @@ class Tracker(abc.ABC):
             self._quality.relocated(recovery.accepted)
             self._pose_covariance.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
-        if wake is not None and not carried and self._quality.goes_on(wake.agreed, wake.agreed_s):
+        unknown = recovery.elsewhere(predicted) < self._numbers.relocalise.enough_later * usual
+        if (
+            wake is not None
+            and unknown
+            and not carried
+            and self._quality.goes_on(wake.agreed, wake.agreed_s)
+        ):
             self._go_on_in(wake.map)  # the map is outdated here
             return unmatched(predicted, matched=here.matched, score=here.score), "relocated"
         if recovery.elapsed_s > self._numbers.quality.give_up_s:
@@ -260,11 +266,13 @@ class Tracker(abc.ABC):
         wake = self._wake
         if wake is None:
             return prediction
+        wake.followed = False
         enough = float(observations.weights.sum()) >= self._numbers.relocalise.least_weight
         match = self._match(observations, prediction, wake.map) if enough else None
         if match is not None and match.matched >= self._quality.least_continuous():
             increment = se2.between(self._T_map_robot, match.T_map_robot)
             prediction = replace(prediction, T_map_robot=match.T_map_robot, increment=increment)
+            wake.followed = True
         wake.carried |= match is not None and match.matched < self._quality.least_continuous()
         agreed = match is not None and not self._quality.arises(match.matched)
         wake.count(agreed, prediction.elapsed)
@@ -395,6 +403,8 @@ class Tracker(abc.ABC):
             off[2] = se2.wrap(float(off[2]))
             covariance = prediction.covariance + coarse(self._numbers.relocalise)
             covariance = covariance + np.diag(off * off)
+        elif self._wake is not None and self._wake.followed:
+            covariance = prediction.covariance  # matched to the scans before, if not to the map
         elif state != "tracking" or not self._trusted:
             motion, covariance = prediction.increment, prediction.covariance
         self._trusted = state in ("tracking", "relocated")
@@ -402,7 +412,7 @@ class Tracker(abc.ABC):
         everyone = replace(observations, votes=None)
         self._loops.add(
             len(self._path), match.T_map_robot, motion, covariance, everyone,
-            elapsed=prediction.elapsed, written=written,
+            elapsed=prediction.elapsed, written=written, found=state == "relocated",
         )  # fmt: skip
 
     def _report(self, frame: Frame, match: Match, state: str) -> Estimate:

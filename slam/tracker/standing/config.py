@@ -49,7 +49,7 @@ class StandingConfig(Settings):
         0.1, "m", "narrower things vote: earlier beams may have missed them", SEEDS
     )
     disagreed: float = number(
-        3.0, "ratio", "of corrections over what odometry may be off, squared, at which it is as "
+        5.0, "ratio", "of corrections over what odometry may be off, squared, at which it is as "
         "likely as not that something is wrong; 0: never asked", SEEDS,
     )  # fmt: skip
     window_s: float = number(2.0, "s", "corrections are summed over it", SEEDS, low=1e-3)

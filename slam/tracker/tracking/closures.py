@@ -78,12 +78,33 @@ class Closures:
         return Edge(a=j - 1, b=j, T_a_b=step, information=inverted(covariance))
 
     def tie(self, middle: int, j: int, predicted: Float) -> Edge | None:
-        """Key frame ``j`` matched to the map about ``middle``, near where it is predicted."""
+        """Key frame ``j`` matched to the map about ``middle``, near where it is predicted.
+
+        Or where it lay online, if as much is explained there: along a corridor, and among what
+        moves, little maps say less than the whole one did.
+        """
+        online = self._online(middle, j)
+        found = self._matched(middle, j, online)
+        off = np.abs(predicted - online)
+        off[2] = abs(se2.wrap(float(off[2])))
+        numbers = self._numbers
+        if max(off[0], off[1]) > numbers.alike_m or off[2] > numbers.alike_rad:
+            other = self._matched(middle, j, predicted)
+            if found[0] < numbers.alias * other[0]:
+                found = other
+        return self._edge(middle, j, found[1], found[0])
+
+    def _online(self, middle: int, j: int) -> Float:
+        """Where key frame ``j`` lies from ``middle`` in the map."""
+        return se2.between(self._keys[middle].T_map_robot, self._keys[j].T_map_robot)
+
+    def _matched(self, middle: int, j: int, predicted: Float) -> tuple[float, Match]:
+        """The match nearest to a prediction, and its support."""
         cell_map, seen = self._submap(middle), self._keys[j].observations
         start = self._matcher.approach(cell_map, seen, predicted, self._coarse)
         match = self._matcher.climb(cell_map, seen, start, predicted, inverted(self._coarse))
         self.spent += MATCHED + DRAWN
-        return self._edge(middle, j, match, support(cell_map, seen, match))
+        return support(cell_map, seen, match), match
 
     def search(self, middle: int, j: int, predicted: Float, gate: float) -> Edge | None:
         """The same, searched for up to ``gate`` m around; None where two places look alike."""
@@ -106,6 +127,9 @@ class Closures:
             return None
         found.sort(key=lambda one: -one[0])
         (best, match), others = found[0], found[1:]
+        known = self._matched(middle, j, self._online(middle, j))
+        if known[0] >= self._numbers.alias * best:
+            return self._edge(middle, j, known[1], known[0])
         alike = any(other > self._numbers.alias * best for other, _ in others)
         return None if alike else self._edge(middle, j, match, best)
 

@@ -142,6 +142,10 @@ class LoopsConfig(Settings):
     recent: int = number(
         6, "key frames", "before it that a step is matched against", low=1, high=1000
     )
+    alike_m: float = number(
+        0.05, "m", "from the place by the graph to that online: farther, both are tried"
+    )
+    alike_rad: float = number(0.01, "rad", "the same of the turn")
     slack_m: float = number(0.05, "m", "added deviation of an online step", low=1e-6)
     slack_rad: float = number(0.01, "rad", "added deviation of an online step", low=1e-6)
     submap: int = number(4, "key frames", "on either side of a submap's middle", low=1, high=1000)
@@ -156,9 +160,9 @@ class LoopsConfig(Settings):
     loop_m: float = number(0.03, "m", "added deviation of a loop", low=1e-6)
     loop_rad: float = number(0.003, "rad", "added deviation of a loop", low=1e-6)
     early: float = number(0.5, "share", "of long_m from which on key frames are chained", high=1.0)
-    corrects: int = number(0, "1", "1: map and pose follow the graph; 0: past poses alone", high=1)
+    corrects: int = number(1, "1", "1: map and pose follow the graph; 0: past poses alone", high=1)
     work: int = number(
-        48, "units", "of work a scan; one: a key frame drawn, a third of a match",
+        60, "units", "of work a scan; one: a key frame drawn, a third of a match",
         "docs/loops.md", low=1, high=MANY,
     )  # fmt: skip
     agree_m: float = number(0.3, "m", "a closure farther off needs another that agrees", low=1e-6)

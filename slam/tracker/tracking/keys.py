@@ -25,6 +25,7 @@ class KeyFrame:
     way_m         driven up to here
     start_s       s since the first frame
     written       whether the map took it in
+    found         whether a lost robot was found in the map since the key frame before
     """
 
     frame: int
@@ -35,6 +36,7 @@ class KeyFrame:
     way_m: float
     start_s: float
     written: bool
+    found: bool = False
 
 
 class KeyFrames:
@@ -47,6 +49,7 @@ class KeyFrames:
         self.way_m, self.elapsed_s = 0.0, 0.0
         self._step: Float = np.zeros(3)
         self._covariance: Float = np.zeros((3, 3))
+        self._found = False
 
     def add(  # noqa: PLR0913 (the facts of one frame)
         self,
@@ -58,11 +61,14 @@ class KeyFrames:
         *,
         elapsed: float = 0.0,
         written: bool = True,
+        found: bool = False,
     ) -> None:
         """Take a frame: its ``motion`` (3,) since the one before, ``covariance`` in that frame.
 
-        ``elapsed`` s after the one before; ``written``: the map took it in.
+        ``elapsed`` s after the one before; ``written``: the map took it in; ``found``: the robot
+        was lost before it, and found in the map.
         """
+        self._found |= found
         self._covariance = se2.propagate(self._covariance, self._step, motion, covariance)
         self._step = se2.compose(self._step, motion)
         self.way_m += math.hypot(float(motion[0]), float(motion[1]))
@@ -81,6 +87,8 @@ class KeyFrames:
                 way_m=self.way_m,
                 start_s=self.elapsed_s,
                 written=written,
+                found=self._found,
             )
         )
         self._step, self._covariance = np.zeros(3), np.zeros((3, 3))
+        self._found = False

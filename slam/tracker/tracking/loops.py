@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Float
+from slam.frontend.odometry_prior import inverted
 from slam.posegraph import Edge, Relaxation, carried, least_moved, relative
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
@@ -26,6 +27,7 @@ from slam.tracker.matching.matcher import Matcher
 from slam.tracker.tracking.closures import DRAWN, Closures
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.redraw import Correction, Redrawing
+from slam.tracker.tracking.relocalise import coarse
 
 _log = logging.getLogger(__name__)
 
@@ -45,6 +47,7 @@ class Loops(KeyFrames):
         """
         super().__init__(config.loops)
         self._numbers, self._map_config = config.loops, config.map
+        self._relocalise = config.tracking.relocalise
         self._new_map = new_map if config.loops.corrects else None
         self.closures = Closures(config, matcher, new_submap, self.keys)
         self.poses: list[Float] = []  # by the graph, of the key frames in it
@@ -66,6 +69,7 @@ class Loops(KeyFrames):
         self._surprised = False
         self._redrawing: Redrawing | None = None
         self._new_graph = False
+        self._moved = False  # the map was corrected
 
     @property
     def edges(self) -> list[Edge]:
@@ -88,7 +92,7 @@ class Loops(KeyFrames):
         redrawing = self._redrawing
         if redrawing is None or not redrawing.done:
             return None
-        self._redrawing = None
+        self._redrawing, self._moved = None, True
         last = len(self.keys) - 1
         T_new_old = se2.compose(redrawing.pose(last), se2.inverse(self.keys[last].T_map_robot))
         after = np.array([redrawing.pose(k) for k in range(len(self.keys))])
@@ -98,11 +102,12 @@ class Loops(KeyFrames):
         return Correction(T_new_old=T_new_old, cell_map=redrawing.cell_map, poses=moved)
 
     def corrected(self, poses: Float) -> Float:
-        """All (n, 3) poses so far, moved with the graph; the same where no loop was found.
+        """All (n, 3) poses so far, moved with the graph; the same while the map is not torn.
 
-        The first key frame is where it was at first, whatever the map's datum.
+        A map that holds together knows more than the key frames of the graph. The first key frame
+        is where it was at first, whatever the map's datum.
         """
-        if not self._edges or self.way_m < self._numbers.long_m:
+        if self.way_m < self._numbers.long_m or not (self._moved or self._torn_keys(1.0)):
             return poses
         after = self._all_poses()
         T = se2.compose(self._first, se2.inverse(after[0]))
@@ -165,6 +170,8 @@ class Loops(KeyFrames):
         """Close a loop at key frame ``j`` if it is on one that no tie goes on with."""
         if self._edges:
             self._ties.append(j)
+        if self.keys[j].found:
+            self._link(j)
         if any(b >= j - self._numbers.every for _, b in list(self._edges)[-self._numbers.batch :]):
             return
         middle = self._nearest(j)
@@ -174,6 +181,23 @@ class Loops(KeyFrames):
             if edge is not None:
                 self._rough[j] = middle, j
                 self._take(edge, predicted)
+
+    def _link(self, j: int) -> None:
+        """Tie key frame ``j`` to the last one before the robot was lost, by where it was found.
+
+        The steps between are those of odometry; the map says where they led.
+        """
+        known = j - 1
+        while known >= 0 and not self.keys[known].written:
+            known -= 1
+        if known < 0 or j - known == 1:
+            return
+        T_a_b = se2.between(self.keys[known].T_map_robot, self.keys[j].T_map_robot)
+        information = inverted(coarse(self._relocalise))
+        self._edges[known, j] = Edge(
+            a=known, b=j, T_a_b=T_a_b, information=information, robust=True
+        )
+        self._fresh, self._surprised = self._fresh + 1, True
 
     def _take(self, edge: Edge, predicted: Float) -> None:
         """Put a closure into the graph; one that is far off only if another says the same."""
@@ -221,19 +245,28 @@ class Loops(KeyFrames):
             return
         if self.way_m < self._numbers.long_m:
             return
-        held = [pair for pair in self._edges if self.weights.get(pair, 0.0) > 0.5]
-        if len({b for _, b in held}) < self._numbers.denying:
+        torn = self._torn_keys(0.0)
+        if not torn:
             return
-        near, last = self._numbers.submap, max(b for _, b in held)
-        pairs = np.array(held + [(k - near, k) for k in range(near, last)])
-        online = np.array([key.T_map_robot for key in self.keys[: len(self.poses)]])
-        torn = set(pairs[self._torn(pairs, online, np.array(self.poses)), 1].tolist())
-        if len(torn) < self._numbers.denying:
-            return
-        _log.info("loop closed: the map is torn at %d key frames and drawn anew", len(torn))
+        _log.info("loop closed: the map is torn at %d key frames and drawn anew", torn)
         if self._numbers.datum == "all":
+            online = np.array([key.T_map_robot for key in self.keys[: len(self.poses)]])
             self.poses = list(least_moved(np.array(self.poses), online))
         self._redrawing = Redrawing(self._map_config, self._new_map, self.keys, self.poses)
+
+    def _torn_keys(self, new: float) -> int:
+        """Key frames at which the graph denies the map; 0 where they are fewer than ``denying``.
+
+        ``new``: weight of closures that came after the latest solution of the graph.
+        """
+        held = [pair for pair in self._edges if self.weights.get(pair, new) > 0.5]
+        if len({b for _, b in held}) < self._numbers.denying:
+            return 0
+        online = np.array([key.T_map_robot for key in self.keys[: len(self.poses)]])
+        near, last = self._numbers.submap, max(b for _, b in held)
+        pairs = np.array(held + [(k - near, k) for k in range(near, last)])
+        torn = set(pairs[self._torn(pairs, online, np.array(self.poses)), 1].tolist())
+        return len(torn) if len(torn) >= self._numbers.denying else 0
 
     def _torn(self, pairs: NDArray[np.int64], online: Float, graph: Float) -> NDArray[np.bool_]:
         """Whether pairs (n, 2) of key frames lie otherwise in the map than in the graph."""

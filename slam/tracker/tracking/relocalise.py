@@ -215,7 +215,10 @@ class Relocalisation:
         if going_on is not None:
             best = going_on
         elif len(rivals) > 1 or not (
-            carried or predicted is None or self._drifted(best, predicted)
+            carried
+            or predicted is None
+            or self._drifted(best, predicted)
+            or self._outweighs(best, usual)
         ):
             return None
         if best.waited or (going_on is None and not self.searches):
@@ -243,6 +246,14 @@ class Relocalisation:
         """Whether nothing else explains nearly as much, though less than usual is explained."""
         others = (h.support for h in self.hypotheses if h is not best)
         return max(others, default=0.0) <= self._config.alone * best.support
+
+    def _outweighs(self, best: Hypothesis, usual: float) -> bool:
+        """Whether a place was followed for so long, and explains so much more than dead reckoning,
+        that the robot was carried there, though each of its scans agrees with the one before.
+        """
+        config = self._config
+        tried, denied = best.tried(config, config.last), config.denied_here * best.support
+        return tried and self.here < denied and best.support >= config.enough_later * usual
 
     def _drifted(self, best: Hypothesis, predicted: Float) -> bool:
         """Whether drift alone may have led from that place to the one of dead reckoning."""

@@ -23,14 +23,15 @@ from slam.tracker.rasterise import rasterise
 class Wake:
     """The map as it was when it first denied a scan, and what was seen since.
 
-    map      a copy of the SLAM's map, written as if nothing were wrong
-    carried  whether a scan did not agree with those before it
-    agreed   scans in a row that agreed with it as well as usual, for ``agreed_s``
+    map       a copy of the SLAM's map, written as if nothing were wrong
+    carried   whether a scan did not agree with those before it
+    followed  whether the latest scan was matched to those before it
+    agreed    scans in a row that agreed with it as well as usual, for ``agreed_s``
     """
 
     def __init__(self, cell_map: CellMap) -> None:
         self.map = cell_map.twin()
-        self.carried = False
+        self.carried = self.followed = False
         self.agreed_s, self.agreed = 0.0, 0
 
     def add(self, observations: Observations, T_map_robot: Float, elapsed: float) -> None:

@@ -242,9 +242,11 @@ def look(
         sensor_sigma=seen.sensor_sigma_m,
     )
     geometry, sums = np.zeros((3, 3)), np.zeros(5)
+    # what moves says nothing of how far the map is off, nor is it new map
+    weights = seen.weights if seen.votes is None else seen.weights * seen.votes
     _look(
         cell_map.cells, short_term, cell_map.cell,
-        seen.points_robot, seen.covariances, seen.weights, seen.joined, seen.T_robot_laser,
+        seen.points_robot, seen.covariances, weights, seen.joined, seen.T_robot_laser,
         T_map_robot, turn % step, step, (elapsed, cell_map.pace(elapsed)), pairing, geometry, sums,
     )  # fmt: skip
     shared, paired, feigned, new, weighed = sums.tolist()

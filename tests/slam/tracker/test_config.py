@@ -20,8 +20,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("3a5fe10d43c6", "bf919bff9b08")),
-        (OccupancyConfig, ["grid"], ("a411685c69f0", "0a3bed9c618e")),
+        (ShuntingConfig, [], ("73d1ace95801", "fffd67f9d5ba")),
+        (OccupancyConfig, ["grid"], ("69c1a5e5ff71", "a772f79ab131")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

@@ -122,12 +122,12 @@ class Misled(Loops):
 
 
 def test_a_wrong_closure_is_taken_back() -> None:
-    """Two wrong ones bend the graph; those found later, where it then drives, undo it."""
+    """Two wrong ones, off by 1 m: what is found later, where it then drives, outweighs them."""
     once = office_loop()
     drive = Drive(once.start, (*once.pieces, *once.pieces))
     stream = frames(World2D(office()), drive, rate_hz=1.0, spec=laser(181), seed=3)
     truth = np.array([se2.between(stream[0].truth, frame.truth) for frame in stream])  # type: ignore[arg-type]
-    graph, poses, worst = Misled(), [np.zeros(3)], 0.0
+    graph, poses = Misled(), [np.zeros(3)]
     graph.add(0, poses[0], np.zeros(3), np.zeros((3, 3)), seen(stream[0]))
     for k in range(1, len(truth)):
         motion = se2.between(truth[k - 1], truth[k]) + np.array([0.002, 0.0, 0.0004])
@@ -135,10 +135,8 @@ def test_a_wrong_closure_is_taken_back() -> None:
         graph.add(k, poses[k], motion, np.diag([1e-4, 1e-4, 1e-6]), seen(stream[k]))
         for _ in range(4):
             graph.work()
-        if len(graph.forced) == 2:
-            worst = max(worst, errors(graph.corrected(np.array(poses)), truth[: k + 1])[-1])
     finish(graph)
-    assert worst > 0.5
+    assert len(graph.forced) == 2
     for edge in graph.forced:  # let go of, or measured again
         assert edge not in graph.edges or graph.weights[edge.a, edge.b] < 0.2
     assert errors(graph.corrected(np.array(poses)), truth).max() < 0.15
