@@ -10,7 +10,8 @@ import numpy as np
 from sim.actors.config import ACTORS
 from sim.actors.holding import DROPPED, QA, QB, VB, Held
 from sim.actors.people import columns
-from sim.actors.people.following import Leaders, in_sight, route
+from sim.actors.people.formation import in_sight, route
+from sim.actors.people.leaders import Leaders
 from sim.actors.people.right_of_way import Crowd, Float, Int
 from sim.core.flow import Field, clearance_at, time_at
 from slam._jit import njit
