@@ -84,20 +84,7 @@ class People:
         self._rates = (stay_mean, pace)
         self.feet = np.zeros((n, gait.N_COLUMNS))
         at = _addresses(bodies, doors, self.names)
-        discs, owner, long = _discs(bodies, doors, self.names)
-        self.crowd = Crowd(
-            discs=discs,
-            yaws=np.zeros(len(at.discs)),
-            owner=owner,
-            long=long,
-            allowed=np.ones((n, max(len(scene.goals), 1)), dtype=np.bool_),
-            state=np.zeros((n, columns.N_STATE)),
-            task=np.full((n, columns.N_TASK), -1, dtype=np.int64),
-            draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
-        )
-        self.crowd.task[:, [columns.WALKING, columns.GOAL]] = 0
-        self.crowd.state[:, [columns.STAYS, columns.SLOW, columns.DENSE]] = 1.0
-        self.crowd.state[:, columns.TURN_RATE] = ACTORS.walking.turn_most
+        self.crowd = _crowd(bodies, doors, self.names, counters, len(at.discs))
         alive = n > 0 and math.isfinite(stay_mean) and len(scene.goals) > 0
         servos = [model.actuator(f"{p}/vx").id for p in self.names]
         limbs = [[model.body(f"{p}/{limb}").mocapid[0] for limb in _LIMBS] for p in self.names]
@@ -207,6 +194,28 @@ class People:
         own = {"feet": self.feet, "state": c.state, "task": c.task, "draws": c.draws}
         hands = {"hands": held.at, "hands.pose": held.pose, "hands.bodies": held.bodies}
         return {**own, **arrays(self.table.leaders), **hands}
+
+
+def _crowd(
+    bodies: Bodies, doors: Doors, names: list[str], counters: NDArray[np.uint64], n_discs: int
+) -> Crowd:
+    """Rows of everybody, who walk to any goal until they are given a role."""
+    n = len(names)
+    discs, owner, long = _discs(bodies, doors, names)
+    crowd = Crowd(
+        discs=discs,
+        yaws=np.zeros(n_discs),
+        owner=owner,
+        long=long,
+        allowed=np.ones((n, max(len(bodies.scene.goals), 1)), dtype=np.bool_),
+        state=np.zeros((n, columns.N_STATE)),
+        task=np.full((n, columns.N_TASK), -1, dtype=np.int64),
+        draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
+    )
+    crowd.task[:, [columns.WALKING, columns.GOAL]] = 0
+    crowd.state[:, [columns.STAYS, columns.SLOW, columns.DENSE]] = 1.0
+    crowd.state[:, columns.TURN_RATE] = ACTORS.walking.turn_most
+    return crowd
 
 
 def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:
