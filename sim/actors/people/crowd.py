@@ -18,7 +18,8 @@ from sim.actors.config import ACTORS
 from sim.actors.holding import Held
 from sim.actors.people import columns
 from sim.actors.people.avoidance import ACCEL, choose, spare_robot
-from sim.actors.people.carrying import clean, keep_hold, pushes, to_what_is_taken
+from sim.actors.people.carrying import keep_hold, pushes
+from sim.actors.people.cleaning import clean, to_what_is_taken
 from sim.actors.people.following import (
     faces,
     follow,
