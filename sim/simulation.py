@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -237,20 +237,7 @@ class Simulation:
     def load_state(self, block: bytes) -> None:
         """Go on from ``save_state``; ``InvalidValueError`` if it is of another simulation."""
         arrays, words = state.unpack(block)
-        if not {"encoders", "lasers"} <= set(words) or "world" not in arrays:
-            raise InvalidValueError("this is the state of a world, not of a simulation")
-        own_name = self.laser.scanner.name
-        if words.get("scanner", own_name) != own_name or (
-            len(words["lasers"]) != len(self.laser.streams)
-        ):
-            raise InvalidValueError(
-                f"the state is of scanner '{words.get('scanner')}', expected '{own_name}'"
-            )
-        for what, own_part in (
-            ("tags", self._tags), ("kidnaps", self._kidnapping), ("changed", self._change_at_s)
-        ):  # fmt: skip
-            if (words.get(what) is None) != (own_part is None):
-                raise InvalidValueError(f"{_PARTS[what]} in the state or in the simulation only")
+        self._check_state(arrays, words)
         self._changed = bool(words.get("changed", False))
         if self._kidnapping is not None:
             self._kidnapping.load(arrays, words["kidnaps"])
@@ -268,6 +255,23 @@ class Simulation:
         if self._labeller is not None and len(arrays["seen"]):
             self._labeller.last_seen[...] = arrays["seen"]
         self.contacts, self.rearranged, self._scan, self._frame = [], [], None, None
+
+    def _check_state(self, arrays: Mapping[str, Any], words: Mapping[str, Any]) -> None:
+        """``InvalidValueError`` for the state of a world, another scanner or other parts."""
+        if not {"encoders", "lasers"} <= set(words) or "world" not in arrays:
+            raise InvalidValueError("this is the state of a world, not of a simulation")
+        own_name = self.laser.scanner.name
+        if words.get("scanner", own_name) != own_name or (
+            len(words["lasers"]) != len(self.laser.streams)
+        ):
+            raise InvalidValueError(
+                f"the state is of scanner '{words.get('scanner')}', expected '{own_name}'"
+            )
+        for what, own_part in (
+            ("tags", self._tags), ("kidnaps", self._kidnapping), ("changed", self._change_at_s)
+        ):  # fmt: skip
+            if (words.get(what) is None) != (own_part is None):
+                raise InvalidValueError(f"{_PARTS[what]} in the state or in the simulation only")
 
     def metadata(self) -> StreamMetadata:
         """What a recording says about itself; ``extra`` has a session, where there is one."""
