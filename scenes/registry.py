@@ -83,7 +83,8 @@ def build(
         inspect.signature(recipe).bind(seed, **options)
     except TypeError as error:
         raise InvalidValueError(f"scene '{name}' cannot take these options: {error}") from None
-    from scenes.crowd import crowd_of, with_crowd
+    from scenes.crowd import crowd_of
+    from scenes.crowd_kinds import with_crowd
     from scenes.mounting import at_scan_height
     from scenes.scene import Scene
 

@@ -23,7 +23,7 @@ from rich.markup import escape
 
 from scripts import interrupt, workers
 from scripts.console import note, progress
-from scripts.output import versions
+from scripts.machine import versions
 from sim.recording.sums import damage_beside, write_beside
 from slam import locks
 from slam.errors import InvalidValueError, MobiliaError, OutputError, SlamFailedError

@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from scripts.option_names import Verb
+from slam.variants import ORACLE, PIPE
+
+BETWEEN = re.compile(r",(?![^{]*\}|[^(]*\))")  # a comma outside braces and brackets
 
 
 class ManyValues(Verb):
@@ -34,3 +38,11 @@ def repeated(args: list[str], lists: set[str]) -> list[str]:
         out += [word] if first or not option else [option, word]
         first = False
     return out
+
+
+def named(values: list[str]) -> tuple[str, ...]:
+    """Words may also be joined by commas, but for the command of a pipe, which may hold some, and
+    inside the braces of a variant and the brackets of an oracle."""
+    whole = (PIPE, ORACLE + PIPE)
+    parts = ([value] if value.startswith(whole) else BETWEEN.split(value) for value in values)
+    return tuple(word for words in parts for word in words if word)

@@ -6,16 +6,14 @@ from __future__ import annotations
 import json
 import math
 import os
-import platform
 import re
 import shutil
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from scripts.machine import versions
 from sim.core.versions import WORLD
 from sim.recording.sums import check_vouched, write_sums
 from slam import locks
@@ -233,38 +231,6 @@ def _put_back(path: Path) -> None:
         else:
             old.rename(path)
             sync_names(path.parent)
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything that can change a number."""
-    wanted = ("mobilia", "mujoco", "gymnasium", "numpy", "scipy", "numba", "opencv-python-headless")
-    found = {}
-    for name in wanted:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return {"python": platform.python_version(), **found}
-
-
-def machine() -> dict[str, Any]:
-    """The machine a figure was measured on."""
-    return {
-        "processor": _processor(),
-        "cores": os.cpu_count(),
-        "system": platform.platform(),
-        "python": sys.version.split()[0],
-    }
-
-
-def _processor() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
 
 
 def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> None:

@@ -62,22 +62,10 @@ def each(
         yield from map(call, items)
         return
     with ExitStack() as stack:
-        backend: dict[str, Any] = {
-            "backend": "loky",
-            "n_jobs": min(jobs, max(len(items), 1)),
-            "initializer": end_with_parent,
-            "initargs": (os.getpid(),),
-        }
         if cluster is None:
-            warnings.filterwarnings("ignore", _REPLACED, UserWarning)  # from a thread of loky
-            stack.enter_context(guarding.guarded_workers())
-            if _TRACKER not in sys.warnoptions:  # handed to the tracker of semaphores: what it
-                sys.warnoptions.append(_TRACKER)  # finds left over, it removes without a word
-        if cluster is not None:
-            client = stack.enter_context(_client(cluster))
-            if shared is not None:
-                _check_shared(client, shared)
-            backend = {"backend": "dask", "wait_for_workers_timeout": WORKERS_TIMEOUT_S}
+            backend = _processes(stack, min(jobs, max(len(items), 1)))
+        else:
+            backend = _cluster(stack, cluster, shared)
         stack.enter_context(joblib.parallel_config(**backend))
         parallel = joblib.Parallel(return_as="generator_unordered", batch_size=1)
         held = (shared, locks.ticket(shared)) if shared is not None else None
@@ -99,6 +87,28 @@ def each(
                 results.close()
             if shared is not None:
                 locks.idle(shared)
+
+
+def _processes(stack: ExitStack, jobs: int) -> dict[str, Any]:
+    """Worker processes of this machine, guarded until ``stack`` ends; as joblib takes it."""
+    warnings.filterwarnings("ignore", _REPLACED, UserWarning)  # from a thread of loky
+    stack.enter_context(guarding.guarded_workers())
+    if _TRACKER not in sys.warnoptions:  # handed to the tracker of semaphores: what it
+        sys.warnoptions.append(_TRACKER)  # finds left over, it removes without a word
+    return {
+        "backend": "loky",
+        "n_jobs": jobs,
+        "initializer": end_with_parent,
+        "initargs": (os.getpid(),),
+    }
+
+
+def _cluster(stack: ExitStack, address: str, shared: Path | None) -> dict[str, Any]:
+    """The workers of a Dask scheduler, connected until ``stack`` ends; as joblib takes it."""
+    client = stack.enter_context(_client(address))
+    if shared is not None:
+        _check_shared(client, shared)
+    return {"backend": "dask", "wait_for_workers_timeout": WORKERS_TIMEOUT_S}
 
 
 def check_jobs(jobs: int) -> None:

@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -23,14 +22,12 @@ from sim.driving.pilot import Pilot
 from sim.sensors.lidar.device import LaserScanner, ScanResult
 from sim.sensors.lidar.link import SerialLink, over_link
 from sim.sensors.lidar.registry import ScannerConfig
-from sim.sensors.lidar.schedule import Window
 from sim.sensors.odometry.encoders import WheelOdometry
-from sim.sensors.scan_timing import ScanTiming
 from sim.sensors.tag_cameras import TagCameras, TagReading
 from sim.world.kidnapping import Kidnapping
 from sim.world.labels import BeamLabeller
-from sim.world.substeps import plain
-from sim.world.world import SUBSTEPS_PER_S, World
+from sim.world.sweep import Sweep
+from sim.world.world import World
 from slam.errors import InvalidValueError
 from slam.frames import (
     NS_PER_S,
@@ -77,9 +74,6 @@ class Simulation:
     labels     whether frames carry truth per beam
     options    passed on to ``scenes.build``: ``scan_height_m`` of the robot's scanner above the
                floor (0.36), and the scene's own, e.g. ``n_chairs=10``
-
-    Attribute ``path``: (rows, 3) true poses of the robot at the steps of the last scan; where it
-    began between two steps, row 0 is the step before.
     """
 
     def __init__(  # noqa: PLR0913 (settings by keyword)
@@ -126,7 +120,7 @@ class Simulation:
         self._frame: Frame | None = None
         self.contacts: list[Contact] = []  # what the robot touched during the last scan
         self.rearranged: list[Rearrangement] = []  # what changed out of sight just before it
-        self._room()
+        self._sweep = Sweep(self.laser)
 
     def _tag_cameras(self, tags: str) -> TagCameras | None:
         if tags not in ("truth", "camera"):
@@ -146,52 +140,23 @@ class Simulation:
         """Geometry and timing of the scanner, as in every frame's scan."""
         return self.laser.spec
 
-    def _room(self) -> None:
-        """Room for what is written down during a scan, whatever its phase."""
-        rows = self.laser.caster.poses.shape[0]
-        self._rows: tuple[Float, Float] = (np.zeros((rows, 3)), np.zeros((rows, 2)))
-        self._window: Window | None = None  # that watch and timing are of
-        self._watch: Any = None
-        self.path, self._travel = self._rows
-
     def use_laser(self, laser: LaserScanner) -> None:
         """Go on with another scanner of the same timing on the same robot."""
-        self.laser, self._window = laser, None
+        self.laser = laser
+        self._sweep.renew()
+
+    @property
+    def path(self) -> Float:
+        """(rows, 3) true poses of the robot at the steps of the last scan.
+
+        Where it began between two steps, row 0 is the step before.
+        """
+        return self._sweep.path
 
     @property
     def scan_period_s(self) -> float:
         """Seconds of simulated time from scan to scan."""
         return float(self.laser.scanner.period_s)
-
-    def _advance(self) -> None:
-        """Let the time of one scan pass."""
-        world, tags = self.world, self._tags
-        if self._kidnapping is not None:
-            self._kidnapping.carried(world)
-        self.rearranged = self._changed_out_of_sight()
-        noted = self.laser.begin(world.data)
-        window = self.laser.window
-        if window.before:  # the scan begins within the step that the one before ended with
-            for rows, own in zip(self._rows, (self.path, self._travel), strict=True):
-                rows[0] = own[-2]
-        world.read_robot(self._rows[0][window.before], self._rows[1][window.before])
-        if self.laser.carried:
-            self._rows[0][0] = self._rows[0][1]
-        if window is not self._window:
-            self._window, self._timing = window, ScanTiming.of(self.laser)
-            self._watch = plain((window.marks, noted, *self._rows))
-            self.path, self._travel = (rows[: window.last + 1] for rows in self._rows)
-        start_ns, phase = world.time_ns, self.laser.phase
-        if phase:
-            start_ns = round((world.step_count - phase) * Fraction(NS_PER_S, SUBSTEPS_PER_S))
-        self._stamp_ns = start_ns + self._timing.offset_ns
-        first = window.before
-        # With ceiling cameras the world stops after every step for them to look.
-        for stop in range(first + 1, window.last + 1) if tags else (window.last,):
-            world.advance(first, stop, self._watch)
-            if tags is not None:
-                tags.note(world.time_ns, world.data)
-            first = stop
 
     def _changed_out_of_sight(self) -> list[Rearrangement]:
         """What is put elsewhere before this scan."""
@@ -215,11 +180,14 @@ class Simulation:
 
     def sense(self) -> ScanResult:
         """As ``observe``, without the frame, which ``frame`` makes when it is asked for."""
-        self._advance()
+        if self._kidnapping is not None:
+            self._kidnapping.carried(self.world)
+        self.rearranged = self._changed_out_of_sight()
+        self._stamp_ns = self._sweep.over_scan(self.world, self.laser, self._tags)
         self._scan, self._frame = self.laser.finish(), None
         self.contacts = self.world.take_contacts()
         self.world.saw(self._scan.bodies)
-        self._timing.roll(self.encoders, self._travel, bool(self.contacts))
+        self._sweep.timing.roll(self.encoders, self._sweep.travel, bool(self.contacts))
         self._labels = self._labeller.label(self._scan) if self._labeller else None
         return self._scan
 
@@ -227,12 +195,12 @@ class Simulation:
     def frame(self) -> Frame | None:
         """Of the last scan; None before the first."""
         if self._frame is None and self._scan is not None:
-            stamp_ns, sweep_s = self._stamp_ns, self._timing.sweep_s
+            stamp_ns, sweep_s = self._stamp_ns, self._sweep.timing.sweep_s
             self._frame = Frame(
                 stamp_ns=stamp_ns,
                 odometry=self.encoders.reading(stamp_ns=stamp_ns, sweep_s=sweep_s),
                 scan=Scan(stamp_ns=stamp_ns, ranges=self._scan.ranges, spec=self.spec),
-                truth=self._timing.truth(self.path),
+                truth=self._sweep.timing.truth(self.path),
                 labels=self._labels,
             )
         return self._frame
@@ -250,7 +218,7 @@ class Simulation:
         seen_by, tags = ({}, None) if self._tags is None else self._tags.save()
         between, scan = self.laser.save()
         if scan:  # the next scan begins within the last step
-            between |= {"path": self.path[-2:], "travel": self._travel[-2:]}
+            between |= {"path": self.path[-2:], "travel": self._sweep.travel[-2:]}
         kidnapping = self._kidnapping
         places, kidnaps = ({}, None) if kidnapping is None else kidnapping.save()
         return state.pack(
@@ -269,6 +237,27 @@ class Simulation:
     def load_state(self, block: bytes) -> None:
         """Go on from ``save_state``; ``InvalidValueError`` if it is of another simulation."""
         arrays, words = state.unpack(block)
+        self._check_state(arrays, words)
+        self._changed = bool(words.get("changed", False))
+        if self._kidnapping is not None:
+            self._kidnapping.load(arrays, words["kidnaps"])
+        own = {k.removeprefix("scan."): v for k, v in arrays.items() if k.startswith("scan.")}
+        self.laser.load(own, words.get("scan", {}))
+        self.world.load_state(arrays["world"].tobytes())
+        self._sweep.renew()
+        if own:
+            self._sweep.path, self._sweep.travel = own["path"], own["travel"]
+        self.encoders.load(arrays, words["encoders"])
+        for rng, saved in zip(self.laser.streams, words["lasers"], strict=True):
+            state.restore_random(rng, saved)
+        if self._tags is not None:
+            self._tags.load(arrays, words["tags"])
+        if self._labeller is not None and len(arrays["seen"]):
+            self._labeller.last_seen[...] = arrays["seen"]
+        self.contacts, self.rearranged, self._scan, self._frame = [], [], None, None
+
+    def _check_state(self, arrays: Mapping[str, Any], words: Mapping[str, Any]) -> None:
+        """``InvalidValueError`` for the state of a world, another scanner or other parts."""
         if not {"encoders", "lasers"} <= set(words) or "world" not in arrays:
             raise InvalidValueError("this is the state of a world, not of a simulation")
         own_name = self.laser.scanner.name
@@ -283,23 +272,6 @@ class Simulation:
         ):  # fmt: skip
             if (words.get(what) is None) != (own_part is None):
                 raise InvalidValueError(f"{_PARTS[what]} in the state or in the simulation only")
-        self._changed = bool(words.get("changed", False))
-        if self._kidnapping is not None:
-            self._kidnapping.load(arrays, words["kidnaps"])
-        own = {k.removeprefix("scan."): v for k, v in arrays.items() if k.startswith("scan.")}
-        self.laser.load(own, words.get("scan", {}))
-        self.world.load_state(arrays["world"].tobytes())
-        self._window = None
-        if own:
-            self.path, self._travel = own["path"], own["travel"]
-        self.encoders.load(arrays, words["encoders"])
-        for rng, saved in zip(self.laser.streams, words["lasers"], strict=True):
-            state.restore_random(rng, saved)
-        if self._tags is not None:
-            self._tags.load(arrays, words["tags"])
-        if self._labeller is not None and len(arrays["seen"]):
-            self._labeller.last_seen[...] = arrays["seen"]
-        self.contacts, self.rearranged, self._scan, self._frame = [], [], None, None
 
     def metadata(self) -> StreamMetadata:
         """What a recording says about itself; ``extra`` has a session, where there is one."""

@@ -12,14 +12,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.constant_velocity import ConstantVelocity
-from slam.errors import (
-    InvalidValueError,
-    MobiliaError,
-    NeedsLabelsError,
-    NotFiniteError,
-    SlamFailedError,
+from slam.answers import (
+    as_map,
+    asked,
+    asked_at_end,
+    asked_changes,
+    asked_landmarks,
+    asked_map,
+    asked_trajectory,
+    judged,
 )
+from slam.constant_velocity import ConstantVelocity
+from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame, Stream
 from slam.oracle import shown
@@ -38,110 +42,7 @@ from slam.system import (
 )
 from slam.trajectory import Trajectory
 
-
-def asked(system: SlamSystem, frame: Frame) -> Estimate:
-    """One update, judged: raises ``SlamFailedError`` for whatever is no estimate of this frame."""
-    with judged():
-        estimate: object = system.update(frame)
-    if not isinstance(estimate, Estimate):
-        raise SlamFailedError(f"returned no Estimate but {estimate!r:.80}", "bad")
-    if estimate.stamp_ns != frame.stamp_ns:
-        raise SlamFailedError(
-            f"returned an estimate for {estimate.stamp_ns} ns instead of {frame.stamp_ns} ns", "bad"
-        )
-    return estimate
-
-
-def asked_map(system: SlamSystem) -> Raster | None:
-    """The map now, None for none or an empty one; ``SlamFailedError`` for what no map can be."""
-    with judged():
-        raster: object = system.map()
-    return as_map(raster)
-
-
-def as_map(raster: object) -> Raster | None:
-    """That map; ``SlamFailedError`` for what no map can be."""
-    if raster is None:
-        return None
-    if not isinstance(raster, Raster):
-        raise SlamFailedError(f"returned no Raster or None but {raster!r:.80}", "bad")
-    if raster.T_map_origin[2] != 0.0:
-        raise SlamFailedError(
-            "returned a map that does not lie along the map's axes, its origin is turned by "
-            f"{raster.T_map_origin[2]} rad",
-            "bad",
-        )
-    return raster if raster.values.size else None
-
-
-def asked_landmarks(system: HasLandmarks) -> Landmarks:
-    """Its landmarks now; ``SlamFailedError`` for what cannot be any."""
-    with judged():
-        found: object = system.landmarks()
-    if not isinstance(found, Landmarks):
-        raise SlamFailedError(f"returned no Landmarks but {found!r:.80}", "bad")
-    return found
-
-
-def asked_changes(system: HasChanges) -> Changes | None:
-    """What moved lately; ``SlamFailedError`` for what cannot be that."""
-    with judged():
-        found: object = system.changes()
-    if found is not None and not isinstance(found, Changes):
-        raise SlamFailedError(f"returned no Changes or None but {found!r:.80}", "bad")
-    return found
-
-
-def asked_trajectory(system: SlamSystem, stamps_ns: NDArray[np.int64]) -> Trajectory:
-    """Its final poses, one at least for each of ``stamps_ns``; ``SlamFailedError`` otherwise."""
-    with judged():
-        final: object = system.trajectory()
-    if not isinstance(final, Trajectory):
-        raise SlamFailedError(f"returned no Trajectory but {final!r:.80}", "bad")
-    if not np.isin(stamps_ns, final.stamps_ns).all():
-        raise SlamFailedError(
-            f"returned {len(final)} poses and leaves out frames; it must have one for each of the "
-            f"{len(stamps_ns)} updates",
-            "bad",
-        )
-    return final
-
-
-def asked_at_end(
-    system: RunsAtTheEnd, stamps_ns: NDArray[np.int64]
-) -> tuple[list[Estimate], list[float]]:
-    """Its estimates for ``stamps_ns`` and their processor times, s; ``SlamFailedError`` if not."""
-    with judged():
-        answers = list(system.estimates_at_end())
-        estimates = [estimate for estimate, _ in answers]
-        spent_s = [float(seconds) for _, seconds in answers]
-        stamps = [estimate.stamp_ns for estimate in estimates]
-    if stamps != stamps_ns.tolist():
-        raise SlamFailedError(
-            f"returned {len(stamps)} estimates; it must return one for each of the "
-            f"{len(stamps_ns)} updates, in order",
-            "bad",
-        )
-    return estimates, spent_s
-
-
-@contextmanager
-def judged() -> Iterator[None]:
-    """Whatever somebody's SLAM raises becomes a ``SlamFailedError`` with its outcome.
-
-    But for ``NeedsLabelsError``: what lacks is the stream's.
-    """
-    try:
-        yield
-    except (SlamFailedError, NeedsLabelsError):
-        raise
-    except NotFiniteError as error:
-        raise SlamFailedError(f"raised {told(error)}", "nan") from error
-    except InvalidValueError as error:  # ours begin with the type whose field is wrong
-        theirs = not str(error).startswith(("Estimate.", "Raster.", "Trajectory."))
-        raise SlamFailedError(f"raised {told(error)}", "raised" if theirs else "bad") from error
-    except Exception as error:
-        raise SlamFailedError(f"raised {told(error)}") from error
+__all__ = ["Replay", "Track", "asked", "primary_of", "systems_named"]
 
 
 @dataclass(eq=False)

@@ -172,34 +172,17 @@ def frames(
     difference = rng.normal(0.0, wheels.difference_sd)
     out: list[Frame] = []
     odom, before = np.zeros(3), drive.at(0.0)[0]
-    variance = wheels.noise**2
     for k in range(math.floor(drive.duration * rate_hz) + 1):
         t = k / rate_hz
         pose, twist = drive.at(t)
-        step = se2.log(se2.between(before, pose))
-        left = step[0] - 0.5 * wheels.base * step[2]
-        right = step[0] + 0.5 * wheels.base * step[2]
-        measured = [
-            d * scale * (1.0 + side * difference) + rng.normal(0.0, wheels.noise) * abs(d) ** 0.5
-            for d, side in ((left, -0.5), (right, 0.5))
-        ]
-        turn = (measured[1] - measured[0]) / wheels.base
-        odom = se2.compose(odom, se2.exp([0.5 * (measured[0] + measured[1]), 0.0, turn]))
-        forward = variance * (abs(left) + abs(right)) / 4.0 + (wheels.scale_sd * step[0]) ** 2
-        heading = variance * (abs(left) + abs(right)) / wheels.base**2
-        heading += (wheels.scale_sd * step[2]) ** 2
-        heading += (wheels.difference_sd * step[0] / wheels.base) ** 2
-        covariance = np.diag([forward, 0.25 * step[0] ** 2 * heading, heading])
+        increment, covariance = rolled(
+            se2.log(se2.between(before, pose)), wheels, scale, difference, rng
+        )
+        odom = se2.compose(odom, increment)
         if spec.sweep_duration > 0.0:  # over the sweep, which may straddle two pieces
             swept = se2.between(pose, drive.at(t + spec.sweep_duration)[0])
             twist = se2.log(swept) / spec.sweep_duration
-        lasers = np.array(
-            [
-                se2.compose(drive.at(t + offset)[0], spec.T_robot_laser)
-                for offset in np.unique(spec.beam_time_offsets)
-            ]
-        )[np.unique(spec.beam_time_offsets, return_inverse=True)[1]]
-        ranges = world.ranges(t, lasers, spec.angles, spec.range_max)
+        ranges = world.ranges(t, lasers_at(t, drive, spec), spec.angles, spec.range_max)
         ranges = np.maximum(ranges + rng.normal(0.0, noise_m, spec.n_beams), 0.0)
         stamp = to_ns(t)
         out.append(
@@ -217,6 +200,33 @@ def frames(
         )
         before = pose
     return out
+
+
+def rolled(
+    step: Array, wheels: Wheels, scale: float, difference: float, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """The increment that the encoders say of a true step (vx, vy, omega), and its covariance."""
+    left = step[0] - 0.5 * wheels.base * step[2]
+    right = step[0] + 0.5 * wheels.base * step[2]
+    measured = [
+        d * scale * (1.0 + side * difference) + rng.normal(0.0, wheels.noise) * abs(d) ** 0.5
+        for d, side in ((left, -0.5), (right, 0.5))
+    ]
+    turn = (measured[1] - measured[0]) / wheels.base
+    variance = wheels.noise**2
+    forward = variance * (abs(left) + abs(right)) / 4.0 + (wheels.scale_sd * step[0]) ** 2
+    heading = variance * (abs(left) + abs(right)) / wheels.base**2
+    heading += (wheels.scale_sd * step[2]) ** 2
+    heading += (wheels.difference_sd * step[0] / wheels.base) ** 2
+    increment = se2.exp([0.5 * (measured[0] + measured[1]), 0.0, turn])
+    return increment, np.diag([forward, 0.25 * step[0] ** 2 * heading, heading])
+
+
+def lasers_at(t: float, drive: Drive, spec: LaserSpec) -> Array:
+    """(n_beams, 3) pose of the laser at each beam of the scan from ``t`` on."""
+    offsets, beam = np.unique(spec.beam_time_offsets, return_inverse=True)
+    poses = [se2.compose(drive.at(t + offset)[0], spec.T_robot_laser) for offset in offsets]
+    return np.array(poses)[beam]
 
 
 def arena(phase: float = 0.25, cell: float = 0.03) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from scripts.benchmark import submission
 from scripts.benchmark.tracks import TRACKS
 from scripts.comparison.recording import digest, record
-from scripts.output import machine, versions
+from scripts.machine import machine, versions
 from scripts.report.answer import ODOMETRY
 from sim.recording.verify import Finding
 

@@ -17,7 +17,8 @@ from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
 from scripts.comparison.recording import digest
 from scripts.console import note
-from scripts.output import RECIPE, locked_folder, machine, together, versions, write_recipe
+from scripts.machine import machine, versions
+from scripts.output import RECIPE, locked_folder, together, write_recipe
 from sim.core.versions import WORLD
 from slam.errors import InvalidValueError
 

@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from scripts.benchmark.tracks import LEVELS, TRACKS
+from scripts.machine import machine, versions
 from scripts.metrics.table import METRICS
-from scripts.output import configs_of, machine, versions
+from scripts.output import configs_of
 from sim.core.versions import WORLD, check_world, world_of
 from sim.recording.sums import check_vouched
 from slam.bounded import text_of

@@ -17,7 +17,8 @@ from scripts.closed_loop.runs import Driven, load
 from scripts.comparison.folder import write_csv
 from scripts.console import level_table
 from scripts.jobs import run_jobs
-from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
+from scripts.machine import machine
+from scripts.output import RECIPE, locked_folder, together, write_recipe
 from slam.errors import UnknownNameError
 from slam.evaluation.lost import FOUND_RULE, LOST_RULE
 from slam.files import write_text

@@ -18,8 +18,9 @@ from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.recording import load
 from scripts.console import level_table
 from scripts.jobs import Job, run_jobs
+from scripts.machine import machine
 from scripts.metrics.table import DRIVES
-from scripts.output import RECIPE, locked_folder, machine, together, write_recipe
+from scripts.output import RECIPE, locked_folder, together, write_recipe
 from slam.evaluation.lost import LOST_RULE
 from slam.frames import BeamClass
 from slam.guests import Limits, limited

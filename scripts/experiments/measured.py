@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from scripts.machine import machine, versions
 from scripts.marks import filled
-from scripts.output import machine, versions
 from scripts.result_files import RESULTS, SCHEMA, commit
 from sim.core.versions import WORLD
 

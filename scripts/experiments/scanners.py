@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scripts.comparison.columns import lost_at
+from scripts.machine import machine
 from scripts.metrics.judged import world_truth
-from scripts.output import machine
 from scripts.paper.runs import follow
 from scripts.scanner_option import every_of
 from sim.core.dynamism import Dynamism

@@ -18,8 +18,8 @@ from scripts.imports import with_imports
 _SCRIPTS = Path(__file__).parents[1]
 # Of what the runs' modules import: these make pages of runs, and no run depends on them.
 _PAGES = frozenset({
-    "comparison", "console", "depends", "figures", "imports", "interrupt", "jobs", "output",
-    "paper_numbers", "report", "times", "workers",
+    "comparison", "console", "depends", "figures", "imports", "interrupt", "jobs", "machine",
+    "output", "paper_numbers", "report", "times", "workers",
 })  # fmt: skip
 _PARK = frozenset({
     "features_trees", "features_segments", "aa3_gpsx", "rfs_measurements", "rfs_inputs", "rfs_gps",

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from scripts.jobs import Job, run_jobs
-from scripts.output import machine, write_recipe
+from scripts.machine import machine
+from scripts.output import write_recipe
 from scripts.paper.depends import checksums
 from scripts.paper.runs import Plan, Run, load_run
 from scripts.paper.times import duration

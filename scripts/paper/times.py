@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scripts.output import RECIPE, machine, read_recipe_words
+from scripts.machine import machine
+from scripts.output import RECIPE, read_recipe_words
 from scripts.paper.runs import Plan
 
 TARGET_S = 45 * 60.0  # all experiments, on 2 cores

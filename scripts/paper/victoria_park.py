@@ -33,6 +33,7 @@ from slam.logs import victoria_graph
 from slam.logs.victoria_park import GpsTrack
 from slam.trajectory import Trajectory
 
+Numbers = dict[str, dict[str, Any]]  # by system and name
 GAP_S = 5.0  # without a fix: the line of Fig. 7 is broken
 WHERE = (
     "victoria-park needs --data with the folder of the dataset: aa3_gpsx.mat, features_trees.mat "
@@ -66,7 +67,9 @@ def reproduce(plan: Plan) -> None:
     numbers = {name: pose_numbers(track, tracks["graph"], gps) for name, track in tracks.items()}
     for name, run in by_name.items():
         numbers[name] |= landmark_numbers(run, graph, tracks[name], tracks["graph"], gps)
-    _page(report, numbers, gps)
+    _positions(report, numbers, gps)
+    _table_1(report, numbers)
+    _landmarks(report, numbers)
     report.figure("fig6", fig6(by_name, tracks, gps), "Fig. 6: maps over GPS (green)")
     _fig7(report, tracks, gps)
     report.systems({name: SYSTEMS[name] for name in names})
@@ -77,7 +80,7 @@ def _track(run: Run, key: str = "poses") -> Trajectory:
     return Trajectory(stamps_ns=run.arrays["stamps"], poses=run.arrays[key])
 
 
-def _page(report: Report, numbers: dict[str, dict[str, Any]], gps: GpsTrack) -> None:
+def _positions(report: Report, numbers: Numbers, gps: GpsTrack) -> None:
     good = good_fixes(gps)
     report.heading("Positions against GPS")
     report.say(
@@ -108,6 +111,9 @@ def _page(report: Report, numbers: dict[str, dict[str, Any]], gps: GpsTrack) -> 
         "reward and trace of the shunting SLAM for trunks at this scale were chosen on this very "
         "drive, as the EKF's preset was; there is no second one to show them on."
     )
+
+
+def _table_1(report: Report, numbers: Numbers) -> None:
     report.heading("Table 1")
     report.say(
         "x and y against GPS (east, north), heading and landmarks against the graph, all after "
@@ -116,6 +122,9 @@ def _page(report: Report, numbers: dict[str, dict[str, Any]], gps: GpsTrack) -> 
     )
     names = [name for name in numbers if name not in ("odometry", "graph")]
     paper_table(report, "Table 1", TABLE_1, [numbers], [*names, "graph"])
+
+
+def _landmarks(report: Report, numbers: Numbers) -> None:
     report.heading("Landmarks")
     rows = []
     for name, n in numbers.items():

@@ -18,7 +18,7 @@ from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 from typing import Any
 
-from scripts.output import machine, versions
+from scripts.machine import machine, versions
 from scripts.quotes.results import RESULTS, SCHEMA, commit, write
 from slam.errors import MobiliaError
 

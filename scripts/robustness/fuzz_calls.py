@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Odd calls of ``update``, ``step``, ``reset`` and constructors, for ``scripts.robustness.fuzz``.
 
-A call may succeed or raise one of our errors. Frames hold extreme values that their types allow;
-arguments of an environment are of any type. Each case draws from (seed, target, number) alone.
+A call may succeed or raise one of our errors. Frames are those of ``fuzz_frames``; arguments of an
+environment are of any type. Each case draws from (seed, target, number) alone.
 """
 
 from __future__ import annotations
@@ -17,21 +17,17 @@ from typing import Any
 
 import numpy as np
 
+from scripts.robustness.fuzz_frames import any_of, extreme, extreme_pose, frames
 from sim.core.dynamism import Dynamism
 from sim.gym.env import MobiliaEnv
 from sim.gym.vector import MobiliaVectorEnv
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from slam.errors import MobiliaError
-from slam.frames import Features, Float, Frame, LaserSpec, Odometry, Scan
 from slam.guests.pipe import guarded
 from slam.system import SlamSystem, create
 
 SLAMS = ("odometry", "shunting", "shunting-features", "occupancy", "ekf", "kiss-icp", "karto")
 PIPED = "pipe"  # odometry in a process of its own
-FRAMES = 6  # of a case
-LAST_NS = 2**63 - 1
-SIZES = (0.0, 5e-324, 1e-300, 1e-30, 1e-9, 1e-3, 0.5, 1.0, 30.0, 999.0, 1e3, 1e6, 1e9, 1e12, 1e100)
-EXTREMES = (*SIZES, 1e154, 1e300, 1.7e308)
 NOT_NUMBERS: tuple[Any, ...] = (
     None, "", "a", "1", b"x", [], {}, (), [1], [1, 2, 3, 4], {"x": 1}, object(), np.nan, math.inf,
     -math.inf, True, False, 5, -1, 0, 3.5, 2**31, 2**70, -(2**70), 1e9, 1e300, -1e300, 1 + 2j,
@@ -72,149 +68,6 @@ class Tally:
         return out
 
 
-def _pick(rng: np.random.Generator, values: Any) -> Any:
-    return values[int(rng.integers(len(values)))]
-
-
-def _number(rng: np.random.Generator, sizes: tuple[float, ...] = EXTREMES) -> float:
-    return float(_pick(rng, sizes)) * (-1.0 if rng.random() < 0.5 else 1.0)
-
-
-def _made(make: Callable[[], Any]) -> Any:
-    """What ``make`` gives, tried until the type allows it."""
-    while True:
-        try:
-            return make()
-        except MobiliaError:
-            continue
-
-
-def _pose(rng: np.random.Generator) -> Float:
-    return np.array([_number(rng), _number(rng), _number(rng)])
-
-
-def spec(rng: np.random.Generator) -> LaserSpec:
-    """A scanner that can be made, however absurd."""
-
-    def make() -> LaserSpec:
-        n = int(_pick(rng, (1, 2, 3, 4, 5, 7, 90, 181, 361, 1081, 5000)))
-        if rng.random() < 0.03:
-            n = 100_000
-        turn = math.tau / n
-        low = abs(_number(rng)) if rng.random() < 0.3 else 0.0
-        offsets = _pick(rng, (np.zeros(0), np.linspace(0.0, 0.03, n), np.full(n, 1e9), None))
-        mounted = _pick(rng, (np.zeros(3), np.array([0.2, 0.0, 0.0]), _pose(rng)))
-        return LaserSpec(
-            n_beams=n,
-            angle_min=_pick(rng, (-math.pi / 2.0, -math.pi, 0.0, _number(rng))),
-            angle_increment=_pick(rng, (turn, turn / 2.0, math.radians(0.5), 1e-9, turn * 1.04)),
-            range_min=low,
-            range_max=_pick(rng, (8.0, 80.0, 1e-6, 1e12, abs(_number(rng)))),
-            beam_time_offsets=rng.uniform(0.0, 0.03, n) if offsets is None else offsets,
-            T_robot_laser=mounted,
-        )  # fmt: skip
-
-    out: LaserSpec = _made(make)
-    return out
-
-
-def _ranges(rng: np.random.Generator, of: LaserSpec) -> np.ndarray[Any, np.dtype[np.float32]]:
-    n, most = of.n_beams, min(of.range_max, 3e38)
-    flat = _pick(rng, (np.nan, np.inf, 0.0, most, of.range_min, 1.0, 5.0, 1e-40, 3e38))
-    kinds: tuple[Callable[[], Any], ...] = (
-        lambda: np.full(n, min(flat, 3e38) if math.isfinite(flat) else flat),
-        lambda: 3.0 + np.sin(np.arange(n) * 0.05),
-        lambda: rng.uniform(0.0, min(most, 1e6), n),
-        lambda: rng.uniform(0.0, 9.0, n).round(),
-        lambda: rng.choice(np.array([np.nan, np.inf, 0.0, 1.0, most, 3e38]), n),
-    )
-    return np.asarray(_pick(rng, kinds)()).astype(np.float32)
-
-
-def _covariance(rng: np.random.Generator, n: int) -> Float:
-    mixed = [abs(_number(rng)) for _ in range(n)]
-    alike = [abs(_number(rng))] * n
-    out = np.diag(_pick(rng, (alike, mixed, [1e-4] * n)))
-    if rng.random() < 0.3:  # fully correlated
-        std = np.sqrt(np.diag(out))
-        out = std[:, None] * std[None, :]
-    return out
-
-
-def _features(rng: np.random.Generator, stamp_ns: int) -> Features:
-    def make() -> Features:
-        k = int(_pick(rng, (0, 1, 2, 3, 30)))
-        near = rng.uniform(-10.0, 10.0, (k, 2))
-        points = near if rng.random() < 0.6 else np.array([_number(rng) for _ in range(2 * k)])
-        if k > 1 and rng.random() < 0.2:
-            points = np.tile(points.reshape(k, 2)[:1], (k, 1))
-        covariances = np.array([_covariance(rng, 2) for _ in range(k)]).reshape(k, 2, 2)
-        return Features(
-            stamp_ns=stamp_ns, points_robot=points.reshape(k, 2), covariances=covariances
-        )
-
-    out: Features = _made(make)
-    return out
-
-
-def _odometry(rng: np.random.Generator, stamp_ns: int, before: Float) -> Odometry:
-    def make() -> Odometry:
-        step = np.array([rng.normal(0.0, 0.1), rng.normal(0.0, 0.1), rng.normal(0.0, 0.1)])
-        if rng.random() < 0.15:
-            step = np.array([_pick(rng, (900.0, 1001.0, 5e-324)), 0.0, _number(rng)])
-        with np.errstate(over="ignore"):
-            pose = before + step if rng.random() < 0.93 else _pose(rng)
-        twist = None if rng.random() < 0.5 else np.array([_number(rng, SIZES[:11])] * 3)
-        stated = None if rng.random() < 0.4 else _covariance(rng, 3)
-        return Odometry(
-            stamp_ns=stamp_ns, T_odom_robot=pose, increment_covariance=stated, twist=twist
-        )
-
-    out: Odometry = _made(make)
-    return out
-
-
-def _stamps(rng: np.random.Generator) -> list[Any]:
-    step = int(_pick(rng, (1, 1_000_000, 26_666_667, 10**9, 10**18)))
-    first = int(_pick(rng, (0, 1_700_000_000 * 10**9, -LAST_NS - 1, LAST_NS - 3 * step, -step)))
-    stamps: list[Any] = [first + k * step for k in range(FRAMES)]
-    if rng.random() < 0.3:
-        k = int(rng.integers(FRAMES))
-        stamps[k] = _pick(rng, (stamps[0], stamps[k - 1], -LAST_NS - 1, LAST_NS, 0, 2**70))
-    if rng.random() < 0.2 and all(abs(s) <= LAST_NS for s in stamps):
-        stamps = [np.int64(s) for s in stamps]
-    return stamps
-
-
-def frames(rng: np.random.Generator) -> list[Frame]:
-    """A short stream; the scanner and what is sensed may change in the middle."""
-    out: list[Frame] = []
-    laser, before = spec(rng), np.zeros(3) if rng.random() < 0.8 else _pose(rng)
-    kind = _pick(rng, ("scan", "scan", "features", "both", "none"))
-    for stamp_ns in _stamps(rng):
-        if rng.random() < 0.1:
-            laser = spec(rng)
-        if rng.random() < 0.1:
-            kind = _pick(rng, ("scan", "features", "both", "none"))
-        try:
-            odometry = _odometry_at(rng, stamp_ns, before)
-            scan = features = None
-            if kind in ("scan", "both"):
-                scan = Scan(stamp_ns=stamp_ns, ranges=_ranges(rng, laser), spec=laser)
-            if kind in ("features", "both"):
-                features = _features(rng, stamp_ns)
-            out.append(Frame(stamp_ns=stamp_ns, odometry=odometry, scan=scan, features=features))
-        except MobiliaError:  # a stamp that no frame can have
-            continue
-        before = odometry.T_odom_robot
-    return out
-
-
-def _odometry_at(rng: np.random.Generator, stamp_ns: int, before: Float) -> Odometry:
-    Odometry(stamp_ns=stamp_ns, T_odom_robot=np.zeros(3))  # the stamp alone may be refused
-    return _odometry(rng, stamp_ns, before)
-
-
 @cache
 def _slam(name: str) -> SlamSystem:
     return guarded("odometry") if name == PIPED else create(name)
@@ -245,22 +98,22 @@ def _room(kind: str) -> Any:
 
 def _action(rng: np.random.Generator, rooms: int) -> Any:
     shape = (2,) if rooms == 1 else (rooms, 2)
-    odd = np.array([_pick(rng, (np.nan, np.inf, -np.inf, _number(rng))) for _ in range(2 * rooms)])
+    odd = np.array([any_of(rng, (np.nan, np.inf, -np.inf, extreme(rng))) for _ in range(2 * rooms)])
     kinds: tuple[Callable[[], Any], ...] = (
         lambda: rng.uniform(-1.0, 1.0, shape),
         lambda: odd.reshape(shape),
         lambda: odd.reshape(shape).tolist(),
-        lambda: np.full(shape, _number(rng)),
-        lambda: np.zeros(_pick(rng, ((), (0,), (1,), (3,), (2, 1), (1, 2), (2, 2, 2), (3, 2)))),
+        lambda: np.full(shape, extreme(rng)),
+        lambda: np.zeros(any_of(rng, ((), (0,), (1,), (3,), (2, 1), (1, 2), (2, 2, 2), (3, 2)))),
         lambda: rng.integers(-3, 3, shape),
-        lambda: rng.uniform(-1.0, 1.0, shape).astype(_pick(rng, (bool, complex, object, "U"))),
-        lambda: _pick(rng, NOT_NUMBERS),
+        lambda: rng.uniform(-1.0, 1.0, shape).astype(any_of(rng, (bool, complex, object, "U"))),
+        lambda: any_of(rng, NOT_NUMBERS),
         lambda: {0: 0.5, 1: 0.5},
         lambda: {0.25, 0.5},
         lambda: (v for v in (0.1, 0.2)),
     )  # fmt: skip
     with np.errstate(all="ignore"):
-        return _pick(rng, kinds)()
+        return any_of(rng, kinds)()
 
 
 def step(tally: Tally, name: str, rng: np.random.Generator) -> None:
@@ -280,23 +133,25 @@ def _options(rng: np.random.Generator) -> Any:
         "goal", "start", "seeds", "scene", "n_chairs", "n_people", "dynamism", "moving_share",
         "rates", "scan_height_m", "resolution_deg", "noise_std_m", "laser", "reset_mask", "gaol", 3,
     )  # fmt: skip
-    inner = {str(_pick(rng, ("n_chairs", "lidar", "door_rate", "x", "walls"))): _odd(rng)}
-    values = (inner, inner, _odd(rng), _number(rng), (_number(rng), _number(rng)), _pose(rng),
-              Lms221Config.ideal(), replace(Dynamism(), chair_push_rate=1e3))  # fmt: skip
+    inner = {str(any_of(rng, ("n_chairs", "lidar", "door_rate", "x", "walls"))): _odd(rng)}
+    values = (
+        inner, inner, _odd(rng), extreme(rng), (extreme(rng), extreme(rng)), extreme_pose(rng),
+        Lms221Config.ideal(), replace(Dynamism(), chair_push_rate=1e3),
+    )  # fmt: skip
     if rng.random() < 0.15:
         return _odd(rng)
-    return {_pick(rng, names): _pick(rng, values) for _ in range(int(rng.integers(1, 3)))}
+    return {any_of(rng, names): any_of(rng, values) for _ in range(int(rng.integers(1, 3)))}
 
 
 def _odd(rng: np.random.Generator) -> Any:
-    return _pick(rng, NOT_NUMBERS)
+    return any_of(rng, NOT_NUMBERS)
 
 
 def reset(tally: Tally, name: str, rng: np.random.Generator) -> None:
     """Odd seeds and options; where they are taken, one step."""
     room = _room(name)
-    seed = _pick(rng, (None, 0, 7, _odd(rng), [1, 2], [_odd(rng), 1], np.arange(2), -1, 2**70))
-    options = _pick(rng, (None, _options(rng), _options(rng)))
+    seed = any_of(rng, (None, 0, 7, _odd(rng), [1, 2], [_odd(rng), 1], np.arange(2), -1, 2**70))
+    options = any_of(rng, (None, _options(rng), _options(rng)))
     if tally.call("reset", room.reset, seed=seed, options=options) is not None:
         tally.call("step", room.step, room.action_space.sample())
 
@@ -313,8 +168,8 @@ def construct(tally: Tally, name: str, rng: np.random.Generator) -> None:
     if name == "vector":
         fitting |= {"num_envs": (1, 2, 0, 2.0), "n_threads": (1, 2, 0), "autoreset_mode": ("x",),
                     "frames": (True, "no")}  # fmt: skip
-    chosen = [_pick(rng, list(fitting)) for _ in range(int(rng.integers(1, 3)))]
-    given = {k: _pick(rng, fitting[k]) if rng.random() < 0.5 else _odd(rng) for k in chosen}
+    chosen = [any_of(rng, list(fitting)) for _ in range(int(rng.integers(1, 3)))]
+    given = {k: any_of(rng, fitting[k]) if rng.random() < 0.5 else _odd(rng) for k in chosen}
     if name == "single" and given.get("render_size") is not None:
         given["render_mode"] = "map"
     make = MobiliaEnv if name == "single" else MobiliaVectorEnv

@@ -21,8 +21,9 @@ from scripts.film import FPS
 from scripts.film.encode import Pace, film, require_ffmpeg
 from scripts.film.render import shoot, watched
 from scripts.film.show import Show
+from scripts.machine import machine
 from scripts.names import file_name
-from scripts.output import machine, whole_folder, write_recipe
+from scripts.output import whole_folder, write_recipe
 from scripts.single_run import score
 from scripts.single_run.costs import FILM, MAP, PICTURES, SLAM, Costs, say
 from scripts.single_run.small_maps import Drawn, drawn, for_file

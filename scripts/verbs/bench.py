@@ -34,7 +34,7 @@ def bench(
         raise InvalidValueError(f"--seconds must lie in [1, 3600] s, got {seconds}")
     from scripts.benches import crowds, dataset, world
     from scripts.benches import slam as bench_slam
-    from scripts.output import machine, versions
+    from scripts.machine import machine, versions
 
     measures: tuple[Callable[[float], Iterable[dict[str, Any]]], ...] = (
         world.simulation,

@@ -12,10 +12,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from scripts.console import console, note
+from scripts.many import named
 from scripts.names import check
 from scripts.process_options import Cluster, Jobs
 from scripts.set_option import Set
-from scripts.verbs.compare import named
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:

@@ -3,34 +3,27 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
-from rich.progress import Progress
 
-from scenes import groups
-from scripts import interrupt
-from scripts.console import console, note, progress
+from scripts.console import console
+from scripts.debugger.options import At, Horizon, Lead, Repeats, Threshold, Top, Who, Within
 from scripts.debugger.question import Question
 from scripts.knobs import Change, CrowdOption, Held, Motion
+from scripts.many import named
 from scripts.names import check, file_name, run_name
+from scripts.output_options import Overwrite
 from scripts.scanner_option import Scanner
+from scripts.tour_options import DynamismLevel, Seconds, Seed
 from scripts.trust import Trust
-from scripts.verbs.compare import named
 from slam.errors import InvalidValueError
 from slam.evaluation.divergence import Rule
-from slam.files import write_text
 
 if TYPE_CHECKING:
     from scripts.debugger.counterfactual import Inquest
-    from scripts.debugger.episode import Case
-    from scripts.debugger.recording import Tape
-
-AGREES_M = 1e-5  # a trajectory on file is rounded
 
 
 def blame(
@@ -45,46 +38,27 @@ def blame(
         str | None, typer.Option(help="SLAM to examine; default the run's first, or shunting.")
     ] = None,
     scene: Annotated[str | None, typer.Option(help="Instead of RUN: a scene to simulate.")] = None,
-    dynamism: Annotated[float, typer.Option(help="How much the scene moves, 0 to 1.")] = 0.5,
+    dynamism: DynamismLevel = 0.5,
     motion: Motion = None,
     change: Change = None,
     crowd: CrowdOption = None,
-    seed: Annotated[int, typer.Option(help="Of the simulated run, whole number >= 0.")] = 0,
-    seconds: Annotated[float, typer.Option(help="Length of the simulated tour, s.")] = 60.0,
+    seed: Seed = 0,
+    seconds: Seconds = 60.0,
     scanner: Scanner = "full",
     option: Annotated[
         list[str] | None, typer.Option(help="Option of the scene: NAME=VALUE, e.g. n_chairs=6.")
     ] = None,
     every: Annotated[int, typer.Option(help="The SLAM gets one scan in so many.")] = 1,
-    threshold: Annotated[
-        float, typer.Option(help="Rise of the error that counts as a divergence, m.")
-    ] = Rule.threshold_m,
-    within: Annotated[float, typer.Option(help="Time within which it rises, s.")] = Rule.within_s,
-    at: Annotated[
-        float | None, typer.Option(help="Examine this time instead of searching, s.")
-    ] = None,
-    lead: Annotated[
-        float, typer.Option(help="Time from the checkpoint to the divergence, s.")
-    ] = Question.lead_s,
-    horizon: Annotated[
-        float, typer.Option(help="Time from the divergence to the end of the re-runs, s.")
-    ] = Question.horizon_s,
-    top: Annotated[
-        int, typer.Option(help="Try only this many of the likeliest; 0: all observed.")
-    ] = Question.top,
-    who: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Try only these: a mover, a group (escorts, chairs) or a pattern (group[0-3])."
-        ),
-    ] = None,
-    repeats: Annotated[
-        int, typer.Option(help="Repeats of original and cure with other noise.")
-    ] = Question.repeats,
+    threshold: Threshold = Rule.threshold_m,
+    within: Within = Rule.within_s,
+    at: At = None,
+    lead: Lead = Question.lead_s,
+    horizon: Horizon = Question.horizon_s,
+    top: Top = Question.top,
+    who: Who = None,
+    repeats: Repeats = Question.repeats,
     out: Annotated[Path | None, typer.Option(help="Folder; default out/blame-...")] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an earlier one in that folder.")
-    ] = False,
+    overwrite: Overwrite = False,
     trust: Trust = False,
 ) -> None:
     """Find which mover misled a SLAM, by running the world again without it.
@@ -106,6 +80,7 @@ def blame(
     )  # fmt: skip
     check([slam] if slam else [], scene)
     from scripts.debugger.episode import Case, case_of
+    from scripts.debugger.make import carry_out
 
     if run is not None:
         case, name = case_of(run, slam, every, trust), run_name(run)
@@ -117,7 +92,7 @@ def blame(
     if at is not None and not 0.0 <= at <= case.seconds:
         raise InvalidValueError(f"--at must lie in 0..{case.seconds:g} s, got {at:g}")
     folder = out or Path("out") / f"blame-{file_name(name)}-{file_name(case.slam)}"
-    _tell(_carry_out(case, question, folder, overwrite), folder)
+    _tell(carry_out(case, question, folder, overwrite=overwrite), folder)
 
 
 def _world(world: dict[str, Any], options: list[str], scanner: str) -> dict[str, Any]:
@@ -128,83 +103,6 @@ def _world(world: dict[str, Any], options: list[str], scanner: str) -> dict[str,
     laser = scanner_of(scanner)
     settings = {**world, **options_of(options)}
     return settings if scanner == "full" else settings | {"laser": laser}
-
-
-def _carry_out(case: Case, question: Question, folder: Path, overwrite: bool) -> Inquest:
-    """Find who is to blame and write the folder."""
-    from scripts.debugger.picture import blame_picture
-    from scripts.debugger.words import as_json
-    from scripts.output import whole_folder, write_recipe
-
-    recipe = _recipe(case, question)
-    with whole_folder(folder, overwrite=overwrite, command="blame", settings=recipe) as part:
-        found = _inquest(case, question)
-        blame_picture(part / "blame.png", found)
-        text = json.dumps(as_json(found), indent=1, allow_nan=False)
-        write_text(part / "blame.json", text + "\n")
-        write_recipe(part, "blame", recipe)
-    return found
-
-
-def _inquest(case: Case, question: Question) -> Inquest:
-    from scripts.debugger.counterfactual import hold
-    from scripts.debugger.recording import record, simulate
-
-    if question.who:  # told before the run
-        movers = simulate(case).world.scene.movers
-        for word in question.who:
-            groups.named(movers, word)
-    with progress() as bar:
-        tape = record(case, _Bar(bar, "driving").scans)
-        _compare(tape)
-        return hold(tape, question, _Bar(bar, "re-runs").trials)
-
-
-class _Bar:
-    """One line of the progress."""
-
-    def __init__(self, bar: Progress, words: str) -> None:
-        self._bar = bar
-        self._task = bar.add_task(words, total=None, unit="")
-
-    def scans(self, done: int, of: int) -> None:
-        """Scans of the original."""
-        interrupt.check()
-        if done % 25 == 0 or done == of:
-            self._bar.update(self._task, completed=done, total=of, unit=f"{done}/{of} scans")
-
-    def trials(self, what: str, done: int, of: int) -> None:
-        """A re-run begins."""
-        interrupt.check()
-        words = what if len(what) < 50 else "all movers"
-        self._bar.update(self._task, completed=done, total=of, unit=escape(words))
-
-
-def _compare(tape: Tape) -> None:
-    """Say so where the run on file was another one."""
-    import numpy as np
-
-    case = tape.case
-    if case.made is not None and case.made.elsewhere():
-        note(f"the episode was made elsewhere: {case.made.elsewhere()}")
-    recorded, again = case.recorded, np.array(tape.strip.believed)
-    if recorded is None:
-        return
-    if recorded.shape != again.shape:
-        note(f"of {case.slam} {len(recorded)} poses are on file, the run again has {len(again)}")
-        return
-    gap = float(np.abs(recorded[:, :2] - again[:, :2]).max())
-    if gap > AGREES_M:
-        note(f"run again, {case.slam} is up to {gap:.3g} m elsewhere: other versions or CPU?")
-
-
-def _recipe(case: Case, question: Question) -> dict[str, Any]:
-    """What makes it again."""
-    settings = {k: repr(v) if k == "laser" else v for k, v in case.settings.items()}
-    asked = {f"asked_{k}": v for k, v in vars(replace(question)).items() if k != "rule"}
-    rule = {f"rule_{k}": v for k, v in vars(question.rule).items()}
-    own = {"slam": case.slam, "seconds": case.seconds, "every": case.every}
-    return {**own, "simulation": settings, **asked, **rule}
 
 
 def _tell(found: Inquest, folder: Path) -> None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,21 +12,18 @@ from rich.markup import escape
 
 from scripts.checked import whole
 from scripts.console import console, fact
-from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels, chosen
+from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels
+from scripts.levels import axis_levels
+from scripts.many import named
 from scripts.names import check
 from scripts.oracle_option import Oracles, with_oracles
 from scripts.process_options import Cluster, Jobs
 from scripts.scanner_option import Scanner, every_of
 from scripts.set_option import Set
-from scripts.verbs.generate import sweep
-from slam.errors import InvalidValueError
 from slam.guests.limits import Limits
-from slam.variants import ORACLE, PIPE
 
 if TYPE_CHECKING:
     from scripts.comparison.plan import Plan
-
-BETWEEN = re.compile(r",(?![^{]*\}|[^(]*\))")  # a comma outside braces and brackets
 
 
 def compare(
@@ -113,36 +109,3 @@ def tell(plan: Plan, rows: list[dict[str, Any]]) -> None:
     said = (answer(standing(rows, plan.slams[0], name, plan.axis)) for name in plan.scenes)
     for line in dict.fromkeys(said):
         fact(line)
-
-
-def named(values: list[str]) -> tuple[str, ...]:
-    """Words may also be joined by commas, but for the command of a pipe, which may hold some, and
-    inside the braces of a variant and the brackets of an oracle."""
-    whole = (PIPE, ORACLE + PIPE)
-    parts = ([value] if value.startswith(whole) else BETWEEN.split(value) for value in values)
-    return tuple(word for words in parts for word in words if word)
-
-
-def axis_levels(
-    dynamism: list[str] | None, motion: list[str] | None, change: list[str] | None
-) -> tuple[str, tuple[float, ...], dict[str, Any]]:
-    """The axis, its levels and what is held, from the three options; default 0 to 1 dynamism."""
-    given = {"dynamism": dynamism, "motion": motion, "change": change}
-    axis, at, held = chosen(*(levels(values or [], f"--{k}") for k, values in given.items()))
-    return axis, at or levels(["0:1:0.25"]), dict(held)
-
-
-def levels(values: list[str], option: str = "--dynamism") -> tuple[float, ...]:
-    """``["0:1:0.5"]`` or ``["0", "0.5,1"]`` -> (0, 0.5, 1)."""
-    found: list[float] = []
-    for word in named(values):
-        if ":" in word:
-            found += sweep(word, option)
-            continue
-        try:
-            found.append(float(word))
-        except ValueError:
-            raise InvalidValueError(
-                f"{option} must be numbers or start:stop:step, got {word!r}"
-            ) from None
-    return tuple(found)

@@ -10,7 +10,9 @@ import typer
 
 from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check
+from scripts.output_options import Overwrite
 from scripts.scanner_option import Scanner
+from scripts.tour_options import DynamismLevel, ScanHeight, Seconds, Seed
 
 FILM_FPS = 15.0  # the whole demo is to last a minute on two cores
 
@@ -18,21 +20,15 @@ FILM_FPS = 15.0  # the whole demo is to last a minute on two cores
 def demo(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("out/demo"),
     scene: Annotated[str, typer.Option(help="Scene to drive in.")] = "office",
-    seconds: Annotated[float, typer.Option(help="Length of the tour, s.")] = 60.0,
-    dynamism: Annotated[
-        float, typer.Option(help="How much the room moves: 0 nothing, 1 most.")
-    ] = 0.5,
+    seconds: Seconds = 60.0,
+    dynamism: DynamismLevel = 0.5,
     motion: Motion = None,
     change: Change = 0.0,
     crowd: CrowdOption = "none",
-    seed: Annotated[int, typer.Option(help="Seed of everything, whole number >= 0.")] = 0,
-    scan_height: Annotated[
-        float, typer.Option(help="Height of the scanner above the floor, m.")
-    ] = 0.36,
+    seed: Seed = 0,
+    scan_height: ScanHeight = 0.36,
     scanner: Scanner = "full",
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
-    ] = False,
+    overwrite: Overwrite = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
 ) -> None:
     """Drive a robot through a moving office, and compare SLAM with odometry.

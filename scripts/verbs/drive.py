@@ -13,11 +13,12 @@ from rich.markup import escape
 from scripts.checked import whole
 from scripts.console import console
 from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels
+from scripts.levels import axis_levels
+from scripts.many import named
 from scripts.names import check
 from scripts.process_options import Jobs
 from scripts.scanner_option import Scanner, every_of
 from scripts.set_option import Set
-from scripts.verbs.compare import axis_levels, named
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 

@@ -13,6 +13,7 @@ from rich.markup import escape
 from scripts.console import console, note, working
 from scripts.knobs import CrowdOption, Motion, options_with
 from scripts.names import check
+from scripts.output_options import Overwrite
 from scripts.scanner_option import Scanner
 from slam.errors import InvalidValueError
 
@@ -44,9 +45,7 @@ def lifelong(
     seed: Annotated[int, typer.Option(help="Of the building.")] = 0,
     scanner: Scanner = "full",
     out: Annotated[Path | None, typer.Option(help="Folder to write; default out/lifelong.")] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
-    ] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Let SLAMs live in a building: each session starts anywhere in the map of those before.
 

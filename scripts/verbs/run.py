@@ -9,10 +9,13 @@ from typing import Annotated
 import typer
 
 from scripts.knobs import Change, CrowdOption, Held, Motion
+from scripts.log_options import Strict, TextFormat
 from scripts.names import check, run_name
 from scripts.oracle_option import Oracles, with_oracles
+from scripts.output_options import Overwrite
 from scripts.scanner_option import Scanner
 from scripts.set_option import Set
+from scripts.tour_options import DynamismLevel, ScanHeight, Seconds, Seed
 from slam.errors import InvalidValueError
 
 
@@ -32,34 +35,23 @@ def run(
             ".rawlog, the folder of Victoria Park; or any text log with --format."
         ),
     ] = None,
-    text_format: Annotated[
-        Path | None,
-        typer.Option("--format", help="TOML file that says which columns of a text log hold what."),
-    ] = None,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Refuse a log that would have to be repaired.")
-    ] = False,
+    text_format: TextFormat = None,
+    strict: Strict = False,
     scene: Annotated[
         str | None, typer.Option(help="Or a simulated scene, driven on a tour of its rooms.")
     ] = None,
-    seconds: Annotated[float, typer.Option(help="Length of the simulated tour, s.")] = 60.0,
-    dynamism: Annotated[
-        float, typer.Option(help="How much the simulated room moves: 0 nothing, 1 most.")
-    ] = 0.5,
+    seconds: Seconds = 60.0,
+    dynamism: DynamismLevel = 0.5,
     motion: Motion = None,
     change: Change = None,
     crowd: CrowdOption = None,
-    seed: Annotated[int, typer.Option(help="Seed of the simulated run, whole number >= 0.")] = 0,
-    scan_height: Annotated[
-        float, typer.Option(help="Height of the simulated scanner above the floor, m.")
-    ] = 0.36,
+    seed: Seed = 0,
+    scan_height: ScanHeight = 0.36,
     scanner: Scanner = "full",
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default out/run-<log or scene>.")
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
-    ] = False,
+    overwrite: Overwrite = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
     map_in: Annotated[
         Path | None,
@@ -83,27 +75,31 @@ def run(
     """
     if (log is None) == (scene is None):
         raise InvalidValueError("name exactly one of --log and --scene")
-    slam = list(with_oracles(slam, oracle, set_))
-    check(slam, scene)
-    if log is None and (strict or text_format is not None):
-        raise InvalidValueError("--strict and --format are about a --log")
-    if log is None and (map_in or map_out or at):
-        raise InvalidValueError("--map-in, --map-out and --at are about a --log")
-    if log is not None:
+    slams = list(with_oracles(slam, oracle, set_))
+    check(slams, scene)
+    if scene is not None:
+        _without_a_log(strict=strict or text_format is not None, maps=bool(map_in or map_out or at))
+        from scripts.single_run.live import on_scene, tour
+        from scripts.single_run.session import Outputs
+
+        folder = out or Path("out") / f"run-{scene.replace(':', '-')}"
+        outputs = Outputs(folder=folder, command="run", overwrite=overwrite, film=film)
+        held = Held(motion=motion, change=change, crowd=crowd)
+        settings = tour(scene, seconds, dynamism, seed, scan_height, scanner, held)
+        on_scene(slams, settings, outputs)
+    elif log is not None:
         from scripts.days.one import Maps
         from scripts.single_run.recorded import Log, on_log
 
         maps = Maps(map_in=map_in, map_out=map_out, at=at)
         folder = out or Path("out") / f"run-{run_name(log)}"
         recorded = Log(path=log, strict=strict, text_format=text_format)
-        on_log(slam, recorded, folder, overwrite=overwrite, film=film, maps=maps)
-    elif scene is not None:
-        from scripts.single_run.live import on_scene, tour
-        from scripts.single_run.session import Outputs
+        on_log(slams, recorded, folder, overwrite=overwrite, film=film, maps=maps)
 
-        folder = out or Path("out") / f"run-{scene.replace(':', '-')}"
-        held = Held(motion=motion, change=change, crowd=crowd)
-        settings = tour(scene, seconds, dynamism, seed, scan_height, scanner, held)
-        on_scene(
-            slam, settings, Outputs(folder=folder, command="run", overwrite=overwrite, film=film)
-        )
+
+def _without_a_log(*, strict: bool, maps: bool) -> None:
+    """``InvalidValueError`` where options about a log were given beside a scene."""
+    if strict:
+        raise InvalidValueError("--strict and --format are about a --log")
+    if maps:
+        raise InvalidValueError("--map-in, --map-out and --at are about a --log")

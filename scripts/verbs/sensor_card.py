@@ -4,15 +4,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 from rich.table import Table
 
 from scripts.console import console, note, working
+from scripts.log_options import Strict, TextFormat
 from slam.errors import MobiliaError
 from slam.files import write_text
+
+if TYPE_CHECKING:
+    from scripts.card.rows import Row
 
 
 def sensor_card(
@@ -26,13 +30,8 @@ def sensor_card(
         list[Path] | None,
         typer.Option(help="A real log to set it beside; several are taken for one scanner's."),
     ] = None,
-    text_format: Annotated[
-        Path | None,
-        typer.Option("--format", help="TOML file that says which columns of a text log hold what."),
-    ] = None,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Refuse a log that would have to be repaired.")
-    ] = False,
+    text_format: TextFormat = None,
+    strict: Strict = False,
 ) -> None:
     """Measure a simulated scanner against its data sheet, or with --log beside a real one.
 
@@ -46,32 +45,49 @@ def sensor_card(
     if log:
         beside_log(log, scanner, out, text_format=text_format, strict=strict)
         return
-    from scripts.card import page, stated  # mujoco: only once the environment is known good
-    from scripts.card import rows as sensor_rows
+    beside_sheet(scanner, out)
+
+
+def beside_sheet(scanner: str, out: Path | None) -> None:
+    """Print what a scanner's data sheet says beside what was measured; with ``out`` also write it.
+
+    Raises ``MobiliaError`` where the scanner departs from its data sheet.
+    """
+    from scripts.card import rows, stated  # mujoco: only once the environment is known good
     from sim.sensors.lidar.registry import DEFAULT, describe
 
-    own = scanner == DEFAULT
     with working("measuring"):
-        rows = sensor_rows.rows() if own else stated.rows_of(scanner)
+        measured = rows.rows() if scanner == DEFAULT else stated.rows_of(scanner)
+    console.print(_table(f"{describe(scanner)} (simulated)", measured))
+    if out is not None:
+        _write_card(out, scanner, measured)
+    broken = [row.what for row in measured if not row.kept]
+    if broken:
+        raise MobiliaError(f"the scanner departs from its data sheet: {'; '.join(broken)}")
+
+
+def _table(title: str, rows: list[Row]) -> Table:
     headings = ("", "what", "data sheet", "measured", "source")
-    title = escape(f"{describe(scanner)} (simulated)")
-    table = Table(*headings, title=title, title_justify="left")
+    table = Table(*headings, title=escape(title), title_justify="left")
     for row in rows:
         mark = "[green]✓[/green]" if row.kept else "[red]✗[/red]"
         table.add_row(mark, row.what, row.datasheet, row.measured, row.source)
-    console.print(table)
-    if out is not None:
-        if own:
-            with working("drawing the page"):
-                page.write_card(out, rows)
-            note(f"wrote {out / 'sensor_card.md'} and its pictures")
-        else:
-            out.mkdir(parents=True, exist_ok=True)
-            write_text(out / f"sensor_card_{scanner}.md", stated.page(scanner, rows))
-            note(f"wrote {out / f'sensor_card_{scanner}.md'}")
-    broken = [row.what for row in rows if not row.kept]
-    if broken:
-        raise MobiliaError(f"the scanner departs from its data sheet: {'; '.join(broken)}")
+    return table
+
+
+def _write_card(out: Path, scanner: str, rows: list[Row]) -> None:
+    """The page of one scanner; that of the LMS-221 has figures."""
+    from scripts.card import page, stated
+    from sim.sensors.lidar.registry import DEFAULT
+
+    if scanner == DEFAULT:
+        with working("drawing the page"):
+            page.write_card(out, rows)
+        note(f"wrote {out / 'sensor_card.md'} and its pictures")
+    else:
+        out.mkdir(parents=True, exist_ok=True)
+        write_text(out / f"sensor_card_{scanner}.md", stated.page(scanner, rows))
+        note(f"wrote {out / f'sensor_card_{scanner}.md'}")
 
 
 def beside_log(

@@ -50,11 +50,7 @@ def verify(
     """
     if regenerate_ < 0 or seed < 0:
         raise InvalidValueError("--regenerate and --seed must be >= 0")
-    import numpy as np
-
     from scripts.results import check
-    from sim.recording.recipe import RECIPE, read_recipe
-    from sim.recording.verify import STATUS, regenerate
 
     with working("checking every file"):
         findings = check(folder)
@@ -64,31 +60,54 @@ def verify(
         from scripts.benchmark.again import made_again
 
         findings += made_again(folder, regenerate_, seed)
-    sound = _sound(folder, findings) if regenerate_ and not submitted else []
-    count = min(regenerate_, len(sound))
-    drawn = np.random.default_rng(seed).choice(len(sound), count, replace=False)
-    chosen = [sound[k] for k in sorted(drawn.tolist())]
-    for scene in dict.fromkeys(read_recipe(episode / RECIPE).recipe.scene for episode in chosen):
-        admitted(scene, "scene", trust)
-    with progress() as bar:
-        task = bar.add_task("making again", total=count, unit="", visible=count > 0)
-        for episode in chosen:
-            interrupt.check()
-            findings.append(regenerate(episode, trust=trust))
-            bar.advance(task)
+    elif regenerate_ and not submitted:
+        findings += _made_again(_drawn(_sound(folder, findings), regenerate_, seed), trust)
     for finding in findings:
         _tell(finding)
-    bad = [finding for finding in findings if not finding.ok]
-    if bad:
-        worst = min(bad, key=lambda finding: list(STATUS).index(finding.verdict))
-        fail(f"{len(bad)} of {len(findings)} findings are not 'whole'; {_words(worst)}")
-        raise typer.Exit(worst.status)
+    _exit_if_bad(findings)
     if submitted:
         again = len(findings) - checked
         made = f", the recordings of {again} of its runs are right" if again else ""
         console.print(f"the file is whole{made}; the results are the submitter's word")
         return
     console.print(f"{checked} checked, {len(findings) - checked} of them made again: all well")
+
+
+def _made_again(episodes: list[Path], trust: bool) -> list[Finding]:
+    """A finding for each episode, simulated anew."""
+    from sim.recording.recipe import RECIPE, read_recipe
+    from sim.recording.verify import regenerate
+
+    for scene in dict.fromkeys(read_recipe(path / RECIPE).recipe.scene for path in episodes):
+        admitted(scene, "scene", trust)
+    findings = []
+    with progress() as bar:
+        task = bar.add_task("making again", total=len(episodes), unit="", visible=bool(episodes))
+        for episode in episodes:
+            interrupt.check()
+            findings.append(regenerate(episode, trust=trust))
+            bar.advance(task)
+    return findings
+
+
+def _drawn(episodes: list[Path], count: int, seed: int) -> list[Path]:
+    """So many of them at random, all where there are fewer, in their order."""
+    import numpy as np
+
+    count = min(count, len(episodes))
+    drawn = np.random.default_rng(seed).choice(len(episodes), count, replace=False)
+    return [episodes[k] for k in sorted(drawn.tolist())]
+
+
+def _exit_if_bad(findings: list[Finding]) -> None:
+    """End with the status of the worst of them, where one is not whole."""
+    from sim.recording.verify import STATUS
+
+    bad = [finding for finding in findings if not finding.ok]
+    if bad:
+        worst = min(bad, key=lambda finding: list(STATUS).index(finding.verdict))
+        fail(f"{len(bad)} of {len(findings)} findings are not 'whole'; {_words(worst)}")
+        raise typer.Exit(worst.status)
 
 
 def _sound(folder: Path, findings: list[Finding]) -> list[Path]:

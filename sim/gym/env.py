@@ -11,12 +11,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from scenes.crowd import crowd_of
-from scenes.mounting import HIGHEST, LOWEST
-from scenes.registry import check_name
 from scenes.scan_plane import SCAN_HEIGHT
-from scenes.scene import within
-from sim.core.checks import instance, number, one_of, switch, whole, whole_numbers
+from sim.core.checks import number, one_of, switch, whole
 from sim.core.contacts import Contact
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
@@ -25,10 +21,11 @@ from sim.gym.goals import GOAL_RADIUS_M, Goal, Ground, goal_of
 from sim.gym.observation import Observation, observed, space_of
 from sim.gym.options import checked_seed, episode
 from sim.gym.pose_source import PoseSource
+from sim.gym.rendering import MODES, Rendering
 from sim.gym.reward import REWARDS, Task
+from sim.gym.settings import checked_settings
 from sim.sensors.lidar.device import ScanResult
-from sim.sensors.lidar.registry import ScannerConfig, scanner_of
-from sim.sensors.odometry.config import preset
+from sim.sensors.lidar.registry import ScannerConfig
 from sim.simulation import Simulation
 from sim.world.world import World
 from slam.errors import InvalidValueError, MobiliaError
@@ -37,8 +34,6 @@ from slam.system import SlamSystem
 
 V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
 MOST_SCANS = 1000  # of one step
-VIEWS = ("top", "follow", "persp")  # as in ``sim.view.pictures``, which needs OpenGL to import
-MAX_PX = 8192  # edge of a picture
 
 
 class ResetNeededError(MobiliaError, gymnasium.error.ResetNeeded):
@@ -146,7 +141,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  (Gymnasium's own class attribute)
-        "render_modes": ["rgb_array", "map"],
+        "render_modes": list(MODES),
         "render_fps": 37,
     }
 
@@ -172,43 +167,24 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         view: str = "top",
         render_size: tuple[int, int] = (640, 480),
     ) -> None:
-        if render_mode is not None:
-            one_of("render_mode", render_mode, self.metadata["render_modes"])
-        one_of("view", view, VIEWS)
+        self._settings = checked_settings(
+            scene=scene, dynamism=dynamism, motion=motion, change=change, crowd=crowd, laser=laser,
+            scan_height_m=scan_height_m, odometry=odometry, labels=labels,
+        )  # fmt: skip
         number("time_limit_s", time_limit_s)
         if not time_limit_s > 0.0:
             raise InvalidValueError(f"time_limit_s must be > 0, got {time_limit_s}")
         switch("terminate_on_collision", terminate_on_collision)
-        switch("labels", labels)
-        instance("scene", scene, str)
-        check_name(scene)
-        Dynamism.of(dynamism, motion=motion, change=change)
-        instance("odometry", odometry, str)
-        preset(odometry)
-        within("scan_height_m", scan_height_m, LOWEST, HIGHEST)
         one_of("reward", reward, REWARDS)
         whole("frame_skip", frame_skip, 1, MOST_SCANS)
-        width, height = whole_numbers("render_size", render_size, "(width, height) in px", MAX_PX)
+        self._rendering = Rendering(render_mode, view, render_size)
         self.render_mode = render_mode
         self.time_limit_s = time_limit_s
         self.terminate_on_collision = terminate_on_collision
-        self._settings: dict[str, Any] = {
-            "scene": scene,
-            "dynamism": dynamism,
-            "motion": motion,
-            "change": change,
-            "crowd": crowd if crowd is None else str(crowd_of(crowd)),
-            "laser": scanner_of(laser),
-            "scan_height_m": scan_height_m,
-            "odometry": odometry,
-            "labels": labels,
-        }
         self._goal, self._reward, self._scans = goal_of("goal", goal), reward, int(frame_skip)
         if self._goal is not None and pose_source is None:
             pose_source = "odometry"
         self._pose_source = None if pose_source is None else PoseSource(pose_source)
-        self._view, self._size = view, (width, height)
-        self._renderer: Any = None
         self._simulation: Simulation | None = None
         self._task: Task | None = None
         self.contacts: list[Contact] = []  # what the robot touched during the last step
@@ -236,7 +212,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         own = Seeds(int(self.np_random.integers(2**31)), **plan.seeds)
         simulation = Simulation(seed=own, **plan.settings)
         task = self._task_of(plan.goal, simulation.world)
-        self._close_renderer()
+        self._rendering.close()
         self._simulation, self._task = simulation, task
         if self._simulation.spec.n_beams != self._n_beams:
             self._set_space(self._simulation.spec)
@@ -348,27 +324,8 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """The picture of ``render_mode``, (height, width, 3) uint8 RGB; None without a mode."""
-        if self.render_mode is None:
-            return None
-        if self._renderer is None:
-            self._renderer = self._make_renderer()
-        picture: NDArray[np.uint8] = self._renderer(self.simulation)
-        return picture
-
-    def _make_renderer(self) -> Any:
-        if self.render_mode == "map":
-            from sim.view.pictures import MapPicture
-
-            return MapPicture(self.simulation, self._size)
-        from sim.view.pictures import CameraPicture
-
-        return CameraPicture(self.simulation, self._size, self._view)
-
-    def _close_renderer(self) -> None:
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        return None if self.render_mode is None else self._rendering.picture(self.simulation)
 
     def close(self) -> None:
         """Free the renderer; the environment can be reset again."""
-        self._close_renderer()
+        self._rendering.close()

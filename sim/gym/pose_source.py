@@ -10,9 +10,10 @@ import numpy as np
 from gymnasium import spaces
 
 from slam import se2
+from slam.answers import judged
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Float, Frame
-from slam.replay import Track, judged
+from slam.replay import Track
 from slam.system import SlamSystem, create, refuse_at_the_end
 
 _FAR_M = 1e4  # poses are told up to here

@@ -16,11 +16,12 @@ from sim.loop.referee import Referee, Tally
 from sim.simulation import Simulation
 from sim.world.world import World
 from slam import se2
+from slam.answers import judged
 from slam.errors import SlamFailedError, UnknownNameError
 from slam.evaluation import lost
 from slam.frames import NS_PER_S, Float, Frame
 from slam.frontend.odometry_sum import MotionSum
-from slam.replay import Track, judged
+from slam.replay import Track
 from slam.system import SlamSystem, refuse_at_the_end
 
 OUTCOMES = ("reached", "wrong", "given up", "failed")

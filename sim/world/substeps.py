@@ -18,8 +18,8 @@ from sim.actors.chairs import Shoved, shove
 from sim.actors.doors import Leaves, swing
 from sim.actors.holding import Held, hold
 from sim.actors.people.crowd import People, decide
-from sim.actors.people.following import Leaders
 from sim.actors.people.gait import walk
+from sim.actors.people.leaders import Leaders
 from sim.actors.people.right_of_way import Addresses, Crowd, Doors
 from sim.actors.people.sitting import Hulls, dress
 from sim.actors.robot import ramp, roll

@@ -7,17 +7,13 @@ between two of them calls ``mj_forward`` then.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes import build
-from scenes.crowd import Crowd, crowd_of, mix, with_crowd
 from scenes.scene import Scene
 from sim.actors.castors import checked_level, stand_on_castors
 from sim.actors.chairs import Shoves, pushers, tables
@@ -28,12 +24,13 @@ from sim.actors.robot import Drive, DriveConfig
 from sim.actors.rolling import Rolling
 from sim.core import state
 from sim.core.bodies import Bodies
-from sim.core.checks import instance, number, numbers
+from sim.core.checks import instance, number
 from sim.core.contacts import Contact, RobotContacts
 from sim.core.dynamism import Dynamism
 from sim.core.engine import engine
 from sim.core.seeds import Seeds
 from sim.world import sessions, substeps
+from sim.world.populated import crowd_for, crowded, populated
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from sim.world.times_of_day import time_of
 from slam.errors import InvalidValueError
@@ -86,13 +83,15 @@ class World:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
         self.rates = Dynamism.of(dynamism, moving_share, motion=motion, change=change)
         change = self.rates.change
-        if session is not None:
+        if session is None:
+            built = populated(scene, self.seeds, self.rates, start, options)
+        else:
             self.rates = sessions.slowed(self.rates, time_of(session).motion)
-            named, given = scene, options.pop("crowd", None)
-            scene, self.seeds = sessions.opened(scene, self.seeds, change, session, options)
-            scene = self._crowded(scene, named, given, start, session)
-            options, change = {}, 0.0
-        built = self._built(scene, start, options)
+            given = options.pop("crowd", None)
+            opened, self.seeds = sessions.opened(scene, self.seeds, change, session, options)
+            crowd = crowd_for(scene, given, self.rates)
+            built = crowded(opened, crowd, start, session, as_many_as_fit=given is None)
+            change = 0.0
         self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
         self.model: mujoco.MjModel = self.scene.compile()
         self.data = mujoco.MjData(self.model)
@@ -104,21 +103,7 @@ class World:
         instance("drive", self.drive_config, DriveConfig)
         self._drive = Drive(self.model, self.drive_config, SUBSTEPS_PER_TICK / SUBSTEPS_PER_S)
         self._shoves = pushers(self.model, self.scene, self.rates, self.seeds)
-        self._doors = Doors(
-            self.model,
-            self.bodies,
-            self._named("door"),
-            rate=self.rates.door_rate,
-            counters=self._counters("doors"),
-        )
-        self.people = People(
-            self.model,
-            self.bodies,
-            self._doors,
-            stay_mean=self.rates.stay_mean,
-            pace=self.rates.pace,
-            counters=self._counters("people"),
-        )
+        self._doors, self.people = self._doors_and_people()
         self._people_rows = self.bodies.rows(self.people.names)
         self._rearranging = self._rearranger(change)
         self.scene.place(self.model, self.data)
@@ -132,35 +117,23 @@ class World:
         substeps.decide_first(self._room)
         mujoco.mj_step1(self.model, self.data)
 
-    def _built(
-        self, scene: Scene | str, start: Sequence[float] | None, options: dict[str, Any]
-    ) -> Scene:
-        if isinstance(scene, str):
-            given = options.pop("crowd", None)
-            built = build(scene, seed=self.seeds.integer("layout"), **options)
-            return self._crowded(built, scene, given, start)
-        if options:
-            raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")
-        instance("scene", scene, Scene)
-        return scene
-
-    def _crowded(
-        self,
-        built: Scene,
-        named: Scene | str,
-        given: object,
-        start: Sequence[float] | None,
-        session: int = 0,
-    ) -> Scene:
-        """The scene with the crowd that is given, else with the mix of the scene of that name."""
-        if given is not None:
-            crowd = crowd_of(given)
-        else:
-            crowd = mix(named, self.rates.crowd) if isinstance(named, str) else Crowd()
-        if not crowd:
-            return built
-        begun = _begun(built, start)
-        return with_crowd(begun, crowd, session, as_many_as_fit=given is None)
+    def _doors_and_people(self) -> tuple[Doors, People]:
+        doors = Doors(
+            self.model,
+            self.bodies,
+            self._named("door"),
+            rate=self.rates.door_rate,
+            counters=self._counters("doors"),
+        )
+        people = People(
+            self.model,
+            self.bodies,
+            doors,
+            stay_mean=self.rates.stay_mean,
+            pace=self.rates.pace,
+            counters=self._counters("people"),
+        )
+        return doors, people
 
     def _named(self, kind: str) -> list[str]:
         """Movers whose kind starts so: "chair" means both sorts."""
@@ -378,13 +351,3 @@ class World:
         self.people.dress()
         self.bodies.restore_physics(self.data, arrays)
         self._contacts.take()
-
-
-def _begun(scene: Scene, start: Sequence[float] | None) -> Scene:
-    """The scene with the robot at ``start``, where one is given."""
-    if start is None or not scene.movers or scene.movers[-1].kind != "robot":
-        return scene
-    x, y, yaw = numbers("start", start, 3, "(x m, y m, heading rad)")
-    if not math.isfinite(x + y + yaw):
-        return scene  # what is wrong is said where the robot is placed
-    return replace(scene, start=(x, y, yaw), initial={**scene.initial, "robot": (x, y, yaw)})

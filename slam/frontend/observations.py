@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from slam._jit import njit
 from slam.errors import InvalidValueError
-from slam.frames import Features, Float, Frame, Scan
+from slam.frames import Features, Float, Frame, LaserSpec, Scan
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import face, join, unveiled
@@ -126,25 +126,50 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     ``twist`` is the body velocity (vx, vy, omega) over the sweep. Raises ``InvalidValueError``
     where that drives more than ``MOST_SWEPT_M`` during it.
     """
-    spec = scan.spec
+    _check_swept(scan.spec, twist)
+    config = grain.frontend
+    points, beams, bearings, free = _cast(scan, twist, grain)
+    points, joined_on, tangents, facings = _surfaces(points, beams, scan.spec, grain)
+    sensor_sigma_m = scan.spec.range_sigma_m or config.sensor_sigma_m
+    covariances = np.zeros((len(points), 3))
+    variance = max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2
+    covariances[:, 0] = covariances[:, 2] = variance
+    increment = scan.spec.angle_increment
+    return Observations(
+        points_robot=points,
+        covariances=covariances,
+        weights=_weights(points, increment, config),
+        tangents=tangents,
+        joined=joined_on,
+        facings=facings,
+        view=view_of_beams(bearings, free, increment, grain.cell_m, config.view),
+        T_robot_laser=scan.spec.T_robot_laser,
+        sensor_sigma_m=sensor_sigma_m,
+    )
+
+
+def _check_swept(spec: LaserSpec, twist: Float) -> None:
     swept = spec.sweep_duration * math.hypot(float(twist[0]), float(twist[1]))
     if swept > MOST_SWEPT_M:
         raise InvalidValueError(
             f"Odometry.twist must drive at most {MOST_SWEPT_M:g} m during a scan's sweep, "
             f"got {swept:g} m"
         )
-    n = spec.n_beams
+
+
+def _cast(scan: Scan, twist: Float, grain: Grain) -> tuple[Float, NDArray[np.int64], Float, Float]:
+    """End points by rising bearing and the rank of each beam; bearings and free ranges of all."""
+    spec, n = scan.spec, scan.spec.n_beams
     points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
     beams = np.empty(n, np.int64)
     use = min(grain.range_m, spec.range_max)
-    config, surfaces = grain.frontend, grain.frontend.surfaces
     count = _scanned(
         scan.ranges,
         spec.angles,
         spec.beam_time_offsets,
         spec.T_robot_laser,
         twist,
-        (spec.range_min, spec.range_max, use, min(use, config.view.silent_m)),
+        (spec.range_min, spec.range_max, use, min(use, grain.frontend.view.silent_m)),
         points,
         beams,
         bearings,
@@ -158,36 +183,33 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
         beams = rank[beams]
         in_order = np.argsort(beams)
         points, beams = points.take(in_order, axis=0), beams[in_order]
+    return points, beams, bearings, free
+
+
+def _surfaces(
+    points: Float, beams: NDArray[np.int64], spec: LaserSpec, grain: Grain
+) -> tuple[Float, NDArray[np.bool_], Float, NDArray[np.uint8]]:
+    """The points that are no mixed pixels; of each ``joined``, ``tangents`` and ``facings``."""
+    config = grain.frontend.surfaces
+    count = len(points)
     onward, tangents = np.zeros(count, np.bool_), np.zeros((count, 2))
-    join(
-        points, beams, spec.T_robot_laser, surfaces.joining(grain.cell_m), onward, tangents,
-    )  # fmt: skip
+    join(points, beams, spec.T_robot_laser, config.joining(grain.cell_m), onward, tangents)
     clear = np.zeros(count, np.bool_)
-    if unveiled(points, beams, spec.T_robot_laser, onward, surfaces.mixed_m, clear) < count:
+    if unveiled(points, beams, spec.T_robot_laser, onward, config.mixed_m, clear) < count:
         kept = np.flatnonzero(clear)  # a mask of rows takes ten times as long
         points, onward = points.take(kept, axis=0), onward.take(kept)
         tangents = tangents.take(kept, axis=0)
     facings = np.zeros(len(points), np.uint8)
-    face(points, spec.T_robot_laser, onward, surfaces.face_m, facings)
-    sensor_sigma_m = spec.range_sigma_m or config.sensor_sigma_m
-    variance = max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2
-    covariances = np.zeros((len(points), 3))
-    covariances[:, 0] = covariances[:, 2] = variance
+    face(points, spec.T_robot_laser, onward, config.face_m, facings)
+    return points, onward, tangents, facings
+
+
+def _weights(points: Float, angle_increment: float, config: FrontendConfig) -> Float:
+    """(n,) by the distance between neighbouring beams: those close together count less."""
     x, y = points[:, 0], points[:, 1]
-    shares = np.sqrt(x * x + y * y) * spec.angle_increment / config.spacing_m
-    weights = np.minimum(np.maximum(shares, config.least_weight), 1.0)
-    view = view_of_beams(bearings, free, spec.angle_increment, grain.cell_m, config.view)
-    return Observations(
-        points_robot=points,
-        covariances=covariances,
-        weights=weights,
-        tangents=tangents,
-        joined=onward,
-        facings=facings,
-        view=view,
-        T_robot_laser=spec.T_robot_laser,
-        sensor_sigma_m=sensor_sigma_m,
-    )
+    shares = np.sqrt(x * x + y * y) * angle_increment / config.spacing_m
+    weights: Float = np.minimum(np.maximum(shares, config.least_weight), 1.0)
+    return weights
 
 
 def from_features(features: Features, grain: Grain) -> Observations:

@@ -140,12 +140,6 @@ def predict(
         least = share * config.least_m**2, share * config.least_rad**2
         rest = least[0] - floor[0], least[1] - floor[1]
         loosened = _widened(unscaled, more, rest)
-    if now.twist is not None:
-        twist = np.asarray(now.twist)
-    elif 0.0 < elapsed < config.twist_s and float(np.abs(increment).max()) <= MOST_TWIST * elapsed:
-        twist = se2.log(increment) / elapsed
-    else:
-        twist = np.zeros(3)
     return Prediction(
         T_map_robot=se2.compose(T_map_before, increment),
         increment=increment,
@@ -153,6 +147,15 @@ def predict(
         unscaled=unscaled,
         loosened=turned(loosened, float(T_map_before[2])),
         floor=floor,
-        twist=twist,
+        twist=_twist(now, increment, elapsed, config),
         elapsed=elapsed,
     )
+
+
+def _twist(now: Odometry, increment: Float, elapsed: float, config: PriorConfig) -> Float:
+    """(3,) body velocity over the sweep: measured, else that of the increment, else none."""
+    if now.twist is not None:
+        return np.asarray(now.twist)
+    if 0.0 < elapsed < config.twist_s and float(np.abs(increment).max()) <= MOST_TWIST * elapsed:
+        return se2.log(increment) / elapsed
+    return np.zeros(3)

@@ -64,6 +64,32 @@ def _lines(covariance: Float) -> tuple[Float, Float, Float]:
 
 def sights(scan: Scan, twist: Float, config: RangeErrorConfig, sigma_m: float) -> Sights:
     """Lines through neighbouring returns; ``twist`` (vx, vy, omega) is held over the sweep."""
+    points, bearings, distances, ranges = _by_bearing(scan, twist)
+    half = np.ceil(0.5 * config.width_m / np.maximum(distances * scan.spec.angle_increment, 1e-6))
+    half = np.clip(half, 2, 40).astype(np.int64)
+    count, mean, covariance = _moments(points, half)
+    directions = points / np.maximum(distances, 1e-9)[:, None]
+    normals, least, spread = _lines(covariance)
+    # Ranges err along the beam, which tilts the line of an oblique surface: without that part
+    share = least / np.maximum((normals * directions).sum(axis=1) ** 2, 0.05)
+    ux, uy = directions.T
+    normals, _, _ = _lines(covariance - share * np.stack([ux * ux, ux * uy, uy * uy]))
+    facing = (normals * directions).sum(axis=1)
+    normals *= -np.sign(facing)[:, None]
+    facing = -np.maximum(np.abs(facing), 1e-3)
+    off = ((points - mean) * normals).sum(axis=1)
+    steepest = math.cos(math.radians(config.steepest_deg))
+    limit = config.flat_sigmas * sigma_m
+    flat = (count == 2 * half + 1) & (least < limit**2) & (np.abs(off) < 2.0 * limit)
+    flat &= (-facing > steepest) & (spread > 16.0 * sigma_m**2)
+    return Sights(
+        points=points, anchors=points - off[:, None] * normals, bearings=bearings,
+        ranges=ranges - off / facing, normals=normals, facing=facing, flat=flat,
+    )  # fmt: skip
+
+
+def _by_bearing(scan: Scan, twist: Float) -> tuple[Float, Float, Float, Float]:
+    """Returns in the laser's frame at the stamp: points, bearings, distances; ranges reported."""
     spec = scan.spec
     hit = np.flatnonzero(scan.valid)
     ends = end_points(
@@ -73,13 +99,14 @@ def sights(scan: Scan, twist: Float, config: RangeErrorConfig, sigma_m: float) -
     points = se2.transform(se2.inverse(spec.T_robot_laser), ends)
     distances, bearings = polar(np.ascontiguousarray(points))
     order = np.argsort(bearings, kind="stable")
-    points, bearings, distances = points[order], bearings[order], distances[order]
     ranges = scan.ranges[hit][order].astype(np.float64)
-    n = len(points)
-    half = np.ceil(0.5 * config.width_m / np.maximum(distances * spec.angle_increment, 1e-6))
-    half = np.clip(half, 2, 40).astype(np.int64)
-    rows = np.arange(n)
-    low, high = np.maximum(rows - half, 0), np.minimum(rows + half, n - 1)
+    return points[order], bearings[order], distances[order], ranges
+
+
+def _moments(points: Float, half: NDArray[np.int64]) -> tuple[Float, Float, Float]:
+    """Of each point and ``half`` neighbours on each side: number, mean, xx, xy and yy (3, n)."""
+    rows = np.arange(len(points))
+    low, high = np.maximum(rows - half, 0), np.minimum(rows + half, len(points) - 1)
     x, y = points[:, 0], points[:, 1]
     sums = _window_sums(np.stack([x, y, x * x, x * y, y * y], axis=1), low, high)
     count = (high - low + 1).astype(np.float64)
@@ -91,26 +118,7 @@ def sights(scan: Scan, twist: Float, config: RangeErrorConfig, sigma_m: float) -
             mean[:, 4] - mean[:, 1] ** 2,
         ]
     )
-    directions = points / np.maximum(distances, 1e-9)[:, None]
-    normals, least, spread = _lines(covariance)
-    # Ranges err along the beam, which tilts the line of an oblique surface: without that part
-    share = least / np.maximum((normals * directions).sum(axis=1) ** 2, 0.05)
-    ux, uy = directions.T
-    normals, _, _ = _lines(covariance - share * np.stack([ux * ux, ux * uy, uy * uy]))
-    facing = (normals * directions).sum(axis=1)
-    normals *= -np.sign(facing)[:, None]
-    facing = -np.maximum(np.abs(facing), 1e-3)
-    off = ((points - mean[:, :2]) * normals).sum(axis=1)
-    anchors = points - off[:, None] * normals
-    steepest = math.cos(math.radians(config.steepest_deg))
-    limit = config.flat_sigmas * sigma_m
-    flat = (count == 2 * half + 1) & (least < limit**2) & (np.abs(off) < 2.0 * limit)
-    flat &= (-facing > steepest) & (spread > 16.0 * sigma_m**2)
-    return Sights(
-        points=points, anchors=anchors, bearings=bearings, ranges=ranges - off / facing,
-        normals=normals,
-        facing=facing, flat=flat,
-    )  # fmt: skip
+    return count, mean[:, :2], covariance
 
 
 def hats(ranges: Float, knots: int, spacing: float) -> Float:

@@ -14,11 +14,11 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from slam.answers import asked, asked_at_end, asked_map, asked_trajectory, judged
 from slam.errors import MobiliaError, SlamFailedError
 from slam.frames import LaserSpec
 from slam.guests import protocol
 from slam.names import OURS, SAFE_PATH, look_in
-from slam.replay import asked, asked_at_end, asked_map, asked_trajectory, judged
 from slam.system import RunsAtTheEnd, SlamSystem, create, told
 
 

@@ -11,17 +11,8 @@ import pytest
 
 from scenes import build
 from scenes.assembly import room_of
-from scenes.crowd import (
-    BY_LEVEL,
-    GROUP,
-    OTHERS_BY_LEVEL,
-    ROW,
-    Crowd,
-    crowd_of,
-    far_ends,
-    mix,
-    slots,
-)
+from scenes.crowd import BY_LEVEL, GROUP, OTHERS_BY_LEVEL, Crowd, crowd_of, mix
+from scenes.crowd_kinds import ROW, far_ends, slots
 from scenes.kinds import kind_of
 from scenes.scene import Scene
 from slam.errors import InvalidValueError

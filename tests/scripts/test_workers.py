@@ -9,7 +9,6 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -19,6 +18,7 @@ from scripts.jobs import Job, run_jobs
 from slam import locks
 from slam.errors import MobiliaError, OutputError
 from slam.guests.wire import Wire
+from tests.processes import processes_with
 
 REPO = Path(__file__).resolve().parents[2]
 MARK = "MOBILIA_TEST_WORKERS"
@@ -42,16 +42,6 @@ def some_jobs(call=never_ends, guest: bool = True) -> list[Job]:
     return [Job(name=f"j{k}", call=call, arguments={"guest": guest}) for k in range(2)]
 
 
-def marked(mark: str) -> list[int]:
-    """Processes with that mark in their environment that are not over."""
-    found = []
-    for process in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            if f"{MARK}={mark}".encode() in (process / "environ").read_bytes().split(b"\0"):
-                found.append(int(process.name))
-    return found
-
-
 def begin(folder: Path, mark: str) -> subprocess.Popen[bytes]:
     """``run_jobs`` in a process of its own, up to where both workers are at work."""
     code = (
@@ -72,11 +62,13 @@ def begin(folder: Path, mark: str) -> subprocess.Popen[bytes]:
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_workers_and_their_guests_end_with_a_killed_command(tmp_path):
     command = begin(tmp_path, "killed")
-    assert len(marked("killed")) >= 11  # the command, 2 workers, 2 guests, their children, guards
+    assert (
+        len(processes_with(MARK, "killed")) >= 11
+    )  # the command, 2 workers, 2 guests, their children, guards
     command.kill()
     command.wait()
     killed = time.monotonic()
-    while left := marked("killed"):
+    while left := processes_with(MARK, "killed"):
         assert time.monotonic() - killed < 10.0, left
         time.sleep(0.01)
     print(f"the last process ended {time.monotonic() - killed:.2f} s after the kill")

@@ -16,7 +16,8 @@ from scenes.scene import Role, Scene
 from sim.actors import holding
 from sim.actors.config import ACTORS
 from sim.actors.doors import Doors
-from sim.actors.people import columns, crowd, following, gait, right_of_way, sitting
+from sim.actors.people import columns, crowd, gait, right_of_way, sitting
+from sim.actors.people.leaders import Leaders, arrays, leaders_of
 from sim.actors.people.right_of_way import Addresses, Crowd
 from sim.core.bodies import Bodies
 from sim.core.draws import between, normal, uniform
@@ -83,20 +84,7 @@ class People:
         self._rates = (stay_mean, pace)
         self.feet = np.zeros((n, gait.N_COLUMNS))
         at = _addresses(bodies, doors, self.names)
-        discs, owner, long = _discs(bodies, doors, self.names)
-        self.crowd = Crowd(
-            discs=discs,
-            yaws=np.zeros(len(at.discs)),
-            owner=owner,
-            long=long,
-            allowed=np.ones((n, max(len(scene.goals), 1)), dtype=np.bool_),
-            state=np.zeros((n, columns.N_STATE)),
-            task=np.full((n, columns.N_TASK), -1, dtype=np.int64),
-            draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
-        )
-        self.crowd.task[:, [columns.WALKING, columns.GOAL]] = 0
-        self.crowd.state[:, [columns.STAYS, columns.SLOW, columns.DENSE]] = 1.0
-        self.crowd.state[:, columns.TURN_RATE] = crowd.TURN_MOST
+        self.crowd = _crowd(bodies, doors, self.names, counters, len(at.discs))
         alive = n > 0 and math.isfinite(stay_mean) and len(scene.goals) > 0
         servos = [model.actuator(f"{p}/vx").id for p in self.names]
         limbs = [[model.body(f"{p}/{limb}").mocapid[0] for limb in _LIMBS] for p in self.names]
@@ -120,7 +108,7 @@ class People:
 
     def _give_roles(  # noqa: C901 (one branch for each kind of role)
         self, planar: list[str], scene: Scene
-    ) -> following.Leaders:
+    ) -> Leaders:
         """Write what everybody does into their rows; who is followed, and the lines."""
         state, task = self.crowd.state, self.crowd.task
         leaders = list(dict.fromkeys(r.leader for r in scene.roles.values() if r.leader))
@@ -152,7 +140,7 @@ class People:
                 task[i, columns.HELD] = planar.index(hold.held)
                 if not hold.hinged:
                     state[i, columns.TURN_RATE] = ACTORS.holding.turn_most
-        return following.leaders_of([planar.index(name) for name in leaders], lines.rows)
+        return leaders_of([planar.index(name) for name in leaders], lines.rows)
 
     def start(self, data: mujoco.MjData) -> None:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand."""
@@ -205,7 +193,29 @@ class People:
         c, held = self.crowd, self.table.held
         own = {"feet": self.feet, "state": c.state, "task": c.task, "draws": c.draws}
         hands = {"hands": held.at, "hands.pose": held.pose, "hands.bodies": held.bodies}
-        return {**own, **following.arrays(self.table.leaders), **hands}
+        return {**own, **arrays(self.table.leaders), **hands}
+
+
+def _crowd(
+    bodies: Bodies, doors: Doors, names: list[str], counters: NDArray[np.uint64], n_discs: int
+) -> Crowd:
+    """Rows of everybody, who walk to any goal until they are given a role."""
+    n = len(names)
+    discs, owner, long = _discs(bodies, doors, names)
+    crowd = Crowd(
+        discs=discs,
+        yaws=np.zeros(n_discs),
+        owner=owner,
+        long=long,
+        allowed=np.ones((n, max(len(bodies.scene.goals), 1)), dtype=np.bool_),
+        state=np.zeros((n, columns.N_STATE)),
+        task=np.full((n, columns.N_TASK), -1, dtype=np.int64),
+        draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
+    )
+    crowd.task[:, [columns.WALKING, columns.GOAL]] = 0
+    crowd.state[:, [columns.STAYS, columns.SLOW, columns.DENSE]] = 1.0
+    crowd.state[:, columns.TURN_RATE] = ACTORS.walking.turn_most
+    return crowd
 
 
 def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:

@@ -22,6 +22,7 @@ from scripts.comparison.columns import COLUMNS, lost_at
 from scripts.comparison.plan import Plan
 from scripts.comparison.recording import load
 from scripts.experiments import dynamism_curve
+from scripts.levels import levels
 from scripts.many import ManyValues, repeated
 from scripts.verbs import compare as verb
 from slam import Estimate, Trajectory, se2, system
@@ -259,7 +260,7 @@ def test_what_cannot_be_compared_is_said_in_a_line(tmp_path):
     with pytest.raises(InvalidValueError, match=r"Plan\.slams"):
         Plan(slams=("odometry", "odometry"), **PLAN)
     with pytest.raises(InvalidValueError, match="--dynamism"):
-        verb.levels(["much"])
+        levels(["much"])
     with pytest.raises(InvalidValueError, match=r"\[0, 1\]"):
         Plan(slams=("odometry",), **{**PLAN, "levels": (2.0,)})
     with pytest.raises(InvalidValueError, match="needs 2 scans a run"):

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from scripts.robustness.fuzz import Sample, attack, corpus, damaged
-from scripts.robustness.fuzz_calls import GROUPS, Tally, frames, run
+from scripts.robustness.fuzz_calls import GROUPS, Tally, run
+from scripts.robustness.fuzz_frames import frames
 
 
 @pytest.fixture(scope="module")

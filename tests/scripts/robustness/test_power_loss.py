@@ -10,7 +10,8 @@ import pytest
 
 from scripts.console import console
 from scripts.robustness.disk_log import Cut, DiskLog, tree
-from scripts.robustness.power_loss import Case, all_together, cases, each_alone, tried
+from scripts.robustness.power_cases import all_together, cases, each_alone
+from scripts.robustness.power_cuts import Case, tried
 from slam.files import put, write_text
 
 CASES = {case.name: case for case in cases(film=False)}

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 import sim
+from scripts.many import named
 from scripts.output import read_recipe_words, write_recipe
-from scripts.verbs.compare import named
 from scripts.verbs.config import config
 from sim.actors.config import ACTORS
 from sim.sensors.lidar import registry

@@ -18,8 +18,9 @@ import numpy as np
 import pytest
 import typer
 
+from scripts.levels import sweep
 from scripts.verbs.export import export
-from scripts.verbs.generate import generate, sweep
+from scripts.verbs.generate import generate
 from scripts.verbs.verify import verify
 from sim.recording.dataset import Plan, check_dataset, read_plan, writing
 from sim.recording.recipe import RECIPE, Recipe, read_recipe

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,7 @@ from slam.errors import SlamFailedError
 from slam.guests.guarding import MARK as MARK_OF_WORKERS
 from slam.guests.guarding import guarded_workers
 from slam.guests.wire import Wire
+from tests.processes import processes_with
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="orphans are only found on Linux")
 
@@ -55,20 +55,10 @@ AWAY = {
 MARK = "MOBILIA_TEST_GUARD"
 
 
-def of(mark: str) -> list[int]:
-    """Processes with that mark in their environment that are not over."""
-    found = []
-    for process in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            if f"{MARK}={mark}".encode() in (process / "environ").read_bytes().split(b"\0"):
-                found.append(int(process.name))
-    return found
-
-
 def none_left(mark: str) -> float:
     """Seconds until none is left; after 10 it fails."""
     started = time.monotonic()
-    while left := of(mark):
+    while left := processes_with(MARK, mark):
         assert time.monotonic() - started < 10.0, left
         time.sleep(0.01)
     return time.monotonic() - started
@@ -110,7 +100,7 @@ def test_a_child_in_another_session_ends_when_mobilia_is_killed(kind):
     )
     with mobilia:
         assert int(mobilia.stdout.readline()) > 0
-        assert len(of(f"killed {kind}")) >= 3
+        assert len(processes_with(MARK, f"killed {kind}")) >= 3
         mobilia.kill()
     print(f"{kind}: {none_left(f'killed {kind}'):.3f} s")
 
@@ -173,7 +163,7 @@ def test_what_is_started_while_workers_are_guarded_ends_with_a_killed_mobilia():
         marked, other = (int(word) for word in mobilia.stdout.readline().split())
         mobilia.kill()
     deadline = time.monotonic() + 10.0
-    while (left := of("workers")) != [other]:  # its guard has gone too
+    while (left := processes_with(MARK, "workers")) != [other]:  # its guard has gone too
         assert time.monotonic() < deadline, (left, marked)
         time.sleep(0.01)
     os.kill(other, signal.SIGKILL)

@@ -82,16 +82,24 @@ def test_agreement_is_counted_in_a_row() -> None:
     assert (wake.agreed, wake.agreed_s) == (1, 0.2)
 
 
-def test_a_robot_that_is_carried_is_told_by_its_surroundings() -> None:
-    """Everything changes between two scans: no way leads there."""
+ELSEWHERE = Drive((-2.6, 1.5, 2.2), ((0.0, 0.3, 16.0),))
+
+
+def carried() -> tuple[ShuntingSlam, list[Frame]]:
+    """A SLAM that knows its room, and the frames that follow from another place in it."""
     system = ShuntingSlam(ShuntingConfig(cell_m=0.05))
     world = World2D(np.vstack([arena(), rectangle(-2.0, 1.0, -1.2, 2.2)]))
     stream = frames(world, Drive((0.0, 0.0, 0.0), ((0.0, 0.8, 24.0),)), rate_hz=5.0, seed=3)
     for frame in stream:
         system.update(frame.without_truth())
-    there = Drive((-2.6, 1.5, 2.2), ((0.0, 0.3, 8.0),))
+    return system, list(going_on(frames(world, ELSEWHERE, rate_hz=5.0, seed=4), stream[-1]))
+
+
+def test_a_robot_that_is_carried_is_told_by_its_surroundings() -> None:
+    """Everything changes between two scans: no way leads there."""
+    system, elsewhere = carried()
     states, last = [], None
-    for frame in going_on(frames(world, there, rate_hz=5.0, seed=4), stream[-1]):
+    for frame in elsewhere:
         last = system.update(frame.without_truth())
         states.append(last.diagnostics["state"])
         if last.diagnostics["state"] == "frozen":
@@ -99,7 +107,7 @@ def test_a_robot_that_is_carried_is_told_by_its_surroundings() -> None:
             assert system._wake.carried
     assert last is not None
     assert "relocated" in states
-    off = last.T_map_robot - there.at(8.0)[0]
+    off = last.T_map_robot - ELSEWHERE.at(16.0)[0]
     assert math.hypot(float(off[0]), float(off[1])) < 0.1
     assert abs(se2.wrap(float(off[2]))) < math.radians(3.0)
 
@@ -109,14 +117,9 @@ def test_another_place_is_believed_only_after_long_while_scans_agree() -> None:
 
     Nor does it take the map for outdated: a place that is known explains what it sees.
     """
-    system = ShuntingSlam(ShuntingConfig(cell_m=0.05))
-    world = World2D(np.vstack([arena(), rectangle(-2.0, 1.0, -1.2, 2.2)]))
-    stream = frames(world, Drive((0.0, 0.0, 0.0), ((0.0, 0.8, 24.0),)), rate_hz=5.0, seed=3)
-    for frame in stream:
-        system.update(frame.without_truth())
-    there = Drive((-2.6, 1.5, 2.2), ((0.0, 0.3, 16.0),))
+    system, elsewhere = carried()
     found_s, estimate = None, None
-    for k, frame in enumerate(going_on(frames(world, there, rate_hz=5.0, seed=4), stream[-1])):
+    for k, frame in enumerate(elsewhere):
         if system._wake is not None:
             system._wake.carried = False
         estimate = system.update(frame.without_truth())
@@ -125,6 +128,6 @@ def test_another_place_is_believed_only_after_long_while_scans_agree() -> None:
     assert estimate is not None
     assert found_s is not None
     assert found_s > 5.0
-    off = estimate.T_map_robot - there.at(16.0)[0]
+    off = estimate.T_map_robot - ELSEWHERE.at(16.0)[0]
     assert math.hypot(float(off[0]), float(off[1])) < 0.1
     assert abs(se2.wrap(float(off[2]))) < math.radians(3.0)

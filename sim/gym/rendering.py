@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The pictures of the environment: which of the two there are, made at the first that is wanted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.core.checks import one_of, whole_numbers
+from sim.simulation import Simulation
+
+MODES = ("rgb_array", "map")
+VIEWS = ("top", "follow", "persp")  # as in ``sim.view.pictures``, which needs OpenGL to import
+MAX_PX = 8192  # edge of a picture
+
+
+class Rendering:
+    """What draws an environment.
+
+    mode  "rgb_array" (3D, needs OpenGL), "map" (2D, needs nothing) or None
+    view  "top", "follow" or "persp" of the former
+    size  (width, height) px
+
+    Raises ``InvalidValueError`` for anything else.
+    """
+
+    def __init__(self, mode: str | None, view: str, size: tuple[int, int]) -> None:
+        if mode is not None:
+            one_of("render_mode", mode, MODES)
+        one_of("view", view, VIEWS)
+        self._mode, self._view = mode, view
+        self._size = whole_numbers("render_size", size, "(width, height) in px", MAX_PX)
+        self._picture: Any = None
+
+    def picture(self, simulation: Simulation) -> NDArray[np.uint8]:
+        """(height, width, 3) uint8 RGB of the simulation that was drawn first since ``close``."""
+        if self._picture is None:
+            self._picture = self._of(simulation)
+        picture: NDArray[np.uint8] = self._picture(simulation)
+        return picture
+
+    def _of(self, simulation: Simulation) -> Any:
+        if self._mode == "map":
+            from sim.view.pictures import MapPicture
+
+            return MapPicture(simulation, self._size)
+        from sim.view.pictures import CameraPicture
+
+        return CameraPicture(simulation, self._size, self._view)
+
+    def close(self) -> None:
+        """Free what draws; the next picture makes it anew, of whatever simulation then."""
+        if self._picture is not None:
+            self._picture.close()
+            self._picture = None

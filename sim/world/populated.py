@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The scene that a world begins with: built, and with a crowd in it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from scenes import build
+from scenes.crowd import Crowd, crowd_of, mix
+from scenes.crowd_kinds import with_crowd
+from scenes.scene import Scene
+from sim.core.checks import instance, numbers
+from sim.core.dynamism import Dynamism
+from sim.core.seeds import Seeds
+from slam.errors import InvalidValueError
+
+
+def populated(
+    scene: Scene | str,
+    seeds: Seeds,
+    rates: Dynamism,
+    start: Sequence[float] | None,
+    options: dict[str, Any],
+) -> Scene:
+    """A scene by name, built with ``options`` and with its crowd; a built one stays as it is.
+
+    Raises ``InvalidValueError`` for options of a built scene.
+    """
+    if isinstance(scene, str):
+        given = options.pop("crowd", None)
+        built = build(scene, seed=seeds.integer("layout"), **options)
+        return crowded(built, crowd_for(scene, given, rates), start, as_many_as_fit=given is None)
+    if options:
+        raise InvalidValueError(f"a built scene takes no options, got {', '.join(options)}")
+    instance("scene", scene, Scene)
+    return scene
+
+
+def crowd_for(scene: Scene | str, given: object, rates: Dynamism) -> Crowd:
+    """The crowd that is given, else the mix of the scene of that name; of a built one nobody."""
+    if given is not None:
+        return crowd_of(given)
+    return mix(scene, rates.crowd) if isinstance(scene, str) else Crowd()
+
+
+def crowded(
+    built: Scene,
+    crowd: Crowd,
+    start: Sequence[float] | None,
+    session: int = 0,
+    *,
+    as_many_as_fit: bool,
+) -> Scene:
+    """The scene with that crowd around the robot, which begins at ``start`` where one is given."""
+    if not crowd:
+        return built
+    return with_crowd(_begun(built, start), crowd, session, as_many_as_fit=as_many_as_fit)
+
+
+def _begun(scene: Scene, start: Sequence[float] | None) -> Scene:
+    """The scene with the robot at ``start``, where one is given."""
+    if start is None or not scene.movers or scene.movers[-1].kind != "robot":
+        return scene
+    x, y, yaw = numbers("start", start, 3, "(x m, y m, heading rad)")
+    if not math.isfinite(x + y + yaw):
+        return scene  # what is wrong is said where the robot is placed
+    return replace(scene, start=(x, y, yaw), initial={**scene.initial, "robot": (x, y, yaw)})
