@@ -422,7 +422,7 @@ class Tracker(abc.ABC):
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=match.T_map_robot,
-            covariance=self._pose_covariance.covariance,
+            covariance=self._covariance(match.T_map_robot, state),
             converged=state in ("tracking", "relocated") and not self._doubtful(),
             diagnostics={
                 "state": state,
@@ -440,6 +440,13 @@ class Tracker(abc.ABC):
                 "T_map_odom": self._T_map_odom.tolist(),
             },
         )
+
+    def _covariance(self, T_map_robot: Float, state: str) -> Float:
+        """(3, 3) of the pose; of a robot that may be lost, it may be anywhere that it has been."""
+        covariance = self._pose_covariance.covariance
+        if state in ("frozen", "lost"):
+            covariance = covariance + self._verdict.p_lost * self._loops.anywhere(T_map_robot)
+        return covariance
 
     def _doubtful(self) -> bool:
         """Whether the crowd may have carried the robot far."""

@@ -50,6 +50,7 @@ class KeyFrames:
         self._step: Float = np.zeros(3)
         self._covariance: Float = np.zeros((3, 3))
         self._found = False
+        self._squares: list[float] = []  # m^2, of the range, mean of each key frame
 
     def add(  # noqa: PLR0913 (the facts of one frame)
         self,
@@ -90,5 +91,18 @@ class KeyFrames:
                 found=self._found,
             )
         )
+        points = seen.points_robot
+        self._squares.append(float((points * points).sum(axis=1).mean()) if len(points) else 0.0)
         self._step, self._covariance = np.zeros(3), np.zeros((3, 3))
         self._found = False
+
+    def anywhere(self, T_map_robot: Float) -> Float:
+        """(3, 3) second moment about a pose if the robot is anywhere that it has seen.
+
+        That is in a disc about each key frame, of the mean radius that is seen there.
+        """
+        off = np.array([key.T_map_robot[:2] for key in self.keys]) - T_map_robot[:2]
+        x, y = off[:, 0], off[:, 1]
+        disc = 0.25 * sum(self._squares) / len(self._squares)  # m^2 along each axis
+        xx, xy, yy = float((x * x).mean()), float((x * y).mean()), float((y * y).mean())
+        return np.array([[xx + disc, xy, 0.0], [xy, yy + disc, 0.0], [0.0, 0.0, math.pi**2 / 3.0]])

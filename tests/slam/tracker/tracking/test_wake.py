@@ -112,6 +112,21 @@ def test_a_robot_that_is_carried_is_told_by_its_surroundings() -> None:
     assert abs(se2.wrap(float(off[2]))) < math.radians(3.0)
 
 
+def test_the_covariance_of_a_lost_robot_covers_all_that_it_has_seen() -> None:
+    system, elsewhere = carried()
+    lost = 0
+    for frame in elsewhere:
+        estimate = system.update(frame.without_truth())
+        off = estimate.T_map_robot - frame.truth
+        off[2] = se2.wrap(float(off[2]))
+        if estimate.diagnostics["state"] == "lost":
+            lost += 1
+            assert estimate.diagnostics["p_lost"] > 0.9
+            assert off @ np.linalg.solve(estimate.covariance, off) < 11.3  # 3 numbers, 99 %
+    assert lost
+    assert estimate.covariance[0, 0] < 0.1**2  # found
+
+
 def test_another_place_is_believed_only_after_long_while_scans_agree() -> None:
     """Told that nothing carried it, a robot that is elsewhere does not jump there at once.
 
