@@ -7,7 +7,7 @@ A plan with another mark, or with too few words in one, is refused: it would be 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -66,12 +66,13 @@ def check_written(source: str, found: Iterable[Mark]) -> None:
     for mark in found:
         form = WRITTEN.get(mark.words[0], "")
         short = len(mark.words) < len(form.split(":"))
+        short |= mark.words[0] == "start" and ":".join(mark.words) != form
         if short or (form.endswith("left|right") and mark.words[2] not in ("left", "right")):
             name = ":".join(mark.words)
             raise InvalidValueError(f"plan '{source}': mark '{name}' must be written {form}")
 
 
-def check_marks(source: str, found: Iterable[Mark], parts: Collection[str]) -> None:
+def check_marks(source: str, found: Sequence[Mark], parts: Collection[str]) -> None:
     """Raise ``InvalidValueError`` for a mark that means nothing, and for a plan that lacks one.
 
     source  name of the plan, for the error
@@ -90,6 +91,12 @@ def check_marks(source: str, found: Iterable[Mark], parts: Collection[str]) -> N
     for word in NEEDED:
         if word not in seen:
             raise InvalidValueError(f"plan '{source}' needs a mark '{WRITTEN[word]}'; it has none")
+    x, y, _ = seen["start"].pose
+    rooms = [mark.rect for mark in found if mark.words[0] == "room"]
+    if not any(low <= x <= high and left <= y <= right for low, left, high, right in rooms):
+        raise InvalidValueError(
+            f"plan '{source}': start:robot at ({x:g}, {y:g}) is in no room; expected it inside one"
+        )
 
 
 def _yaw(site: mujoco.MjsSite) -> float:

@@ -28,6 +28,8 @@ def file_of(folder: str, name: str) -> Path:
         name = KINDS[name].part or name
     path = Path(name) if name.endswith(".xml") else HERE / folder / f"{name}.xml"
     if not path.is_file():
+        if folder == "plans" and name.endswith(".xml"):
+            raise InvalidValueError(f"{path}: no such file, expected the MJCF file of a plan")
         known = f"; there are {', '.join(ours(folder))}" if folder == "parts" else ""
         raise InvalidValueError(f"no file '{path.name}' for '{name}' among the {folder}{known}")
     return path

@@ -25,6 +25,7 @@ from rich.table import Table
 from rich.text import Text
 
 LINE_EVERY_S = 10.0  # between lines of progress where the output is no terminal
+FEW_STEPS = 50  # up to these a pace over the last half minute says nothing
 console = Console()
 _errors = Console(stderr=True)
 
@@ -97,10 +98,19 @@ def _words(task: Task) -> str:
     done = str(task.fields.get("unit", ""))
     if task.total is not None and task.completed >= task.total:
         return f"{_plain(task.description)}: {done or 'done'}, {task.elapsed or 0.0:.0f} s"
-    left = task.time_remaining
+    left = _left_s(task)
     parts = [done, f"{task.elapsed or 0.0:.0f} s so far"]
     parts += [f"about {left:.0f} s left"] if left else []
     return f"{_plain(task.description)}: {', '.join(filter(None, parts))}"
+
+
+def _left_s(task: Task) -> float | None:
+    """Of few long steps, from all the time so far: the last two may have ended together."""
+    if task.total is None or task.total > FEW_STEPS:
+        return task.time_remaining
+    if not task.completed or task.elapsed is None:
+        return None
+    return task.elapsed * (task.total - task.completed) / task.completed
 
 
 def _plain(description: str) -> str:

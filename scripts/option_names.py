@@ -35,7 +35,11 @@ _FIRST = re.compile(r"^([a-z_]+)(?= must )")
 
 
 class Verb(TyperCommand):
-    """A command whose errors name its options."""
+    """A command whose errors name its options, and whose help fits any terminal."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.help = flowing(self.help or "")
 
     def invoke(self, ctx: Any) -> Any:
         """Run it; ``InvalidValueError`` about a field becomes one about the option."""
@@ -46,6 +50,11 @@ class Verb(TyperCommand):
             if said == str(error):
                 raise
             raise InvalidValueError(said) from error
+
+
+def flowing(text: str) -> str:
+    """Each paragraph as one line: rich keeps the line ends of the source, which are elsewhere."""
+    return "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
 
 
 def by_option(

@@ -112,6 +112,8 @@ def test_scene(outside: Path):
 
 WRONG = {
     'material="floor_concrete"': ('material="marble"', "marble.*There are: .*floor_concrete"),
+    'name="start:robot"': ('name="start:robt"', "mark 'start:robt' must be written start:robot"),
+    'pos="-2 0 0"': ('pos="-9 0 0"', r"start:robot at \(-9, 0\) is in no room"),
     "desk:shed:0": ("dsk:shed:0", "unknown mark 'dsk:shed:0'.*'desk'.*room:NAME.*bookshelf"),
     "start:robot": ("goal:there", "needs a mark 'start:robot'"),
     "room:shed": ("opening:shed", "needs a mark 'room:NAME'"),

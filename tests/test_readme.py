@@ -142,4 +142,6 @@ def test_the_dataset_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         done = CliRunner().invoke(app, words, catch_exceptions=False)
         assert done.exit_code == 0, done.output
     assert (tmp_path / "out" / "office" / "SHA256SUMS").exists()
-    assert (tmp_path / "out" / "office" / "office-d0.5-s0001.log.gz").exists()
+    assert (tmp_path / "out" / "office-d0.5-s0001.log.gz").exists()
+    done = CliRunner().invoke(app, ["verify", "out/office"])  # an export is no part of it
+    assert done.exit_code == 0, done.output

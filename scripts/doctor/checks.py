@@ -27,6 +27,7 @@ LEAST_FREE_GB = 1.0  # in the working folder: a dataset of an hour, or the films
 EXTRAS = {  # what each is for; how to get them follows from their names
     "guests": "SLAMs of others to compare with",
     "yag": "YAG SLAM",
+    "live": "mobilia live",
     "rerun": "render --rerun",
     "rl": "scripts.experiments.train_policy",
     "cluster": "--cluster",

@@ -122,6 +122,8 @@ class Listener:
         if seeks:
             seconds = (request.seek_time - self._first_ns) / NS_PER_S
             asked.insert(0, Seek(time_s=seconds, nearest=True))
+        if not playing:  # else it would play on from there until the pause is done
+            asked.reverse()
         for one in asked:
             try:
                 self._inbox.ask(one)

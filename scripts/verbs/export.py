@@ -25,7 +25,9 @@ def export(
     to: Annotated[str, typer.Option(help="tum, carmen or npz.")],
     out: Annotated[
         Path | None,
-        typer.Option(help="File to write; default beside the episode. tum: NAME_odometry.tum, ..."),
+        typer.Option(
+            help="File to write; default beside the log or dataset. tum: NAME_odometry.tum, ..."
+        ),
     ] = None,
 ) -> None:
     """Write an episode as TUM trajectories, as a CARMEN log or as NumPy arrays.
@@ -46,11 +48,19 @@ def export(
     stream = read_bag(episode, labels=True) if is_bag(episode) else open_log(episode)
     suffix = {"tum": ".tum", "carmen": ".log.gz", "npz": ".npz"}[to]
     plain = episode.absolute()
-    target = out or plain.with_name(plain.name.split(".log")[0] + suffix)
+    target = out or _beside(plain) / (plain.name.split(".log")[0] + suffix)
     with working(f"writing {to}"):
         written = writers[to](target, stream)
     for path in written:
         console.print(escape(str(path)), soft_wrap=True)
+
+
+def _beside(log: Path) -> Path:
+    """The nearest folder above whose files no SHA256SUMS lists: there, one more is no damage."""
+    from sim.recording.sums import SUMS
+
+    free = (folder for folder in log.parents if not (folder / SUMS).exists())
+    return next(free, log.parent)
 
 
 def _tum(target: Path, stream: Stream) -> list[Path]:

@@ -20,13 +20,13 @@ from slam.logs import carmen_messages as messages
 from slam.logs.carmen_clock import Clock, rough_steps
 from slam.logs.carmen_messages import LaserMessage, PoseMessage
 from slam.logs.carmen_poses import ScanPoses, at_rest, scan_poses
-from slam.logs.repairs import NO_ODOMETRY, Repairs
+from slam.logs.repairs import NO_ODOMETRY, SHORT_ODOM, Repairs
 from slam.logs.saturation import saturated_from
 from slam.logs.stamps import Ordered, digits_of, put_in_order
 from slam.logs.text import numbered_lines
 
-_STAMPED = ("FLASER", "ROBOTLASER1", "RAWLASER1", "ODOM")
-LASERS = ("ROBOTLASER1", "FLASER", "RAWLASER1")  # the first of these that a log has is read
+_STAMPED = ("FLASER", "ROBOTLASER1", "RAWLASER1", "LASER_READING", "ODOM")
+LASERS = ("ROBOTLASER1", "FLASER", "RAWLASER1", "LASER_READING")  # the first that a log has is read
 DEFAULT_RANGE_MAX_M = 80.0  # CARMEN's own guess for FLASER
 _RANGE_MAX_PARAM = "robot_front_laser_max"
 _OFFSET_PARAM = "robot_frontlaser_offset"
@@ -43,12 +43,13 @@ class Log:
     params: dict[str, float] = field(default_factory=dict)
     ignored: Counter[str] = field(default_factory=Counter)
     digits: int = 1  # significant ones, of the stamp that has most
+    short_odom: bool | None = None  # whether ODOM lines have no speeds; as the first of them says
     wheels: bool = True  # False: a log without odometry is none that is damaged
     mount: Float | None = None  # of the laser on the robot; None: as far ahead as a PARAM says
 
 
 def read_carmen(path: str | Path, *, strict: bool = False) -> Stream:
-    """A CARMEN text log (plain, .gz or .xz) as frames: FLASER, ROBOTLASER1 or RAWLASER1.
+    """A CARMEN text log (plain, .gz or .xz) as frames: its lines of ``LASERS``.
 
     Odometry is the robot pose in the scan's own line; for RAWLASER1 it is interpolated between
     ODOM lines (scans outside them are dropped and counted). Logs that went through a mapper
@@ -57,6 +58,10 @@ def read_carmen(path: str | Path, *, strict: bool = False) -> Stream:
     inverse(pose of scan k) * (last ODOM before scan k + 1), exact but for the printed digits.
     In logs whose laser pose is no fixed mount of the robot pose, the laser pose is the corrected
     one. TRUEPOS lines, where there are any, are the truth.
+
+    A particle filter's own log (LASER_READING) has the wheels' pose in the line of the scan, and
+    ODOM lines of five words. Where a log of CARMEN has such ODOM lines, all of them must be short:
+    they are counted as a repair.
 
     What is usual in public logs is repaired: a last line without an end is left out; stamps that
     step back by less than 1 s are sorted, equal ones spread by the odometry between them
@@ -72,6 +77,9 @@ def read_carmen(path: str | Path, *, strict: bool = False) -> Stream:
     name = next((kind for kind in LASERS if log.scans[kind]), None)
     if name is None:
         raise LogFormatError(path, f"no scan found (none of {', '.join(LASERS)})")
+    if log.short_odom and name != "LASER_READING":
+        why = "ODOM lines have 5 words (x y theta t), not 10"
+        repairs.note(SHORT_ODOM, why, log.odom[0].line, len(log.odom))
     for other in LASERS:
         if other != name and log.scans[other]:
             log.ignored[other] += len(log.scans[other])
@@ -145,10 +153,16 @@ def _read(path: Path, repairs: Repairs) -> Log:
         try:
             _take(log, number, words)
             if words[0] in _STAMPED:
-                log.digits = max(log.digits, digits_of(words[-3]))
+                log.digits = max(log.digits, digits_of(words[_stamp_at(log, words[0])]))
         except ValueError as error:
             raise LogFormatError(path, str(error), number) from error
     return log
+
+
+def _stamp_at(log: Log, name: str) -> int:
+    """Where the time is in the line of a message."""
+    bare = name == "LASER_READING" or (name == "ODOM" and log.short_odom)
+    return -1 if bare else -3
 
 
 def _take(log: Log, number: int, words: list[str]) -> None:
@@ -159,8 +173,12 @@ def _take(log: Log, number: int, words: list[str]) -> None:
             log.scans["ROBOTLASER1"].append(messages.parse_robotlaser(number, words))
         case "RAWLASER1":
             log.scans["RAWLASER1"].append(messages.parse_rawlaser(number, words))
+        case "LASER_READING":
+            log.scans["LASER_READING"].append(messages.parse_laser_reading(number, words))
         case "ODOM":
-            log.odom.append(messages.parse_odom(number, words))
+            if log.short_odom is None:
+                log.short_odom = len(words) == messages.SHORT_ODOM_WORDS
+            log.odom.append(messages.parse_odom(number, words, short=log.short_odom))
         case "TRUEPOS":
             log.truth.append(messages.parse_truepos(number, words))
         case "PARAM" if len(words) > 1 and words[1] in (_RANGE_MAX_PARAM, _OFFSET_PARAM):

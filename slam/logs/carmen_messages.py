@@ -13,6 +13,12 @@ logger's source), lengths in metres, angles in radians, ``t`` in seconds::
     TRUEPOS true x y theta  odom x y theta  t host t_logger
     PARAM name value ...
 
+Logs of particle filters (GMapping's own, ``.gfs``) write two of them shorter, beside lines about
+the filter::
+
+    ODOM x y theta  t
+    LASER_READING n r_1 .. r_n  x y theta  t
+
 Ranges count counter-clockwise. ``remission_mode`` came with later versions; ``turn_axis`` is
 written but not documented. All parsers raise ``ValueError`` with what was expected.
 """
@@ -33,8 +39,12 @@ MAX_STAMP_S = 9e9  # what 64-bit nanoseconds hold: year 2255
 NAME = re.compile(r"[A-Za-z][\w-]*")
 KNOWN_NAMES = tuple(
     [name]
-    for name in ("PARAM", "ODOM", "FLASER", "ROBOTLASER1", "RAWLASER1", "RLASER", "TRUEPOS", "SYNC")
+    for name in (
+        *("PARAM", "ODOM", "FLASER", "ROBOTLASER1", "RAWLASER1", "RLASER", "TRUEPOS", "SYNC"),
+        "LASER_READING",
+    )
 )
+ODOM_WORDS, SHORT_ODOM_WORDS = 10, 5
 
 Pose = tuple[float, float, float]
 
@@ -96,10 +106,31 @@ def parse_rawlaser(line: int, words: list[str]) -> LaserMessage:
     return _parse_laser(line, words, after=(3,))
 
 
-def parse_odom(line: int, words: list[str]) -> PoseMessage:
-    """``ODOM``: pose of the robot by its wheels."""
-    _expect(len(words) == 10, f"ODOM has 10 words, got {len(words)}")
-    return PoseMessage(line=line, stamp_ns=stamp_ns(words[-3]), pose=_pose(words[1:4]))
+def parse_laser_reading(line: int, words: list[str]) -> LaserMessage:
+    """``LASER_READING``: a scan and the pose by the wheels, in a particle filter's own log."""
+    n = _count(words, 1)
+    expected = 2 + n + 4
+    _expect(
+        len(words) == expected, f"LASER_READING of {n} beams has {expected} words, got {len(words)}"
+    )
+    pose = _pose(words[2 + n : 5 + n])
+    return LaserMessage(
+        line=line,
+        stamp_ns=stamp_ns(words[-1]),
+        ranges=_ranges(words[2 : 2 + n]),
+        intensities=[],
+        beams=None,
+        laser_pose=pose,
+        robot_pose=pose,
+    )
+
+
+def parse_odom(line: int, words: list[str], *, short: bool = False) -> PoseMessage:
+    """``ODOM``: pose of the robot by its wheels; ``short``: as particle filters write it."""
+    expected = SHORT_ODOM_WORDS if short else ODOM_WORDS
+    _expect(len(words) == expected, f"ODOM has {expected} words, got {len(words)}")
+    stamp = words[-1] if short else words[-3]
+    return PoseMessage(line=line, stamp_ns=stamp_ns(stamp), pose=_pose(words[1:4]))
 
 
 def parse_truepos(line: int, words: list[str]) -> PoseMessage:

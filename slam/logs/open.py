@@ -22,6 +22,7 @@ from slam.logs.text import numbered_lines
 from slam.logs.victoria_park import is_victoria_park, read_victoria_park
 
 _LINES_TO_LOOK_AT = 1000
+_NAMED = 3  # recordings of a folder that a message names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +83,8 @@ def open_log(
     path = Path(path)
     if text_format is not None:
         return read_rover(path, text_format, strict=strict)
+    if path.is_dir() and not (is_bag(path) or is_victoria_park(path)):
+        raise LogFormatError(path, _what_folder(path))
     for log_format in FORMATS:
         if log_format.recognises(path):
             return log_format.read(path, strict)
@@ -90,3 +93,15 @@ def open_log(
         path, f"of no known format; known: {known}; others by a description of their columns "
         "(--format)"
     )  # fmt: skip
+
+
+def _what_folder(path: Path) -> str:
+    """What a folder that is no log is instead: one of recordings, or of something else."""
+    try:
+        inside = sorted(child.name for child in path.iterdir() if is_bag(child))
+    except OSError as error:
+        return f"cannot be read: {error.strerror or error}"
+    if not inside:
+        return "is a folder, not a regular file, and neither a bag nor Victoria Park"
+    few = ", ".join(inside[:_NAMED]) + (", ..." if len(inside) > _NAMED else "")
+    return f"is a folder, not a regular file; name one of the recordings in it: {few}"

@@ -17,6 +17,7 @@ STAMPS_SORTED = "stamps_stepped_back"
 STAMPS_SPREAD = "stamps_equal_spread"
 CLOCK_STEPS = "clock_steps_back"
 STRAY_STAMPS = "stamps_stray"
+SHORT_ODOM = "odom_lines_without_speeds"
 NO_ODOMETRY = "scans_with_assumed_odometry"
 WORDS = {
     TORN_LINE: "{} torn end (a last line or object without its end) left out",
@@ -24,6 +25,7 @@ WORDS = {
     STAMPS_SPREAD: "{} scans with the time of another spread over the time there was",
     CLOCK_STEPS: "{} times the clock steps back by 1 s or more: order of the file kept",
     STRAY_STAMPS: "{} stamps far from their neighbours' replaced",
+    SHORT_ODOM: "{} ODOM lines without speeds and host read as x y theta t",
     NO_ODOMETRY: "no odometry: {} scans with that of a constant velocity",
 }
 
@@ -47,10 +49,9 @@ class Repairs:
         self.counts[kind] += count
 
     def facts(self) -> dict[str, int]:
-        """The counts, of all kinds that a text log can have, for ``StreamMetadata.extra``."""
-        return {
-            kind: self.counts[kind] for kind in WORDS if kind != NO_ODOMETRY or self.counts[kind]
-        }
+        """The counts, of all kinds that most text logs can have, for ``StreamMetadata.extra``."""
+        rare = (SHORT_ODOM, NO_ODOMETRY)
+        return {kind: self.counts[kind] for kind in WORDS if kind not in rare or self.counts[kind]}
 
     def warn(self) -> None:
         """Say all of them in one line, if there are any."""

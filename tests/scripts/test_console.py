@@ -8,6 +8,7 @@ import time
 
 import pytest
 from rich.console import Console
+from rich.progress import Progress
 
 from scripts import console
 
@@ -59,3 +60,13 @@ def test_what_counts_nothing_tells_too(printed: io.StringIO):
 
 def test_it_is_told_every_ten_seconds():
     assert console.LINE_EVERY_S == 10.0
+
+
+def test_the_time_left_of_few_long_steps_is_that_of_all_so_far():
+    bar = Progress(get_time=lambda: now)
+    now = 0.0
+    task = bar.add_task("simulating", total=6)
+    now = 99.0
+    bar.advance(task, 2)  # two that ended together
+    now = 150.0
+    assert console._words(bar.tasks[0]) == "simulating: 150 s so far, about 300 s left"

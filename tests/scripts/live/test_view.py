@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import struct
 import sys
 import threading
@@ -13,12 +14,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from scripts.experiments import live_client
 from scripts.live import opened, sdk, server
+from scripts.live.client import Client, fields
 from scripts.live.playback import Playback
 from scripts.live.session import EPOCH_NS
 from scripts.live.view import View
 from slam.errors import InvalidValueError, MissingDependencyError
-from tests.scripts.live.client import Client, fields
 
 LOOPBACK = ("127.0.0.1", 0)
 
@@ -108,7 +110,7 @@ def test_the_time_line_of_the_app_is_obeyed(client: Client):
     request = struct.pack("<BBfBQI", 3, 1, 2.0, 1, seek, 2) + b"ab"  # pause at twice the speed
     client.socket.send(request)
     client.until(lambda: client.states > states)
-    client.until(lambda: client.playback()["time_s"] < 0.1 and not client.playback()["playing"])
+    client.until(lambda: client.playback()["time_s"] == 0.0 and not client.playback()["playing"])
     assert client.playback()["speed"] == 2.0
     client.send(op="setParameters", parameters=[{"name": "speed", "value": 1.0}], id="q")
     client.until(lambda: client.playback()["speed"] == 1.0 or client.call("/step"))
@@ -164,3 +166,21 @@ def test_a_port_that_is_taken_is_named(view: View):
     session = view.session
     with pytest.raises(InvalidValueError, match=f"cannot listen at 127.0.0.1:{view.port}"):
         View(sdk.require(), session, Playback(iter(())), ("127.0.0.1", view.port), (0, 1))
+
+
+def test_the_client_of_the_page_drives_pushes_and_draws(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("foxglove", reason="needs the extra 'live'")
+    pytest.importorskip("websockets", reason="needs a WebSocket client")
+    monkeypatch.setattr(live_client, "TWISTS", 3)
+    monkeypatch.setattr(live_client, "PUSH_SCANS", 40)
+    live_client.main(["--out", str(tmp_path / "live.png")])
+    said = capsys.readouterr().out
+    way, rolled = (
+        re.search(words, said) for words in (r"/truth/pose: ([\d.]+) m", r"([\d.]+) m moved")
+    )
+    assert way
+    assert float(way[1]) > 0.1
+    assert rolled
+    assert float(rolled[1]) > 0.1
+    assert "/events: client: the robot takes twists" in said
+    assert (tmp_path / "live.png").read_bytes().startswith(b"\x89PNG")

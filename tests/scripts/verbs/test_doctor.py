@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import os
+import tomllib
 from importlib import metadata
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -52,6 +54,11 @@ def test_each_thing_is_there_or_the_way_to_it_is_named(installed):
     assert told["cores"].found.startswith(f"{checks.cores()} ")
     assert told["films (ffmpeg)"].state == "ok"
     assert all(finding.how for finding in told.values() if finding.state != "ok")
+
+
+def test_every_extra_is_looked_at():
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())
+    assert set(checks.EXTRAS) == set(project["project"]["optional-dependencies"])
 
 
 def test_what_is_too_old_or_not_there_is_missing(installed):

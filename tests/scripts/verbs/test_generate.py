@@ -371,6 +371,12 @@ def test_exports_are_read_back(serial, tmp_path):
         assert np.array_equal(arrays["ranges"][3], frames[3].scan.ranges, equal_nan=True)
         assert np.array_equal(arrays["label_kind"][3], frames[3].labels.kind)
         assert np.array_equal(arrays["T_world_robot"][-1], frames[-1].truth)
+    before = sorted(serial.rglob("*"))
+    export(episode, "carmen", None)
+    assert sorted(serial.rglob("*")) == before  # a file that nothing lists would be foreign there
+    (serial.parent / f"{episode.name}.log.gz").unlink()
+    with pytest.raises(LogFormatError, match=f"name one of the recordings in it: {NAMES[0]}"):
+        export(serial, "tum", None)
     with pytest.raises(InvalidValueError, match="--to must be one of"):
         export(episode, "minari", tmp_path / "a.h5")
     with pytest.raises(LogFormatError, match="no such file"):

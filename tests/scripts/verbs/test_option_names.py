@@ -7,9 +7,10 @@ import re
 from pathlib import Path
 
 import pytest
+from typer.main import get_command
 
 from scripts.cli import app
-from scripts.option_names import OPTIONS_OF, by_option
+from scripts.option_names import OPTIONS_OF, by_option, flowing
 
 
 @pytest.mark.parametrize(
@@ -56,3 +57,9 @@ def test_every_option_that_a_field_is_said_to_have_is_there():
     verbs = get_command(app).commands.values()
     there = {name for verb in verbs for one in verb.params for name in one.opts}
     assert {name for names in OPTIONS_OF.values() for name in names} <= there
+
+
+def test_a_paragraph_of_help_is_one_line():
+    assert flowing("First.\n\nOne that\nis long.\n") == "First.\n\nOne that is long."
+    for command in get_command(app).commands.values():
+        assert not re.search(r"[^\n]\n[^\n]", command.help or ""), command.name

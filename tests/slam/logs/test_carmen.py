@@ -249,3 +249,51 @@ def test_a_stream_without_scans_is_not_written(tmp_path):
     with pytest.raises(InvalidValueError, match="no scan"):
         write_carmen(tmp_path / "a.log", stream)
     assert list(tmp_path.iterdir()) == []
+
+
+def short_odom(line):
+    """``ODOM x y theta t``, as particle filters write it."""
+    words = line.split()
+    return " ".join([*words[:4], words[-3]]) + "\n"
+
+
+def test_odom_without_speeds_is_read_and_counted(tmp_path, carmen_text, caplog):
+    poses = carmen_text.path_poses(7)
+    log = [carmen_text.odom(k + 0.5, pose) for k, pose in enumerate(poses)]
+    scans = [carmen_text.rawlaser(k, k) for k in range(1, 7)]
+    long = [line for both in zip(log, [*scans, ""], strict=True) for line in both]
+    short = [short_odom(line) if line.startswith("ODOM") else line for line in long]
+    first, second = read(tmp_path, "".join(long)), read(tmp_path, "".join(short))
+    np.testing.assert_array_equal(odometry(first), odometry(second))
+    assert second.metadata.extra["odom_lines_without_speeds"] == 7
+    assert "odom_lines_without_speeds" not in first.metadata.extra
+    assert "7 ODOM lines without speeds" in caplog.text
+    with pytest.raises(LogFormatError, match="ODOM lines have 5 words"):
+        read_carmen(tmp_path / "a.log", strict=True)
+    for mixed, expected in (([*short, log[0]], 5), ([*long, short[0]], 10)):
+        with pytest.raises(LogFormatError, match=f"ODOM has {expected} words"):
+            read(tmp_path, "".join(mixed))
+
+
+def test_the_own_log_of_a_particle_filter(tmp_path, carmen_text):
+    poses = carmen_text.path_poses(6)
+    lines = ["PARAM particles 30\n"]
+    for k, pose in enumerate(poses):
+        ranges, at = carmen_text.ranges(k), carmen_text.words(pose)
+        lines += [short_odom(carmen_text.odom(k, pose)), "NEFF 12.5\n"]
+        lines += [f"LASER_READING 181 {ranges} {at} {k}.000000\n"]
+    stream = read(tmp_path, "".join(lines))
+    np.testing.assert_allclose(odometry(stream), poses, atol=1e-6)
+    assert [frame.stamp_ns for frame in stream] == [to_ns(k) for k in range(6)]
+    assert stream.metadata.truth == ""
+    assert stream.metadata.extra["ignored"] == {"NEFF": 6, "PARAM": 1}
+    assert read_carmen(tmp_path / "a.log", strict=True).length == 6  # nothing of it is a repair
+    with pytest.raises(LogFormatError, match=r":4: LASER_READING of 181 beams has 187 words"):
+        read(tmp_path, "".join(lines).replace(" 0.000000\nODOM", " 0 0\nODOM", 1))
+
+
+def test_the_filters_log_of_csail_has_the_scans_of_the_corrected_one(data_folder):
+    folder = data_folder("mit_csail")
+    own, corrected = (open_log(folder / f"csail-{name}.log.xz") for name in ("gfs", "corrected"))
+    for a, b in zip(own, corrected, strict=True):
+        np.testing.assert_array_equal(a.scan.ranges, b.scan.ranges)

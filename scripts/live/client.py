@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from slam.errors import MissingDependencyError
+
 DEADLINE_S = 120.0  # of a wait; on a busy machine a scan takes its time
 TEXT = b"json"
 
@@ -28,13 +30,20 @@ class Client:
         self.answers: dict[int, Any] = {}
         self.said: list[str] = []
         self.info: dict[str, Any] = {}
+        self.events: list[str] = []
         self.states = 0
         self._calls = 0
 
     @classmethod
     @contextmanager
     def of(cls, url: str) -> Iterator[Client]:
-        connect = importlib.import_module("websockets.sync.client").connect
+        """Connected to ``ws://HOST:PORT``; raises ``MissingDependencyError``, ``OSError``."""
+        try:
+            connect = importlib.import_module("websockets.sync.client").connect
+        except ImportError as error:
+            raise MissingDependencyError(
+                "a client of mobilia live needs a WebSocket library: pip install websockets"
+            ) from error
         with connect(url, subprotocols=["foxglove.sdk.v1"], max_size=None) as socket:
             yield cls(socket)
 
@@ -51,6 +60,8 @@ class Client:
                 for entity in fields(message[13:]).get(2, []):
                     parts = fields(entity)
                     self.entities[parts[3][0].decode()] = parts
+            elif topic == "/events":
+                self.events.append(fields(message[13:])[3][0].decode())
         elif message[0] == 3:
             _, call, length = struct.unpack_from("<III", message, 1)
             self.answers[call] = json.loads(message[13 + length :])
@@ -73,19 +84,23 @@ class Client:
         """Take messages until something is true."""
         end = time.monotonic() + DEADLINE_S
         while not true():
-            assert time.monotonic() < end, (self.said, self.answers)
+            if time.monotonic() > end:
+                raise TimeoutError(f"nothing came in {DEADLINE_S:g} s: {self.said}, {self.answers}")
             self.take()
         return true()
 
     def send(self, **words: Any) -> None:
+        """A message of the protocol that is text."""
         self.socket.send(json.dumps(words))
 
     def subscribe(self, *topics: str) -> None:
+        """Ask for what comes on these."""
         self.until(lambda: self.channels and self.services)
         ids = [id for id, channel in self.channels.items() if channel["topic"] in topics]
         self.send(op="subscribe", subscriptions=[{"id": id, "channelId": id} for id in ids])
 
     def publish(self, channel: int, message: bytes) -> None:
+        """On a channel that this client has advertised."""
         self.socket.send(struct.pack("<BI", 1, channel) + message)
 
     def call(self, service: str, **words: Any) -> Any:
@@ -98,7 +113,9 @@ class Client:
         return self.answers[call]
 
     def playback(self) -> dict[str, Any]:
-        return json.loads(self.newest.get("/playback", b"{}"))
+        """The state of the view, {} before it came."""
+        found: dict[str, Any] = json.loads(self.newest.get("/playback", b"{}"))
+        return found
 
     def pose(self, topic: str) -> tuple[float, float]:
         """x, y m of a ``PoseInFrame``."""
