@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -74,6 +75,23 @@ class Observations:
     T_robot_laser: Float
     sensor_sigma_m: float = FRONTEND.sensor_sigma_m
     votes: Float | None = None
+
+    @cached_property
+    def weight(self) -> float:
+        """Sum of the weights."""
+        return float(self.weights.sum())
+
+    @cached_property
+    def mean_vote(self) -> float:
+        """Mean of the votes, 1 where nothing is known of them."""
+        return float(self.votes.mean()) if self.votes is not None and len(self.votes) else 1.0
+
+    def with_votes(self, votes: Float | None) -> Observations:
+        """The same with other votes: ``replace``, at a quarter of its time."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, votes=votes)
+        other.__dict__.pop("mean_vote", None)
+        return other
 
 
 @njit
