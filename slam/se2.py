@@ -128,20 +128,21 @@ def propagate(
     bx, by, _ = np.asarray(T_b_c, dtype=np.float64).tolist()
     c, s = math.cos(theta), math.sin(theta)
     f, g = -s * bx - c * by, c * bx - s * by  # last column of F
-    P0, P1, P2 = np.asarray(covariance_a_b, dtype=np.float64).tolist()
-    Q0, Q1, Q2 = np.asarray(covariance_b_c, dtype=np.float64).tolist()
-    FP = [[a + f * e for a, e in zip(P0, P2, strict=True)]]
-    FP += [[b + g * e for b, e in zip(P1, P2, strict=True)], P2]
-    GQ = [[c * a - s * b for a, b in zip(Q0, Q1, strict=True)]]
-    GQ += [[s * a + c * b for a, b in zip(Q0, Q1, strict=True)], Q2]
-    out = np.array(
-        [
-            [
-                p[0] + f * p[2] + c * q[0] - s * q[1],
-                p[1] + g * p[2] + s * q[0] + c * q[1],
-                p[2] + q[2],
-            ]
-            for p, q in zip(FP, GQ, strict=True)
-        ]
-    )
-    return np.asarray(0.5 * (out + out.T), dtype=np.float64)
+    (p00, p01, p02), (p10, p11, p12), (p20, p21, p22) = np.asarray(
+        covariance_a_b, dtype=np.float64
+    ).tolist()
+    (q00, q01, q02), (q10, q11, q12), (q20, q21, q22) = np.asarray(
+        covariance_b_c, dtype=np.float64
+    ).tolist()
+    # F P and G Q; their last rows are those of P and Q
+    a00, a01, a02 = p00 + f * p20, p01 + f * p21, p02 + f * p22
+    a10, a11, a12 = p10 + g * p20, p11 + g * p21, p12 + g * p22
+    b00, b01, b02 = c * q00 - s * q10, c * q01 - s * q11, c * q02 - s * q12
+    b10, b11, b12 = s * q00 + c * q10, s * q01 + c * q11, s * q02 + c * q12
+    xx = a00 + f * a02 + c * b00 - s * b01
+    xy, yx = a01 + g * a02 + s * b00 + c * b01, a10 + f * a12 + c * b10 - s * b11
+    yy = a11 + g * a12 + s * b10 + c * b11
+    xt, tx = a02 + b02, p20 + f * p22 + c * q20 - s * q21
+    yt, ty = a12 + b12, p21 + g * p22 + s * q20 + c * q21
+    xy, xt, yt = 0.5 * (xy + yx), 0.5 * (xt + tx), 0.5 * (yt + ty)
+    return np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, p22 + q22]])

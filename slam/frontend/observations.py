@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.errors import InvalidValueError
-from slam.frames import Features, Float, Frame, LaserSpec, Scan
-from slam.frontend.config import FRONTEND, FrontendConfig
+from slam.frames import Features, Float, Frame, Scan
+from slam.frontend.config import FRONTEND, FrontendConfig, Joining
 from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import face, join, unveiled
 from slam.frontend.visibility import View, view_of_beams, view_of_features
@@ -75,6 +76,23 @@ class Observations:
     sensor_sigma_m: float = FRONTEND.sensor_sigma_m
     votes: Float | None = None
 
+    @cached_property
+    def weight(self) -> float:
+        """Sum of the weights."""
+        return float(self.weights.sum())
+
+    @cached_property
+    def mean_vote(self) -> float:
+        """Mean of the votes, 1 where nothing is known of them."""
+        return float(self.votes.mean()) if self.votes is not None and len(self.votes) else 1.0
+
+    def with_votes(self, votes: Float | None) -> Observations:
+        """The same with other votes: ``replace``, at a quarter of its time."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, votes=votes)
+        other.__dict__.pop("mean_vote", None)
+        return other
+
 
 @njit
 def _scanned(  # noqa: PLR0913 (kernel)
@@ -88,22 +106,23 @@ def _scanned(  # noqa: PLR0913 (kernel)
     beams: NDArray[np.int64],
     bearings: NDArray[np.float64],
     free: NDArray[np.float64],
-) -> int:
+) -> tuple[int, bool]:
     """End points in the robot frame of the stamp; bearings and free ranges about that laser.
 
     ``limits``: range_min, range_max, range of use, free range without a return. Returns how many
-    points were written.
+    points were written, and whether the bearings rise from beam to beam.
     """
     low, high, use, silent = limits
     lx, ly = T_robot_laser[0], T_robot_laser[1]
     lc, ls = math.cos(T_robot_laser[2]), math.sin(T_robot_laser[2])
-    count = 0
+    count, rising = 0, True
     for k in range(len(ranges)):
         r = float(ranges[k])
         hit = low <= r <= high
         free[k] = 0.0
         bearings[k] = angles[k]
         if math.isnan(r) or r < low or r == 0.0:
+            rising &= k == 0 or bearings[k] >= bearings[k - 1]
             continue
         reach = min(r, use) if hit else silent
         px = lx + reach * math.cos(angles[k] + T_robot_laser[2])
@@ -112,11 +131,72 @@ def _scanned(  # noqa: PLR0913 (kernel)
         dx, dy = px - lx, py - ly
         bearings[k] = math.atan2(lc * dy - ls * dx, lc * dx + ls * dy)
         free[k] = math.sqrt(dx * dx + dy * dy)
+        rising &= k == 0 or bearings[k] >= bearings[k - 1]
         if hit and r <= use:
             points[count, 0] = px
             points[count, 1] = py
             beams[count] = k
             count += 1
+    return count, rising
+
+
+class Weighing(NamedTuple):
+    """What the weight of a hit needs: rad between beams, and two of ``FrontendConfig``."""
+
+    increment: float
+    spacing_m: float
+    least: float
+
+
+@inner
+def _cleared(
+    points: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    origin: NDArray[np.float64],
+    mixed_m: float,
+    joined: NDArray[np.bool_],
+    tangents: NDArray[np.float64],
+) -> int:
+    """Move the hits that are no mixed pixel to the front; how many there are."""
+    clear = np.empty(len(points), np.bool_)
+    count = unveiled(points, beams, origin, joined, mixed_m, clear)
+    if count < len(points):
+        m = 0
+        for k in range(len(points)):
+            if clear[k]:
+                points[m, 0], points[m, 1], joined[m] = points[k, 0], points[k, 1], joined[k]
+                tangents[m, 0], tangents[m, 1] = tangents[k, 0], tangents[k, 1]
+                m += 1
+    return count
+
+
+@njit
+def _surveyed(  # noqa: PLR0913 (kernel)
+    points: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    origin: NDArray[np.float64],
+    joining: Joining,
+    stretches: tuple[float, float],
+    weighing: Weighing,
+    variance: float,
+    joined: NDArray[np.bool_],
+    tangents: NDArray[np.float64],
+    facings: NDArray[np.uint8],
+    covariances: NDArray[np.float64],
+    weights: NDArray[np.float64],
+) -> int:
+    """Surfaces through the hits; those that remain are moved to the front, and their number.
+
+    ``stretches``: ``SurfaceConfig.mixed_m`` and ``face_m``; ``variance`` m^2 of every observation.
+    """
+    join(points, beams, origin, joining, joined, tangents)
+    count = _cleared(points, beams, origin, stretches[0], joined, tangents)
+    face(points[:count], origin, joined, stretches[1], facings)
+    for k in range(count):
+        covariances[k, 0], covariances[k, 1], covariances[k, 2] = variance, 0.0, variance
+        x, y = points[k, 0], points[k, 1]
+        share = math.sqrt(x * x + y * y) * weighing.increment / weighing.spacing_m
+        weights[k] = min(max(share, weighing.least), 1.0)
     return count
 
 
@@ -126,90 +206,64 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     ``twist`` is the body velocity (vx, vy, omega) over the sweep. Raises ``InvalidValueError``
     where that drives more than ``MOST_SWEPT_M`` during it.
     """
-    _check_swept(scan.spec, twist)
-    config = grain.frontend
-    points, beams, bearings, free = _cast(scan, twist, grain)
-    points, joined_on, tangents, facings = _surfaces(points, beams, scan.spec, grain)
-    sensor_sigma_m = scan.spec.range_sigma_m or config.sensor_sigma_m
-    covariances = np.zeros((len(points), 3))
-    variance = max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2
-    covariances[:, 0] = covariances[:, 2] = variance
-    increment = scan.spec.angle_increment
-    return Observations(
-        points_robot=points,
-        covariances=covariances,
-        weights=_weights(points, increment, config),
-        tangents=tangents,
-        joined=joined_on,
-        facings=facings,
-        view=view_of_beams(bearings, free, increment, grain.cell_m, config.view),
-        T_robot_laser=scan.spec.T_robot_laser,
-        sensor_sigma_m=sensor_sigma_m,
-    )
-
-
-def _check_swept(spec: LaserSpec, twist: Float) -> None:
+    spec = scan.spec
     swept = spec.sweep_duration * math.hypot(float(twist[0]), float(twist[1]))
     if swept > MOST_SWEPT_M:
         raise InvalidValueError(
             f"Odometry.twist must drive at most {MOST_SWEPT_M:g} m during a scan's sweep, "
             f"got {swept:g} m"
         )
-
-
-def _cast(scan: Scan, twist: Float, grain: Grain) -> tuple[Float, NDArray[np.int64], Float, Float]:
-    """End points by rising bearing and the rank of each beam; bearings and free ranges of all."""
-    spec, n = scan.spec, scan.spec.n_beams
+    n = spec.n_beams
     points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
     beams = np.empty(n, np.int64)
     use = min(grain.range_m, spec.range_max)
-    count = _scanned(
+    config, surfaces = grain.frontend, grain.frontend.surfaces
+    count, rising = _scanned(
         scan.ranges,
         spec.angles,
         spec.beam_time_offsets,
         spec.T_robot_laser,
         twist,
-        (spec.range_min, spec.range_max, use, min(use, grain.frontend.view.silent_m)),
+        (spec.range_min, spec.range_max, use, min(use, config.view.silent_m)),
         points,
         beams,
         bearings,
         free,
     )
     points, beams = points[:count], beams[:count]
-    if spec.sweep_duration > 0.0 and (bearings[1:] < bearings[:-1]).any():
+    if not rising and spec.sweep_duration > 0.0:
         # An interlaced scanner that turns: neighbours are those by bearing, not by number.
         rank = np.empty(n, np.int64)
         rank[np.argsort(bearings, kind="stable")] = np.arange(n)
         beams = rank[beams]
         in_order = np.argsort(beams)
         points, beams = points.take(in_order, axis=0), beams[in_order]
-    return points, beams, bearings, free
-
-
-def _surfaces(
-    points: Float, beams: NDArray[np.int64], spec: LaserSpec, grain: Grain
-) -> tuple[Float, NDArray[np.bool_], Float, NDArray[np.uint8]]:
-    """The points that are no mixed pixels; of each ``joined``, ``tangents`` and ``facings``."""
-    config = grain.frontend.surfaces
-    count = len(points)
-    onward, tangents = np.zeros(count, np.bool_), np.zeros((count, 2))
-    join(points, beams, spec.T_robot_laser, config.joining(grain.cell_m), onward, tangents)
-    clear = np.zeros(count, np.bool_)
-    if unveiled(points, beams, spec.T_robot_laser, onward, config.mixed_m, clear) < count:
-        kept = np.flatnonzero(clear)  # a mask of rows takes ten times as long
-        points, onward = points.take(kept, axis=0), onward.take(kept)
-        tangents = tangents.take(kept, axis=0)
-    facings = np.zeros(len(points), np.uint8)
-    face(points, spec.T_robot_laser, onward, config.face_m, facings)
-    return points, onward, tangents, facings
-
-
-def _weights(points: Float, angle_increment: float, config: FrontendConfig) -> Float:
-    """(n,) by the distance between neighbouring beams: those close together count less."""
-    x, y = points[:, 0], points[:, 1]
-    shares = np.sqrt(x * x + y * y) * angle_increment / config.spacing_m
-    weights: Float = np.minimum(np.maximum(shares, config.least_weight), 1.0)
-    return weights
+    sensor_sigma_m = spec.range_sigma_m or config.sensor_sigma_m
+    onward, tangents, facings = (
+        np.empty(count, np.bool_),
+        np.empty((count, 2)),
+        np.empty(count, np.uint8),
+    )
+    covariances, weights = np.empty((count, 3)), np.empty(count)
+    left = _surveyed(
+        points, beams, spec.T_robot_laser, surfaces.joining(grain.cell_m),
+        (surfaces.mixed_m, surfaces.face_m),
+        Weighing(spec.angle_increment, config.spacing_m, config.least_weight),
+        max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2,
+        onward, tangents, facings, covariances, weights,
+    )  # fmt: skip
+    view = view_of_beams(bearings, free, spec.angle_increment, grain.cell_m, config.view)
+    return Observations(
+        points_robot=points[:left],
+        covariances=covariances[:left],
+        weights=weights[:left],
+        tangents=tangents[:left],
+        joined=onward[:left],
+        facings=facings[:left],
+        view=view,
+        T_robot_laser=spec.T_robot_laser,
+        sensor_sigma_m=sensor_sigma_m,
+    )
 
 
 def from_features(features: Features, grain: Grain) -> Observations:

@@ -30,19 +30,27 @@ def turned(covariance: Float, theta: float) -> Float:
     return np.array([[a, b, e], [b, d, f], [e, f, tt]])
 
 
+def upper_inverted(
+    a: float, b: float, c: float, d: float, e: float, f: float
+) -> tuple[float, float, float, float, float, float]:
+    """``inverted`` of [[a, b, c], [b, d, e], [c, e, f]]: the same six of it."""
+    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
+    bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
+    det = a * aa + b * ab + c * ac
+    if det <= 0.0:
+        x, y, t = (1.0 / max(v, SINGULAR) for v in (a, d, f))
+        return x, 0.0, 0.0, y, 0.0, t
+    return aa / det, ab / det, ac / det, bb / det, bc / det, cc / det
+
+
 def inverted(matrix: Float) -> Float:
     """Inverse of a symmetric positive definite (3, 3) matrix, in a fixed order of operations.
 
     One that rounding has left singular is taken without its correlations.
     """
     (a, b, c), (_, d, e), (_, _, f) = matrix.tolist()
-    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
-    bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
-    det = a * aa + b * ab + c * ac
-    if det <= 0.0:
-        return np.diag([1.0 / max(v, SINGULAR) for v in (a, d, f)])
-    adjugate = [[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]
-    return np.array([[entry / det for entry in row] for row in adjugate])
+    a, b, c, d, e, f = upper_inverted(a, b, c, d, e, f)
+    return np.array([[a, b, c], [b, d, e], [c, e, f]])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

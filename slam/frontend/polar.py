@@ -8,10 +8,29 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+
+
+BEARING_OFF = 2e-5  # rad, more than ``bearing`` is ever off: 1.15e-5
+
+
+@inner
+def bearing(x: float, y: float) -> float:
+    """atan2(y, x) to within ``BEARING_OFF``, several times as fast: to decide what is far from
+    a limit (Abramowitz and Stegun 1964, 4.4.49)."""
+    wide, high = abs(x), abs(y)
+    t = min(wide, high) / max(wide, high, 1e-300)
+    q = t * t
+    turn = 0.1801410 + q * (-0.0851330 + q * 0.0208351)
+    turn = t * (0.9998660 + q * (-0.3302995 + q * turn))
+    if high > wide:
+        turn = 0.5 * math.pi - turn
+    if x < 0.0:
+        turn = math.pi - turn
+    return -turn if y < 0.0 else turn
 
 
 @njit

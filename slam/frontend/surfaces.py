@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import inner
 from slam.frontend.config import FRONTEND, Joining
 
 LINE_HITS = FRONTEND.surfaces.line_hits
@@ -59,7 +59,7 @@ def _one_line(
     return True
 
 
-@njit
+@inner
 def join(
     points: NDArray[np.float64],
     beams: NDArray[np.int64],
@@ -96,7 +96,7 @@ def join(
                 tangents[k, 0], tangents[k, 1] = dx / d, dy / d
 
 
-@njit
+@inner
 def face(
     points: NDArray[np.float64],
     origin: NDArray[np.float64],
@@ -152,7 +152,7 @@ def _apart(points: NDArray[np.float64], j: int, k: int) -> float:
     return math.sqrt(dx * dx + dy * dy)
 
 
-@njit
+@inner
 def unveiled(
     points: NDArray[np.float64],
     beams: NDArray[np.int64],

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from slam._jit import inner, njit
 from slam.frontend.config import FRONTEND, ViewConfig
+from slam.frontend.polar import BEARING_OFF, bearing
 
 
 class View(NamedTuple):
@@ -111,7 +112,16 @@ def seen_empty(view: View, dx: float, dy: float) -> bool:
     r = math.sqrt(dx * dx + dy * dy)
     if r >= view.farthest - view.margin:
         return False
-    bins = len(view.limit)
+    bins, slack = len(view.limit), BEARING_OFF / view.step
+    turns = bearing(dx, dy) / view.step
+    k = math.floor(turns + 0.5)
+    if abs(turns - k) < 0.5 - slack:  # in this bin, and not in its neighbour
+        if k < 0:
+            k += bins
+        elif k >= bins:
+            k -= bins
+        if r >= view.limit[k] - view.margin:
+            return False
     turns = math.atan2(dy, dx) / view.step
     k = math.floor(turns + 0.5)
     off = turns - k

@@ -14,7 +14,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam import se2
 from slam._jit import inner, njit
 from slam.frames import Float
 from slam.frontend.observations import Observations
@@ -106,9 +105,12 @@ def _rasterise_point(  # noqa: PLR0913 (kernel)
                     du = i - u
                     m = min(whole + du * (part + pa * du), ends)
                     value = bell[int(m * FINE)]
-                    if value > cells.impression[scratch, j & MASK, i & MASK]:
-                        cells.impression[scratch, j & MASK, i & MASK] = value
-                        cells.faced[scratch, j & MASK, i & MASK] = faced
+                    # Written in any case: a branch here costs more.
+                    before = cells.impression[scratch, j & MASK, i & MASK]
+                    faced_before = cells.faced[scratch, j & MASK, i & MASK]
+                    more = value > before
+                    cells.impression[scratch, j & MASK, i & MASK] = value if more else before
+                    cells.faced[scratch, j & MASK, i & MASK] = faced if more else faced_before
     return True
 
 
@@ -156,23 +158,67 @@ def _rasterise_stretch(  # noqa: PLR0913 (kernel)
     return True
 
 
+@inner
+def _moved(
+    points_robot: NDArray[np.float64],
+    covariances: NDArray[np.float64],
+    pose: NDArray[np.float64],
+    cell: float,
+    points: NDArray[np.float64],
+    box: NDArray[np.float64],
+) -> None:
+    """``points`` in the map frame, and the ``box`` (xmin, ymin, xmax, ymax) of their Gaussians."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    largest = 0.0
+    box[0] = box[1] = math.inf
+    box[2] = box[3] = -math.inf
+    for k in range(len(points)):
+        x = c * points_robot[k, 0] - s * points_robot[k, 1] + pose[0]
+        y = s * points_robot[k, 0] + c * points_robot[k, 1] + pose[1]
+        points[k, 0], points[k, 1] = x, y
+        box[0], box[1] = min(box[0], x), min(box[1], y)
+        box[2], box[3] = max(box[2], x), max(box[3], y)
+        largest = max(largest, covariances[k, 0], covariances[k, 2])
+    edge = max(3.0 * cell, 4.0 * math.sqrt(largest)) + cell
+    box[0], box[1] = box[0] - edge, box[1] - edge
+    box[2], box[3] = box[2] + edge, box[3] + edge
+
+
+@inner
+def _is_covered(cells: Cells, box: NDArray[np.float64], size: float) -> bool:
+    """Whether the directory has the blocks, ``size`` m wide, of the box and those around it."""
+    rows, columns = cells.directory.shape
+    cx, cy = cells.corner[0], cells.corner[1]
+    inside = math.floor(box[0] / size) - 1 >= cx and math.floor(box[1] / size) - 1 >= cy
+    inside &= math.floor(box[2] / size) + 2 <= cx + columns
+    return bool(inside and math.floor(box[3] / size) + 2 <= cy + rows)
+
+
 @njit
 def _stamp(  # noqa: PLR0913 (kernel)
     cells: Cells,
-    points: NDArray[np.float64],
+    points_robot: NDArray[np.float64],
     covariances: NDArray[np.float64],
     joined: NDArray[np.bool_],
     facings: NDArray[np.uint8],
-    theta: float,
+    pose: NDArray[np.float64],
     cell: float,
     ends: float,
     bell: NDArray[np.float32],
     start: int,
+    points: NDArray[np.float64],
+    box: NDArray[np.float64],
 ) -> int:
-    """Raise I around the points (map frame) from ``start`` on; the index where room ran out, or n.
+    """Raise I around the points, seen from ``pose``, from ``start`` on.
 
-    ``covariances`` are in the robot frame, which is turned by ``theta``.
+    Returns the index of the point at which room ran out, n where it did not, and -1 where the
+    directory does not cover the ``box`` (4,). ``points`` (n, 2) and that box are filled first.
     """
+    if start == 0:
+        _moved(points_robot, covariances, pose, cell, points, box)
+        if not _is_covered(cells, box, SIDE * cell):
+            return -1
+    theta = pose[2]
     c, s = math.cos(theta), math.sin(theta)
     scale = 1.0 / (cell * cell)
     for k in range(start, len(points)):
@@ -195,28 +241,26 @@ def _stamp(  # noqa: PLR0913 (kernel)
 
 def rasterise(cell_map: CellMap, observations: Observations, T_map_robot: Float) -> None:
     """Write the impressions of ``observations`` seen from ``T_map_robot`` onto the map."""
-    points_map = se2.transform(T_map_robot, observations.points_robot)
-    if len(points_map) == 0:
-        return
-    largest = float(observations.covariances[:, ::2].max())
-    edge = max(3.0 * cell_map.cell, 4.0 * math.sqrt(largest)) + cell_map.cell
-    x, y = points_map[:, 0], points_map[:, 1]
-    cell_map.cover(
-        float(x.min()) - edge, float(y.min()) - edge, float(x.max()) + edge, float(y.max()) + edge
-    )
+    n = len(observations.points_robot)
+    points_map, box = np.empty((n, 2)), np.empty(4)
     done, ends = 0, cell_map.config.map.bell_ends
-    while done < len(points_map):
+    while done < n:
         done = _stamp(
             cell_map.cells,
-            points_map,
+            observations.points_robot,
             observations.covariances,
             observations.joined,
             observations.facings,
-            float(T_map_robot[2]),
+            T_map_robot,
             cell_map.cell,
             ends,
             _bell(ends),
             done,
+            points_map,
+            box,
         )
-        if done < len(points_map):
+        if done < 0:
+            cell_map.cover(*box.tolist())
+            done = 0
+        elif done < n:
             cell_map.grow()

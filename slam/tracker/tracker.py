@@ -117,8 +117,8 @@ class Tracker(abc.ABC):
         votes = self._standing.votes(
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
         )
-        observations = replace(observations, votes=votes)
-        self._vote = float(votes.mean()) if len(votes) else 1.0
+        observations = observations.with_votes(votes)
+        self._vote = observations.mean_vote
         prediction, match, state = self._localise(
             frame.stamp_ns, observations, prediction
         )  # 3 Eq. (13)
@@ -197,7 +197,7 @@ class Tracker(abc.ABC):
         The prior comes back wider where enough is in view to correct what odometry alone gave for
         the pose before, and after a slip.
         """
-        if float(observations.weights.sum()) >= self._numbers.relocalise.least_weight:
+        if observations.weight >= self._numbers.relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = replace(prediction, carried=self._pose_covariance.odometry_part(motion))
         if self._relocalisation is not None:
@@ -226,7 +226,7 @@ class Tracker(abc.ABC):
     ) -> tuple[Match, str]:
         """Dead reckoning, until one hypothesis alone explains what is seen."""
         prediction = self._go_on(observations, prediction)
-        observations = replace(observations, votes=None)  # they are of another place
+        observations = observations.with_votes(None)  # they are of another place
         predicted = prediction.T_map_robot
         precision = inverted(prediction.prior)
         here = self._matcher.climb(self.cell_map, observations, predicted, predicted, precision)
@@ -267,7 +267,7 @@ class Tracker(abc.ABC):
         if wake is None:
             return prediction
         wake.followed = False
-        enough = float(observations.weights.sum()) >= self._numbers.relocalise.least_weight
+        enough = observations.weight >= self._numbers.relocalise.least_weight
         match = self._match(observations, prediction, wake.map) if enough else None
         if match is not None and match.matched >= self._quality.least_continuous():
             increment = se2.between(self._T_map_robot, match.T_map_robot)
@@ -302,7 +302,7 @@ class Tracker(abc.ABC):
         step = min(prediction.elapsed, self.config.map.longest_look_s)
         quality, denied = self._quality, False
         enough = self._numbers.relocalise.least_weight
-        if float(observations.weights.sum()) >= enough and quality.arises(match.matched):
+        if observations.weight >= enough and quality.arises(match.matched):
             confirmed, contradicted, _ = self.cell_map.integrate(
                 observations.view, T_map_laser, step, write=False
             )
@@ -344,7 +344,7 @@ class Tracker(abc.ABC):
     ) -> None:
         """Whether the robot is lost, or the map in view outdated."""
         total, enough = confirmed + contradicted, self._numbers.relocalise.least_weight
-        few = float(observations.weights.sum()) < enough or total == 0.0
+        few = observations.weight < enough or total == 0.0
         if len(observations.points_robot) == 0:
             self._verdict.see_nothing()
         elif few or not self._quality.suspicious:
@@ -409,7 +409,7 @@ class Tracker(abc.ABC):
             motion, covariance = prediction.increment, prediction.covariance
         self._trusted = state in ("tracking", "relocated")
         covariance = turned(covariance, -float(self._T_map_robot[2]))
-        everyone = replace(observations, votes=None)
+        everyone = observations.with_votes(None)
         self._loops.add(
             len(self._path), match.T_map_robot, motion, covariance, everyone,
             elapsed=prediction.elapsed, written=written, found=state == "relocated",

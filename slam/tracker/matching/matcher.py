@@ -14,20 +14,9 @@ from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import inverted, turned
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.few import Widths, blur, room_for
 from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import Climb, Reward, Seen, refine
-
-
-def _spread(points_robot: Float, T_map_robot: Float, covariance: Float) -> Float:
-    """(n, 3) xx, xy, yy of points (robot frame) that a pose's (3, 3) ``covariance`` smears."""
-    (xx, xy, xt), (_, yy, yt), (_, _, tt) = turned(covariance, -float(T_map_robot[2])).tolist()
-    x, y = points_robot[:, 0], points_robot[:, 1]
-    ttx, tty = tt * x, tt * y
-    out = np.empty((len(x), 3))
-    out[:, 0] = xx - 2.0 * xt * y + tty * y
-    out[:, 1] = xy + xt * x - yt * y - ttx * y
-    out[:, 2] = yy + 2.0 * yt * x + ttx * x
-    return out
 
 
 def seen_by(observations: Observations) -> Seen:
@@ -117,7 +106,7 @@ class Matcher:
     ) -> Match:
         """The local optimum reached from ``start``; the reward's weight falls with the match."""
         seen = seen_by(observations)
-        full = float(observations.weights.sum())
+        full = observations.weight
         pose = np.array(start, dtype=np.float64)
         information = np.zeros((3, 3))
         tau, matched, overlapped, score = self.config.reward, 0.0, 0.0, -math.inf
@@ -155,42 +144,25 @@ class Matcher:
 
         Returns the prediction itself where the prior moves no observation by half a cell.
         """
-        points = observations.points_robot
-        if len(points) == 0:
+        n = len(observations.points_robot)
+        if n == 0:
             return prediction
         numbers = self.numbers.climb
-        least = (numbers.moved_cells * self.config.cell_m) ** 2
-        (xx, _, _), (_, yy, _), (_, _, tt) = covariance.tolist()
-        farthest = float((points[:, 0] ** 2 + points[:, 1] ** 2).max())
-        if 2.0 * (xx + yy + farthest * tt) < least:  # (a + b)^2 <= 2 (a^2 + b^2)
+        every = max(1, math.ceil(n / numbers.few))
+        few = room_for(-(-n // every))
+        widths = Widths(
+            place=float(covariance[0, 0] + covariance[1, 1]),
+            least=(numbers.moved_cells * self.config.cell_m) ** 2,
+            most=(numbers.widest_cells * self.config.cell_m) ** 2,
+        )
+        in_robot = turned(covariance, -float(prediction[2]))
+        if not blur(seen_by(observations), in_robot, widths, every, few):
             return prediction
-        every = max(1, math.ceil(len(points) / numbers.few))
-        few = points[::every]
-        spread = _spread(few, prediction, covariance)
-        most = (numbers.widest_cells * self.config.cell_m) ** 2
-        widths = spread[:, 0] + spread[:, 2]
-        if not (widths > least).any():
-            return prediction
-        spread *= np.minimum(1.0, most / np.maximum(widths, 1e-12))[:, None]
         pose = np.array(prediction, dtype=np.float64)
         refine(
-            cell_map.cells,
-            self.reward,
-            self._climb,
-            Seen(
-                np.ascontiguousarray(few),
-                observations.covariances[::every] + spread,
-                np.ascontiguousarray(observations.weights[::every]) * every,
-                np.ascontiguousarray(observations.tangents[::every]),
-                np.ascontiguousarray(observations.facings[::every]),
-                np.ascontiguousarray(votes_of(observations)[::every]),
-            ),
-            pose,
-            prediction,
-            inverted(covariance),
-            self.config.reward,
-            np.zeros((3, 3)),
-        )
+            cell_map.cells, self.reward, self._climb, few, pose, prediction,
+            inverted(covariance), self.config.reward, np.zeros((3, 3)),
+        )  # fmt: skip
         return pose
 
     def search(

@@ -13,7 +13,7 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float
-from slam.frontend.odometry_prior import Prediction, inverted
+from slam.frontend.odometry_prior import Prediction, upper_inverted
 from slam.tracker.standing.config import StandingConfig
 
 
@@ -31,29 +31,39 @@ class Agreement:
         self._config = config
         self._windows = (config.window_s, config.long_window_s)
         own = (config.match_m, config.match_m, math.radians(config.match_deg))
-        self._own = np.diag(np.square(own))
+        self._own = [v * v for v in own]
         self.forget()
 
     def forget(self) -> None:
         """The robot was set elsewhere: what was summed says nothing of it."""
-        self._sums = [np.zeros(3) for _ in self._windows]
-        self._variances = [np.zeros((3, 3)) for _ in self._windows]
+        self._sums = [[0.0] * 3 for _ in self._windows]
+        self._variances = [[0.0] * 6 for _ in self._windows]
         self.ratio = 0.0
         self._worst = 0
         self._elapsed_s = 0.0
 
     def take(self, prediction: Prediction, T_map_robot: Float) -> None:
         """The robot is matched to ``T_map_robot``."""
-        off = T_map_robot - prediction.T_map_robot
-        off[2] = se2.wrap(float(off[2]))
+        off = (T_map_robot - prediction.T_map_robot).tolist()
+        off[2] = se2.wrap(off[2])
+        (xx, xy, xt), (_, yy, yt), (_, _, tt) = prediction.covariance.tolist()
+        more = xx, xy, xt, yy, yt, tt
         self.ratio, self._elapsed_s = 0.0, prediction.elapsed
         for k, window in enumerate(self._windows):
             keep = math.exp(-prediction.elapsed / window)
-            S = self._sums[k] = keep * self._sums[k] + off
-            V = self._variances[k] = keep * keep * self._variances[k] + prediction.covariance
-            ratio = _form(S, inverted(V + self._own)) / 3.0
+            square = keep * keep
+            S = self._sums[k] = [keep * a + b for a, b in zip(self._sums[k], off, strict=True)]
+            V = [square * a + b for a, b in zip(self._variances[k], more, strict=True)]
+            self._variances[k] = V
+            ratio = self._form(S, V) / 3.0
             if ratio > self.ratio:
                 self.ratio, self._worst = ratio, k
+
+    def _form(self, S: list[float], V: list[float]) -> float:
+        """S' (V + R)^-1 S in a fixed order of operations; V by xx, xy, xt, yy, yt, tt."""
+        (x, y, t), (xx, xy, xt, yy, yt, tt), (own_x, own_y, own_t) = S, V, self._own
+        a, b, c, d, e, f = upper_inverted(xx + own_x, xy, xt, yy + own_y, yt, tt + own_t)
+        return x * (a * x + 2.0 * (b * y + c * t)) + y * (d * y + 2.0 * e * t) + f * t * t
 
     def dragged(self, vote: float) -> float:
         """Probability in [0, 1) that the matches are wrong, and not odometry.
@@ -70,7 +80,7 @@ class Agreement:
 
         The spread of both is ``dragged`` S S'.
         """
-        x, y, turn = self._sums[self._worst].tolist()
+        x, y, turn = self._sums[self._worst]
         rows = [[x * x, x * y, x * turn], [x * y, y * y, y * turn], [x * turn, y * turn, turn**2]]
         return dragged * np.array(rows)
 
@@ -81,15 +91,5 @@ class Agreement:
 
     def off_m(self, dragged: float) -> float:
         """m, deviation of the position by that."""
-        x, y, _ = self._sums[self._worst].tolist()
+        x, y, _ = self._sums[self._worst]
         return math.sqrt(dragged) * math.hypot(x, y)
-
-
-def _form(v: Float, m: Float) -> float:
-    """v' m v in a fixed order of operations."""
-    (x, y, t), (a, b, c) = v.tolist(), m.tolist()
-    return float(
-        x * (a[0] * x + 2.0 * (a[1] * y + a[2] * t))
-        + y * (b[1] * y + 2.0 * b[2] * t)
-        + c[2] * t * t
-    )

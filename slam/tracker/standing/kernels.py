@@ -4,63 +4,86 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner, njit
+from slam.frontend.polar import BEARING_OFF, bearing
+
+
+class Asking(NamedTuple):
+    """How places are compared with the free ranges of a scan; the others as in ``StandingConfig``.
+
+    step         rad between bins
+    margin       m that all beams within ``spread`` rad of a place went on beyond it
+    sure         share of that emptiness that is believed
+    """
+
+    step: float
+    margin: float
+    spread: float
+    sure: float
+    settled_s: float
+    left_m: float
+    along_m: float
+    thin_m: float
 
 
 @inner
-def _passed(
-    limit: NDArray[np.float64], step: float, x: float, y: float, margin: float, spread: float
-) -> bool:
-    """Whether all beams within ``spread`` rad went on beyond (x, y) (laser axes) by ``margin``."""
-    r = math.sqrt(x * x + y * y)
-    bins = len(limit)
-    turns = math.atan2(y, x) / step
-    first, last = math.floor(turns - spread / step + 0.5), math.floor(turns + spread / step + 0.5)
-    for k in range(first, last + 1):  # noqa: SIM110 (compiled)
-        if limit[k % bins] < r + margin:
+def _passed(limit: NDArray[np.float64], of: Asking, x: float, y: float) -> bool:
+    """Whether all beams within the spread went on beyond (x, y) (laser axes) by the margin."""
+    end = math.sqrt(x * x + y * y) + of.margin
+    bins, wide = len(limit), of.spread / of.step
+    if wide >= 1.1 and 0.1 * of.step > BEARING_OFF:  # most did not: the middle one shows it
+        k = math.floor(bearing(x, y) / of.step + 0.5)
+        if limit[k + bins if k < 0 else (k - bins if k >= bins else k)] < end:
             return False
+    turns = math.atan2(y, x) / of.step
+    first, last = math.floor(turns - wide + 0.5), math.floor(turns + wide + 0.5)
+    k = first % bins
+    for _ in range(last + 1 - first):
+        if limit[k] < end:
+            return False
+        k = k + 1 if k + 1 < bins else 0
     return True
 
 
-@njit
-def emptied(  # noqa: PLR0913 (kernel)
+@inner
+def _emptied(  # noqa: PLR0913 (kernel)
     points: NDArray[np.float64],
     pose: NDArray[np.float64],
     lasers: NDArray[np.float64],
     limits: NDArray[np.float64],
     ages: NDArray[np.float64],
-    step: float,
-    margin: float,
-    spread: float,
+    of: Asking,
+    recent: int,
     out: NDArray[np.float64],
 ) -> None:
     """Age of the newest scan that saw the place of each point (robot frame) empty, else inf.
 
-    lasers  (J, 3) in the map, ``limits`` (J, bins) free ranges as in ``View``, newest first
+    lasers  (J, 3) in the map, ``limits`` (J, bins) free ranges as in ``View``, newest first, of
+    which the first few, ``recent``, are asked
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    views = len(lasers)
-    cosines, sines = np.empty(views), np.empty(views)
-    for j in range(views):
+    cosines, sines = np.empty(recent), np.empty(recent)
+    for j in range(recent):
         cosines[j], sines[j] = math.cos(lasers[j, 2]), math.sin(lasers[j, 2])
     for k in range(len(points)):
         x = c * points[k, 0] - s * points[k, 1] + pose[0]
         y = s * points[k, 0] + c * points[k, 1] + pose[1]
         out[k] = math.inf
-        for j in range(views):
+        for j in range(recent):
             dx, dy = x - lasers[j, 0], y - lasers[j, 1]
             u, v = cosines[j] * dx + sines[j] * dy, cosines[j] * dy - sines[j] * dx
-            if _passed(limits[j], step, u, v, margin, spread):
+            if _passed(limits[j], of, u, v):
                 out[k] = ages[j]
                 break
 
 
-@njit
-def indexed(
+@inner
+def _indexed(
     points: NDArray[np.float64],
     T_robot_laser: NDArray[np.float64],
     step: float,
@@ -80,41 +103,39 @@ def indexed(
         last[b] = k
 
 
-@njit
-def left(  # noqa: PLR0913 (kernel)
+@inner
+def _left(  # noqa: PLR0913 (kernel)
     before: NDArray[np.float64],
     age: float,
     points: NDArray[np.float64],
     T_map_laser: NDArray[np.float64],
     T_robot_laser: NDArray[np.float64],
     limit: NDArray[np.float64],
-    step: float,
-    bounds: tuple[float, float, float],
+    of: Asking,
     first: NDArray[np.int64],
     last: NDArray[np.int64],
     out: NDArray[np.float64],
 ) -> None:
-    """Lower ``out`` to ``age`` for points within ``near`` m of a place that was left.
+    """Lower ``out`` to ``age`` for points within ``left_m`` of a place that was left.
 
     before  (m, 2) points of an earlier scan, map frame; left if present beams pass them
     points  (n, 2) present ones, robot frame, by bin ``first`` to ``last`` (see ``indexed``)
     limit   (bins,) free ranges of the present scan
-    bounds  margin m and spread rad of passing, near
     """
-    margin, spread, near = bounds
+    near = of.left_m
     bins = len(limit)
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     lc, ls = math.cos(T_robot_laser[2]), math.sin(T_robot_laser[2])
     for i in range(len(before)):
         gx, gy = before[i, 0] - T_map_laser[0], before[i, 1] - T_map_laser[1]
         u, v = c * gx + s * gy, c * gy - s * gx
-        if not _passed(limit, step, u, v, margin, spread):
+        if not _passed(limit, of, u, v):
             continue
         x, y = lc * u - ls * v + T_robot_laser[0], ls * u + lc * v + T_robot_laser[1]
         r = math.sqrt(u * u + v * v)
-        middle = math.floor(math.atan2(v, u) / step + 0.5)
+        middle = math.floor(math.atan2(v, u) / of.step + 0.5)
         # 1.6 > pi / 2: asin(q) is below 1.6 q for q in [0, 1]
-        wide = math.floor(min(near / max(r, near), 1.0) * 1.6 / step) + 1
+        wide = math.floor(min(near / max(r, near), 1.0) * 1.6 / of.step) + 1
         for b in range(middle - wide, middle + wide + 1):
             at = b % bins
             if first[at] < 0:
@@ -125,8 +146,8 @@ def left(  # noqa: PLR0913 (kernel)
                     out[k] = min(out[k], age)
 
 
-@njit
-def along(
+@inner
+def _along(
     points: NDArray[np.float64],
     joined: NDArray[np.bool_],
     votes: NDArray[np.float64],
@@ -162,3 +183,44 @@ def along(
 def _apart(points: NDArray[np.float64], j: int, k: int) -> float:
     dx, dy = points[j, 0] - points[k, 0], points[j, 1] - points[k, 1]
     return math.sqrt(dx * dx + dy * dy)
+
+
+@njit
+def votes(  # noqa: PLR0913 (kernel)
+    points: NDArray[np.float64],
+    joined: NDArray[np.bool_],
+    limit: NDArray[np.float64],
+    pose: NDArray[np.float64],
+    T_map_laser: NDArray[np.float64],
+    T_robot_laser: NDArray[np.float64],
+    lasers: NDArray[np.float64],
+    limits: NDArray[np.float64],
+    ages: NDArray[np.float64],
+    recent: int,
+    before: NDArray[np.float64],
+    ends: NDArray[np.int64],
+    of: Asking,
+    out: NDArray[np.float64],
+) -> None:
+    """Fill ``out`` (n,) with the vote of each of the points (robot frame), see ``Standing``.
+
+    limit   (bins,) free ranges of the present scan, seen from ``T_map_laser``
+    lasers, limits, ages, recent  of the scans asked, see ``_emptied``
+    before  (m, 2) points in the map of those whose things may have left; ends (L,) of each scan's
+    """
+    stood = np.empty(len(points))
+    _emptied(points, pose, lasers, limits, ages, of, recent, stood)
+    first, last = np.empty(len(limit), np.int64), np.empty(len(limit), np.int64)
+    _indexed(points, T_robot_laser, of.step, first, last)
+    start = 0
+    for j in range(len(ends)):
+        _left(
+            before[start : ends[j]], ages[j], points, T_map_laser, T_robot_laser, limit, of,
+            first, last, stood,
+        )  # fmt: skip
+        start = ends[j]
+    own = np.empty(len(points))
+    for k in range(len(points)):
+        ratio = of.settled_s / max(stood[k], 1e-300)
+        own[k] = 1.0 - of.sure * (1.0 - 1.0 / (1.0 + ratio * ratio))
+    _along(points, joined, own, of.along_m, of.thin_m, out)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from slam import se2
 from slam.frames import NS_PER_S, Float
 from slam.frontend.observations import Observations
 from slam.tracker.standing.config import StandingConfig
-from slam.tracker.standing.kernels import along, emptied, indexed, left
+from slam.tracker.standing.kernels import Asking, votes
+
+NO_POINTS = np.empty((0, 2))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,42 +94,31 @@ class Standing:
         asked = self._asked(stamp_ns, seen.view.step) if config.settled_s > 0.0 else []
         if not asked or not len(points):
             return np.ones(len(points))
-        ages = np.array([(stamp_ns - look.stamp_ns) / NS_PER_S for look in asked])
+        ages = [(stamp_ns - look.stamp_ns) / NS_PER_S for look in asked]
         place, heading = max(float(prior[0, 0]), float(prior[1, 1])), float(prior[2, 2])
         margin = config.margin_m + config.sigmas * math.sqrt(place)
         spread = math.radians(config.spread_deg) + config.sigmas * math.sqrt(heading)
-        spread = min(spread, 0.5 * math.pi)
-        recent = [look for look, age in zip(asked, ages, strict=True) if age <= config.came_s]
-        stood = np.full(len(points), np.inf)
-        if recent:
-            emptied(
-                points, T_map_robot, np.array([look.T_map_laser for look in recent]),
-                np.array([look.limit for look in recent]), ages, seen.view.step, margin, spread,
-                stood,
-            )  # fmt: skip
-        self._look_for_what_left(asked, ages, seen, T_map_robot, (margin, spread), stood)
-        sure = 1.0 / (1.0 + place / config.vague_m**2)  # else the prediction may be what is off
-        votes = 1.0 - sure * (1.0 - 1.0 / (1.0 + (config.settled_s / stood) ** 2))
+        asking = Asking(
+            step=seen.view.step,
+            margin=margin,
+            spread=min(spread, 0.5 * math.pi),
+            # else the prediction may be what is off
+            sure=1.0 / (1.0 + place / config.vague_m**2),
+            settled_s=config.settled_s,
+            left_m=config.left_m,
+            along_m=config.along_m,
+            thin_m=config.thin_m,
+        )
+        newest = sum(age <= config.left_s for age in ages)
+        lately = [look.points_map for look in asked[:newest]]
         out = np.empty(len(points))
-        along(points, seen.joined, votes, config.along_m, config.thin_m, out)
+        votes(
+            points, seen.joined, seen.view.limit, T_map_robot,
+            se2.compose(T_map_robot, seen.T_robot_laser), seen.T_robot_laser,
+            np.array([look.T_map_laser for look in asked]),
+            np.array([look.limit for look in asked]), np.array(ages),
+            sum(age <= config.came_s for age in ages),
+            np.concatenate(lately) if lately else NO_POINTS,
+            np.array(list(accumulate(map(len, lately))), np.int64), asking, out,
+        )  # fmt: skip
         return out
-
-    def _look_for_what_left(
-        self,
-        asked: list[Look],
-        ages: Float,
-        seen: Observations,
-        T_map_robot: Float,
-        passing: tuple[float, float],
-        stood: Float,
-    ) -> None:
-        config, view, points = self._config, seen.view, seen.points_robot
-        first, last = np.empty(len(view.limit), np.int64), np.empty(len(view.limit), np.int64)
-        indexed(points, seen.T_robot_laser, view.step, first, last)
-        T_map_laser = se2.compose(T_map_robot, seen.T_robot_laser)
-        for look, age in zip(asked, ages.tolist(), strict=True):
-            if age <= config.left_s:
-                left(
-                    look.points_map, age, points, T_map_laser, seen.T_robot_laser, view.limit,
-                    view.step, (*passing, config.left_m), first, last, stood,
-                )  # fmt: skip

@@ -85,10 +85,9 @@ class Rival:
 
     def _has_fallen(self, observations: Observations, match: Match) -> bool:
         """Among a few things alone nothing is decided: all of them may have moved."""
-        if float(observations.weights.sum()) < self._least_weight:
+        if observations.weight < self._least_weight:
             return False
-        votes = observations.votes
-        if votes is None or float(votes.mean()) >= self._config.outvoted:
+        if observations.votes is None or observations.mean_vote >= self._config.outvoted:
             return False
         return match.rewarded < self._config.fallen * self._usual
 
@@ -163,7 +162,7 @@ class Rival:
         precision: Float,
     ) -> Match:
         votes = self._standing.votes(stamp_ns, start, prior, observations)
-        seen = replace(observations, votes=votes)
+        seen = observations.with_votes(votes)
         return self._matcher.climb(cell_map, seen, start, start, precision)
 
     def _decide(self, match: Match) -> Match:

@@ -10,11 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from slam import se2
+from slam._jit import njit
 from slam.frames import Features, Odometry, Scan
+from slam.frontend import surfaces
 from slam.frontend.config import Joining
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.frontend.odometry_prior import inverted, predict, turned
-from slam.frontend.surfaces import join
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
 from slam.tracker.matching.local_search import SearchWindow
@@ -25,6 +26,14 @@ from tests.world2d import World2D, arena, laser, rectangle
 
 Array = NDArray[np.float64]
 CONFIG = ShuntingConfig(cell_m=0.05)
+
+
+@njit
+def join(
+    points: Array, beams: Array, origin: Array, numbers: Joining, out: Array, tangents: Array
+) -> None:
+    """Only other kernels can call it."""
+    surfaces.join(points, beams, origin, numbers, out, tangents)
 
 
 def joining(near_m: float) -> Joining:
