@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from slam.estimate import Raster
 from slam.frames import Float
+from slam.strips import join
 
 Bounds = tuple[float, float, float, float]
 Levels = NDArray[np.uint8]
@@ -32,8 +33,7 @@ class LevelMap(NamedTuple):
 
 def levels_of(raster: Raster) -> LevelMap:
     """A whole map so."""
-    levels = (np.nan_to_num(raster.values) * np.float32(255.0)).astype(np.uint8)
-    return LevelMap(levels, raster.resolution_m, raster.T_map_origin)
+    return LevelMap(_levels(raster.values), raster.resolution_m, raster.T_map_origin)
 
 
 class MapTiles:
@@ -67,18 +67,12 @@ class MapTiles:
         x, y, _ = raster.T_map_origin.tolist()
         columns = math.floor(x / self._cell_m + 0.5)
         rows = math.floor(y / self._cell_m + 0.5)
-        height = raster.values.shape[0]
-        step = max(self.cells, (1 << 22) // max(raster.values.shape[1], 1))
-        step -= step % self.cells
-        first = 0
-        while first < height:  # a stripe at a time: the memory is that of one
-            last = min(first + step - (rows + first) % self.cells, height)
-            levels = np.nan_to_num(raster.values[first:last]) * np.float32(255.0)
-            pooled, row, column = _pooled(
-                levels.astype(np.uint8), rows + first, columns, self.cells
-            )
-            self._paste(pooled, row, column)
-            first = last
+        n, (height, width) = self.cells, raster.values.shape
+        top, left = rows // n, columns // n
+        shape = (rows + height - 1) // n - top + 1, (columns + width - 1) // n - left + 1
+        largest = np.full(shape, np.nan, np.float32)
+        join(largest, raster.values, n, rows - top * n, columns - left * n)
+        self._paste(_levels(largest), top, left)
 
     def whole(self) -> LevelMap | None:
         """All tiles as one; None before the first."""
@@ -120,13 +114,5 @@ class MapTiles:
             made[i : i + half, j : j + half] = small
 
 
-def _pooled(levels: Levels, row: int, column: int, cells: int) -> tuple[Levels, int, int]:
-    """(largest of each ``cells`` x ``cells``, its first row and column in such blocks)."""
-    if cells == 1:
-        return levels, row, column
-    before = row % cells, column % cells
-    after = tuple(-(n + b) % cells for n, b in zip(levels.shape, before, strict=True))
-    padded = np.pad(levels, ((before[0], after[0]), (before[1], after[1])))
-    height, width = padded.shape
-    blocks = padded.reshape(height // cells, cells, width // cells, cells)
-    return blocks.max(axis=(1, 3)), row // cells, column // cells
+def _levels(values: NDArray[np.float32]) -> Levels:
+    return (np.nan_to_num(values) * np.float32(255.0)).astype(np.uint8)

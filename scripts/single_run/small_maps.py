@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from slam.estimate import Changes, Raster
 from slam.maps import MAX_PIXELS
 from slam.replay import Track
-from slam.strips import MapStrips
+from slam.strips import MapStrips, joined_together
 
 MOST_CELLS = 800  # along the longer side; a picture of a map drops cells where it has more
 
@@ -41,7 +41,7 @@ def drawn(track: Track, most: int = MOST_CELLS) -> Drawn | None:
     changes, found = None, track.changes_strips()
     if found is not None:
         same = [layer.cut(known) if layer.shape == cells.shape else layer for layer in found]
-        appeared, gone = (layer.joined(n).whole() for layer in same)
+        appeared, gone = joined_together(same, n)
         changes = Changes(appeared=appeared, gone=gone)
     return Drawn(part, part.joined(n).whole(), changes, n)
 
