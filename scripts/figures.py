@@ -12,6 +12,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
@@ -60,9 +61,11 @@ def styled(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure whole or not at all; PNG by suffix, 150 dpi."""
+    """Write a figure as a PNG of 150 dpi, whole or not at all."""
+    figure.set_dpi(150)
     with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=150, metadata={"Software": None})
+        # savefig would draw a figure with a layout twice
+        FigureCanvasAgg(figure).print_png(temporary, metadata={"Software": None})
 
 
 def _axes(width: float, height: float, rows: int = 1) -> tuple[Figure, NDArray[np.object_]]:

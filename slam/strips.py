@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ Cells = NDArray[np.float32]
 Piece = tuple[int, Cells]
 Bounds = tuple[float, float, float, float]
 Span = tuple[int, int]
+Rectangle = tuple[int, int, int, int]  # first row and column, past-the-last row and column
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,12 +41,14 @@ class MapStrips:
     pieces        of a first and a past-the-last row, what is known there: (first column, values)
                   of disjoint pieces, lowest column first; the values, all rows high, are those of a
                   ``Raster`` and not to be changed. Row 0 is the lowest y
+    extent        what ``known`` returns, where that can be had without reading all
     """
 
     shape: tuple[int, int]
     resolution_m: float
     T_map_origin: Float
     pieces: Callable[[int, int], Iterable[Piece]]
+    extent: Callable[[], Rectangle | None] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(
@@ -99,8 +102,14 @@ class MapStrips:
             n += 1
         return self.joined(n)
 
-    def known(self) -> tuple[int, int, int, int] | None:
+    def known(self) -> Rectangle | None:
         """First row and column, past-the-last row and column with anything known; None for none."""
+        return self._known
+
+    @cached_property
+    def _known(self) -> Rectangle | None:
+        if self.extent is not None:
+            return self.extent()
         height, width = self.shape
         in_rows = np.zeros(height, np.bool_)
         left, right = width, 0
@@ -114,7 +123,15 @@ class MapStrips:
         rows = np.flatnonzero(in_rows)
         return None if len(rows) == 0 else (int(rows[0]), int(left), int(rows[-1]) + 1, int(right))
 
-    def cut(self, rectangle: tuple[int, int, int, int]) -> MapStrips:
+    def trimmed(self) -> MapStrips | None:
+        """Without its unknown rim; None where nothing is known."""
+        known = self.known()
+        if known is None:
+            return None
+        inner = self.cut(known)
+        return replace(inner, extent=lambda: (0, 0, *inner.shape))
+
+    def cut(self, rectangle: Rectangle) -> MapStrips:
         """A part of it; rows and columns as of ``known``."""
         low, left, high, right = rectangle
 
@@ -190,9 +207,54 @@ def of_layers(
             resolution_m=cell,
             T_map_origin=np.array([left * SQUARE * cell, low * SQUARE * cell, 0.0]),
             pieces=partial(_stacked, lambda number, at=at: band(number)[at]),
+            extent=partial(_extent, lambda bounds, at=at: part(bounds)[at], squares),
         )
         for at in range(count)
     )
+
+
+def _extent(part: Callable[[Bounds], Raster | None], squares: MapSquares) -> Rectangle | None:
+    """Of what is known in ``squares``, in cells from the lowest row and column of them."""
+    places, cell = squares.places, squares.resolution_m
+    low, left = places.min(axis=0).tolist()
+
+    def known(row: int, column: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        j, i = column * SQUARE, row * SQUARE
+        raster = part((j * cell, i * cell, (j + SQUARE) * cell, (i + SQUARE) * cell))
+        there = np.zeros((0, 0), np.bool_)
+        if raster is not None:
+            there = ~np.isnan(_within(raster, (j, i, j + SQUARE, i + SQUARE)))
+        return (
+            i - low * SQUARE + np.flatnonzero(there.any(axis=1)),
+            j - left * SQUARE + np.flatnonzero(there.any(axis=0)),
+        )
+
+    return edges([(row, column) for row, column in places.tolist()], known)
+
+
+def edges(
+    squares: Sequence[tuple[int, int]],
+    known: Callable[[int, int], tuple[NDArray[np.int64], NDArray[np.int64]]],
+) -> Rectangle | None:
+    """First and past-the-last row and column of what is known in squares; only the outer are read.
+
+    known  of a square's row and column: the rows and the columns of cells in which it has anything,
+           in rising order
+    """
+    known = lru_cache(maxsize=None)(known)
+
+    def end(axis: int, last: bool) -> int | None:
+        for line in sorted({square[axis] for square in squares}, reverse=last):
+            found = [known(*square)[axis] for square in squares if square[axis] == line]
+            ends = [int(lines[-1 if last else 0]) for lines in found if len(lines)]
+            if ends:
+                return max(ends) if last else min(ends)
+        return None
+
+    low, left, high, right = end(0, False), end(1, False), end(0, True), end(1, True)
+    if low is None or left is None or high is None or right is None:
+        return None
+    return low, left, high + 1, right + 1
 
 
 def joined_together(layers: Sequence[MapStrips], n: int) -> list[Raster]:
@@ -242,7 +304,7 @@ def _stacked(band: Callable[[int], list[Piece]], first: int, last: int) -> Itera
         yield left, out
 
 
-def _within(part: Raster, cells: tuple[int, int, int, int]) -> Cells:
+def _within(part: Raster, cells: Rectangle) -> Cells:
     """What of ``part`` lies within first column and row, past-the-last column and row; NaN where it
     has nothing to say."""
     x, y, _ = part.T_map_origin.tolist()

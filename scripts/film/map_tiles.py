@@ -115,4 +115,4 @@ class MapTiles:
 
 
 def _levels(values: NDArray[np.float32]) -> Levels:
-    return (np.nan_to_num(values) * np.float32(255.0)).astype(np.uint8)
+    return (np.fmax(values, np.float32(0.0)) * np.float32(255.0)).astype(np.uint8)  # NaN: 0

@@ -33,10 +33,10 @@ def drawn(track: Track, most: int = MOST_CELLS) -> Drawn | None:
     Raises as ``Track.map`` does.
     """
     cells = track.map_strips()
+    part = None if cells is None else cells.trimmed()
     known = None if cells is None else cells.known()
-    if cells is None or known is None:
+    if cells is None or part is None or known is None:
         return None
-    part = cells.cut(known)
     n = max(-(-max(part.shape) // most), 1)
     changes, found = None, track.changes_strips()
     if found is not None:

@@ -17,7 +17,7 @@ from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, Scan
 from slam.frontend.config import FRONTEND
-from slam.strips import MapStrips, Piece, Span, runs
+from slam.strips import MapStrips, Piece, Rectangle, Span, edges, runs
 
 # Black or slanted surfaces give no return either: beyond this a silent beam says nothing.
 FREE_WITHOUT_RETURN_M = FRONTEND.view.silent_m
@@ -102,15 +102,52 @@ class SeenSpace:
                 yield left, out
 
         T_map_origin = np.array([*origin, 0.0])
-        whole = MapStrips(shape=shape, resolution_m=step, T_map_origin=T_map_origin, pieces=pieces)
-        known = whole.known()
-        return map_ if known is None else whole.cut(known)
+        whole = MapStrips(
+            shape=shape,
+            resolution_m=step,
+            T_map_origin=T_map_origin,
+            pieces=pieces,
+            extent=lambda: _around(
+                self._extent(ours, in_row), map_.known(), first_row, first_column
+            ),
+        )
+        return whole.trimmed() or map_
+
+    def _extent(
+        self,
+        ours: tuple[NDArray[np.int64], NDArray[np.int64]],
+        in_row: Mapping[int, Sequence[int]],
+    ) -> Rectangle | None:
+        """Of what has been seen, in rows and columns of which ``ours`` are our cells."""
+        met = {key: spans for key, *spans in _tiles_met(*ours, in_row)}
+
+        def known(row: int, column: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+            (i0, i1), (j0, j1) = met[row, column]
+            at = np.ix_(ours[0][i0:i1] % _CHUNK, ours[1][j0:j1] % _CHUNK)
+            there = self._tiles[row, column][at] != 0
+            return i0 + np.flatnonzero(there.any(axis=1)), j0 + np.flatnonzero(there.any(axis=0))
+
+        return edges(list(met), known)
 
     def _cells(self, edge: float, count: int, step: float) -> NDArray[np.int64]:
         """Our cells, along one axis, in which the centres of ``count`` others from ``edge`` lie."""
         centres = edge + (np.arange(count) + 0.5) * step
         cells: NDArray[np.int64] = np.floor(centres / self.resolution_m).astype(np.int64)
         return cells
+
+
+def _around(
+    one: Rectangle | None, other: Rectangle | None, rows: int, columns: int
+) -> Rectangle | None:
+    """The least rectangle around ``one`` and ``other``, moved by ``rows`` and ``columns``."""
+    if other is None:
+        return one
+    other = other[0] + rows, other[1] + columns, other[2] + rows, other[3] + columns
+    if one is None:
+        return other
+    return (
+        min(one[0], other[0]), min(one[1], other[1]), max(one[2], other[2]), max(one[3], other[3])
+    )  # fmt: skip
 
 
 def _tiles_met(
