@@ -31,9 +31,9 @@ class Changed:
         T_map_laser = se2.compose(T_map_robot, scan.spec.T_robot_laser)
         angles = scan.spec.angles
         ends = np.stack([reach * np.cos(angles), reach * np.sin(angles)], axis=1)
-        count = max(int(float(reach.max()) / ALONG_M), 1)
-        parts = np.linspace(0.0, 1.0, count, endpoint=False)
-        along = (ends[::BESIDE, None, :] * parts[None, :, None]).reshape(-1, 2)
+        few, at = reach[::BESIDE], np.arange(0.0, float(reach.max()), ALONG_M)
+        beam, step = np.nonzero(at[None, :] < few[:, None])
+        along = ends[::BESIDE][beam] * (at[step] / few[beam])[:, None]
         points = se2.transform(T_map_laser, np.vstack([ends, along]))
         column, row = np.floor(points / SQUARE_M).astype(np.int64).T
         keys = np.unique(row * _WIDE + column + _WIDE // 2)  # one number sorts faster than two

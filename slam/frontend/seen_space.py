@@ -22,6 +22,8 @@ from slam.strips import MapStrips, Piece, Rectangle, Span, edges, runs
 # Black or slanted surfaces give no return either: beyond this a silent beam says nothing.
 FREE_WITHOUT_RETURN_M = FRONTEND.view.silent_m
 _CHUNK = 256
+_SHIFT = 4  # bits of the parts of a cell in which OpenCV takes corners
+_PARTS = 1 << _SHIFT
 
 
 class SeenSpace:
@@ -45,12 +47,14 @@ class SeenSpace:
         cells = se2.transform(T_map_laser, outline) / self.resolution_m
         low = np.floor(cells.min(axis=0) / _CHUNK).astype(int)
         high = np.floor(cells.max(axis=0) / _CHUNK).astype(int)
+        fixed = np.round((cells - 0.5) * _PARTS).astype(np.int64)
         for column in range(low[0], high[0] + 1):
             for row in range(low[1], high[1] + 1):
-                tile = self._tiles.setdefault((row, column), np.zeros((_CHUNK, _CHUNK), np.uint8))
-                local = cells - (column * _CHUNK + 0.5, row * _CHUNK + 0.5)
-                fixed = np.round(local * 16.0).astype(np.int32)
-                cv2.fillPoly(tile, [fixed], 1, cv2.LINE_8, 4)
+                tile = self._tiles.get((row, column))
+                if tile is None:
+                    tile = self._tiles[row, column] = np.zeros((_CHUNK, _CHUNK), np.uint8)
+                local = fixed - (column * _CHUNK * _PARTS, row * _CHUNK * _PARTS)
+                cv2.fillPoly(tile, [local.astype(np.int32)], 1, cv2.LINE_8, _SHIFT)
 
     def _occupied_tiles(self) -> Iterator[tuple[int, int]]:
         return (key for key, tile in self._tiles.items() if tile.any())
