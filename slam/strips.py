@@ -24,7 +24,7 @@ from slam.estimate import SQUARE, MapSquares, Raster
 from slam.frames import Float
 
 STRIP_CELLS = 1 << 20  # of a strip, 4 MiB: about what is held at a time
-_BAND = 64  # rows of a square that are asked for at once
+_BAND = 128  # rows of a square that are asked for at once
 _WHOLE = 1e-6  # cells; so near to a whole number is one
 Cells = NDArray[np.float32]
 Piece = tuple[int, Cells]
@@ -93,14 +93,8 @@ class MapStrips:
             resolution_m=n * self.resolution_m,
             T_map_origin=self.T_map_origin,
             pieces=pieces,
+            extent=lambda: _in_blocks(self.known(), n),
         )
-
-    def within(self, most_cells: int) -> MapStrips:
-        """The same in the smallest such cells of which there are at most ``most_cells``."""
-        n = 1
-        while math.ceil(self.shape[0] / n) * math.ceil(self.shape[1] / n) > most_cells:
-            n += 1
-        return self.joined(n)
 
     def known(self) -> Rectangle | None:
         """First row and column, past-the-last row and column with anything known; None for none."""
@@ -211,6 +205,14 @@ def of_layers(
         )
         for at in range(count)
     )
+
+
+def _in_blocks(rectangle: Rectangle | None, n: int) -> Rectangle | None:
+    """The blocks of ``n`` a side that a rectangle of cells meets."""
+    if rectangle is None:
+        return None
+    low, left, high, right = rectangle
+    return low // n, left // n, -(-high // n), -(-right // n)
 
 
 def _extent(part: Callable[[Bounds], Raster | None], squares: MapSquares) -> Rectangle | None:

@@ -46,7 +46,9 @@ def course(scans: int, metres: float, name: str) -> Float:
     ways = np.stack([np.cos(headings), np.sin(headings)], axis=1)
     corners = np.vstack([np.zeros(2), np.cumsum(ways * leg_m, axis=0)])
     xy = corners[leg] + ways[leg] * (along - leg * leg_m)[:, None]
-    return np.column_stack([xy, headings[leg]])
+    poses = np.column_stack([xy, headings[leg]])
+    poses[0, 2] = 0.0  # the first pose is the map's frame: the first leg begins with a turn in it
+    return poses
 
 
 def houses(path: Float, rng: np.random.Generator) -> NDArray[np.float64]:

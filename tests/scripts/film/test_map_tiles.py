@@ -12,6 +12,7 @@ from scripts.film.map_pane import View, raster_picture
 from scripts.film.map_tiles import TILE, MapTiles
 from scripts.single_run.small_maps import drawn, for_file
 from slam import create
+from slam.frontend.seen_space import SeenSpace
 from slam.replay import Track
 from slam.strips import of_raster
 from slam.system import MapsInParts, Raster
@@ -132,9 +133,9 @@ def test_a_map_in_pictures_keeps_thin_walls_and_its_extent():
 
 def test_a_map_too_large_for_an_image_has_coarser_cells_and_says_so(monkeypatch):
     strips = of_raster(made(1000, 500))
-    assert for_file(strips) == (strips, "")
-    monkeypatch.setattr("scripts.single_run.small_maps.MAX_PIXELS", 125_000)
-    fitting, said = for_file(strips)
+    assert for_file(strips, SeenSpace()) == (strips, "")
+    monkeypatch.setattr("scripts.single_run.small_maps.MOST_PIXELS", 125_000)
+    fitting, said = for_file(strips, SeenSpace())
     assert fitting.shape == (500, 250)
     assert "cells of 0.1 m instead of 0.05 m: the map is 25 m x 50 m" in said
 
