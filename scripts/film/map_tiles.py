@@ -19,6 +19,7 @@ from slam.strips import join
 
 Bounds = tuple[float, float, float, float]
 Levels = NDArray[np.uint8]
+_SLACK = 1e-6  # pixels; an edge so near to that of a pixel is there
 TILE = 128  # pixels of a side
 LEAST_PX = 0.5  # of the view for a pixel of a tile; smaller ones are joined, two by two
 
@@ -54,8 +55,8 @@ class MapTiles:
         step = self.cells * self._cell_m
         if step == 0.0:
             return bounds
-        low = [math.floor(edge / step + 1e-6) * step for edge in bounds[:2]]
-        high = [math.ceil(edge / step - 1e-6) * step for edge in bounds[2:]]
+        low = [math.floor(edge / step + _SLACK) * step for edge in bounds[:2]]
+        high = [math.ceil(edge / step - _SLACK) * step for edge in bounds[2:]]
         return low[0], low[1], high[0], high[1]
 
     def put(self, raster: Raster) -> None:
@@ -73,6 +74,22 @@ class MapTiles:
         largest = np.full(shape, np.nan, np.float32)
         join(largest, raster.values, n, rows - top * n, columns - left * n)
         self._paste(_levels(largest), top, left)
+
+    def empty(self, bounds: Bounds) -> bool:
+        """Whether nothing is to be seen within ``bounds``, m."""
+        step = self.cells * self._cell_m
+        if step == 0.0:
+            return True
+        j0, i0 = (math.floor(edge / step + _SLACK) for edge in bounds[:2])
+        j1, i1 = (math.ceil(edge / step - _SLACK) for edge in bounds[2:])
+        for a in range(i0 // TILE, (i1 - 1) // TILE + 1):
+            for b in range(j0 // TILE, (j1 - 1) // TILE + 1):
+                tile = self._tiles.get((a, b))
+                rows = slice(max(i0 - a * TILE, 0), i1 - a * TILE)
+                columns = slice(max(j0 - b * TILE, 0), j1 - b * TILE)
+                if tile is not None and tile[rows, columns].any():
+                    return False
+        return True
 
     def whole(self) -> LevelMap | None:
         """All tiles as one; None before the first."""

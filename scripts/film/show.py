@@ -253,7 +253,7 @@ class _Panes:
         rest_s = 0.0 if isinstance(track.system, MapsInParts) else show.duration_s / MOST_MAPS
         if abs(seconds - self._mapped_at) >= rest_s:
             self._mapped_at = seconds
-            for bounds in show.changed.taken(in_parts=rest_s == 0.0):
+            for bounds in show.changed.taken(in_parts=rest_s == 0.0, empty=tiles.empty):
                 part = track.map_part(tiles.aligned(bounds))
                 if part is not None:
                     tiles.put(part)
