@@ -195,16 +195,16 @@ def of_layers(
                     layer.append(((a - left) * SQUARE, _within(raster, cells)))
         return found
 
-    return tuple(
-        MapStrips(
+    def strips(layer: int) -> MapStrips:
+        return MapStrips(
             shape=((high - low) * SQUARE, (right - left) * SQUARE),
             resolution_m=cell,
             T_map_origin=np.array([left * SQUARE * cell, low * SQUARE * cell, 0.0]),
-            pieces=partial(_stacked, lambda number, at=at: band(number)[at]),
-            extent=partial(_extent, lambda bounds, at=at: part(bounds)[at], squares),
+            pieces=partial(_stacked, lambda number: band(number)[layer]),
+            extent=partial(_extent, lambda bounds: part(bounds)[layer], squares),
         )
-        for at in range(count)
-    )
+
+    return tuple(map(strips, range(count)))
 
 
 def _in_blocks(rectangle: Rectangle | None, n: int) -> Rectangle | None:
