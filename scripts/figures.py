@@ -130,7 +130,7 @@ def draw_raster(ax: Axes, raster: Raster, **look: Any) -> None:
 @styled()
 def errors(path: Path, tracks: Mapping[str, Trajectory], truth: Trajectory) -> None:
     """Position and heading error over time, unaligned: in the frame of the known first pose."""
-    figure, axes = _axes(9.0, 5.0, rows=2, margins=(0.75, 0.1, 0.5, 0.35))
+    figure, axes = _axes(9.0, 5.0, rows=2, margins=(0.85, 0.1, 0.5, 0.35))
     for name, track in tracks.items():
         stamps, offset, turned = error_series(track, truth)
         color = color_of(name, list(tracks))

@@ -21,7 +21,7 @@ from slam.strips import MapStrips, Piece, Rectangle, Span, edges, runs
 
 # Black or slanted surfaces give no return either: beyond this a silent beam says nothing.
 FREE_WITHOUT_RETURN_M = FRONTEND.view.silent_m
-_CHUNK = 256
+_CHUNK = 512  # cells along a tile: of small ones OpenCV takes as long for each scan and tile
 _SHIFT = 4  # bits of the parts of a cell in which OpenCV takes corners
 _PARTS = 1 << _SHIFT
 
