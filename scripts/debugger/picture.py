@@ -299,7 +299,9 @@ def _curve(ax: mpl.axes.Axes, found: Inquest, trial: Trial, times: Float, named:
         style = {"color": "#b06a00", "lw": 1.3, "ls": "-" if trial.change.out else "--"}
         label = str(trial.change)
     elif named:
-        style = {"color": tuple(c / 255.0 for c in CULPRIT), "lw": 2.2}
+        before = sum(line.get_gid() == "named" for line in ax.lines)
+        color = draw.paler(CULPRIT, 0.3 * min(before, 2))  # one is told from the next
+        style = {"color": tuple(c / 255.0 for c in color), "lw": 2.2, "gid": "named"}
         label = str(trial.change)
         style["ls"] = "-" if trial.change.out else "--"
     else:
