@@ -83,10 +83,9 @@ def _write_pgm(path: Path, map_: MapStrips) -> str:
         for first, last in reversed(list(map_.strips())):
             strip = np.full((last - first, width), UNKNOWN, np.uint8)
             for column, values in map_.pieces(first, last):
-                strip[:, column : column + values.shape[1]] = _gray(values)
-            image = strip[::-1].tobytes()
-            digest.update(image)
-            file.write(image)
+                _paint(strip[::-1, column : column + values.shape[1]], values)
+            digest.update(strip)
+            file.write(strip)
     return digest.hexdigest()
 
 
@@ -179,11 +178,10 @@ def _check_cells(count: int, shape: tuple[int, ...]) -> None:
         raise InvalidValueError(f"a map file needs 1 to {MAX_PIXELS} cells, got shape {shape}")
 
 
-def _gray(values: NDArray[np.float32]) -> NDArray[np.uint8]:
-    gray = np.full(values.shape, UNKNOWN, dtype=np.uint8)
-    gray[values > OCCUPIED_THRESHOLD] = OCCUPIED  # false for NaN
-    gray[values < FREE_THRESHOLD] = FREE
-    return gray
+def _paint(gray: NDArray[np.uint8], values: NDArray[np.float32]) -> None:
+    """What is known, over ``UNKNOWN``."""
+    np.copyto(gray, OCCUPIED, where=values > OCCUPIED_THRESHOLD)  # false for NaN
+    np.copyto(gray, FREE, where=values < FREE_THRESHOLD)
 
 
 def _plain(value: float) -> str:

@@ -27,7 +27,7 @@ from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame, Stream
 from slam.oracle import shown
-from slam.strips import MapStrips, of_parts, of_raster
+from slam.strips import MapStrips, of_layers, of_parts, of_raster
 from slam.system import (
     CanSave,
     ChangesInParts,
@@ -145,8 +145,8 @@ class Track:
             return None if known is None else (of_raster(known.appeared), of_raster(known.gone))
         with self._named("map_squares()"), judged():
             squares = system.map_squares()
-        appeared, gone = of_parts(self._appeared, squares), of_parts(self._gone, squares)
-        return None if appeared is None or gone is None else (appeared, gone)
+        layers = of_layers(self._layers, 2, squares)
+        return None if layers is None else (layers[0], layers[1])
 
     def changes_part(self, bounds: tuple[float, float, float, float]) -> Changes | None:
         """The changes within ``bounds`` of a system that has ``ChangesInParts``."""
@@ -156,13 +156,9 @@ class Track:
         with self._named("changes_part()"), judged():
             return system.changes_part(bounds)
 
-    def _appeared(self, bounds: tuple[float, float, float, float]) -> Raster | None:
+    def _layers(self, bounds: tuple[float, float, float, float]) -> Sequence[Raster | None]:
         part = self.changes_part(bounds)
-        return None if part is None else part.appeared
-
-    def _gone(self, bounds: tuple[float, float, float, float]) -> Raster | None:
-        part = self.changes_part(bounds)
-        return None if part is None else part.gone
+        return (None, None) if part is None else (part.appeared, part.gone)
 
     def landmarks(self) -> Landmarks | None:
         """Its landmarks, None for a system without; raises ``SlamFailedError`` as ``map`` does."""

@@ -9,26 +9,28 @@ and time follows the cells that are there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
+from slam._jit import njit
 from slam.checked import pose
 from slam.errors import InvalidValueError
 from slam.estimate import SQUARE, MapSquares, Raster
 from slam.frames import Float
 
 STRIP_CELLS = 1 << 20  # of a strip, 4 MiB: about what is held at a time
-_BAND = 64  # rows of a square that are asked for at once
+_BAND = 128  # rows of a square that are asked for at once
 _WHOLE = 1e-6  # cells; so near to a whole number is one
 Cells = NDArray[np.float32]
 Piece = tuple[int, Cells]
 Bounds = tuple[float, float, float, float]
 Span = tuple[int, int]
+Rectangle = tuple[int, int, int, int]  # first row and column, past-the-last row and column
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,24 +41,28 @@ class MapStrips:
     pieces        of a first and a past-the-last row, what is known there: (first column, values)
                   of disjoint pieces, lowest column first; the values, all rows high, are those of a
                   ``Raster`` and not to be changed. Row 0 is the lowest y
+    extent        what ``known`` returns, where that can be had without reading all
     """
 
     shape: tuple[int, int]
     resolution_m: float
     T_map_origin: Float
     pieces: Callable[[int, int], Iterable[Piece]]
+    extent: Callable[[], Rectangle | None] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(
             self, "T_map_origin", pose("MapStrips", "T_map_origin", self.T_map_origin)
         )
 
-    def strips(self) -> Iterator[Span]:
-        """First and past-the-last row of each strip, lowest y first."""
+    def strips(self, low: int = 0, high: int | None = None) -> Iterator[Span]:
+        """First and past-the-last row of each strip of rows ``low`` to before ``high``, lowest y
+        first."""
         height, width = self.shape
+        high = height if high is None else high
         step = max(STRIP_CELLS // max(width, 1), 1)
-        for first in range(0, height, step):
-            yield first, min(first + step, height)
+        for first in range(low, high, step):
+            yield first, min(first + step, high)
 
     def whole(self) -> Raster:
         """All of it, for what is known to be small."""
@@ -74,17 +80,12 @@ class MapStrips:
             return self
         height, width = self.shape
         across = math.ceil(width / n)
-        step = max(STRIP_CELLS // (n * width), 1)
 
         def pieces(first: int, last: int) -> Iterator[Piece]:
             out = np.full((last - first, across), np.nan, np.float32)
-            for a in range(first, last, step):
-                b = min(a + step, last)
-                for column, piece in self.pieces(a * n, min(b * n, height)):
-                    small = _joined(piece, n, column % n)
-                    at = column // n
-                    part = out[a - first : b - first, at : at + small.shape[1]]
-                    np.fmax(part, small, out=part)
+            for low, high in self.strips(first * n, min(last * n, height)):
+                for column, piece in self.pieces(low, high):
+                    join(out, piece, n, low - first * n, column)
             yield 0, out
 
         return MapStrips(
@@ -92,30 +93,39 @@ class MapStrips:
             resolution_m=n * self.resolution_m,
             T_map_origin=self.T_map_origin,
             pieces=pieces,
+            extent=lambda: _in_blocks(self.known(), n),
         )
 
-    def within(self, most_cells: int) -> MapStrips:
-        """The same in the smallest such cells of which there are at most ``most_cells``."""
-        n = 1
-        while math.ceil(self.shape[0] / n) * math.ceil(self.shape[1] / n) > most_cells:
-            n += 1
-        return self.joined(n)
-
-    def known(self) -> tuple[int, int, int, int] | None:
+    def known(self) -> Rectangle | None:
         """First row and column, past-the-last row and column with anything known; None for none."""
+        return self._known
+
+    @cached_property
+    def _known(self) -> Rectangle | None:
+        if self.extent is not None:
+            return self.extent()
         height, width = self.shape
-        in_rows, in_columns = np.zeros(height, np.bool_), np.zeros(width, np.bool_)
+        in_rows = np.zeros(height, np.bool_)
+        left, right = width, 0
         for first, last in self.strips():
             for column, piece in self.pieces(first, last):
                 there = ~np.isnan(piece)
                 in_rows[first:last] |= there.any(axis=1)
-                in_columns[column : column + piece.shape[1]] |= there.any(axis=0)
-        rows, columns = np.flatnonzero(in_rows), np.flatnonzero(in_columns)
-        if len(rows) == 0:
-            return None
-        return int(rows[0]), int(columns[0]), int(rows[-1]) + 1, int(columns[-1]) + 1
+                if column < left or column + piece.shape[1] > right:
+                    found = column + np.flatnonzero(there.any(axis=0))
+                    left, right = min([left, *found[:1]]), max([right, *(found[-1:] + 1)])
+        rows = np.flatnonzero(in_rows)
+        return None if len(rows) == 0 else (int(rows[0]), int(left), int(rows[-1]) + 1, int(right))
 
-    def cut(self, rectangle: tuple[int, int, int, int]) -> MapStrips:
+    def trimmed(self) -> MapStrips | None:
+        """Without its unknown rim; None where nothing is known."""
+        known = self.known()
+        if known is None:
+            return None
+        inner = self.cut(known)
+        return replace(inner, extent=lambda: (0, 0, *inner.shape))
+
+    def cut(self, rectangle: Rectangle) -> MapStrips:
         """A part of it; rows and columns as of ``known``."""
         low, left, high, right = rectangle
 
@@ -159,6 +169,14 @@ def of_parts(part: Callable[[Bounds], Raster | None], squares: MapSquares) -> Ma
 
     None for no squares. The map must not change as long as this is used.
     """
+    layers = of_layers(lambda bounds: (part(bounds),), 1, squares)
+    return None if layers is None else layers[0]
+
+
+def of_layers(
+    part: Callable[[Bounds], Sequence[Raster | None]], count: int, squares: MapSquares
+) -> tuple[MapStrips, ...] | None:
+    """The same of ``count`` maps on the same cells, which ``part`` gives at once."""
     places, cell = squares.places, squares.resolution_m
     if len(places) == 0:
         return None
@@ -166,21 +184,94 @@ def of_parts(part: Callable[[Bounds], Raster | None], squares: MapSquares) -> Ma
     high, right = (places.max(axis=0) + 1).tolist()
 
     @lru_cache(maxsize=2)  # strips begin and end within bands
-    def band(number: int) -> list[Piece]:
+    def band(number: int) -> list[list[Piece]]:
         row = low * SQUARE + number * _BAND
-        found = []
+        found: list[list[Piece]] = [[] for _ in range(count)]
         for a, b in runs([(j, j + 1) for j in places[places[:, 0] == row // SQUARE, 1].tolist()]):
             cells = (a * SQUARE, row, b * SQUARE, row + _BAND)
-            raster = part((cells[0] * cell, row * cell, cells[2] * cell, (row + _BAND) * cell))
-            if raster is not None:
-                found.append(((a - left) * SQUARE, _within(raster, cells)))
+            bounds = (cells[0] * cell, row * cell, cells[2] * cell, (row + _BAND) * cell)
+            for layer, raster in zip(found, part(bounds), strict=True):
+                if raster is not None:
+                    layer.append(((a - left) * SQUARE, _within(raster, cells)))
         return found
 
-    origin = np.array([left * SQUARE * cell, low * SQUARE * cell, 0.0])
-    shape = (high - low) * SQUARE, (right - left) * SQUARE
-    return MapStrips(
-        shape=shape, resolution_m=cell, T_map_origin=origin, pieces=partial(_stacked, band)
-    )
+    def strips(layer: int) -> MapStrips:
+        return MapStrips(
+            shape=((high - low) * SQUARE, (right - left) * SQUARE),
+            resolution_m=cell,
+            T_map_origin=np.array([left * SQUARE * cell, low * SQUARE * cell, 0.0]),
+            pieces=partial(_stacked, lambda number: band(number)[layer]),
+            extent=partial(_extent, lambda bounds: part(bounds)[layer], squares),
+        )
+
+    return tuple(map(strips, range(count)))
+
+
+def _in_blocks(rectangle: Rectangle | None, n: int) -> Rectangle | None:
+    """The blocks of ``n`` a side that a rectangle of cells meets."""
+    if rectangle is None:
+        return None
+    low, left, high, right = rectangle
+    return low // n, left // n, -(-high // n), -(-right // n)
+
+
+def _extent(part: Callable[[Bounds], Raster | None], squares: MapSquares) -> Rectangle | None:
+    """Of what is known in ``squares``, in cells from the lowest row and column of them."""
+    places, cell = squares.places, squares.resolution_m
+    low, left = places.min(axis=0).tolist()
+
+    def known(row: int, column: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        j, i = column * SQUARE, row * SQUARE
+        raster = part((j * cell, i * cell, (j + SQUARE) * cell, (i + SQUARE) * cell))
+        there = np.zeros((0, 0), np.bool_)
+        if raster is not None:
+            there = ~np.isnan(_within(raster, (j, i, j + SQUARE, i + SQUARE)))
+        return (
+            i - low * SQUARE + np.flatnonzero(there.any(axis=1)),
+            j - left * SQUARE + np.flatnonzero(there.any(axis=0)),
+        )
+
+    return edges([(row, column) for row, column in places.tolist()], known)
+
+
+def edges(
+    squares: Sequence[tuple[int, int]],
+    known: Callable[[int, int], tuple[NDArray[np.int64], NDArray[np.int64]]],
+) -> Rectangle | None:
+    """First and past-the-last row and column of what is known in squares; only the outer are read.
+
+    known  of a square's row and column: the rows and the columns of cells in which it has anything,
+           in rising order
+    """
+    known = lru_cache(maxsize=None)(known)
+
+    def end(axis: int, last: bool) -> int | None:
+        for line in sorted({square[axis] for square in squares}, reverse=last):
+            found = [known(*square)[axis] for square in squares if square[axis] == line]
+            ends = [int(lines[-1 if last else 0]) for lines in found if len(lines)]
+            if ends:
+                return max(ends) if last else min(ends)
+        return None
+
+    low, left, high, right = end(0, False), end(1, False), end(0, True), end(1, True)
+    if low is None or left is None or high is None or right is None:
+        return None
+    return low, left, high + 1, right + 1
+
+
+def joined_together(layers: Sequence[MapStrips], n: int) -> list[Raster]:
+    """``joined(n).whole()`` of maps on the same cells, read a strip of all of them at a time: what
+    they share is made once."""
+    height, width = layers[0].shape
+    outs = [np.full((-(-height // n), -(-width // n)), np.nan, np.float32) for _ in layers]
+    for first, last in layers[0].strips():
+        for layer, out in zip(layers, outs, strict=True):
+            for column, piece in layer.pieces(first, last):
+                join(out, piece, n, first, column)
+    return [
+        Raster(values=out, resolution_m=n * layer.resolution_m, T_map_origin=layer.T_map_origin)
+        for layer, out in zip(layers, outs, strict=True)
+    ]
 
 
 def runs(spans: Iterable[Span]) -> list[Span]:
@@ -197,6 +288,10 @@ def runs(spans: Iterable[Span]) -> list[Span]:
 def _stacked(band: Callable[[int], list[Piece]], first: int, last: int) -> Iterator[Piece]:
     """The rows of several bands, as pieces that are all rows high."""
     bands = [(n * _BAND, band(n)) for n in range(first // _BAND, (last - 1) // _BAND + 1)]
+    if len(bands) == 1:
+        row, pieces = bands[0]
+        yield from ((column, values[first - row : last - row]) for column, values in pieces)
+        return
     spans = runs((c, c + v.shape[1]) for _, pieces in bands for c, v in pieces)
     for left, right in spans:
         out = np.full((last - first, right - left), np.nan, np.float32)
@@ -211,13 +306,15 @@ def _stacked(band: Callable[[int], list[Piece]], first: int, last: int) -> Itera
         yield left, out
 
 
-def _within(part: Raster, cells: tuple[int, int, int, int]) -> Cells:
+def _within(part: Raster, cells: Rectangle) -> Cells:
     """What of ``part`` lies within first column and row, past-the-last column and row; NaN where it
     has nothing to say."""
-    values = np.full((cells[3] - cells[1], cells[2] - cells[0]), np.nan, np.float32)
     x, y, _ = part.T_map_origin.tolist()
     j0, i0 = round(x / part.resolution_m), round(y / part.resolution_m)
     height, width = part.values.shape
+    if (j0, i0, j0 + width, i0 + height) == cells:
+        return part.values
+    values = np.full((cells[3] - cells[1], cells[2] - cells[0]), np.nan, np.float32)
     j_low, i_low = max(cells[0], j0), max(cells[1], i0)
     j_high, i_high = min(cells[2], j0 + width), min(cells[3], i0 + height)
     if j_low < j_high and i_low < i_high:
@@ -226,12 +323,25 @@ def _within(part: Raster, cells: tuple[int, int, int, int]) -> Cells:
     return values
 
 
-def _joined(values: Cells, n: int, before: int) -> Cells:
-    """The largest of each ``n`` x ``n``, the first block beginning ``before`` columns earlier."""
-    height, width = values.shape
-    margins = ((0, -height % n), (before, -(width + before) % n))
-    padded = np.pad(values, margins, constant_values=np.nan)
-    height, width = padded.shape
-    blocks = padded.reshape(height // n, n, width // n, n)
-    joined: Cells = np.fmax.reduce(np.fmax.reduce(blocks, axis=3), axis=1)
-    return joined
+def join(out: Cells, values: Cells, n: int, row: int, column: int) -> None:
+    """Let each cell of ``out`` be at least as large as those of ``values`` in it, ``n`` a side.
+
+    row, column  of ``values`` in ``out``, in cells of ``values``
+    """
+    given = np.ascontiguousarray(values).view()
+    given.setflags(write=False)  # of one type, for one compiled kernel
+    _join(out, given, n, row, column)
+
+
+@njit
+def _join(out: Cells, values: Cells, n: int, row: int, column: int) -> None:
+    for a in range(values.shape[0]):
+        i, j = (row + a) // n, column // n
+        beside = n - column % n  # columns of values before the next of out
+        for b in range(values.shape[1]):
+            value = values[a, b]
+            if not np.isnan(value) and not out[i, j] >= value:  # out may be NaN
+                out[i, j] = value
+            beside -= 1
+            if beside == 0:
+                j, beside = j + 1, n

@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from scripts.figures import save, styled
 from slam.days.changes import Change
@@ -18,6 +19,7 @@ from slam.days.mobility import MobilityMap
 from slam.estimate import Raster
 
 COLOURS = {"appeared": "#1b7f4d", "gone": "#c0392b", "moved": "#2457a6", "door": "#b8860b"}
+UNSEEN = "#b0b4b8"
 _LEAST = 0.05  # a confidence below is not drawn
 
 
@@ -25,7 +27,7 @@ def _draw(ax: Axes, snapshot: Snapshot, cell_m: float, title: str) -> None:
     low, images = dense(snapshot.cells, snapshot.standing)
     height, width = images[0].shape
     x, y = (low * cell_m).tolist()
-    ax.set_facecolor("#b0b4b8")
+    ax.set_facecolor(UNSEEN)
     ax.imshow(
         images[0], origin="lower", extent=(x, x + width * cell_m, y, y + height * cell_m),
         cmap="Greys", vmin=0.0, vmax=1.0, interpolation="nearest",
@@ -43,7 +45,8 @@ def changes_picture(
 ) -> None:
     """Both sessions beside each other, every change ringed in its colour."""
     with styled():
-        figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.6), sharex=True, sharey=True)
+        figure = Figure(figsize=(11.0, 4.6))
+        axes = figure.subplots(1, 2, sharex=True, sharey=True)
         for ax, snapshot, title in zip(axes, snapshots, titles, strict=True):
             _draw(ax, snapshot, cell_m, title)
         for change in changes:
@@ -54,9 +57,9 @@ def changes_picture(
             new = change.kind in ("appeared", "door", "moved")
             first = change.before or change.at
             if old:
-                axes[0].add_patch(plt.Circle(first, radius, fill=False, color=colour, lw=1.6))
+                axes[0].add_patch(Circle(first, radius, fill=False, color=colour, lw=1.6))
             if new:
-                axes[1].add_patch(plt.Circle(change.at, radius, fill=False, color=colour, lw=1.6))
+                axes[1].add_patch(Circle(change.at, radius, fill=False, color=colour, lw=1.6))
             if change.before is not None:
                 axes[1].annotate(
                     "", change.at, change.before,
@@ -64,7 +67,8 @@ def changes_picture(
                 )  # fmt: skip
         for kind, colour in COLOURS.items():
             axes[1].plot([], [], "o", mfc="none", color=colour, label=kind)
-        axes[1].legend(loc="upper right", fontsize=8)
+        axes[1].plot([], [], "s", color=UNSEEN, label="not seen")
+        figure.legend(loc="outside lower center", ncols=len(COLOURS) + 1, frameon=False)
         axes[0].set_ylabel("y, m")
         save(figure, path)
 
@@ -78,27 +82,28 @@ def mobility_picture(path: Path, mobility: MobilityMap, hours: Sequence[float]) 
     last = float(mobility.history.times_s[-1])
     day = (np.floor(last / DAY_S) + 1.0) * DAY_S
     panes: list[tuple[str, Raster | None, str]] = [
-        ("how often something stands there", standing, "Greys"),
-        ("how much that changes", changing, "inferno"),
+        ("how often something stands there, 0 to 1", standing, "Greys"),
+        ("how much that changes, 0 to 1", changing, "inferno"),
     ]
     panes += [
-        (f"expected at {h:g} h the day after", mobility.probability(day + 3600.0 * h), "Greys")
+        (f"probability at {h:g} h the day after", mobility.probability(day + 3600.0 * h), "Greys")
         for h in hours
     ]
     with styled():
         rows = -(-len(panes) // 2)
-        figure, grid = plt.subplots(rows, 2, figsize=(11.0, 4.4 * rows), squeeze=False)
+        figure = Figure(figsize=(11.0, 4.4 * rows))
+        grid = figure.subplots(rows, 2, squeeze=False)
         for ax, (title, raster, colours) in zip(grid.ravel(), panes, strict=False):
             assert raster is not None
             x, y, _ = raster.T_map_origin.tolist()
             height, width = (n * raster.resolution_m for n in raster.values.shape)
-            ax.set_facecolor("#b0b4b8")
+            ax.set_facecolor(UNSEEN)
             drawn = ax.imshow(
                 raster.values, origin="lower", extent=(x, x + width, y, y + height),
                 cmap=colours, vmin=0.0, vmax=1.0, interpolation="nearest",
             )  # fmt: skip
             figure.colorbar(drawn, ax=ax, shrink=0.8)
-            ax.set_title(title)
+            ax.set(title=title, xlabel="x, m", ylabel="y, m")
         for ax in grid.ravel()[len(panes) :]:
             ax.set_axis_off()
         save(figure, path)

@@ -36,10 +36,12 @@ from slam.frames import NS_PER_S, Float, Frame
 CULPRIT: draw.Color = (176, 32, 190)
 CELL_PX = 380
 PX_PER_M = 56.0
+RIM_M = 0.2  # of the plan below the room
 SIDE_M = (3.5, 9.0)  # least and most of what a cell shows
 MOMENTS = 5
 MAX_PX = 8000
 THICK = 3
+LABEL_PX, LINE_PX = 16, 20  # of words in a cell
 ROOM = 1.8  # of the chart, times the original's greatest error
 
 
@@ -86,6 +88,7 @@ class _Camera:
         size = [max(64, round((side + 0.6) * scale)) for side in (xmax - xmin, ymax - ymin)]
         self._view = MapView(scene, *size)
         self._radii = [mover.radius for mover in scene.movers]
+        self._foot = round(float(self._view.to_pixels([[xmin, ymin - RIM_M]])[0][1]))
         self._window = self._square()
 
     def _square(self) -> tuple[int, int, int, int]:
@@ -102,11 +105,12 @@ class _Camera:
         side = min(max(float((high - low).max()) + 2.0, SIDE_M[0]), most)
         half = 0.5 * side * self._view.plan.scale
         x, y = self._view.to_pixels([0.5 * (low + high)])[0]
-        height, width = self._view.plan.picture.shape[:2]
+        width = self._view.plan.picture.shape[1]
+        height = self._foot  # below it is the plan's own scale
         x = min(max(x, half), max(width - half, 0.5 * width))
         y = min(max(y, half), max(height - half, 0.5 * height))
         left, top = max(0, round(x - half)), max(0, round(y - half))
-        return left, top, round(x + half), round(y + half)
+        return left, top, round(x + half), min(round(y + half), self._foot)
 
     def _world(self, T_map_robot: Float) -> Float:
         return se2.compose(self._found.tape.T_world_map, T_map_robot)
@@ -130,16 +134,20 @@ class _Camera:
         self._hits(picture, strip.frames[row], believed)
         self._outline(picture, believed)
         was = self._found.tape.strip.poses[row if trial is None else row + self._found.first]
+        words: list[tuple[int, int, int, int]] = []
         for label, group in _labelled(self._found):
             for name in group:
                 gone = name in change.out
                 self._ring(picture, was if gone else poses, names.index(name), gone)
-            self._label(picture, was, names.index(group[0]), label)
+            first_of = names.index(group[0])
+            at = was if group[0] in change.out else poses
+            words.append(self._label(picture, at, first_of, label, words))
         x0, y0, x1, y1 = self._window
         cell = np.ascontiguousarray(picture[y0:y1, x0:x1])
         left, low, metre = 14, len(cell) - 14, round(self._view.plan.scale)
-        cv2.line(cell, (left, low), (left + metre, low), draw.INK, THICK, cv2.LINE_AA)
-        draw.text(cell, "1 m", (left, low - 24), 16, draw.INK)
+        for color, thick in ((draw.PAPER, 3 * THICK), (draw.INK, THICK)):
+            cv2.line(cell, (left, low), (left + metre, low), color, thick, cv2.LINE_AA)
+        _write(cell, "1 m", (left, low - 26), draw.INK)
         return cell
 
     def _hits(self, picture: Picture, frame: Frame, T_world_robot: Float) -> None:
@@ -161,11 +169,28 @@ class _Camera:
         cv2.circle(picture, centre, radius, draw.BLUE, THICK, cv2.LINE_AA)
         cv2.line(picture, centre, tip, draw.BLUE, THICK, cv2.LINE_AA)
 
-    def _label(self, picture: Picture, poses: Float, m: int, label: str) -> None:
-        """The word beside the first of those named."""
+    def _label(
+        self,
+        picture: Picture,
+        poses: Float,
+        m: int,
+        label: str,
+        others: Sequence[tuple[int, int, int, int]],
+    ) -> tuple[int, int, int, int]:
+        """The word beside the first of those named, within the cell and clear of the ``others``;
+        x, y, width, height (px) of it."""
         x, y = self._view.to_pixels([poses[m][:2]])[0].round().astype(int).tolist()
         side = round((self._radii[m] + 0.2) * self._view.plan.scale)
-        draw.text(picture, label, (x + side, y - 8), 16, CULPRIT, bold=True)
+        wide = draw.text_width(label, LABEL_PX, bold=True)
+        left, top, right, low = self._window
+        x = x + side if x + side + wide <= right else x - side - wide
+        x, y = max(x, left + 2), min(max(y - 8, top + 2), low - LINE_PX)
+        while any(
+            x < a + w and a < x + wide and y < b + h and b < y + LINE_PX for a, b, w, h in others
+        ):
+            y += LINE_PX
+        _write(picture, label, (x, y), CULPRIT, bold=True)
+        return x, y, wide, LINE_PX
 
     def _ring(self, picture: Picture, poses: Float, m: int, gone: bool) -> None:
         """Around somebody named; in dashes where one was who is out."""
@@ -182,6 +207,15 @@ class _Camera:
             cv2.ellipse(
                 picture, centre, (size, size), 0, start, end, CULPRIT, THICK, cv2.LINE_AA
             )  # fmt: skip
+
+
+def _write(
+    picture: Picture, words: str, at: tuple[int, int], color: draw.Color, bold: bool = False
+) -> None:
+    """Words with a rim of paper: readable on floors, walls and people."""
+    for x, y in ((-2, 0), (2, 0), (0, -2), (0, 2), (-1, -1), (1, 1), (-1, 1), (1, -1)):
+        draw.text(picture, words, (at[0] + x, at[1] + y), LABEL_PX, draw.PAPER, bold=bold)
+    draw.text(picture, words, at, LABEL_PX, color, bold=bold)
 
 
 def _named(found: Inquest) -> list[str]:
@@ -265,7 +299,9 @@ def _curve(ax: mpl.axes.Axes, found: Inquest, trial: Trial, times: Float, named:
         style = {"color": "#b06a00", "lw": 1.3, "ls": "-" if trial.change.out else "--"}
         label = str(trial.change)
     elif named:
-        style = {"color": tuple(c / 255.0 for c in CULPRIT), "lw": 2.2}
+        before = sum(line.get_gid() == "named" for line in ax.lines)
+        color = draw.paler(CULPRIT, 0.3 * min(before, 2))  # one is told from the next
+        style = {"color": tuple(c / 255.0 for c in color), "lw": 2.2, "gid": "named"}
         label = str(trial.change)
         style["ls"] = "-" if trial.change.out else "--"
     else:

@@ -161,13 +161,25 @@ def draw_ellipse(
 
 
 def scale_bar(picture: Picture, view: View, unit: float) -> None:
-    """A length of 1, 2 or 5 times a power of ten in the lower left corner."""
-    longest = view.width / view.scale / 4.0
-    meters = draw.round_down(longest)
-    x, y = round(12 * unit), view.height - round(12 * unit)
-    thick = max(1, round(3 * unit))
-    picture[y : y + thick, x : x + round(meters * view.scale)] = draw.INK
-    draw.text(picture, draw.length(meters), (x, y - round(18 * unit)), round(12 * unit), draw.INK)
+    """A length of 1, 2 or 5 times a power of ten in a corner: the lower left one, or the first of
+    the others in which nothing is drawn."""
+    meters = draw.round_down(view.width / view.scale / 4.0)
+    word, size, thick = draw.length(meters), round(12 * unit), max(1, round(3 * unit))
+    margin, bar, above = round(12 * unit), round(meters * view.scale), round(18 * unit)
+    wide = max(bar, draw.text_width(word, size))
+    places = [
+        (x, y)
+        for y in (view.height - margin, margin + above)
+        for x in (margin, view.width - margin - wide)
+    ]
+    free = (
+        (x, y)
+        for x, y in places
+        if (picture[y - above : y + thick, x : x + wide] == draw.PAPER).all()
+    )
+    x, y = next(free, places[0])
+    picture[y : y + thick, x : x + bar] = draw.INK
+    draw.text(picture, word, (x, y - above), size, draw.INK)
 
 
 @dataclass(eq=False)

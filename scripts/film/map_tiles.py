@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from slam.estimate import Raster
 from slam.frames import Float
+from slam.strips import join
 
 Bounds = tuple[float, float, float, float]
 Levels = NDArray[np.uint8]
+_SLACK = 1e-6  # pixels; an edge so near to that of a pixel is there
 TILE = 128  # pixels of a side
 LEAST_PX = 0.5  # of the view for a pixel of a tile; smaller ones are joined, two by two
 
@@ -32,8 +34,7 @@ class LevelMap(NamedTuple):
 
 def levels_of(raster: Raster) -> LevelMap:
     """A whole map so."""
-    levels = (np.nan_to_num(raster.values) * np.float32(255.0)).astype(np.uint8)
-    return LevelMap(levels, raster.resolution_m, raster.T_map_origin)
+    return LevelMap(_levels(raster.values), raster.resolution_m, raster.T_map_origin)
 
 
 class MapTiles:
@@ -54,8 +55,8 @@ class MapTiles:
         step = self.cells * self._cell_m
         if step == 0.0:
             return bounds
-        low = [math.floor(edge / step + 1e-6) * step for edge in bounds[:2]]
-        high = [math.ceil(edge / step - 1e-6) * step for edge in bounds[2:]]
+        low = [math.floor(edge / step + _SLACK) * step for edge in bounds[:2]]
+        high = [math.ceil(edge / step - _SLACK) * step for edge in bounds[2:]]
         return low[0], low[1], high[0], high[1]
 
     def put(self, raster: Raster) -> None:
@@ -67,18 +68,28 @@ class MapTiles:
         x, y, _ = raster.T_map_origin.tolist()
         columns = math.floor(x / self._cell_m + 0.5)
         rows = math.floor(y / self._cell_m + 0.5)
-        height = raster.values.shape[0]
-        step = max(self.cells, (1 << 22) // max(raster.values.shape[1], 1))
-        step -= step % self.cells
-        first = 0
-        while first < height:  # a stripe at a time: the memory is that of one
-            last = min(first + step - (rows + first) % self.cells, height)
-            levels = np.nan_to_num(raster.values[first:last]) * np.float32(255.0)
-            pooled, row, column = _pooled(
-                levels.astype(np.uint8), rows + first, columns, self.cells
-            )
-            self._paste(pooled, row, column)
-            first = last
+        n, (height, width) = self.cells, raster.values.shape
+        top, left = rows // n, columns // n
+        shape = (rows + height - 1) // n - top + 1, (columns + width - 1) // n - left + 1
+        largest = np.full(shape, np.nan, np.float32)
+        join(largest, raster.values, n, rows - top * n, columns - left * n)
+        self._paste(_levels(largest), top, left)
+
+    def empty(self, bounds: Bounds) -> bool:
+        """Whether nothing is to be seen within ``bounds``, m."""
+        step = self.cells * self._cell_m
+        if step == 0.0:
+            return True
+        j0, i0 = (math.floor(edge / step + _SLACK) for edge in bounds[:2])
+        j1, i1 = (math.ceil(edge / step - _SLACK) for edge in bounds[2:])
+        for a in range(i0 // TILE, (i1 - 1) // TILE + 1):
+            for b in range(j0 // TILE, (j1 - 1) // TILE + 1):
+                tile = self._tiles.get((a, b))
+                rows = slice(max(i0 - a * TILE, 0), i1 - a * TILE)
+                columns = slice(max(j0 - b * TILE, 0), j1 - b * TILE)
+                if tile is not None and tile[rows, columns].any():
+                    return False
+        return True
 
     def whole(self) -> LevelMap | None:
         """All tiles as one; None before the first."""
@@ -120,13 +131,5 @@ class MapTiles:
             made[i : i + half, j : j + half] = small
 
 
-def _pooled(levels: Levels, row: int, column: int, cells: int) -> tuple[Levels, int, int]:
-    """(largest of each ``cells`` x ``cells``, its first row and column in such blocks)."""
-    if cells == 1:
-        return levels, row, column
-    before = row % cells, column % cells
-    after = tuple(-(n + b) % cells for n, b in zip(levels.shape, before, strict=True))
-    padded = np.pad(levels, ((before[0], after[0]), (before[1], after[1])))
-    height, width = padded.shape
-    blocks = padded.reshape(height // cells, cells, width // cells, cells)
-    return blocks.max(axis=(1, 3)), row // cells, column // cells
+def _levels(values: NDArray[np.float32]) -> Levels:
+    return (np.fmax(values, np.float32(0.0)) * np.float32(255.0)).astype(np.uint8)  # NaN: 0

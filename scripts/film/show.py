@@ -210,7 +210,10 @@ class _Panes:
 
     def paint(self, frame: Frame, seconds: float) -> Picture:
         show, layout = self._show, self._layout
-        fresh = abs(seconds - self._fresh_at) >= FRESH_S * show.pace.speed - 1e-6
+        fresh = (
+            show.pace.fps * FRESH_S <= 1.0  # scans come when they come: some early by a part
+            or abs(seconds - self._fresh_at) >= FRESH_S * show.pace.speed - 1e-6
+        )
         track, trails = show.track(), show.trails
         T_view_map = show.T_view_map()
         if fresh:
@@ -250,7 +253,7 @@ class _Panes:
         rest_s = 0.0 if isinstance(track.system, MapsInParts) else show.duration_s / MOST_MAPS
         if abs(seconds - self._mapped_at) >= rest_s:
             self._mapped_at = seconds
-            for bounds in show.changed.taken(in_parts=rest_s == 0.0):
+            for bounds in show.changed.taken(in_parts=rest_s == 0.0, empty=tiles.empty):
                 part = track.map_part(tiles.aligned(bounds))
                 if part is not None:
                     tiles.put(part)

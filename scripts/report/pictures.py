@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Affine2D
 
 from scenes.kinds import is_door
@@ -139,10 +140,11 @@ def _panel(run: RunFile, paths: Float | None = None) -> tuple[Figure, Axes]:
             spine.set_visible(False)
         meters = 10.0 ** math.floor(math.log10(width / 3.0))
         at = (x + 0.06 * width, y + 0.06 * height)
-        ax.plot([at[0], at[0] + meters], [at[1], at[1]], color=style.INK, lw=2.0, zorder=6)
+        rim = [withStroke(linewidth=2.0, foreground="white")]  # a box would hide what is there
+        ax.plot([at[0], at[0] + meters], [at[1], at[1]], color=style.INK, lw=2.0, zorder=6,
+                path_effects=rim)  # fmt: skip
         ax.annotate(f"{meters:g} m", at, xytext=(0, 4), textcoords="offset points", fontsize=9,
-                    zorder=6, bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none",
-                                    "alpha": 0.7})  # fmt: skip
+                    zorder=6, path_effects=rim)  # fmt: skip
     return figure, ax
 
 

@@ -64,7 +64,8 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
     ) as folder:
         costs, show.filmed = outputs.costs or Costs(), outputs.film
         show.pace = outputs.pace or Pace.within_a_minute(show.duration_s, outputs.film_fps)
-        reel = film(folder / "film.mp4", show.pace.fps) if outputs.film else nullcontext()
+        pace, path = show.pace, folder / "film.mp4"
+        reel = film(path, pace.fps, preset=pace.preset) if outputs.film else nullcontext()
         started = time.perf_counter()
         with costs.beside(FILM), reel as opened, costs.scans():
             frames = shoot(costs.reading(stream), show, opened, partial(costs.stage, FILM))
@@ -110,7 +111,7 @@ def _write_map(folder: Path, show: Show) -> Drawn | None:
     primary = show.track()
     found = drawn(primary)
     if found is not None:
-        cells, said = for_file(show.seen.merge(found.cells))
+        cells, said = for_file(found.cells, show.seen)
         write_map(folder / "map", cells)
         if said:
             note(said)

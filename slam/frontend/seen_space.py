@@ -17,11 +17,13 @@ from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, Scan
 from slam.frontend.config import FRONTEND
-from slam.strips import MapStrips, Piece, Span, runs
+from slam.strips import MapStrips, Piece, Rectangle, Span, edges, runs
 
 # Black or slanted surfaces give no return either: beyond this a silent beam says nothing.
 FREE_WITHOUT_RETURN_M = FRONTEND.view.silent_m
-_CHUNK = 256
+_CHUNK = 512  # cells along a tile: of small ones OpenCV takes as long for each scan and tile
+_SHIFT = 4  # bits of the parts of a cell in which OpenCV takes corners
+_PARTS = 1 << _SHIFT
 
 
 class SeenSpace:
@@ -45,12 +47,14 @@ class SeenSpace:
         cells = se2.transform(T_map_laser, outline) / self.resolution_m
         low = np.floor(cells.min(axis=0) / _CHUNK).astype(int)
         high = np.floor(cells.max(axis=0) / _CHUNK).astype(int)
+        fixed = np.round((cells - 0.5) * _PARTS).astype(np.int64)
         for column in range(low[0], high[0] + 1):
             for row in range(low[1], high[1] + 1):
-                tile = self._tiles.setdefault((row, column), np.zeros((_CHUNK, _CHUNK), np.uint8))
-                local = cells - (column * _CHUNK + 0.5, row * _CHUNK + 0.5)
-                fixed = np.round(local * 16.0).astype(np.int32)
-                cv2.fillPoly(tile, [fixed], 1, cv2.LINE_8, 4)
+                tile = self._tiles.get((row, column))
+                if tile is None:
+                    tile = self._tiles[row, column] = np.zeros((_CHUNK, _CHUNK), np.uint8)
+                local = fixed - (column * _CHUNK * _PARTS, row * _CHUNK * _PARTS)
+                cv2.fillPoly(tile, [local.astype(np.int32)], 1, cv2.LINE_8, _SHIFT)
 
     def _occupied_tiles(self) -> Iterator[tuple[int, int]]:
         return (key for key, tile in self._tiles.items() if tile.any())
@@ -102,15 +106,52 @@ class SeenSpace:
                 yield left, out
 
         T_map_origin = np.array([*origin, 0.0])
-        whole = MapStrips(shape=shape, resolution_m=step, T_map_origin=T_map_origin, pieces=pieces)
-        known = whole.known()
-        return map_ if known is None else whole.cut(known)
+        whole = MapStrips(
+            shape=shape,
+            resolution_m=step,
+            T_map_origin=T_map_origin,
+            pieces=pieces,
+            extent=lambda: _around(
+                self._extent(ours, in_row), map_.known(), first_row, first_column
+            ),
+        )
+        return whole.trimmed() or map_
+
+    def _extent(
+        self,
+        ours: tuple[NDArray[np.int64], NDArray[np.int64]],
+        in_row: Mapping[int, Sequence[int]],
+    ) -> Rectangle | None:
+        """Of what has been seen, in rows and columns of which ``ours`` are our cells."""
+        met = {key: spans for key, *spans in _tiles_met(*ours, in_row)}
+
+        def known(row: int, column: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+            (i0, i1), (j0, j1) = met[row, column]
+            at = np.ix_(ours[0][i0:i1] % _CHUNK, ours[1][j0:j1] % _CHUNK)
+            there = self._tiles[row, column][at] != 0
+            return i0 + np.flatnonzero(there.any(axis=1)), j0 + np.flatnonzero(there.any(axis=0))
+
+        return edges(list(met), known)
 
     def _cells(self, edge: float, count: int, step: float) -> NDArray[np.int64]:
         """Our cells, along one axis, in which the centres of ``count`` others from ``edge`` lie."""
         centres = edge + (np.arange(count) + 0.5) * step
         cells: NDArray[np.int64] = np.floor(centres / self.resolution_m).astype(np.int64)
         return cells
+
+
+def _around(
+    one: Rectangle | None, other: Rectangle | None, rows: int, columns: int
+) -> Rectangle | None:
+    """The least rectangle around ``one`` and ``other``, moved by ``rows`` and ``columns``."""
+    if other is None:
+        return one
+    other = other[0] + rows, other[1] + columns, other[2] + rows, other[3] + columns
+    if one is None:
+        return other
+    return (
+        min(one[0], other[0]), min(one[1], other[1]), max(one[2], other[2]), max(one[3], other[3])
+    )  # fmt: skip
 
 
 def _tiles_met(

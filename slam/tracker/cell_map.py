@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from slam.errors import InvalidValueError
 from slam.estimate import SQUARE, MapSquares
 from slam.frontend.visibility import View
-from slam.tracker.cells import SIDE, Cells, dense, forget_impressions, living, no_cells, with_room
+from slam.tracker.cells import SIDE, Cells, forget_impressions, living, no_cells, with_room
 from slam.tracker.config import TrackerConfig
+from slam.tracker.windows import dense
 
 MAX_BLOCKS_ACROSS = 1 << 15  # directory edge; 7.8 km at 3 cm cells
 MAX_DIRECTORY = 1 << 26  # entries, 256 MiB: 1.9 km square

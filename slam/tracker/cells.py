@@ -133,28 +133,6 @@ def forget_impressions(cells: Cells) -> None:
     cells.counts[TOUCHED_COUNT] = 0
 
 
-def dense(
-    cells: Cells, i0: int, j0: int, shape: tuple[int, int]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """x and y of cells (i0 + column, j0 + row), 0 where nothing lives."""
-    top, left = j0 >> SHIFT, i0 >> SHIFT
-    rows = np.arange(top, ((j0 + shape[0] - 1) >> SHIFT) + 1) - int(cells.corner[1])
-    columns = np.arange(left, ((i0 + shape[1] - 1) >> SHIFT) + 1) - int(cells.corner[0])
-    x, y = (np.zeros((len(rows), SIDE, len(columns), SIDE), np.float32) for _ in range(2))
-    inside_r = np.flatnonzero((rows >= 0) & (rows < cells.directory.shape[0]))
-    inside_c = np.flatnonzero((columns >= 0) & (columns < cells.directory.shape[1]))
-    slots = cells.directory[np.ix_(rows[inside_r], columns[inside_c])]
-    a, b = np.nonzero(slots >= 0)
-    x[inside_r[a], :, inside_c[b]] = cells.x[slots[a, b]]
-    y[inside_r[a], :, inside_c[b]] = cells.y[slots[a, b]]
-    window = np.s_[j0 - top * SIDE :, i0 - left * SIDE :]
-    flat = (len(rows) * SIDE, len(columns) * SIDE)
-    return (
-        x.reshape(flat)[window][: shape[0], : shape[1]].copy(),
-        y.reshape(flat)[window][: shape[0], : shape[1]].copy(),
-    )
-
-
 @inner
 def in_reach(
     cells: Cells, view: View, ox: float, oy: float, size: float

@@ -25,7 +25,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.archives import read_arrays
+from slam.archives import read_arrays, write_arrays
 from slam.checked import covariance, is_number, pose
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing
@@ -129,8 +129,7 @@ def save(
         arrays |= extra
     header["sha256"] = _sum(header, arrays)
     with replacing(path) as temporary, temporary.open("wb") as file:
-        content: Any = {"header": np.array(json.dumps(header)), **arrays}
-        np.savez_compressed(file, **content)
+        write_arrays(file, {"header": np.array(json.dumps(header)), **arrays})
 
 
 def _sum(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from slam.archives import read_arrays
+from slam.archives import read_arrays, write_arrays
 from slam.errors import LogFormatError
 
 
@@ -34,6 +34,17 @@ def _same(one: dict[str, NDArray[Any]], other: dict[str, NDArray[Any]]) -> bool:
     return list(one) == list(other) and all(
         a.dtype == other[name].dtype and np.array_equal(a, other[name]) for name, a in one.items()
     )
+
+
+def test_what_is_written_is_read_and_is_the_same_bytes_again(tmp_path: Path):
+    paths = tmp_path / "one.npz", tmp_path / "other.npz"
+    for path in paths:
+        with path.open("wb") as opened:
+            write_arrays(opened, _arrays())
+    assert _same(read_arrays(paths[0]), _arrays())
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    np.savez_compressed(tmp_path / "numpy.npz", **_arrays())
+    assert len(paths[0].read_bytes()) < 1.2 * (tmp_path / "numpy.npz").stat().st_size
 
 
 @pytest.fixture(params=["savez", "savez_compressed"])

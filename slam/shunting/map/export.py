@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from slam.estimate import Changes, Raster
 from slam.shunting.map.network import Network
-from slam.tracker.cells import dense
+from slam.tracker.windows import Window, window
+
+Blocks = NDArray[np.float32]  # (n, 8, 8)
 
 
 def existence(
@@ -21,12 +24,12 @@ def existence(
     extent = network.raster_extent(bounds)
     if extent is None:
         return None
-    x, y = _dense(network, extent)
+    found, x, y = _living(network, extent)
     values = np.divide(x, np.float32(network.config.saturation), out=x)
     np.maximum(y, values, out=values)
     np.minimum(values, np.float32(1.0), out=values)
     values[values == 0.0] = np.nan
-    return _raster(network, values, extent)
+    return _raster(network, found.spread(values, np.nan), extent)
 
 
 def changes(
@@ -42,36 +45,36 @@ def changes(
         return None
     reach = network.config.map.beside_cells
     rim = 0 if bounds is None else reach  # what is beside the part counts as well
-    x, y = _dense(network, (extent[0] - rim, extent[1] - rim, extent[2] + rim, extent[3] + rim))
+    wider = extent[0] - rim, extent[1] - rim, extent[2] + rim, extent[3] + rim
+    found, x, y = _living(network, wider)
     lately = np.minimum(np.float32(network.config.decay_per_s) * x / (1.0 - x), np.float32(1.0))
-    appeared, gone = lately - _around(y, reach), y - _around(lately, reach)
-    for layer in (appeared, gone):
-        np.maximum(layer, np.float32(0.0), out=layer)
-        layer[(x == 0.0) & (y == 0.0)] = np.nan
-    inner = np.s_[rim : x.shape[0] - rim, rim : x.shape[1] - rim]
-    appeared, gone = appeared[inner], gone[inner]
-    return Changes(appeared=_raster(network, appeared, extent), gone=_raster(network, gone, extent))
+    silent = (x == 0.0) & (y == 0.0)
+    inner = np.s_[rim : wider[3] - wider[1] - rim, rim : wider[2] - wider[0] - rim]
+    appeared, gone = (
+        _raster(network, _beyond(found, one, other, silent, reach)[inner], extent)
+        for one, other in ((lately, y), (y, lately))
+    )
+    return Changes(appeared=appeared, gone=gone)
 
 
-def _around(values: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
-    """The largest value within ``reach`` neurons: a wall seen one neuron aside is no change."""
-    for axis in (0, 1):
-        padded = np.pad(values, [(reach, reach) if k == axis else (0, 0) for k in (0, 1)])
-        n = values.shape[axis]
-        values = padded[:n] if axis == 0 else padded[:, :n]
-        values = values.copy()
-        for k in range(1, 2 * reach + 1):  # one by one: a stack of them would be all the memory
-            beside = padded[k : k + n] if axis == 0 else padded[:, k : k + n]
-            np.maximum(values, beside, out=values)
-    return values
+def _beyond(
+    found: Window, one: Blocks, other: Blocks, silent: NDArray[np.bool_], reach: int
+) -> NDArray[np.float32]:
+    """How much more ``one`` is than the largest of ``other`` within ``reach`` neurons: a wall seen
+    one neuron aside is no change. NaN where ``silent`` and where no neuron lives."""
+    square = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
+    around = cv2.dilate(found.spread(other, 0.0), square)
+    beyond = found.spread(np.where(silent, np.float32(np.nan), one), np.nan)
+    np.subtract(beyond, around, out=beyond)
+    np.maximum(beyond, np.float32(0.0), out=beyond)
+    return beyond
 
 
-def _dense(
-    network: Network, extent: tuple[int, int, int, int]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """x and y of the cells (i0, j0) to before (i1, j1)."""
+def _living(network: Network, extent: tuple[int, int, int, int]) -> tuple[Window, Blocks, Blocks]:
+    """The blocks among the cells (i0, j0) to before (i1, j1), their x and their y."""
     i0, j0, i1, j1 = extent
-    return dense(network.cells, i0, j0, (j1 - j0, i1 - i0))
+    found = window(network.cells, i0, j0, (j1 - j0, i1 - i0))
+    return found, network.cells.x[found.slots], network.cells.y[found.slots]
 
 
 def _raster(

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from scripts.film.close_up import CloseUp, off_by
-from scripts.film.draw import GREEN, RED
-from scripts.film.map_pane import MAX_TRAIL, Trail, View, draw_trail, raster_picture
+from scripts.film.draw import GREEN, INK, PAPER, RED
+from scripts.film.map_pane import MAX_TRAIL, Trail, View, draw_trail, raster_picture, scale_bar
 from slam import se2
 from slam.system import Raster
 
@@ -68,3 +68,17 @@ def test_how_far_off_is_told_in_its_own_sigmas(error, says):
 
 def test_a_covariance_of_nothing_has_no_sigmas():
     assert off_by(np.array([0.02, 0.0]), np.zeros((2, 2))) == "2.0 cm off"
+
+
+def test_the_scale_bar_keeps_clear_of_the_map():
+    view = View.fitting((0.0, 0.0, 20.0, 10.0), 400, 200)
+    corners = np.s_[150:, :150], np.s_[150:, 250:], np.s_[:50, :150], np.s_[:50, 250:]
+    blank = np.full((200, 400, 3), PAPER, np.uint8)
+    for drawn in range(len(corners) + 1):
+        picture = blank.copy()
+        for corner in corners[:drawn]:
+            picture[corner] = GREEN
+        scale_bar(picture, view, 1.0)
+        there = [bool((picture[corner] == INK).all(axis=2).any()) for corner in corners]
+        free = drawn % len(corners)  # where all are drawn in, in the first
+        assert there == [k == free for k in range(len(corners))]

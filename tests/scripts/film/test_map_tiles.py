@@ -6,12 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scripts.film.changed import Changed
+from scripts.film.changed import SQUARE_M, Changed, _squares
 from scripts.film.encode import LAPSE_FPS, MOST_PICTURES, Pace
 from scripts.film.map_pane import View, raster_picture
 from scripts.film.map_tiles import TILE, MapTiles
 from scripts.single_run.small_maps import drawn, for_file
 from slam import create
+from slam.frontend.seen_space import SeenSpace
 from slam.replay import Track
 from slam.strips import of_raster
 from slam.system import MapsInParts, Raster
@@ -76,6 +77,17 @@ def test_parts_one_by_one_show_what_the_whole_shows_at_every_scale(scale):
     np.testing.assert_array_equal(one, other)
 
 
+def test_tiles_know_where_they_are_empty():
+    raster, tiles = made(30, 40, at=(0, 0)), MapTiles()
+    assert tiles.empty((0.0, 0.0, 2.0, 1.5))
+    tiles.put(raster)
+    for k in range(200):
+        x, y = np.random.default_rng(k).integers(-20, 50, 2) * CELL
+        inside = cut(raster, (max(x, 0.0), max(y, 0.0), x + 3 * CELL, y + 2 * CELL))
+        known = inside is not None and (inside.values >= 1.0 / 255.0).any()
+        assert tiles.empty((x, y, x + 3 * CELL, y + 2 * CELL)) != known
+
+
 def test_memory_follows_the_view_and_not_the_map():
     tiles, scale = MapTiles(), 560 / 400.0  # 400 m in 560 px
     for k in range(40):
@@ -132,9 +144,9 @@ def test_a_map_in_pictures_keeps_thin_walls_and_its_extent():
 
 def test_a_map_too_large_for_an_image_has_coarser_cells_and_says_so(monkeypatch):
     strips = of_raster(made(1000, 500))
-    assert for_file(strips) == (strips, "")
-    monkeypatch.setattr("scripts.single_run.small_maps.MAX_PIXELS", 125_000)
-    fitting, said = for_file(strips)
+    assert for_file(strips, SeenSpace()) == (strips, "")
+    monkeypatch.setattr("scripts.single_run.small_maps.MOST_PIXELS", 125_000)
+    fitting, said = for_file(strips, SeenSpace())
     assert fitting.shape == (500, 250)
     assert "cells of 0.1 m instead of 0.05 m: the map is 25 m x 50 m" in said
 
@@ -161,7 +173,7 @@ def test_what_scans_changed_is_all_that_a_film_must_draw():
         track.take(frame)
         changed.add(frame.scan, track.estimates[-1].T_map_robot)
         if k % 7 == 0 or k == len(stream) - 1:
-            for bounds in changed.taken():
+            for bounds in changed.taken(empty=tiles.empty):
                 part = track.map_part(tiles.aligned(bounds))
                 drawn += part.values.size
                 tiles.put(part)
@@ -177,10 +189,15 @@ def test_what_scans_changed_is_all_that_a_film_must_draw():
 
 def test_runs_of_squares_cover_each_once():
     changed = Changed()
-    changed._squares = {(0, 0), (0, 1), (0, 3), (1, 3), (-1, -2)}
+    squares = [(0, 0), (0, 1), (0, 3), (1, 3), (-1, -2)]
+    centres = [((column + 0.5) * SQUARE_M, (row + 0.5) * SQUARE_M) for row, column in squares]
+    met, crossed = _squares(np.array(centres[:2])), _squares(np.array(centres[1:]))
+    changed._met, changed._crossed = set(met), set(crossed)
     assert list(changed.taken()) == [
         (-8.0, -4.0, -4.0, 0.0), (0.0, 0.0, 8.0, 4.0),
         (12.0, 0.0, 16.0, 4.0), (12.0, 4.0, 16.0, 8.0),
     ]  # fmt: skip
-    changed._squares = {(0, 0), (2, 3)}
+    changed._met, changed._crossed = set(met), set(crossed)
+    assert list(changed.taken(empty=lambda _: True)) == [(0.0, 0.0, 8.0, 4.0)]
+    changed._met = _squares(np.array([[1.0, 1.0], [15.0, 11.0]]))
     assert list(changed.taken(in_parts=False)) == [(0.0, 0.0, 16.0, 12.0)]
