@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import scenes
 from scripts import workers
@@ -32,15 +33,15 @@ from scripts.benchmark.tracks import chosen
 from scripts.comparison.recording import load, record
 from scripts.experiments.measured import add_options, head, seeds_of, table
 from scripts.marks import fill_page
-from scripts.metrics.judged import Judged, lost_s, world_truth
+from scripts.metrics.judged import Judged, world_truth
 from scripts.result_files import write
 from sim.core.versions import WORLD
 from sim.recording.recipe import Recipe
 from slam import create
 from slam.errors import MobiliaError
-from slam.evaluation.lost import LOST_RULE
+from slam.evaluation import lost
 from slam.files import make_folder, replacing
-from slam.frames import Frame
+from slam.frames import NS_PER_S, Frame
 from slam.frontend.odometry_sum import MotionSum
 from slam.oracle import shown
 from slam.replay import Track
@@ -111,15 +112,33 @@ def kept(frames: Sequence[Frame], every: int) -> list[Frame]:
     return out
 
 
+def spared(frames: Sequence[Frame]) -> NDArray[np.bool_]:
+    """(n,) those that do not count for a loss, for the robot was carried (at the full rate)."""
+    truth = world_truth(frames)
+    seconds = (truth.stamps_ns - truth.stamps_ns[0]) / NS_PER_S
+    return lost.excused(seconds, truth.poses[:, :2])
+
+
+def loss(run: Judged, excused: NDArray[np.bool_]) -> tuple[float | None, float]:
+    """When it was lost, s, None for never; root mean square error, m, of what counts before."""
+    seconds = (run.pairs.stamps_ns - run.pairs.stamps_ns[0]) / NS_PER_S
+    off, turned = run.pairs.distances, run.pairs.errors[:, 2]
+    at = lost.lost_at(seconds, np.where(excused, 0.0, off), np.where(excused, 0.0, turned))
+    counts = ~excused & (seconds < (math.inf if at is None else at))
+    return at, math.sqrt(float((off[counts] ** 2).mean()))
+
+
 def judged(job: tuple[Drive, str, int], folder: Path) -> Row:
     """One run of a SLAM at one rate."""
     one, slam, every = job
-    frames, system = kept(load(one.path(folder)).frames, every), create(slam)
+    whole = load(one.path(folder)).frames
+    frames, system = kept(whole, every), create(slam)
     track = Track(one.name, system)
     for frame in frames:
         track.take(shown(system, frame))
     run = Judged.of(track, world_truth(frames))
     off, converged, due = run.is_off(), run.converged(), run.is_due()
+    lost_s, error_m = loss(run, spared(whole)[::every])
     return {
         "slam": slam,
         "stream": one.stream,
@@ -127,8 +146,8 @@ def judged(job: tuple[Drive, str, int], folder: Path) -> Row:
         "every": every,
         "scans": len(frames),
         "ate_m": run.ate(),
-        "error_m": run.error_while_tracking(),
-        "lost_s": lost_s(run.pairs, run.known),
+        "error_m": error_m,
+        "lost_s": lost_s,
         "silent": run.silent_share(),
         "due": int(due.sum()),
         "told": int((due & run.is_told()).sum()),
@@ -145,8 +164,8 @@ def hz(every: int) -> str:
 
 def summary(rows: Sequence[Row]) -> list[str]:
     """Of the runs of one cell: error, losses, silence, admissions, false alarms, NEES."""
-    errors = np.array([row["ate_m"] if row["error_m"] is None else row["error_m"] for row in rows])
-    lost, due = sum(row["lost_s"] is not None for row in rows), sum(row["due"] for row in rows)
+    errors = np.array([row["error_m"] for row in rows])
+    gone, due = sum(row["lost_s"] is not None for row in rows), sum(row["due"] for row in rows)
     good = sum(row["good"] for row in rows)
     silent = np.array([row["silent"] or 0.0 for row in rows])
     nees = [math.nan if row["nees_over_3"] is None else row["nees_over_3"] for row in rows]
@@ -154,7 +173,7 @@ def summary(rows: Sequence[Row]) -> list[str]:
     return [
         f"{CM * math.exp(float(np.log(errors).mean())):.2f}",
         f"{CM * errors.max():.1f}",
-        f"{lost} of {len(rows)}",
+        f"{gone} of {len(rows)}",
         f"{PERCENT * silent.mean():.1f} %",
         told,
         f"{PERCENT * sum(row['false'] for row in rows) / max(good, 1):.1f} %",
@@ -201,7 +220,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     told = (
         f"World {WORLD}, {wanted.seeds} drives of a stream, level {wanted.level:g}, training seeds "
         f"from {wanted.first_seed}; scenes for {wanted.seconds:g} s, tracks as long as they are. "
-        f"Lost: {LOST_RULE}."
+        f"Lost: {lost.LOST_RULE}."
     )
     try:
         first = head(wanted, MARK, arguments, "streams", "level", "slams", "every")
