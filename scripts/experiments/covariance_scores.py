@@ -74,7 +74,8 @@ def asked(estimate: Path, truth: Path) -> dict[str, Any]:
         raise MissingDependencyError(
             f"smfeval must run (pip install smfeval): {done.stderr.strip()[-300:]}"
         )
-    report: dict[str, Any] = json.loads(done.stdout)
+    report: dict[str, Any]
+    report, _ = json.JSONDecoder().raw_decode(done.stdout)  # words follow it
     return report
 
 
