@@ -2,7 +2,7 @@
 """What smfeval says of the covariances: ``python -m scripts.experiments.covariance_scores``.
 
 Needs the package smfeval (https://pypi.org/project/smfeval, tried with 0.4.0) in this interpreter.
-Its command ``smfeval score`` reads what ``mobilia export --to smfeval`` writes. Streams are those
+Its commands ``score`` and ``nees`` read what ``mobilia export --to smfeval`` writes. Streams are those
 of ``scripts.experiments.rates``, one scan in eight; recordings stay in ``--folder``, the files that
 are scored beside them. Writes ``docs/results/covariance_scores.json`` and a table of
 ``docs/uncertainty.md``.
@@ -65,25 +65,24 @@ def exported(one: Drive, slam: str, folder: Path) -> tuple[Path, Path]:
     return paths
 
 
-def asked(estimate: Path, truth: Path) -> dict[str, Any]:
-    """The report of ``smfeval score``; ``MissingDependencyError`` where it does not run."""
-    command = [sys.executable, "-m", "smfeval.cli.main", "score", "--calibration", "--json"]
+def asked(verb: str, estimate: Path, truth: Path) -> dict[str, Any]:
+    """The report of ``smfeval VERB``; ``MissingDependencyError`` where it does not run."""
+    command = [sys.executable, "-m", "smfeval.cli.main", verb, "--json"]
     command += ["--ref-body-frame", "robot", "--ref-pose-frame", "map", str(estimate), str(truth)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LIMIT_S)
     if done.returncode != 0:
         raise MissingDependencyError(
             f"smfeval must run (pip install smfeval): {done.stderr.strip()[-300:]}"
         )
-    report: dict[str, Any]
-    report, _ = json.JSONDecoder().raw_decode(done.stdout)  # words follow it
+    report: dict[str, Any] = json.loads(done.stdout)
     return report
 
 
 def scored(job: tuple[Drive, str], folder: Path) -> Row:
     """One run."""
     one, slam = job
-    report = asked(*exported(one, slam, folder))
-    scores, split = report["scores"], report["calibration_split"]["absolute"]["translation"]
+    files = exported(one, slam, folder)
+    scores, nees = asked("score", *files)["scores"], asked("nees", *files)
     return {
         "slam": slam,
         "stream": one.stream,
@@ -93,9 +92,9 @@ def scored(job: tuple[Drive, str], folder: Path) -> Row:
         "energy_m": scores["energy_score"]["mean"],
         "interval_m": scores["interval_score"]["mean"],
         "log_score": scores["log_score_translation"]["median"],
-        "coverage": report["calibration"]["coverage"],
-        "nees_mean": split["anees"],
-        "nees_median": split["median"],
+        "coverage": nees["coverage"],
+        "nees_mean": nees["anees"]["anees"],
+        "nees_median": nees["median_nees"],
     }
 
 
