@@ -2,9 +2,9 @@
 """What smfeval says of the covariances: ``python -m scripts.experiments.covariance_scores``.
 
 Needs the package smfeval (https://pypi.org/project/smfeval, tried with 0.4.0) in this interpreter.
-Its commands ``score`` and ``nees`` read what ``mobilia export --to smfeval`` writes. Streams are those
-of ``scripts.experiments.rates``, one scan in eight; recordings stay in ``--folder``, the files that
-are scored beside them. Writes ``docs/results/covariance_scores.json`` and a table of
+Its commands ``score`` and ``nees`` read what ``mobilia export --to smfeval`` writes. Streams are
+those of ``scripts.experiments.rates``, one scan in eight; recordings stay in ``--folder``, the
+files that are scored beside them. Writes ``docs/results/covariance_scores.json`` and a table of
 ``docs/uncertainty.md``.
 
 smfeval scores positions of three dimensions. A robot on a floor has two: z is known and exact. So
