@@ -55,12 +55,15 @@ def write_tum(path: Path, trajectory: Trajectory, epoch_ns: int = 0) -> None:
     for stamp_ns, (x, y, theta) in zip(
         (trajectory.stamps_ns + epoch_ns).tolist(), trajectory.poses.tolist(), strict=True
     ):
-        seconds, nanoseconds = divmod(abs(stamp_ns), NS_PER_S)
-        sign = "-" if stamp_ns < 0 else ""
         qz, qw = math.sin(theta / 2.0), math.cos(theta / 2.0)
-        stamp = f"{sign}{seconds}.{nanoseconds:09d}"
-        lines.append(f"{stamp} {x:.9f} {y:.9f} 0 0 0 {qz:.12f} {qw:.12f}")
+        lines.append(f"{tum_stamp(stamp_ns)} {x:.9f} {y:.9f} 0 0 0 {qz:.12f} {qw:.12f}")
     write_text(path, "\n".join(lines) + "\n" if lines else "")
+
+
+def tum_stamp(stamp_ns: int) -> str:
+    """Seconds with all nine digits."""
+    seconds, nanoseconds = divmod(abs(stamp_ns), NS_PER_S)
+    return f"{'-' if stamp_ns < 0 else ''}{seconds}.{nanoseconds:09d}"
 
 
 def read_tum(path: Path) -> Trajectory:
@@ -72,7 +75,7 @@ def read_tum(path: Path) -> Trajectory:
         if not line.strip() or line.startswith("#"):
             continue
         try:
-            stamp_ns, pose = _tum_pose(line.split())
+            stamp_ns, pose = tum_pose(line.split())
             if stamps and stamp_ns <= stamps[-1]:
                 raise ValueError("time does not increase")
         except (ValueError, ArithmeticError) as error:
@@ -84,8 +87,11 @@ def read_tum(path: Path) -> Trajectory:
     )
 
 
-def _tum_pose(words: list[str]) -> tuple[int, tuple[float, float, float]]:
-    """Stamp (ns, exact: Unix times have more digits than a float) and (x, y, yaw)."""
+def tum_pose(words: list[str]) -> tuple[int, tuple[float, float, float]]:
+    """Stamp (ns, exact: Unix times have more digits than a float) and (x, y, yaw).
+
+    Raises ``ValueError`` or ``ArithmeticError`` for other than eight numbers of a pose.
+    """
     if len(words) != 8:
         raise ValueError(f"expected 8 numbers, found {len(words)}")
     x, y, _, qx, qy, qz, qw = values = [float(word) for word in words[1:]]

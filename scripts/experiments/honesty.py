@@ -12,6 +12,8 @@ A push displaces the pose in the SLAM at a random moment between 0.3 and 0.85 of
 ``PUSH_M`` in a random direction or by ``PUSH_DEG``; nothing else in it learns of that
 (``Tracker.displace``). It is back when it stays within ``BACK_M`` and ``BACK_DEG`` of the run
 without the push for ``STAYS_S``.
+
+With ``--page`` the sums are written to that page, too, at its marks ``honesty`` and ``pushes``.
 """
 
 from __future__ import annotations
@@ -30,6 +32,8 @@ import numpy as np
 from scripts import workers
 from scripts.comparison.recording import load
 from scripts.experiments.crowd_streams import SCENES, TRAIN, CrowdStream, make, train_streams
+from scripts.experiments.measured import table
+from scripts.marks import fill_page
 from scripts.metrics.judged import Judged, lost_s, world_truth
 from slam import se2
 from slam.frames import NS_PER_S, Float, Frame
@@ -42,6 +46,7 @@ BACK_M, BACK_DEG, STAYS_S = 0.05, 1.0, 1.0
 WATCHED_S = 15.0  # after a push
 WANTED_S = 3.0  # to be back
 KINDS = ("m", "deg")
+HEADS = ("", "ATE, cm", "lost", "scans due", "admitted", "false alarms", "NEES / 3")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +69,14 @@ class Row:
             f"{self.name:36s}{100.0 * self.ate:8.2f}{self.lost:6d}{self.due:6d}{told}"
             f"{self.false / max(self.good, 1):8.3f}{self.nees:8.2f}"
         )
+
+    def cells(self) -> list[str]:
+        """As in the table of a page."""
+        told = f"{100.0 * self.told / self.due:.1f} %" if self.due else "–"
+        return [
+            self.name, f"{100.0 * self.ate:.2f}", str(self.lost), str(self.due), told,
+            f"{100.0 * self.false / max(self.good, 1):.2f} %", f"{self.nees:.2f}",
+        ]  # fmt: skip
 
 
 def judged(stream: CrowdStream, folder: Path, numbers: Mapping[str, object]) -> Row:
@@ -158,15 +171,18 @@ def _print_runs(streams: Sequence[CrowdStream], folder: Path, wanted: argparse.N
     rows = sorted(workers.each(call, streams, jobs=wanted.jobs), key=lambda row: row.name)
     for row in rows:
         print(row.line())
-    for motion in wanted.motions:
-        print(
-            overall(
-                f"motion {motion:g}", [r for r in rows if f"motion{motion:g}_" in r.name]
-            ).line()
-        )
-    for scene in wanted.scenes:
-        print(overall(scene, [r for r in rows if r.name.startswith(scene)]).line())
-    print(overall("all", rows).line())
+    sums = [
+        overall(f"motion {motion:g}", [r for r in rows if f"motion{motion:g}_" in r.name])
+        for motion in wanted.motions
+    ]
+    sums += [
+        overall(scene, [r for r in rows if r.name.startswith(scene)]) for scene in wanted.scenes
+    ]
+    sums.append(overall("all", rows))
+    for row in sums:
+        print(row.line())
+    if wanted.page is not None:
+        fill_page(wanted.page, "honesty", table(HEADS, [row.cells() for row in sums]))
 
 
 def _print_pushes(streams: Sequence[CrowdStream], folder: Path, wanted: argparse.Namespace) -> None:
@@ -182,10 +198,14 @@ def _print_pushes(streams: Sequence[CrowdStream], folder: Path, wanted: argparse
     for name, kind, back in found:
         if back is None or back > WANTED_S:
             print(f"{name}, {kind}: " + ("not back" if back is None else f"{back:.1f} s"))
+    lines = []
     for kind, words in zip(KINDS, (f"{PUSH_M:g} m", f"{PUSH_DEG:g} degrees"), strict=True):
         times = [math.inf if back is None else back for _, other, back in found if other == kind]
         quick = sum(back <= WANTED_S for back in times)
-        print(f"pushed by {words}: {quick} of {len(times)} back within {WANTED_S:g} s")
+        lines.append(f"Pushed by {words}: {quick} of {len(times)} back within {WANTED_S:g} s.")
+    print("\n".join(lines))
+    if wanted.page is not None:
+        fill_page(wanted.page, "pushes", "\n".join(f"- {line}" for line in lines))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -196,6 +216,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--most", type=int, default=20, help="seeds of each scene and motion")
     parser.add_argument("--folder", type=Path, default=Path("out/honesty"), help="of recordings")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--page", type=Path, help="with the marks honesty and pushes")
     parser.add_argument("--push", type=int, default=0, help="so many pushes of each kind")
     parser.add_argument("--set", nargs="*", default=[], metavar="PATH=NUMBER", help="of the config")
     wanted = parser.parse_args(arguments)

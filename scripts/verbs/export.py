@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,29 +16,36 @@ from slam.errors import InvalidValueError
 from slam.files import replacing
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from slam.frames import Frame, Stream
 
+SLAM = "shunting"
+
 
 def export(
     episode: Annotated[Path, typer.Argument(help="An episode, a bag or any other log.")],
-    to: Annotated[str, typer.Option(help="tum, carmen or npz.")],
+    to: Annotated[str, typer.Option(help="tum, carmen, npz or smfeval.")],
     out: Annotated[
         Path | None,
         typer.Option(
             help="File to write; default beside the log or dataset. tum: NAME_odometry.tum, ..."
         ),
     ] = None,
+    slam: Annotated[str, typer.Option(help="With --to smfeval: whose poses.")] = SLAM,
 ) -> None:
     """Write an episode as TUM trajectories, as a CARMEN log or as NumPy arrays.
 
     tum: NAME_odometry.tum and, where it is known, NAME_truth.tum. carmen: scans, odometry, true
-    poses. npz: everything, labels too, as arrays by name.
+    poses. npz: everything, labels too, as arrays by name. smfeval: runs a SLAM; NAME_SLAM.tum has
+    its online poses with their covariances ("wide TUM"), NAME_truth.tum the true ones in its map.
     """
     writers: dict[str, Callable[[Path, Stream], list[Path]]] = {
-        "tum": _tum, "carmen": _carmen, "npz": _npz,
+        "tum": _tum, "carmen": _carmen, "npz": _npz, "smfeval": partial(_smfeval, slam=slam),
     }  # fmt: skip
+    if slam != SLAM and to != "smfeval":
+        raise InvalidValueError(f"--slam is for --to smfeval, got --to {to}")
     if to not in writers:
         raise InvalidValueError(f"--to must be one of {', '.join(writers)}, got {to!r}")
     from sim.recording.verify import check_bag
@@ -46,7 +54,7 @@ def export(
 
     check_bag(episode)
     stream = read_bag(episode, labels=True) if is_bag(episode) else open_log(episode)
-    suffix = {"tum": ".tum", "carmen": ".log.gz", "npz": ".npz"}[to]
+    suffix = {"carmen": ".log.gz", "npz": ".npz"}.get(to, ".tum")
     plain = episode.absolute()
     target = out or _beside(plain) / (plain.name.split(".log")[0] + suffix)
     with working(f"writing {to}"):
@@ -82,6 +90,40 @@ def _tum(target: Path, stream: Stream) -> list[Path]:
         written.append(target.with_name(f"{target.stem}_truth{target.suffix}"))
         poses = np.array([truth[k] for k in known])
         write_tum(written[-1], Trajectory(stamps_ns=at[known], poses=poses), epoch_ns)
+    return written
+
+
+def _smfeval(target: Path, stream: Stream, slam: str) -> list[Path]:
+    import numpy as np
+
+    from scripts.names import file_name
+    from scripts.output import versions
+    from slam import create, se2
+    from slam.evaluation.wide_tum import write_wide_tum
+    from slam.frames import EPOCH
+    from slam.oracle import shown
+    from slam.replay import Track
+    from slam.trajectory import Trajectory, write_tum
+
+    track = Track(slam, create(slam))
+    truth: list[tuple[int, NDArray[np.float64]]] = []
+    for frame in stream:
+        track.take(shown(track.system, frame))
+        if frame.truth is not None:
+            truth.append((frame.stamp_ns, frame.truth))
+    if not track.estimates:
+        raise InvalidValueError("smfeval scores poses: this log has no frames")
+    online, epoch_ns = track.online(), int(stream.metadata.extra.get(EPOCH, 0))
+    written = [target.with_name(f"{target.stem}_{file_name(slam)}{target.suffix}")]
+    write_wide_tum(
+        written[0], online, track.covariances(), epoch_ns=epoch_ns, algorithm=slam,
+        version=versions()["mobilia"],
+    )  # fmt: skip
+    if truth and truth[0][0] == online.stamps_ns[0]:  # the map begins where the robot does
+        written.append(target.with_name(f"{target.stem}_truth{target.suffix}"))
+        stamps = np.array([stamp_ns for stamp_ns, _ in truth])
+        poses = np.array([se2.between(truth[0][1], pose) for _, pose in truth])
+        write_tum(written[1], Trajectory(stamps_ns=stamps, poses=poses), epoch_ns)
     return written
 
 

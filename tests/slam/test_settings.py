@@ -155,6 +155,7 @@ STAY = {
     "tracker/matching/local_search.py": "how the work is laid out; integers of a field in bytes",
     "tracker/matching/planes.py": "how the work is laid out; places in an array",
     "tracker/matching/whole_search.py": "how the work is laid out; no result depends on it",
+    "tracker/standing/recent.py": "an empty array",
     "tracker/tracking/closures.py": "what a piece of work counts, in units of loops.work",
     "tracker/uncertainty/residuals.py": "places in an array",
 }

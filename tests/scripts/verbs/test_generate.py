@@ -27,7 +27,9 @@ from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, write_sums
 from sim.recording.template import EPOCH_NS
 from sim.recording.verify import check_hashes, messages_sha256, regenerate
+from slam import create
 from slam.errors import InvalidValueError, LogFormatError, MobiliaError, OutputError
+from slam.evaluation.wide_tum import read_wide_tum
 from slam.logs import read_bag, read_carmen
 from slam.trajectory import read_tum
 
@@ -381,6 +383,24 @@ def test_exports_are_read_back(serial, tmp_path):
         export(episode, "minari", tmp_path / "a.h5")
     with pytest.raises(LogFormatError, match="no such file"):
         export(tmp_path / "none.mcap", "tum", None)
+
+
+def test_poses_with_covariances_are_exported(serial, tmp_path):
+    episode, frames = serial / NAMES[0], list(read_bag(serial / NAMES[0]))
+    export(episode, "smfeval", tmp_path / "a.tum")
+    online, covariances = read_wide_tum(tmp_path / "a_shunting.tum")
+    assert online.stamps_ns.tolist() == [f.stamp_ns + EPOCH_NS for f in frames]
+    slam = create("shunting")
+    said = [slam.update(frame.without_truth()) for frame in frames]
+    np.testing.assert_allclose(online.poses, [e.T_map_robot for e in said], atol=1e-12)
+    np.testing.assert_allclose(covariances, [e.covariance for e in said], atol=1e-9)
+    truth = read_tum(tmp_path / "a_truth.tum").poses
+    np.testing.assert_allclose(truth[0], 0.0, atol=1e-9)  # in the map, as the poses are
+    assert np.hypot(*(truth - online.poses)[:, :2].T).max() < 0.05
+    with pytest.raises(InvalidValueError, match="states none"):
+        export(episode, "smfeval", tmp_path / "b.tum", "karto")
+    with pytest.raises(InvalidValueError, match="--slam is for --to smfeval"):
+        export(episode, "tum", tmp_path / "b.tum", "ekf")
 
 
 def kill_in_mid_episode(worker: subprocess.Popen[bytes], out: Path) -> None:

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Poses with their covariances, one a line: "wide TUM", which ``smfeval`` scores.
+
+A line is that of a TUM file, ``t x y z qx qy qz qw``, and after it the lower triangle of a (6, 6)
+covariance, row by row: c11 c21 c22 c31 ... c66, 21 numbers. Above the lines stands the header of
+smfeval's own format SQUARE 0.3, each line of it a comment: without it they are the same file.
+
+The covariance is of the tangent at the pose, translation before rotation, in the frame of the
+*robot* (right perturbation). Ours is of x, y and heading along the axes of the *map*, so it is
+turned. What a robot on a floor cannot do, z, roll and pitch, has the variance ``FLAT``.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from slam.bounded import text_of
+from slam.checked import finite
+from slam.errors import InvalidValueError, LogFormatError
+from slam.files import write_text
+from slam.frames import Float
+from slam.trajectory import MAX_TUM_BYTES, Trajectory, tum_pose, tum_stamp
+
+FLAT = 1e-10  # m², rad²: (10 um)², of z, roll, pitch; smfeval takes less than 1e-12 for none
+FORMAT = "SQUARE/0.3"
+TUM_WORDS, ENTRIES = 8, 21  # in a line: the pose, and the lower triangle
+PLANAR = (0, 1, 5)  # x, y and yaw among x, y, z, roll, pitch, yaw
+_LOWER = np.tril_indices(6)
+
+
+def to_body(covariance: Float, theta: float) -> Float:
+    """(3, 3) of x, y, heading along the axes of the map, as the robot's (6, 6), turned by theta."""
+    turn = _turn(theta)
+    whole = np.diag(np.full(6, FLAT))
+    whole[np.ix_(PLANAR, PLANAR)] = turn.T @ covariance @ turn
+    return whole
+
+
+def to_map(whole: Float, theta: float) -> Float:
+    """Inverse of ``to_body``."""
+    turn = _turn(theta)
+    return np.asarray(turn @ whole[np.ix_(PLANAR, PLANAR)] @ turn.T)
+
+
+def _turn(theta: float) -> Float:
+    c, s = math.cos(theta), math.sin(theta)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def write_wide_tum(
+    path: Path,
+    trajectory: Trajectory,
+    covariances: Float,
+    *,
+    epoch_ns: int = 0,
+    algorithm: str = "shunting",
+    version: str = "0",
+) -> None:
+    """Poses T_map_robot and their (n, 3, 3) covariances of x, y, heading in the map.
+
+    epoch_ns   is added to each stamp: of a bag whose frames begin at 0 s (``slam.frames.EPOCH``)
+    algorithm, version  words of the header
+
+    The known first pose may have no variance: it gets ``FLAT``. Raises ``InvalidValueError`` for
+    covariances of another shape, not finite, not positive semidefinite, or all of them zero:
+    whoever states none cannot be scored.
+    """
+    covariances = _checked(np.asarray(covariances, dtype=np.float64), len(trajectory))
+    lines = [f"#%{key} {value}" for key, value in _header(algorithm, version)]
+    for stamp_ns, pose, covariance in zip(
+        (trajectory.stamps_ns + epoch_ns).tolist(), trajectory.poses, covariances, strict=True
+    ):
+        x, y, theta = pose.tolist()
+        numbers = [x, y, 0.0, 0.0, 0.0, math.sin(theta / 2.0), math.cos(theta / 2.0)]
+        numbers += to_body(covariance, theta)[_LOWER].tolist()
+        lines.append(" ".join([tum_stamp(stamp_ns), *(repr(number) for number in numbers)]))
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def _header(algorithm: str, version: str) -> list[tuple[str, str]]:
+    """Names and values of smfeval's header. Gauge: the map begins at the known start."""
+    for name, word in (("algorithm", algorithm), ("version", version)):
+        if not word or not word.isprintable():
+            raise InvalidValueError(f"{name} must be one line of text, got {word!r:.80}")
+    return [
+        ("FORMAT", FORMAT),
+        ("REPRESENTATION", "gaussian_se3"),
+        ("POSE_FRAME", "map"),
+        ("BODY_FRAME", "robot"),
+        ("GAUGE", "fixed"),
+        ("TIMESTAMP_UNIT", "seconds"),
+        ("ALGORITHM", algorithm),
+        ("ALGORITHM_VERSION", version),
+        ("TANGENT_CONVENTION", "right_perturbation"),
+        ("TANGENT_ORDER", "translation_rotation"),
+        ("ROTATION_PARAM", "axis_angle"),
+    ]
+
+
+def _checked(covariances: Float, n: int) -> Float:
+    """Symmetric to the last bit, with ``FLAT`` more where they are singular."""
+    if covariances.shape != (n, 3, 3):
+        raise InvalidValueError(f"covariances must be ({n}, 3, 3), got {covariances.shape}")
+    finite("wide TUM", "covariances", covariances)
+    if n and not covariances.any():
+        raise InvalidValueError("covariances are all zero: this SLAM states none to be scored")
+    symmetric = 0.5 * (covariances + covariances.transpose(0, 2, 1))
+    least = np.linalg.eigvalsh(symmetric)[:, 0]
+    if n and float(least.min()) < -FLAT:
+        k = int(least.argmin())
+        raise InvalidValueError(
+            f"covariances must be positive semidefinite, got an eigenvalue of {least[k]:g} in "
+            f"scan {k}"
+        )
+    return symmetric + np.where(least < FLAT, 2.0 * FLAT, 0.0)[:, None, None] * np.eye(3)
+
+
+def read_wide_tum(path: Path) -> tuple[Trajectory, Float]:
+    """The planar part: poses, and (n, 3, 3) covariances of x, y, heading in the map.
+
+    Raises ``LogFormatError`` with the line for what is no wide TUM.
+    """
+    stamps: list[int] = []
+    poses: list[tuple[float, float, float]] = []
+    covariances: list[Float] = []
+    for number, line in enumerate(text_of(path, MAX_TUM_BYTES).splitlines(), 1):
+        words = line.split()
+        if not words or line.startswith("#"):
+            continue
+        try:
+            stamp_ns, pose = tum_pose(words[:TUM_WORDS])
+            if stamps and stamp_ns <= stamps[-1]:
+                raise ValueError("time does not increase")
+            covariances.append(to_map(_whole(words[TUM_WORDS:]), pose[2]))
+        except (ValueError, ArithmeticError) as error:
+            raise LogFormatError(path, f"no wide TUM: {error}", number) from error
+        stamps.append(stamp_ns)
+        poses.append(pose)
+    trajectory = Trajectory(
+        stamps_ns=np.array(stamps, dtype=np.int64), poses=np.array(poses).reshape(-1, 3)
+    )
+    return trajectory, np.array(covariances).reshape(-1, 3, 3)
+
+
+def _whole(words: list[str]) -> Float:
+    """The (6, 6) covariance of a lower triangle."""
+    if len(words) != ENTRIES:
+        raise ValueError(f"expected {TUM_WORDS + ENTRIES} numbers, found {TUM_WORDS + len(words)}")
+    values = np.array([float(word) for word in words])
+    if not np.isfinite(values).all():
+        raise ValueError("expected finite numbers in the covariance")
+    lower = np.zeros((6, 6))
+    lower[_LOWER] = values
+    whole = lower + lower.T - np.diag(np.diag(lower))
+    if float(np.diag(whole).min()) < 0.0:
+        raise ValueError(f"expected variances >= 0, found {float(np.diag(whole).min()):g}")
+    return np.asarray(whole, dtype=np.float64)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is given to smfeval, and the table of what it says."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scripts.experiments.covariance_scores import asked, exported, markdown
+from scripts.experiments.rates import Drive, simulate
+from sim.recording.recipe import Recipe
+from slam.errors import MissingDependencyError
+from slam.evaluation.wide_tum import read_wide_tum
+from slam.trajectory import read_tum
+
+
+def test_poses_and_truth_are_in_one_map(tmp_path: Path):
+    recipe = Recipe(scene="arena", seed=0, dynamism=0.0, seconds=2.0, scanner="noise")
+    drive = Drive(stream="arena", level=0.0, recipe=recipe)
+    simulate(drive, tmp_path)
+    estimate, truth = exported(drive, "shunting", tmp_path)
+    online, covariances = read_wide_tum(estimate)
+    true = read_tum(truth)
+    assert np.array_equal(online.stamps_ns, true.stamps_ns)
+    assert covariances.shape == (len(true), 3, 3)
+    assert np.abs(online.poses - true.poses).max() < 0.05
+
+
+@pytest.mark.skipif(importlib.util.find_spec("smfeval") is not None, reason="smfeval is installed")
+def test_without_smfeval_it_says_how_to_get_it(tmp_path: Path):
+    with pytest.raises(MissingDependencyError, match="pip install smfeval"):
+        asked("nees", tmp_path / "a.tum", tmp_path / "b.tum")
+
+
+def test_drives_are_averaged_and_the_right_values_stand_below():
+    row = {"stream": "arena", "slam": "shunting", "seed": 0, "crps_m": 0.01, "energy_m": 0.02}
+    row |= {"interval_m": 0.1, "log_score": -16.0, "coverage": 1.0, "nees_mean": 1.0}
+    rows = [
+        {**row, "nees_median": n, "crps_m": c} for n, c in ((1.0, 0.01), (3.0, 0.03), (2.0, 0.02))
+    ]
+    table = markdown(rows, "told").splitlines()
+    assert table[0] == "told"
+    assert table[-2] == (
+        "| arena | `shunting` | 2.00 | 2.00 | 10.0 | -16.0 | 100.0 % | 2.00 | 1.00 |"
+    )
+    assert table[-1].endswith("| 95.6 % | 1.39 | 2 |")
