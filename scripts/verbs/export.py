@@ -96,8 +96,8 @@ def _tum(target: Path, stream: Stream) -> list[Path]:
 def _smfeval(target: Path, stream: Stream, slam: str) -> list[Path]:
     import numpy as np
 
+    from scripts.machine import versions
     from scripts.names import file_name
-    from scripts.output import versions
     from slam import create, se2
     from slam.evaluation.wide_tum import write_wide_tum
     from slam.frames import EPOCH

@@ -240,7 +240,7 @@ class Tracker(abc.ABC):
             self._quality.relocated(recovery.accepted)
             self._pose_covariance.relocated(coarse(self._numbers.relocalise))
             return match, "relocated"
-        unknown = recovery.elsewhere(predicted) < self._numbers.relocalise.enough_later * usual
+        unknown = recovery.elsewhere(predicted) < self._numbers.relocalise.enough_last * usual
         if (
             wake is not None
             and unknown
@@ -350,9 +350,10 @@ class Tracker(abc.ABC):
         elif few or not self._quality.suspicious:
             self._verdict.trust()
         else:
-            support = match.overlapped * confirmed / total
-            here = support / self._quality.usual_whole()
-            self._verdict.take(here, ratio=self._agreement.ratio)
+            share = confirmed / total
+            whole = match.overlapped * share / self._quality.usual_whole()
+            voting = match.matched * share / self._quality.usual_support()
+            self._verdict.take(max(whole, voting), ratio=self._agreement.ratio, vote=self._vote)
 
     def _suspect(self, observations: Observations, prediction: Prediction) -> None:
         """The frame is denied: begin to search the map, and from some such frames on be lost."""

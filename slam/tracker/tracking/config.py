@@ -107,6 +107,7 @@ class VerdictConfig(Settings):
     agreed: float = number(
         4.0, "ratio", "of corrections over what odometry may be off: more is evidence", SEEDS
     )
+    most: float = number(8.0, "1", "log odds, most that those corrections add", SEEDS)
     rival: float = number(
         20.0, "1", "the same, by what a known other place has more of the usual support", SEEDS
     )

@@ -82,8 +82,11 @@ class TrackingQuality:
 
     @property
     def suspicious(self) -> bool:
-        """Only a map that for long explained what is seen can show where the robot is."""
-        return self.freeze_below > 0.0 and self.is_worth_searching()
+        """Only a map that for long explained what is seen can show where the robot is.
+
+        What has no vote need not be explained: a crowd close by does not take the doubt away.
+        """
+        return self.freeze_below > 0.0 and self.is_worth_searching_near()
 
     def arises(self, matched: float) -> bool:
         """Whether a match is so poor that the map in view is to be asked."""

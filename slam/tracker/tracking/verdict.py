@@ -36,16 +36,20 @@ class Verdict:
         """The map is too young, or too little is in view, to deny a pose."""
         self.word, self.p_lost = TRACKING, 0.0
 
-    def take(self, here: float, elsewhere: float = 0.0, ratio: float = 0.0) -> None:
+    def take(
+        self, here: float, elsewhere: float = 0.0, ratio: float = 0.0, vote: float = 0.0
+    ) -> None:
         """``here``: the support of the pose, over the usual one; ``elsewhere``: of the best other
-        place that is known, 0 where none is; ``ratio``: see ``tracker.standing.agreement``.
+        place that is known, 0 where none is; ``ratio``: see ``tracker.standing.agreement``;
+        ``vote``: the mean of the returns. Where all stand, odometry is wrong, and not the pose.
 
         A support is the matched share of the returns, times the share of the old map in view that
         they confirm. So it counts what still stands against what is denied.
         """
         config = self._config
         odds = config.steep * (config.even - here) + config.rival * max(elsewhere - here, 0.0)
-        odds += 1.5 * max(ratio - config.agreed, 0.0)  # -log of a Gaussian: 1/2 S'(V + R)^-1 S
+        denied = 1.5 * max(ratio - config.agreed, 0.0)  # -log of a Gaussian: 1/2 S'(V + R)^-1 S
+        odds += min((1.0 - vote) * denied, config.most)
         self.p_lost = 1.0 / (1.0 + math.exp(min(max(-odds, -50.0), 50.0)))
         if self.p_lost >= 0.5:
             self.word = LOST

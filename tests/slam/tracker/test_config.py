@@ -20,8 +20,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("73d1ace95801", "fffd67f9d5ba")),
-        (OccupancyConfig, ["grid"], ("69c1a5e5ff71", "a772f79ab131")),
+        (ShuntingConfig, [], ("9e067d843682", "109a56f81e12")),
+        (OccupancyConfig, ["grid"], ("319e780a1b16", "672901a12eb7")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

@@ -93,7 +93,10 @@ def test_what_stands_here_and_elsewhere_decides(here: float, elsewhere: float, w
     assert surer.p_lost > verdict.p_lost
     denied = Verdict(VerdictConfig())
     denied.take(here, elsewhere, ratio=20.0)
-    assert denied.word == LOST
+    assert (denied.word == LOST) == (here < 0.8)  # odometry alone does not outweigh what stands
+    slipped = Verdict(VerdictConfig())
+    slipped.take(here, elsewhere, ratio=20.0, vote=1.0)  # nothing moves: the wheels did
+    assert slipped.p_lost == verdict.p_lost
 
 
 def test_the_area_under_a_roc_counts_pairs_and_ties_half() -> None:
