@@ -32,7 +32,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError
 from slam.estimate import Changes, Estimate, Landmarks, MapSquares, Raster
-from slam.frames import Frame
+from slam.frames import Float, Frame
 from slam.names import first_line, join_folders, refuse_code
 from slam.settings import Settings
 from slam.trajectory import Trajectory
@@ -111,6 +111,14 @@ class ChangesInParts(Protocol):
 
     def changes_part(self, bounds: tuple[float, float, float, float]) -> Changes | None:
         """The cells of ``changes()`` within ``bounds``, as ``map_part`` those of ``map()``."""
+
+
+@runtime_checkable
+class MovingMap(Protocol):
+    """Optional: a map that closed loops move. ``diagnostics["correction"]`` is not zero then."""
+
+    def poses_in_map(self) -> Float:
+        """(n, 3) of all frames so far in the map as it is now."""
 
 
 @runtime_checkable

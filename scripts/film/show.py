@@ -27,10 +27,10 @@ from scripts.film.scan_pane import LEGEND, legend, points_robot
 from scripts.film.view import Stage
 from slam import se2
 from slam.estimate import Raster
-from slam.frames import NS_PER_S, Float, Frame
+from slam.frames import NS_PER_S, Float, Frame, Scan
 from slam.frontend.seen_space import SeenSpace
 from slam.replay import Replay, Track
-from slam.system import MapsInParts
+from slam.system import MapsInParts, MovingMap
 
 SEEN_EVERY_NS = 200_000_000  # the areas of neighbouring scans overlap
 MOST_MAPS = 60  # whole ones, of a log
@@ -66,7 +66,9 @@ class Show:
     trails: dict[str, Trail] = field(default_factory=dict)
     unsure: list[Bar] = field(default_factory=list)
     changed: Changed = field(default_factory=Changed)
+    redrawn: int = 0  # times that the SLAM moved its map
     _seen_ns: int = -SEEN_EVERY_NS
+    _scans: list[tuple[int, Scan]] = field(default_factory=list)  # that were seen, by frame
     _first: tuple[int, Float | None] | None = None
     _last: Frame | None = None
     _panes: _Panes | None = None
@@ -116,6 +118,7 @@ class Show:
         if frame.scan is not None and frame.stamp_ns - self._seen_ns >= SEEN_EVERY_NS:
             self.seen.add(frame.scan, self.track().estimates[-1].T_map_robot)
             self._seen_ns = frame.stamp_ns
+            self._scans.append((len(self.track().estimates) - 1, frame.scan))
         seconds = self.seconds(frame)
         for name, track in self.replay.tracks.items():
             estimate = track.estimates[-1]
@@ -126,6 +129,7 @@ class Show:
                 error[2] = se2.wrap(float(error[2]))
             self.series.setdefault(name, Series()).add(seconds, error, estimate.covariance)
         self._note_trust(seconds)
+        self._follow_map()
         if self.filmed and frame.scan is not None and self.stage.bounds is None:
             self.changed.add(frame.scan, self.track().estimates[-1].T_map_robot)
         return seconds
@@ -153,6 +157,22 @@ class Show:
         if frame.truth is None or first is None:
             return None
         return se2.between(first, frame.truth)
+
+    def _follow_map(self) -> None:
+        """Lay out anew what was seen, where closed loops have moved the map (docs/loops.md)."""
+        system = self.track().system
+        moved = any(self.track().estimates[-1].diagnostics.get("correction", ()))
+        if not moved or not isinstance(system, MovingMap):
+            return
+        poses = system.poses_in_map()
+        self.seen, self.redrawn = SeenSpace(), self.redrawn + 1
+        self.trails[self.primary] = trail = Trail()
+        for pose in poses:
+            trail.add(pose)
+        for k, scan in self._scans:
+            self.seen.add(scan, poses[k])
+            if self.filmed and self.stage.bounds is None:
+                self.changed.add(scan, poses[k])
 
     def _note_trust(self, seconds: float) -> None:
         if self.track().estimates[-1].converged:
@@ -204,6 +224,7 @@ class _Panes:
         )
         # of a log, nobody knows how large its world is
         self._tiles = MapTiles() if stage.bounds is None else None
+        self._redrawn = show.redrawn
         self._base = self._still()
         self._fresh_at = self._mapped_at = -np.inf
         self._camera: Picture | None = None
@@ -249,6 +270,8 @@ class _Panes:
         track = show.track()
         if tiles is None:
             return track.map()
+        if self._redrawn != show.redrawn:
+            self._redrawn, self._tiles = show.redrawn, (tiles := MapTiles())
         tiles.fit(self._map.view(show.trails[show.primary], show.T_view_map()).scale)
         rest_s = 0.0 if isinstance(track.system, MapsInParts) else show.duration_s / MOST_MAPS
         if abs(seconds - self._mapped_at) >= rest_s:

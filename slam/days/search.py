@@ -42,6 +42,7 @@ class StartSearch:
     def __init__(self, known: Tracker, config: SearchConfig) -> None:
         self._known, self._config = known, config
         self.alone = type(known)(known.config)
+        self.alone.hold_map()
         self.elapsed_s, self.denied = 0.0, 0
         self._search = known.relocalisation()
         self._before: tuple[int, Float] | None = None

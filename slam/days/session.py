@@ -82,6 +82,7 @@ class Session:
                 f"{history.times_s[-1]:g} s, got {time_s:g} s"
             )
         self.tracker, self.time_s = tracker, float(time_s)
+        tracker.hold_map()  # what a session keeps of places lies in it
         self.history = history or History(cell_m=self.config.evidence.cell_m)
         self._found, self._new = found, found
         self.reset()

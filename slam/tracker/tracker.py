@@ -81,6 +81,7 @@ class Tracker(abc.ABC):
         new_map = partial(self._new_map, self.config) if self.map_moves else None
         self._loops = Loops(self.config, self._matcher, self._new_submap, new_map)
         self._T_map_odom, self._corrected_by = np.zeros(3), np.zeros(3)
+        self._held = self._found = False  # the map; the robot, by a search, in this scan
         self._standing = Standing(self.config.standing)
         self._agreement = Agreement(self.config.standing)
         self._rival = Rival(self._matcher, self._standing)
@@ -110,6 +111,7 @@ class Tracker(abc.ABC):
         if self._before is None and self._resumed is None:
             return self._first(frame)
         self._path.check_order(frame.stamp_ns)
+        self._found = False
         self._correct()
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         seen = frame if self._ranges is None else self._ranges.seen(frame)
@@ -155,7 +157,7 @@ class Tracker(abc.ABC):
         self._corrected_by = np.zeros(3)
         self._loops.work()
         lost = self._wake is not None or self._relocalisation is not None
-        if not self._trusted or lost or self._resumed is not None:
+        if not self._trusted or lost or self._held or self._resumed is not None:
             return
         correction = self._loops.correction(self._path.poses)
         if correction is None and self._ranges is not None:
@@ -235,6 +237,7 @@ class Tracker(abc.ABC):
         match = recovery.step(observations, prediction, here, usual, carried=carried)
         self._verdict.take(recovery.here / usual, recovery.elsewhere(predicted) / usual)
         if match is not None:
+            self._found = True
             self._go_on_in(wake.map if wake is not None and recovery.went_on else self.cell_map)
             self._verdict.trust()
             self._quality.relocated(recovery.accepted)
@@ -296,6 +299,8 @@ class Tracker(abc.ABC):
         if state != "tracking":
             return match, state
         if self._rival.undecided:
+            if self._wake is not None:
+                self._wake.followed = False
             return match, "frozen"
         rasterise(self.cell_map, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
@@ -413,7 +418,7 @@ class Tracker(abc.ABC):
         everyone = observations.with_votes(None)
         self._loops.add(
             len(self._path), match.T_map_robot, motion, covariance, everyone,
-            elapsed=prediction.elapsed, written=written, found=state == "relocated",
+            elapsed=prediction.elapsed, written=written, found=self._found,
         )  # fmt: skip
 
     def _report(self, frame: Frame, match: Match, state: str) -> Estimate:
@@ -443,7 +448,7 @@ class Tracker(abc.ABC):
         )
 
     def _covariance(self, T_map_robot: Float, state: str) -> Float:
-        """(3, 3) of the pose; of a robot that may be lost, it may be anywhere that it has been."""
+        """(3, 3) of the pose; of a robot that may be lost, it may be anywhere that it has seen."""
         covariance = self._pose_covariance.covariance
         if state in ("frozen", "lost"):
             covariance = covariance + self._verdict.p_lost * self._loops.anywhere(T_map_robot)
@@ -536,8 +541,17 @@ class Tracker(abc.ABC):
         slam._quality.resume(state.usual, state.supports, state.tracked_s, state.tracked)
         return slam
 
+    def hold_map(self) -> None:
+        """The map is a frame of reference from now on: closed loops do not move it."""
+        self._held = True
+        self._loops.hold()
+
+    def poses_in_map(self) -> Float:
+        """(n, 3) of all frames so far in the map as it is now: moved with it by each correction."""
+        return self._path.poses()
+
     def trajectory(self) -> Trajectory:
-        """The poses with the loops closed that were found so far; the online ones without any."""
+        """The poses moved with the loops found so far where they tear the map, else as online."""
         return self._path.trajectory(self._loops.corrected(self._path.poses()))
 
 

@@ -158,6 +158,7 @@ STAY = {
     "tracker/matching/whole_search.py": "how the work is laid out; no result depends on it",
     "tracker/standing/recent.py": "an empty array",
     "tracker/tracking/closures.py": "what a piece of work counts, in units of loops.work",
+    "tracker/tracking/quality.py": "a guard against division by zero",
     "tracker/uncertainty/residuals.py": "places in an array",
 }
 

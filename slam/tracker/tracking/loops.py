@@ -61,6 +61,7 @@ class Loops(KeyFrames):
         self._later: deque[tuple[int, int]] = deque()  # from which key frame on, and where to tie
         self._first: Float = np.zeros(3)
         self._rough: dict[int, tuple[int, int]] = {}  # found by search, by key frame
+        self._links: set[tuple[int, int]] = set()  # over losses: not found by matching
         self._tied_to: set[int] = set()  # key frames with ties
         self._again = 0
         self._relaxation: Relaxation | None = None
@@ -70,6 +71,10 @@ class Loops(KeyFrames):
         self._redrawing: Redrawing | None = None
         self._new_graph = False
         self._moved = False  # the map was corrected
+
+    def hold(self) -> None:
+        """The map is not moved from now on."""
+        self._new_map, self._redrawing = None, None
 
     @property
     def edges(self) -> list[Edge]:
@@ -90,7 +95,7 @@ class Loops(KeyFrames):
     def correction(self, poses: Callable[[], Float]) -> Correction | None:
         """The new map, if one is ready, with all (n, 3) ``poses()`` moved into it."""
         redrawing = self._redrawing
-        if redrawing is None or not redrawing.done:
+        if redrawing is None or not redrawing.done or self._found or redrawing.outrun:
             return None
         self._redrawing, self._moved = None, True
         last = len(self.keys) - 1
@@ -129,6 +134,8 @@ class Loops(KeyFrames):
 
     def _task(self) -> int:
         """One piece of work; its cost in units, 0 if there is none."""
+        if self._redrawing is not None and self._redrawing.outrun:
+            self._redrawing, self._new_graph = None, True
         if self._redrawing is not None and not self._redrawing.done:
             self._redrawing.draw()
             return DRAWN
@@ -170,9 +177,10 @@ class Loops(KeyFrames):
         """Close a loop at key frame ``j`` if it is on one that no tie goes on with."""
         if self._edges:
             self._ties.append(j)
+        closures = [b for a, b in self._edges if (a, b) not in self._links]
         if self.keys[j].found:
             self._link(j)
-        if any(b >= j - self._numbers.every for _, b in list(self._edges)[-self._numbers.batch :]):
+        if any(b >= j - self._numbers.every for b in closures[-self._numbers.batch :]):
             return
         middle = self._nearest(j)
         if middle is not None:
@@ -197,6 +205,7 @@ class Loops(KeyFrames):
         self._edges[known, j] = Edge(
             a=known, b=j, T_a_b=T_a_b, information=information, robust=True
         )
+        self._links.add((known, j))
         self._fresh, self._surprised = self._fresh + 1, True
 
     def _take(self, edge: Edge, predicted: Float) -> None:
@@ -246,7 +255,7 @@ class Loops(KeyFrames):
         if self.way_m < self._numbers.long_m:
             return
         torn = self._torn_keys(0.0)
-        if not torn:
+        if not torn or not self._holds_present():
             return
         _log.info("loop closed: the map is torn at %d key frames and drawn anew", torn)
         if self._numbers.datum == "all":
@@ -254,13 +263,26 @@ class Loops(KeyFrames):
             self.poses = list(least_moved(np.array(self.poses), online))
         self._redrawing = Redrawing(self._map_config, self._new_map, self.keys, self.poses)
 
+    def _holds_present(self) -> bool:
+        """Whether closures hold what was driven since the robot was last lost.
+
+        Lost: at two key frames in a row. Else the graph knows of it what odometry said meanwhile: it is not to move the robot.
+        """
+        written = [key.written for key in self.keys]
+        lost = [k for k in range(1, len(written)) if not (written[k - 1] or written[k])]
+        if not lost:
+            return True
+        found = [pair for pair in self._edges if pair not in self._links]
+        held = {b for a, b in found if a < lost[-1] < b and self.weights.get((a, b), 0.0) > 0.5}
+        return len(held) >= self._numbers.denying
+
     def _torn_keys(self, new: float) -> int:
         """Key frames at which the graph denies the map; 0 where they are fewer than ``denying``.
 
         ``new``: weight of closures that came after the latest solution of the graph.
         """
         held = [pair for pair in self._edges if self.weights.get(pair, new) > 0.5]
-        if len({b for _, b in held}) < self._numbers.denying:
+        if len({b for a, b in held if (a, b) not in self._links}) < self._numbers.denying:
             return 0
         online = np.array([key.T_map_robot for key in self.keys[: len(self.poses)]])
         near, last = self._numbers.submap, max(b for _, b in held)

@@ -17,6 +17,8 @@ from slam import se2
 from slam.frames import Float
 from slam.tracker.tracking.config import QualityConfig
 
+LEAST = 1e-9  # supports are divided by the usual one
+
 
 class TrackingQuality:
     """What frames so far were like, and whether the next one fits.
@@ -62,11 +64,11 @@ class TrackingQuality:
 
     def usual_support(self) -> float:
         """Median of it times the share of the map in view that is confirmed."""
-        return median(self.supports) if self.supports else 1.0
+        return max(median(self.supports), LEAST) if self.supports else 1.0
 
     def usual_whole(self) -> float:
         """As ``usual_support``, of all returns: what a place must explain to be the right one."""
-        return median(self.wholes) if self.wholes else 1.0
+        return max(median(self.wholes), LEAST) if self.wholes else 1.0
 
     def is_worth_searching(self, share: float = 1.0) -> bool:
         """Grown (or to that share), and explains what is seen: else it cannot deny it either."""

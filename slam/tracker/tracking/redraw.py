@@ -51,6 +51,11 @@ class Redrawing:
         """Whether all key frames are in the map."""
         return self._drawn == len(self._keys)
 
+    @property
+    def outrun(self) -> bool:
+        """Whether a lost robot was found since: how the way goes on is for a new graph to say."""
+        return any(key.found for key in self._keys[self._last + 1 :])
+
     def pose(self, k: int) -> Float:
         """(3,) of key frame ``k`` in the new map."""
         while len(self._poses) <= k:
