@@ -28,9 +28,10 @@ from slam.system import SlamSystem, create
 from slam.tracker.tracker import Tracker
 
 RIGHT_M, RIGHT_RAD = 0.5, 0.35  # of the true pose: the place that was found is the right one
+KNOWN_M = 0.3  # a start so near to a place that was seen is known
 COLUMNS = (
-    "slam", "session", "time_of_day", "map", "found_after_s", "place", "rmse_m", "worst_m",
-    "tracked", "ghost_rate", "recall", "map_kb", "memory_mb", "load_s", "ms_per_scan",
+    "slam", "session", "time_of_day", "map", "start", "found_after_s", "place", "rmse_m", "worst_m",
+    "disagrees", "tracked", "ghost_rate", "recall", "map_kb", "memory_mb", "load_s", "ms_per_scan",
 )  # fmt: skip
 """Of lifelong.csv. The last two are about the machine."""
 
@@ -89,6 +90,8 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
     if first and drive.frames[0].truth is not None:
         building.T_map_world = se2.inverse(drive.frames[0].truth)
     state = session.state
+    row["start"] = _start(session, building.T_map_world, drive)
+    row["disagrees"] = None if first or state.found_after_s is None else state.disagrees
     row["found_after_s"] = state.found_after_s
     row["tracked"] = state.tracked
     written = keep(session, building.map)
@@ -103,6 +106,17 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
     if state.found_after_s is not None:
         row |= _map_scores(building.T_map_world, drive, track)
     return row
+
+
+def _start(session: Session, T_map_world: Float | None, drive: Drive) -> str:
+    """Whether a session before this one saw the place where the robot starts; "" without truth."""
+    truth, history = drive.frames[0].truth, session.history
+    if T_map_world is None or truth is None or not len(history):
+        return ""
+    at = se2.compose(T_map_world, truth)[:2]
+    cells, _ = history.table()
+    near = np.hypot(*((cells + 0.5) * history.cell_m - at).T) < KNOWN_M
+    return "known" if near.any() else "unknown"
 
 
 def _anew(building: Building, drive: Drive) -> dict[str, Any]:
@@ -175,5 +189,7 @@ def _standing(recording: Recording) -> list[Still]:
     return [
         thing
         for thing in still_things(recording)
-        if math.dist(ends[thing.row, :2].tolist(), thing.pose[:2]) < NEAR_M and len(thing.points)
+        if not thing.kind.startswith("person")
+        and math.dist(ends[thing.row, :2].tolist(), thing.pose[:2]) < NEAR_M
+        and len(thing.points)
     ]

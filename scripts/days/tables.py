@@ -23,13 +23,13 @@ _FORMS = {
     "load_s": "{:.2f}", "ms_per_scan": "{:.2f}",
 }  # fmt: skip
 _PRINTED = {
-    "session": "session", "time_of_day": "time", "map": "map", "found_after_s": "found, s",
-    "place": "place", "rmse_m": "rmse, m", "ghost_rate": "ghosts", "recall": "recall",
-    "map_kb": "kB", "ms_per_scan": "ms",
+    "session": "session", "time_of_day": "time", "map": "map", "start": "start",
+    "found_after_s": "found, s", "place": "place", "rmse_m": "rmse, m", "ghost_rate": "ghosts",
+    "recall": "recall", "map_kb": "kB", "ms_per_scan": "ms",
 }  # fmt: skip
 _SHOWN = (
-    "session", "time_of_day", "map", "found_after_s", "place", "rmse_m", "worst_m", "ghost_rate",
-    "recall", "map_kb", "ms_per_scan",
+    "session", "time_of_day", "map", "start", "found_after_s", "place", "rmse_m", "worst_m",
+    "ghost_rate", "recall", "map_kb", "ms_per_scan",
 )  # fmt: skip
 
 
