@@ -15,6 +15,7 @@ import numpy as np
 from scripts.comparison.maps import NEAR_M, Believed, StaticDistance
 from scripts.comparison.recording import Recording
 from scripts.comparison.sight import clearance
+from scripts.days import ages
 from scripts.days.sessions import Drive
 from scripts.days.truth import Still, still_things
 from scripts.names import file_name
@@ -31,7 +32,8 @@ RIGHT_M, RIGHT_RAD = 0.5, 0.35  # of the true pose: the place that was found is 
 KNOWN_M = 0.3  # a start so near to a place that was seen is known
 COLUMNS = (
     "slam", "session", "time_of_day", "map", "start", "found_after_s", "place", "rmse_m", "worst_m",
-    "disagrees", "tracked", "ghost_rate", "recall", "map_kb", "memory_mb", "load_s", "ms_per_scan",
+    "disagrees", "outdated_told", "outdated_false", "tracked", "ghost_rate", "recall", "map_kb",
+    "memory_mb", "load_s", "ms_per_scan",
 )  # fmt: skip
 """Of lifelong.csv. The last two are about the machine."""
 
@@ -44,6 +46,9 @@ class Building:
     anew        it cannot load a map: every session is the first
     T_map_world the frame of the first session's map; None before, or without truth
     snapshots   what each session that fitted saw, by its number
+    copies      its map after each of them, where maps of some age are asked for
+    aged        rows (``ages.COLUMNS``) of the last session in older maps
+    before      the session before, where it was simulated
     """
 
     name: str
@@ -51,6 +56,9 @@ class Building:
     anew: bool = False
     T_map_world: Float | None = None
     snapshots: dict[int, Snapshot] = field(default_factory=dict)
+    copies: dict[int, Path] = field(default_factory=dict)
+    aged: list[dict[str, Any]] = field(default_factory=list)
+    before: Recording | None = None
 
 
 def started(names: Sequence[str], folder: Path) -> list[Building]:
@@ -97,6 +105,9 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
     written = keep(session, building.map)
     if state.fits:
         building.snapshots[drive.number] = session.known().sessions[-1]
+        building.copies[drive.number] = ages.keep_copy(
+            building.map, building.map.parent / "maps", drive.number
+        )
     row["map"] = "new" if first else "merged" if state.fits else written.name
     row["load_s"] = loaded_s
     row["map_kb"] = written.stat().st_size / 1e3
@@ -105,7 +116,30 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
     row |= _errors(building.T_map_world, drive, track, searched)
     if state.found_after_s is not None:
         row |= _map_scores(building.T_map_world, drive, track)
+        if building.before is not None and drive.recording is not None:
+            shares = ages.changed_share(building.before, drive.recording)
+            row |= ages.verdicts(track.estimates, shares, searched)
+    building.before = drive.recording
     return row
+
+
+def age_rows(building: Building, drive: Drive) -> Iterator[dict[str, Any]]:
+    """Of that session in maps some sessions old (``ages.AGES``); none of them is written to."""
+    kept = sorted(building.copies)
+    for age, number in ages.ages_of(kept, drive.number):
+        kind = type(create(building.name))
+        assert issubclass(kind, Tracker)
+        session = Session.open(building.copies[number], kind, time_s=drive.time_s)
+        track = Track(building.name, session)
+        row: dict[str, Any] = dict.fromkeys(ages.COLUMNS)
+        row |= {"slam": building.name, "age": age, "session": drive.number}
+        if track.survive(drive.frames) is not None:
+            yield row | {"place": "failed"}
+            continue
+        state = session.state
+        row |= {"found_after_s": state.found_after_s, "tracked": state.tracked}
+        searched = sum(e.diagnostics.get("state") == "searching" for e in track.estimates)
+        yield row | _errors(building.T_map_world, drive, track, searched)
 
 
 def _start(session: Session, T_map_world: Float | None, drive: Drive) -> str:

@@ -64,7 +64,10 @@ def changes_picture(
                 )  # fmt: skip
         for kind, colour in COLOURS.items():
             axes[1].plot([], [], "o", mfc="none", color=colour, label=kind)
-        axes[1].legend(loc="upper right", fontsize=8)
+        figure.legend(
+            *axes[1].get_legend_handles_labels(), loc="lower center", ncols=len(COLOURS),
+            fontsize=8, bbox_to_anchor=(0.5, -0.04),
+        )  # fmt: skip
         axes[0].set_ylabel("y, m")
         save(figure, path)
 
@@ -79,7 +82,7 @@ def mobility_picture(path: Path, mobility: MobilityMap, hours: Sequence[float]) 
     day = (np.floor(last / DAY_S) + 1.0) * DAY_S
     panes: list[tuple[str, Raster | None, str]] = [
         ("how often something stands there", standing, "Greys"),
-        ("how much that changes", changing, "inferno"),
+        ("how much that changes", changing, "OrRd"),
     ]
     panes += [
         (f"expected at {h:g} h the day after", mobility.probability(day + 3600.0 * h), "Greys")

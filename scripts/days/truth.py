@@ -177,6 +177,13 @@ def changed_spots(
     return found
 
 
+def moved_since(thing: Still, others: Sequence[Still]) -> bool:
+    """Whether it does not stand among the things of another session as it stands here."""
+    return not any(
+        t.name == thing.name and not _elsewhere(thing, t, ELSEWHERE_M, TURNED_RAD) for t in others
+    )
+
+
 def _same(one: Still, other: Still) -> bool:
     """Whether a thing stood there in both sessions, for about as long as it was seen."""
     there = not _elsewhere(one, other, SHIFTED_M, SHIFTED_RAD)
