@@ -73,13 +73,13 @@ class HabitConfig(Settings):
 class ChangeConfig(Settings):
     """What counts as changed between two sessions."""
 
-    stands: float = number(0.5, "share", "of the looks that found it: something stands", high=1.0)
-    empty: float = number(0.15, "share", "of the looks that found it: nothing stands", high=1.0)
+    stands: float = number(0.4, "share", "of the looks that found it: something stands", high=1.0)
+    empty: float = number(0.1, "share", "of the looks that found it: nothing stands", high=1.0)
     join_m: float = number(0.25, "m", "cells nearer than this are one object")
     slack_m: float = number(0.2, "m", "an edge that moved by less has not moved")
     leg_m: float = number(0.3, "m", "a smaller part may be a leg of a thing")
     thing_m: float = number(0.7, "m", "legs within this are of one thing")
-    least: float = number(0.19, "confidence", "what is less sure is not listed", high=1.0)
+    least: float = number(0.22, "confidence", "what is less sure is not listed", high=1.0)
     moved_m: float = number(1.0, "m", "farthest that a thing is followed to another place")
     alike: float = number(0.6, "ratio", "of the smaller to the larger size: may be the same thing")
     leaf_least_m: float = number(0.55, "m", "shortest leaf of a door")
