@@ -64,10 +64,8 @@ def changes_picture(
                 )  # fmt: skip
         for kind, colour in COLOURS.items():
             axes[1].plot([], [], "o", mfc="none", color=colour, label=kind)
-        figure.legend(
-            *axes[1].get_legend_handles_labels(), loc="lower center", ncols=len(COLOURS),
-            fontsize=8, bbox_to_anchor=(0.5, -0.04),
-        )  # fmt: skip
+        handles, names = axes[1].get_legend_handles_labels()
+        figure.legend(handles, names, loc="lower center", ncols=len(COLOURS), fontsize=8)
         axes[0].set_ylabel("y, m")
         save(figure, path)
 

@@ -21,8 +21,8 @@ Row = Mapping[str, Any]
 _FORMS = {
     "found_after_s": "{:.1f}", "rmse_m": "{:.3f}", "worst_m": "{:.3f}", "tracked": "{:.2f}",
     "disagrees": "{:.3f}", "outdated_told": "{:.2f}", "outdated_false": "{:.2f}",
-    "ghost_rate": "{:.3f}", "recall": "{:.2f}", "map_kb": "{:.0f}", "memory_mb": "{:.2f}",
-    "load_s": "{:.2f}", "ms_per_scan": "{:.2f}",
+    "ghost_rate": "{:.3f}", "ghost_seen_rate": "{:.3f}", "recall": "{:.2f}", "map_kb": "{:.0f}",
+    "memory_mb": "{:.2f}", "load_s": "{:.2f}", "ms_per_scan": "{:.2f}",
 }  # fmt: skip
 _PRINTED = {
     "session": "session", "time_of_day": "time", "map": "map", "start": "start",
@@ -31,7 +31,8 @@ _PRINTED = {
 }  # fmt: skip
 _SHOWN = (
     "session", "time_of_day", "map", "start", "found_after_s", "place", "rmse_m", "worst_m",
-    "outdated_told", "outdated_false", "ghost_rate", "recall", "map_kb", "load_s", "ms_per_scan",
+    "outdated_told", "outdated_false", "ghost_rate", "ghost_seen_rate", "recall", "map_kb",
+    "load_s", "ms_per_scan",
 )  # fmt: skip
 
 

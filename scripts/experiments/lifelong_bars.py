@@ -78,7 +78,8 @@ def summary(buildings: Sequence[dict[str, Any]], slam: str) -> list[str]:
         "load_s",
     ):
         early, late = of(lambda rows: rows[1:4], column), of(lambda rows: rows[-3:], column)
-        lines.append(f"{column}: sessions 1 to 3 {early:.3f}, the last three {late:.3f}")
+        if not np.isnan(late):
+            lines.append(f"{column}: sessions 1 to 3 {early:.3f}, the last three {late:.3f}")
     told, false = _mean(later, "outdated_told"), _mean(later, "outdated_false")
     lines.append(
         f"'map outdated here' where it clearly is {told:.2f}, where it hardly is {false:.2f}"

@@ -84,7 +84,7 @@ class ChangeConfig(Settings):
     alike: float = number(0.6, "ratio", "of the smaller to the larger size: may be the same thing")
     leaf_least_m: float = number(0.55, "m", "shortest leaf of a door")
     leaf_most_m: float = number(1.3, "m", "longest leaf of a door")
-    leaf_thick: float = number(0.45, "share", "of its length: a thicker piece is no leaf")
+    leaf_thick: float = number(0.55, "share", "of its length: a thicker piece is no leaf")
     hinge_m: float = number(0.6, "m", "farthest that the ends of a leaf's two places lie apart")
 
 
