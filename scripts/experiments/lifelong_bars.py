@@ -71,6 +71,7 @@ def summary(buildings: Sequence[dict[str, Any]], slam: str) -> list[str]:
     for column in (
         "rmse_m",
         "ghost_rate",
+        "ghost_seen_rate",
         "recall",
         "map_kb",
         "memory_mb",
