@@ -11,15 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scripts.comparison.maps import NEAR_M, Believed, StaticDistance
 from scripts.comparison.recording import Recording
 from scripts.comparison.sight import clearance
+from scripts.days import ages
 from scripts.days.sessions import Drive
 from scripts.days.truth import Still, still_things
 from scripts.names import file_name
 from slam import se2
 from slam.days.evidence import Snapshot
+from slam.days.history import History
 from slam.days.session import Session, keep
 from slam.errors import SlamFailedError
 from slam.frames import Float
@@ -28,9 +31,11 @@ from slam.system import SlamSystem, create
 from slam.tracker.tracker import Tracker
 
 RIGHT_M, RIGHT_RAD = 0.5, 0.35  # of the true pose: the place that was found is the right one
+KNOWN_M = 0.3  # a start so near to a place that was seen is known
 COLUMNS = (
-    "slam", "session", "time_of_day", "map", "found_after_s", "place", "rmse_m", "worst_m",
-    "tracked", "ghost_rate", "recall", "map_kb", "memory_mb", "load_s", "ms_per_scan",
+    "slam", "session", "time_of_day", "map", "start", "found_after_s", "place", "rmse_m", "worst_m",
+    "disagrees", "outdated_told", "outdated_false", "tracked", "ghost_rate", "ghost_seen_rate",
+    "recall", "map_kb", "memory_mb", "load_s", "ms_per_scan",
 )  # fmt: skip
 """Of lifelong.csv. The last two are about the machine."""
 
@@ -43,6 +48,9 @@ class Building:
     anew        it cannot load a map: every session is the first
     T_map_world the frame of the first session's map; None before, or without truth
     snapshots   what each session that fitted saw, by its number
+    copies      its map after each of them, where maps of some age are asked for
+    aged        rows (``ages.COLUMNS``) of the last session in older maps
+    before      the session before, where it was simulated
     """
 
     name: str
@@ -50,6 +58,9 @@ class Building:
     anew: bool = False
     T_map_world: Float | None = None
     snapshots: dict[int, Snapshot] = field(default_factory=dict)
+    copies: dict[int, Path] = field(default_factory=dict)
+    aged: list[dict[str, Any]] = field(default_factory=list)
+    before: Recording | None = None
 
 
 def started(names: Sequence[str], folder: Path) -> list[Building]:
@@ -89,11 +100,16 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
     if first and drive.frames[0].truth is not None:
         building.T_map_world = se2.inverse(drive.frames[0].truth)
     state = session.state
+    row["start"] = _start(session, building.T_map_world, drive)
+    row["disagrees"] = None if first or state.found_after_s is None else state.disagrees
     row["found_after_s"] = state.found_after_s
     row["tracked"] = state.tracked
     written = keep(session, building.map)
     if state.fits:
         building.snapshots[drive.number] = session.known().sessions[-1]
+        building.copies[drive.number] = ages.keep_copy(
+            building.map, building.map.parent / "maps", drive.number
+        )
     row["map"] = "new" if first else "merged" if state.fits else written.name
     row["load_s"] = loaded_s
     row["map_kb"] = written.stat().st_size / 1e3
@@ -101,8 +117,42 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
     searched = sum(e.diagnostics.get("state") == "searching" for e in track.estimates)
     row |= _errors(building.T_map_world, drive, track, searched)
     if state.found_after_s is not None:
-        row |= _map_scores(building.T_map_world, drive, track)
+        row |= _map_scores(building.T_map_world, drive, track, session.known())
+        if building.before is not None and drive.recording is not None:
+            shares = ages.changed_share(building.before, drive.recording)
+            row |= ages.verdicts(track.estimates, shares, searched)
+    building.before = drive.recording
     return row
+
+
+def age_rows(building: Building, drive: Drive) -> Iterator[dict[str, Any]]:
+    """Of that session in maps some sessions old (``ages.AGES``); none of them is written to."""
+    kept = sorted(building.copies)
+    for age, number in ages.ages_of(kept, drive.number):
+        kind = type(create(building.name))
+        assert issubclass(kind, Tracker)
+        session = Session.open(building.copies[number], kind, time_s=drive.time_s)
+        track = Track(building.name, session)
+        row: dict[str, Any] = dict.fromkeys(ages.COLUMNS)
+        row |= {"slam": building.name, "age": age, "session": drive.number}
+        if track.survive(drive.frames) is not None:
+            yield row | {"place": "failed"}
+            continue
+        state = session.state
+        row |= {"found_after_s": state.found_after_s, "tracked": state.tracked}
+        searched = sum(e.diagnostics.get("state") == "searching" for e in track.estimates)
+        yield row | _errors(building.T_map_world, drive, track, searched)
+
+
+def _start(session: Session, T_map_world: Float | None, drive: Drive) -> str:
+    """Whether a session before this one saw the place where the robot starts; "" without truth."""
+    truth, history = drive.frames[0].truth, session.history
+    if T_map_world is None or truth is None or not len(history):
+        return ""
+    at = se2.compose(T_map_world, truth)[:2]
+    cells, _ = history.table()
+    near = np.hypot(*((cells + 0.5) * history.cell_m - at).T) < KNOWN_M
+    return "known" if near.any() else "unknown"
 
 
 def _anew(building: Building, drive: Drive) -> dict[str, Any]:
@@ -153,8 +203,10 @@ def _errors(T_map_world: Float | None, drive: Drive, track: Track, searched: int
     }
 
 
-def _map_scores(T_map_world: Float | None, drive: Drive, track: Track) -> dict[str, Any]:
-    """Ghosts and recall of the map at the end of a simulated session."""
+def _map_scores(
+    T_map_world: Float | None, drive: Drive, track: Track, known: History | None = None
+) -> dict[str, Any]:
+    """Ghosts and recall of the map at the end of a simulated session, the last one of ``known``."""
     recording, raster = drive.recording, track.map()
     if recording is None or raster is None or T_map_world is None:
         return {}
@@ -163,10 +215,21 @@ def _map_scores(T_map_world: Float | None, drive: Drive, track: Track) -> dict[s
     near = StaticDistance(recording.static_map)(occupied)
     near = np.minimum(near, clearance(occupied, recording, len(recording.frames) - 1))
     held = [believed.holds(thing.points) for thing in _standing(recording)]
+    seen = near[_looked_at(se2.transform(T_map_world, occupied), known)]
     return {
         "ghost_rate": float((near > NEAR_M).mean()) if len(occupied) else None,
+        "ghost_seen_rate": float((seen > NEAR_M).mean()) if len(seen) else None,
         "recall": float(np.mean(held)) if held else None,
     }
+
+
+def _looked_at(points: Float, known: History | None) -> NDArray[np.bool_]:
+    """(n,) which points (n, 2) m in the map lie in places that the last session has a say on."""
+    if known is None or not len(known) or not len(points):
+        return np.zeros(len(points), dtype=np.bool_)
+    places = np.floor(points / known.cell_m).astype(np.int64)
+    seen = {tuple(cell) for cell in known.sessions[-1].cells.tolist()}
+    return np.array([tuple(place) in seen for place in places.tolist()], dtype=np.bool_)
 
 
 def _standing(recording: Recording) -> list[Still]:
@@ -175,5 +238,7 @@ def _standing(recording: Recording) -> list[Still]:
     return [
         thing
         for thing in still_things(recording)
-        if math.dist(ends[thing.row, :2].tolist(), thing.pose[:2]) < NEAR_M and len(thing.points)
+        if not thing.kind.startswith("person")
+        and math.dist(ends[thing.row, :2].tolist(), thing.pose[:2]) < NEAR_M
+        and len(thing.points)
     ]

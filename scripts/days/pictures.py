@@ -83,7 +83,7 @@ def mobility_picture(path: Path, mobility: MobilityMap, hours: Sequence[float]) 
     day = (np.floor(last / DAY_S) + 1.0) * DAY_S
     panes: list[tuple[str, Raster | None, str]] = [
         ("how often something stands there, 0 to 1", standing, "Greys"),
-        ("how much that changes, 0 to 1", changing, "inferno"),
+        ("how much that changes, 0 to 1", changing, "OrRd"),
     ]
     panes += [
         (f"probability at {h:g} h the day after", mobility.probability(day + 3600.0 * h), "Greys")

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,14 +29,16 @@ _COLUMNS = (
 )  # fmt: skip
 
 
-def changes_page(folder: Path, building: Building, drives: Mapping[int, Drive]) -> str:
-    """Pictures and changes.csv into ``folder``, and the page's part on one SLAM's changes.
+def changes_page(
+    folder: Path, building: Building, drives: Mapping[int, Drive]
+) -> tuple[str, dict[str, Any] | None]:
+    """Pictures and changes.csv into ``folder``; the page's part on one SLAM's changes, the score.
 
     Each session is compared with the one before that fitted; scored where it was simulated.
     """
     history = read_history(building.map) if building.map.exists() else None
     if history is None or len(building.snapshots) < 2:
-        return ""
+        return "", None
     numbers = sorted(building.snapshots)
     found, scores = {}, []
     for first, second in pairwise(numbers):
@@ -49,7 +52,20 @@ def changes_page(folder: Path, building: Building, drives: Mapping[int, Drive]) 
     pair = building.snapshots[last[0]], building.snapshots[last[1]]
     titles = f"session {last[0]}", f"session {last[1]}"
     changes_picture(folder / "changes.png", pair, titles, history.cell_m, found[last])
-    return _words(building.name, last, found[last], scores, history)
+    words = _words(building.name, last, found[last], scores, history)
+    return words, added(scores) if scores else None
+
+
+def added(scores: Sequence[ChangeScore]) -> dict[str, Any]:
+    """The counts of all (``ChangeScore``), and the median position error, m."""
+    off = [m for s in scores for m in s.off_m]
+    counts: dict[str, Any] = {
+        name: sum(getattr(s, name) for s in scores) for name in ("listed", "right", "seen", "told")
+    }
+    for name in ("doors", "moved"):
+        pairs = [getattr(s, name) for s in scores]
+        counts[name] = [sum(p[0] for p in pairs), sum(p[1] for p in pairs)]
+    return counts | {"off_m": float(np.median(off)) if off else None}
 
 
 def _rows(found: Mapping[tuple[int, int], Sequence[Change]]) -> list[list[object]]:
@@ -83,15 +99,15 @@ def _score(
 
 def summed(scores: Sequence[ChangeScore]) -> str:
     """Precision, recall and position error of all, in words."""
-    listed, right = sum(s.listed for s in scores), sum(s.right for s in scores)
-    seen, told = sum(s.seen for s in scores), sum(s.told for s in scores)
-    off = [m for s in scores for m in s.off_m]
-    if not listed or not seen:
+    of = added(scores)
+    if not of["listed"] or not of["seen"]:
         return "too few changes to score"
-    error = f", median position error {100.0 * float(np.median(off)):.0f} cm" if off else ""
+    error = f", median position error {100.0 * of['off_m']:.0f} cm" if of["off_m"] else ""
     return (
-        f"precision {right / listed:.2f} ({right} of {listed} places listed), recall "
-        f"{told / seen:.2f} ({told} of {seen} places that both sessions saw){error}"
+        f"precision {of['right'] / of['listed']:.2f} ({of['right']} of {of['listed']} places "
+        f"listed), recall {of['told'] / of['seen']:.2f} ({of['told']} of {of['seen']} places that "
+        f"both sessions saw){error}; truly so: {of['doors'][1]} of {of['doors'][0]} doors, "
+        f"{of['moved'][1]} of {of['moved'][0]} moved"
     )
 
 
@@ -104,8 +120,8 @@ def _words(
 ) -> str:
     text = f"\n## What changed, by {name}\n\n"
     if scores:
-        text += f"Of things of at least {LEAST_M:g} m, from each session to the next: "
-        text += f"{summed(scores)}.\n\n"
+        text += "From each session to the next, precision of all that is listed, recall of things "
+        text += f"of at least {LEAST_M:g} m: {summed(scores)}.\n\n"
     text += f"From session {numbers[0]} to session {numbers[1]}:\n\n"
     text += "![before and after](changes.png)\n\n"
     text += "| change | at, m | size, m | confidence |\n|---|---|---|---|\n"

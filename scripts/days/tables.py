@@ -12,6 +12,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
+from scripts.days.ages import COLUMNS as AGE_COLUMNS
 from scripts.days.lifelong import COLUMNS
 from sim.recording.tables import table
 from slam.files import write_text
@@ -19,17 +20,19 @@ from slam.files import write_text
 Row = Mapping[str, Any]
 _FORMS = {
     "found_after_s": "{:.1f}", "rmse_m": "{:.3f}", "worst_m": "{:.3f}", "tracked": "{:.2f}",
-    "ghost_rate": "{:.3f}", "recall": "{:.2f}", "map_kb": "{:.0f}", "memory_mb": "{:.2f}",
-    "load_s": "{:.2f}", "ms_per_scan": "{:.2f}",
+    "disagrees": "{:.3f}", "outdated_told": "{:.2f}", "outdated_false": "{:.2f}",
+    "ghost_rate": "{:.3f}", "ghost_seen_rate": "{:.3f}", "recall": "{:.2f}", "map_kb": "{:.0f}",
+    "memory_mb": "{:.2f}", "load_s": "{:.2f}", "ms_per_scan": "{:.2f}",
 }  # fmt: skip
 _PRINTED = {
-    "session": "session", "time_of_day": "time", "map": "map", "found_after_s": "found, s",
-    "place": "place", "rmse_m": "rmse, m", "ghost_rate": "ghosts", "recall": "recall",
-    "map_kb": "kB", "ms_per_scan": "ms",
+    "session": "session", "time_of_day": "time", "map": "map", "start": "start",
+    "found_after_s": "found, s", "place": "place", "rmse_m": "rmse, m", "ghost_rate": "ghosts",
+    "recall": "recall", "map_kb": "kB", "ms_per_scan": "ms",
 }  # fmt: skip
 _SHOWN = (
-    "session", "time_of_day", "map", "found_after_s", "place", "rmse_m", "worst_m", "ghost_rate",
-    "recall", "map_kb", "ms_per_scan",
+    "session", "time_of_day", "map", "start", "found_after_s", "place", "rmse_m", "worst_m",
+    "outdated_told", "outdated_false", "ghost_rate", "ghost_seen_rate", "recall", "map_kb",
+    "load_s", "ms_per_scan",
 )  # fmt: skip
 
 
@@ -62,19 +65,53 @@ def verdict(rows: Sequence[Row]) -> str:
     text = (
         f"{len(found)} of {len(later)} sessions found, {soon} within 10 s, {wrong} at a wrong place"
     )
+    unknown = sum(row["start"] == "unknown" for row in later)
+    if unknown:
+        text += f"; {unknown} began where no session before had been"
     measured = [row["rmse_m"] for row in rows if row["rmse_m"] is not None]
     if len(measured) > 1 and measured[0]:
         text += f"; error of the last session {measured[-1] / measured[0]:.2f} of the first's"
     return text
 
 
-def write(folder: Path, rows: Sequence[Row], settings: Mapping[str, Any], changes: str) -> None:
-    """lifelong.csv, lifelong.json and lifelong.md; ``changes`` is the page's part on them."""
+def write(
+    folder: Path,
+    rows: Sequence[Row],
+    settings: Mapping[str, Any],
+    changes: str,
+    aged: Sequence[Row] = (),
+    score: Mapping[str, Any] | None = None,
+) -> None:
+    """lifelong.csv, lifelong.json, lifelong.md, and ages.csv if there are ``aged`` rows.
+
+    ``changes`` is the page's part on them, ``score`` what of them is true (``report.added``).
+    """
     cells = [[words_exactly(row[column]) for column in COLUMNS] for row in rows]
     write_text(folder / "lifelong.csv", table(COLUMNS, cells))
-    whole = {"schema": 1, "settings": dict(settings), "rows": [dict(row) for row in rows]}
+    whole = {
+        "schema": 1,
+        "settings": dict(settings),
+        "rows": [dict(row) for row in rows],
+        "ages": [dict(row) for row in aged],
+        "changes": None if score is None else dict(score),
+    }
     write_text(folder / "lifelong.json", json.dumps(whole, indent=2) + "\n")
-    write_text(folder / "lifelong.md", page(rows, settings) + changes)
+    if aged:
+        old = [[words_exactly(row[column]) for column in AGE_COLUMNS] for row in aged]
+        write_text(folder / "ages.csv", table(AGE_COLUMNS, old))
+    write_text(folder / "lifelong.md", page(rows, settings) + ages_part(aged) + changes)
+
+
+def ages_part(aged: Sequence[Row]) -> str:
+    """The page's table of the last session in older maps; "" without any."""
+    if not aged:
+        return ""
+    number = aged[0]["session"]
+    shown = [c for c in AGE_COLUMNS if c != "session"]
+    head = "| " + " | ".join(c.replace("_", " ") for c in shown) + " |\n"
+    rule = "|" + "---|" * len(shown) + "\n"
+    body = "".join("| " + " | ".join(words(c, row[c]) for c in shown) + " |\n" for row in aged)
+    return f"\n## Session {number} in a map some sessions old\n\n{head}{rule}{body}"
 
 
 def words_exactly(value: object) -> str:

@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What truly changed between two simulated sessions, and how much of it a list of changes tells."""
+"""What truly changed between two simulated sessions, and how much of it a list of changes tells.
+
+A listed place is right if anything came to it or went from it: also a small thing, a person who
+stood there, a door that stood otherwise while it was seen, or a thing in whose place another one
+stands. Recall asks for less: things of ``LEAST_M`` that stood still for most of the session, were
+met by beams, and whose place the other session saw.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenes.kinds import is_door
 from scripts.comparison.recording import Recording
@@ -20,19 +27,24 @@ from slam.frames import Float
 
 STILL_M, STILL_RAD = 0.1, 0.15  # of its commonest pose, a thing stands still there
 STILL_SHARE = 0.6  # of the scans at which it must; else it has no place in that session
-LEAST_M = 0.4  # smallest thing that counts
+LONGER = 0.5  # share of scans, or of beams: a thing that stood there for so much longer has changed
+REST_SHARE = 0.05  # of the scans: shorter, and it only came past
+LEAST_M = 0.4  # smallest thing that is asked for
 ELSEWHERE_M, TURNED_RAD = 0.4, 0.4  # what is off by more stands elsewhere; of a door, has turned
+SHIFTED_M, SHIFTED_RAD = 0.15, 0.15  # what is off by more may be listed, but need not
 SEEN_BEAMS = 20  # that must have met a thing where it stands for it to be seen
 SEEN_SHARE = 0.5  # of a thing's place that the other session must have seen
 HIT_M = 0.45  # a listed place this near to a true one is it
-_UNCOUNTED = "robot"  # beside people
+_OUTSIDE_M = 500.0  # what is out of the building lies farther away
+_UNCOUNTED = "robot"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Still:
-    """A thing that stood still for most of a session.
+    """A thing, and where it stood still.
 
     row     in the recording         pose  (x, y, heading) m, m, rad in the world
+    share   of the scans at which it stood there; ``met``: of the beams that met it
     points  (n, 2) m, where beams met it there
     """
 
@@ -41,6 +53,8 @@ class Still:
     kind: str
     radius_m: float
     pose: tuple[float, float, float]
+    share: float
+    met: float
     points: Float
 
     def middle(self) -> tuple[float, float]:
@@ -53,17 +67,21 @@ class Still:
 
 
 def still_things(recording: Recording) -> list[Still]:
-    """All movable things and doors that stood still, seen or not."""
+    """All things, doors and people in the building that stood still for most of the session."""
+    return [thing for thing in rests(recording) if thing.share >= STILL_SHARE]
+
+
+def rests(recording: Recording) -> list[Still]:
+    """Every place where one of them stood still for a while, seen or not; its commonest first."""
     found = []
     sights = [Sight(recording, k).points for k in range(len(recording.frames))]
     for row, kind in enumerate(recording.kinds):
-        if kind == _UNCOUNTED or kind.startswith("person"):
+        if kind == _UNCOUNTED:
             continue
-        pose = np.median(recording.poses[:, row], axis=0)
-        off = recording.poses[:, row] - pose
-        near = np.hypot(off[:, 0], off[:, 1]) < STILL_M
-        near &= np.abs(np.array([se2.wrap(a) for a in off[:, 2]])) < STILL_RAD
-        if near.mean() >= STILL_SHARE:
+        beams = (recording.hit == row).sum(axis=1)
+        for pose, near in _stays(recording.poses[:, row]):
+            if np.abs(pose[:2]).max() > _OUTSIDE_M:
+                continue
             x, y, yaw = pose.tolist()
             found.append(
                 Still(
@@ -72,9 +90,27 @@ def still_things(recording: Recording) -> list[Still]:
                     kind=kind,
                     radius_m=float(recording.radii_m[row]),
                     pose=(x, y, yaw),
+                    share=float(near.mean()),
+                    met=float(beams[near].sum() / max(beams.sum(), 1)),
                     points=_met(recording, row, sights, np.flatnonzero(near).tolist()),
                 )
             )
+    return found
+
+
+def _stays(poses: Float) -> list[tuple[Float, NDArray[np.bool_]]]:
+    """Poses of (n, 3) that one thing keeps in ``REST_SHARE`` of them, and in which of them."""
+    found = []
+    left = np.ones(len(poses), bool)
+    pose = np.median(poses, axis=0)
+    while left.any():
+        off = poses - pose
+        turned = np.mod(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi
+        near = left & (np.hypot(off[:, 0], off[:, 1]) < STILL_M) & (np.abs(turned) < STILL_RAD)
+        if near.mean() >= REST_SHARE:
+            found.append((pose, near))
+        left &= ~near
+        pose = poses[int(np.argmax(left))]
     return found
 
 
@@ -91,12 +127,18 @@ def _met(recording: Recording, row: int, sights: Sequence[Float], scans: Sequenc
 
 @dataclass(frozen=True, kw_only=True)
 class Spot:
-    """A place that changed: something came or went; ``seen`` in both sessions."""
+    """A place that changed: something came or went.
+
+    asked   of ``LEAST_M``, clearly elsewhere, and nothing else has taken its place
+    seen    met by beams in the one session, and its place looked at in the other
+    """
 
     at: tuple[float, float]
     name: str
     came: bool
     seen: bool
+    asked: bool = True
+    door: bool = False
 
 
 def changed_spots(
@@ -106,37 +148,60 @@ def changed_spots(
     cell_m: float,
     T_map_world: Float,
 ) -> list[Spot]:
-    """In the map's frame. A place that another thing has taken over has not changed."""
-    things = {t.name: t for t in still_things(first)}, {t.name: t for t in still_things(second)}
+    """In the map's frame."""
+    places = rests(first), rests(second)
+    recordings = first, second
     found = []
     for here, other, came in ((0, 1, False), (1, 0, True)):
-        for name, thing in things[here].items():
-            later = things[other].get(name)
+        for thing in places[here]:
+            later = [t for t in places[other] if t.name == thing.name]
+            if any(_same(thing, t) for t in later):
+                continue
             size = thing.radius_m if is_door(thing.kind) else 2.0 * thing.radius_m
-            if size < LEAST_M or (later is not None and not _elsewhere(thing, later)):
-                continue
-            if name not in things[other] and _restless(name, second if here == 0 else first):
-                continue  # it has no place in the other session: nothing can be said
-            if any(_covers(rest, thing) for rest in things[other].values() if rest.name != name):
-                continue
             at = se2.transform(T_map_world, np.array([thing.middle()]))[0]
             seen = len(thing.points) >= SEEN_BEAMS
             seen &= _seen_share(snapshots[other], at, 0.5 * size, cell_m) >= SEEN_SHARE
-            found.append(Spot(at=(float(at[0]), float(at[1])), name=name, came=came, seen=seen))
+            rest = [t for t in places[other] if t.name != thing.name and t.share >= STILL_SHARE]
+            asked = size >= LEAST_M and not any(_covers(one, thing) for one in rest)
+            asked &= thing.share >= STILL_SHARE
+            if later:
+                asked &= later[0].share >= STILL_SHARE
+                asked &= _elsewhere(thing, later[0], ELSEWHERE_M, TURNED_RAD)
+            elif _inside(thing.name, recordings[other]):
+                asked = False  # it was about, and may have been in its place for a while
+            where = (float(at[0]), float(at[1]))
+            door = is_door(thing.kind)
+            found.append(
+                Spot(at=where, name=thing.name, came=came, seen=seen, asked=asked, door=door)
+            )
     return found
 
 
-def _restless(name: str, recording: Recording) -> bool:
-    """Whether it is there and did not stand still."""
-    return name in recording.names and bool(
-        np.abs(recording.poses[0, recording.names.index(name), :2]).max() < 500.0
+def moved_since(thing: Still, others: Sequence[Still]) -> bool:
+    """Whether it does not stand among the things of another session as it stands here."""
+    return not any(
+        t.name == thing.name and not _elsewhere(thing, t, ELSEWHERE_M, TURNED_RAD) for t in others
     )
 
 
-def _elsewhere(one: Still, other: Still) -> bool:
-    if is_door(one.kind):
-        return abs(se2.wrap(one.pose[2] - other.pose[2])) > TURNED_RAD
-    return math.dist(one.pose[:2], other.pose[:2]) > ELSEWHERE_M
+def _same(one: Still, other: Still) -> bool:
+    """Whether a thing stood there in both sessions, for about as long as it was seen."""
+    there = not _elsewhere(one, other, SHIFTED_M, SHIFTED_RAD)
+    return there and max(abs(one.share - other.share), abs(one.met - other.met)) < LONGER
+
+
+def _inside(name: str, recording: Recording) -> bool:
+    """Whether it was in the building at the start."""
+    if name not in recording.names:
+        return False
+    start = recording.poses[0, recording.names.index(name), :2]
+    return bool(np.abs(start).max() < _OUTSIDE_M)
+
+
+def _elsewhere(one: Still, other: Still, least_m: float, least_rad: float) -> bool:
+    if is_door(one.kind) and abs(se2.wrap(one.pose[2] - other.pose[2])) > least_rad:
+        return True
+    return math.dist(one.pose[:2], other.pose[:2]) > least_m
 
 
 def _covers(one: Still, spot: Still) -> bool:
@@ -169,8 +234,10 @@ class ChangeScore:
     """Counts of places.
 
     listed, right  that the list has, and of these the true ones
-    seen, told     true ones that both sessions saw, and of these those that the list has
+    seen, told     true ones that are asked for and were seen, and of these those that the list has
     off_m          of each right one, m from the true place
+    doors          (listed as a door, of these truly one door before and after)
+    moved          (listed as moved, of these truly one thing before and after)
     """
 
     listed: int
@@ -178,33 +245,35 @@ class ChangeScore:
     seen: int
     told: int
     off_m: tuple[float, ...]
+    doors: tuple[int, int] = (0, 0)
+    moved: tuple[int, int] = (0, 0)
 
 
-def scored(
-    changes: Sequence[Change], truth: Sequence[Spot], least_m: float = LEAST_M
-) -> ChangeScore:
-    """Of the listed places of things of ``least_m`` and more; all of them may tell a true one.
-
-    A door counts by its hinge's side: its leaf's two places lie within its length of the hinge.
-    """
-    right = listed = 0
+def scored(changes: Sequence[Change], truth: Sequence[Spot]) -> ChangeScore:
+    """Of all listed places, whatever their size: what a scan meets of a chair may be its column."""
     off: list[float] = []
     told: set[tuple[float, float]] = set()
+    named: dict[str, list[bool]] = {"door": [], "moved": []}
     for change in changes:
-        reach = HIT_M + (change.size_m if change.kind == "door" else 0.0)
-        for spot in change.spots():
-            near = [t for t in truth if math.dist(t.at, spot) < reach]
-            told.update(t.at for t in near)
-            if change.size_m >= least_m:
-                listed += 1
-                right += bool(near)
-                if near and change.kind != "door":
-                    off.append(min(math.dist(t.at, spot) for t in near))
-    seen = [t for t in truth if t.seen]
+        near = [[t for t in truth if math.dist(t.at, spot) < HIT_M] for spot in change.places]
+        told.update(t.at for some in near for t in some)
+        for spot, some in zip(change.places, near, strict=True):
+            off += [min(math.dist(t.at, spot) for t in some)] if some else []
+        if change.kind in named:
+            named[change.kind].append(_is_one(near[0], near[1], door=change.kind == "door"))
+    seen = [t for t in truth if t.asked and t.seen]
     return ChangeScore(
-        listed=listed,
-        right=right,
+        listed=sum(len(change.places) for change in changes),
+        right=len(off),
         seen=len(seen),
         told=sum(t.at in told for t in seen),
         off_m=tuple(off),
+        doors=(len(named["door"]), sum(named["door"])),
+        moved=(len(named["moved"]), sum(named["moved"])),
     )
+
+
+def _is_one(before: Sequence[Spot], after: Sequence[Spot], *, door: bool) -> bool:
+    """Whether the same thing went from one place and came to the other."""
+    went = {t.name for t in before if not t.came and t.door == door}
+    return bool(went & {t.name for t in after if t.came and t.door == door})

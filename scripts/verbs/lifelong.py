@@ -31,7 +31,7 @@ def lifelong(
     scene: Annotated[
         str | None, typer.Option(help="Or a scene, whose sessions are simulated here.")
     ] = None,
-    sessions: Annotated[int, typer.Option(help="How many of them.")] = 10,
+    sessions: Annotated[int, typer.Option(help="How many of them, the first included.")] = 11,
     change: Annotated[
         float, typer.Option(help="Share of things and doors put elsewhere between two sessions.")
     ] = 0.3,
@@ -105,8 +105,11 @@ def _write(
         with working("living through the sessions"):
             for row in life.rows(buildings, _noted(drives, kept)):
                 rows.append(row)
-        pages = [changes_page(folder, b, kept) for b in buildings if not b.anew][:1]
-        tables.write(folder, rows, settings, "".join(pages))
+        own = next((b for b in buildings if not b.anew), None)
+        changes, score = ("", None) if own is None else changes_page(folder, own, kept)
+        last = kept[max(kept)]
+        aged = [row for b in buildings if not b.anew for row in life.age_rows(b, last)]
+        tables.write(folder, rows, settings, changes, aged, score)
         write_recipe(folder, "lifelong", settings)
     for name in names:
         console.print(tables.printed(name, [row for row in rows if row["slam"] == name]))

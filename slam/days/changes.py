@@ -33,7 +33,10 @@ class Change:
     before      (x, y) m where a moved thing stood; None for the others
     size_m      longest side of what was seen of it
     angle_deg   by which a door turned, counter-clockwise; 0 for the others
-    confidence  in [0, 1]: how clear both sessions are about its places, less for few of them
+    places      middles (x, y) m of what was seen to differ: of a moved thing and of a door's leaf
+                before and after, of the others one
+    confidence  in [0, 1]: how clear both sessions are about its places, less for few of them and
+                where one of the sessions saw only part of what is around
     """
 
     kind: str
@@ -42,10 +45,7 @@ class Change:
     confidence: float
     before: tuple[float, float] | None = None
     angle_deg: float = 0.0
-
-    def spots(self) -> list[tuple[float, float]]:
-        """Every place that changed: two of a moved thing."""
-        return [self.at] if self.before is None else [self.before, self.at]
+    places: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,6 +58,18 @@ class _Piece:
     ends: Float
     size_m: float
     thick_m: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Part:
+    """Neighbouring places that changed: ``points`` (n, 2) m, ``clear`` (n,) by how much."""
+
+    points: Float
+    clear: Float
+
+    @property
+    def middle(self) -> Float:
+        return np.asarray(self.points.mean(axis=0))
 
 
 def between(
@@ -73,7 +85,13 @@ def between(
     found = [*_doors(gone, come, config), *_moved(gone, come, config)]
     for kind, rest in (("gone", gone), ("appeared", come)):
         found += [
-            Change(kind=kind, at=_point(p.centre), size_m=p.size_m, confidence=p.confidence)
+            Change(
+                kind=kind,
+                at=_point(p.centre),
+                size_m=p.size_m,
+                confidence=p.confidence,
+                places=(_point(p.centre),),
+            )
             for p in rest
         ]
     return sorted(found, key=lambda c: (-c.confidence, c.at))
@@ -107,16 +125,46 @@ def _pieces(
         empty = other <= config.empty
     changed = (stands & empty & ~_grown(still, config.slack_m / cell_m)).astype(np.uint8)
     joined = _grown(changed > 0, 0.5 * config.join_m / cell_m).astype(np.uint8)
+    known = _known_around(there, other, config.slack_m / cell_m)
     count, labels = cv2.connectedComponents(joined, connectivity=8)
-    pieces = []
+    parts = []
     for label in range(1, count):
         j, i = np.nonzero((labels == label) & (changed > 0))
         points: Float = (np.stack([i, j], axis=1) + low).astype(np.float64) * cell_m + 0.5 * cell_m
-        clear = float((there[j, i] - other[j, i]).mean())
-        piece = _piece(points, clear * (1.0 - math.exp(-3.0 * len(i) / _FULL)), cell_m)
-        if piece.size_m >= config.least_m:
-            pieces.append(piece)
-    return pieces
+        clear = (there[j, i] - other[j, i]) * known[j, i]
+        parts.append(_Part(points=points, clear=clear.astype(np.float64)))
+    pieces = [_piece(part, cell_m) for part in _legs_joined(parts, cell_m, config)]
+    return [piece for piece in pieces if piece.confidence >= config.least]
+
+
+def _known_around(
+    one: NDArray[np.float32], other: NDArray[np.float32], cells: float
+) -> NDArray[np.float32]:
+    """Share of the places around each that both saw: at the edge of what was seen, edges move."""
+    side = 2 * math.floor(cells + 1e-9) + 1
+    both = (~np.isnan(one) & ~np.isnan(other)).astype(np.float32)
+    return np.asarray(cv2.blur(both, (side, side), borderType=cv2.BORDER_CONSTANT))
+
+
+def _legs_joined(parts: list[_Part], cell_m: float, config: ChangeConfig) -> list[_Part]:
+    """Small parts, as the legs of a chair are, joined while they fit into one thing."""
+    small = [p for p in parts if _extent(p.points, cell_m) <= config.leg_m]
+    joined = [p for p in parts if _extent(p.points, cell_m) > config.leg_m]
+    while small:
+        one = small.pop(0)
+        nearest = sorted(small, key=lambda p: float(np.linalg.norm(p.middle - one.middle)))
+        for other in nearest:
+            both = np.concatenate([one.points, other.points])
+            if _extent(both, cell_m) <= config.thing_m:
+                one = _Part(points=both, clear=np.concatenate([one.clear, other.clear]))
+                small.remove(other)
+        joined.append(one)
+    return joined
+
+
+def _extent(points: Float, cell_m: float) -> float:
+    """Longest side of the box around, along the axes, m."""
+    return float((points.max(axis=0) - points.min(axis=0)).max()) + cell_m
 
 
 def _grown(image: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
@@ -126,7 +174,9 @@ def _grown(image: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
     return np.asarray(cv2.dilate(image.astype(np.uint8), disc) > 0)
 
 
-def _piece(points: Float, confidence: float, cell_m: float) -> _Piece:
+def _piece(part: _Part, cell_m: float) -> _Piece:
+    points = part.points
+    confidence = float(part.clear.mean()) * (1.0 - math.exp(-3.0 * len(points) / _FULL))
     centre = points.mean(axis=0)
     off = points - centre
     _, _, axes = np.linalg.svd(off, full_matrices=False) if len(off) > 1 else (0, 0, np.eye(2))
@@ -160,6 +210,7 @@ def _doors(gone: list[_Piece], come: list[_Piece], config: ChangeConfig) -> list
                     size_m=length,
                     confidence=min(old.confidence, new.confidence),
                     angle_deg=math.degrees(turned),
+                    places=(_point(old.centre), _point(new.centre)),
                 )
             )
             gone.remove(old)
@@ -223,6 +274,7 @@ def _moved(gone: list[_Piece], come: list[_Piece], config: ChangeConfig) -> list
                 before=_point(old.centre),
                 size_m=max(old.size_m, new.size_m),
                 confidence=min(old.confidence, new.confidence),
+                places=(_point(old.centre), _point(new.centre)),
             )
         )
     gone[:], come[:] = list(left.values()), list(right.values())

@@ -41,6 +41,25 @@ class SearchConfig(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class AgreementConfig(Settings):
+    """Whether what a session saw fits the days before."""
+
+    always: float = number(0.7, "share", "of the looks of all sessions: always stands", high=1.0)
+    stands: float = number(0.5, "share", "of a session's looks: something stands", high=1.0)
+    empty: float = number(0.2, "share", "most of the looks, around it too: nothing", high=1.0)
+    slack: int = number(2, "places", "that an edge may be off by", high=10)
+    same_m: float = number(0.1, "m", "starts nearer than this are one")
+    same_rad: float = number(0.03, "rad", "and turned by less than this")
+    known: int = number(120, "places", "that always stand and were looked at: it has a say", low=1)
+    on_m: float = number(1.0, "m", "driven since the start before a place is accepted, or on_s")
+    on_s: float = number(8.0, "s", "since the start, if the robot stands")
+    accepts: float = number(0.05, "share", "that may disagree where the session began", high=1.0)
+    stood: float = number(0.02, "share", "the same after on_s, if it has not driven on_m", high=1.0)
+    denies: float = number(0.12, "share", "that disagrees: it did not begin there", high=1.0)
+    spoils: float = number(0.1, "share", "of a whole session: it is kept apart", high=1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
 class HabitConfig(Settings):
     """How often and how long things stand."""
 
@@ -54,16 +73,18 @@ class HabitConfig(Settings):
 class ChangeConfig(Settings):
     """What counts as changed between two sessions."""
 
-    stands: float = number(0.5, "share", "of the looks that found it: something stands", high=1.0)
-    empty: float = number(0.15, "share", "of the looks that found it: nothing stands", high=1.0)
+    stands: float = number(0.4, "share", "of the looks that found it: something stands", high=1.0)
+    empty: float = number(0.1, "share", "of the looks that found it: nothing stands", high=1.0)
     join_m: float = number(0.25, "m", "cells nearer than this are one object")
     slack_m: float = number(0.2, "m", "an edge that moved by less has not moved")
-    least_m: float = number(0.25, "m", "shorter objects are not listed")
-    moved_m: float = number(4.0, "m", "farthest that a thing is followed to another place")
+    leg_m: float = number(0.3, "m", "a smaller part may be a leg of a thing")
+    thing_m: float = number(0.7, "m", "legs within this are of one thing")
+    least: float = number(0.22, "confidence", "what is less sure is not listed", high=1.0)
+    moved_m: float = number(1.0, "m", "farthest that a thing is followed to another place")
     alike: float = number(0.6, "ratio", "of the smaller to the larger size: may be the same thing")
     leaf_least_m: float = number(0.55, "m", "shortest leaf of a door")
     leaf_most_m: float = number(1.3, "m", "longest leaf of a door")
-    leaf_thick: float = number(0.45, "share", "of its length: a thicker piece is no leaf")
+    leaf_thick: float = number(0.55, "share", "of its length: a thicker piece is no leaf")
     hinge_m: float = number(0.6, "m", "farthest that the ends of a leaf's two places lie apart")
 
 
@@ -73,5 +94,6 @@ class DaysConfig(Settings):
 
     evidence: EvidenceConfig = field(default=EvidenceConfig())
     search: SearchConfig = field(default=SearchConfig())
+    agreement: AgreementConfig = field(default=AgreementConfig())
     habit: HabitConfig = field(default=HabitConfig())
     change: ChangeConfig = field(default=ChangeConfig())

@@ -2,8 +2,9 @@
 """Where in the map of the days before a session starts.
 
 The robot maps on its own, in a frame that begins where it stands, while the known map is searched
-for what it sees. A place counts when it alone explains the present scan and the kept ones as well.
-Nothing is written to the known map meanwhile.
+for what it sees. A place counts when it alone explains the present scan, and all that was seen
+since the start agrees with the days before (``slam.days.agreement``), or, where the map has no
+days, with the map. Nothing is written to the known map meanwhile.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from slam import se2
-from slam.days.config import SearchConfig
+from slam.days.agreement import Past, Trial
+from slam.days.config import DaysConfig
 from slam.estimate import Estimate
-from slam.frames import Float, Frame, to_s
+from slam.frames import NS_PER_S, Float, Frame, to_s
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
 from slam.tracker.rasterise import rasterise
@@ -36,14 +38,19 @@ class Kept:
 class StartSearch:
     """Maps alone and searches the known map, until the start is found.
 
-    alone  the SLAM that maps meanwhile    denied  places found that the kept scans denied
+    alone  the SLAM that maps meanwhile    denied  places found that the rest denied
+    seen   scans to be counted when the place is found, and the poses in the session's own frame
     """
 
-    def __init__(self, known: Tracker, config: SearchConfig) -> None:
-        self._known, self._config = known, config
+    def __init__(self, known: Tracker, config: DaysConfig, past: Past) -> None:
+        self._known, self._config, self._past = known, config.search, past
+        self._every_ns = round(config.evidence.every_s * NS_PER_S)
+        self._trial: Trial | None = None
+        self.seen: list[tuple[Frame, Float]] = []
         self.alone = type(known)(known.config)
         self.alone.hold_map()
         self.elapsed_s, self.denied = 0.0, 0
+        self._way_m = 0.0  # driven while scans were kept
         self._search = known.relocalisation()
         self._before: tuple[int, Float] | None = None
         self._kept: list[Kept] = []
@@ -62,6 +69,9 @@ class StartSearch:
             self._begin_again(estimate)
             return estimate, None
         self._keep(observations, pose, elapsed)
+        self._way_m += float(np.hypot(*(pose - before)[:2]))
+        if not self.seen or now - self.seen[-1][0].stamp_ns >= self._every_ns:
+            self.seen.append((frame, pose))
         prediction = Prediction(
             T_map_robot=pose,
             increment=se2.between(before, pose),
@@ -74,17 +84,35 @@ class StartSearch:
         if match is None:
             return estimate, None
         T_map_own = se2.compose(match.T_map_robot, se2.inverse(pose))
-        if not self._agrees(T_map_own, usual):
+        agrees = self._tried(T_map_own) if self._past.known else self._agrees(T_map_own, usual)
+        if agrees:
+            return estimate, T_map_own
+        if agrees is False:
             self.denied += 1
-            self._search = self._known.relocalisation()
-            return estimate, None
-        return estimate, T_map_own
+            self._trial, self._search = None, self._known.relocalisation()
+        return estimate, None
+
+    def _tried(self, T_map_own: Float) -> bool | None:
+        """Whether all that was seen agrees with the days before; None: not known yet."""
+        if self._trial is None or not self._trial.is_at(T_map_own):
+            self._trial = Trial(self._past, T_map_own)
+        found, config = self._trial.agreement(self.seen), self._past.config
+        if found.known < config.known:
+            return None
+        if found.disagrees > config.denies:
+            return False
+        if self._way_m >= config.on_m:
+            return True if found.disagrees <= config.accepts else None
+        stood = self.elapsed_s >= config.on_s and found.disagrees <= config.stood
+        return True if stood else None
 
     def _begin_again(self, estimate: Estimate) -> None:
         """Its own map is in doubt: motion and kept scans are worth nothing from before."""
         if estimate.diagnostics.get("state") == "lost":
-            self._search = self._known.relocalisation()
+            self._search, self._trial = self._known.relocalisation(), None
             self._kept.clear()
+            self.seen.clear()
+            self._way_m = 0.0
 
     @staticmethod
     def _twist(frame: Frame, before: Float, pose: Float, elapsed: float) -> Float:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from slam import se2
+from slam.days.agreement import Agreement, Past
 from slam.days.config import DaysConfig
 from slam.days.evidence import SessionGrid
 from slam.days.history import NAMES, History
@@ -42,6 +43,7 @@ class SessionState:
     denied          places that were found and denied by what else the session saw
     merged          scans of the search that were merged
     tracked         share of the scans after the find that were tracked
+    disagrees       share of what it saw that does not fit the days before (``Agreement``)
     fits            whether the map may be replaced by what the session made of it
     """
 
@@ -50,6 +52,7 @@ class SessionState:
     denied: int
     merged: int
     tracked: float
+    disagrees: float
     fits: bool
 
 
@@ -102,8 +105,8 @@ class Session:
         """Forget this session; a map that was already written to cannot be taken back."""
         own = replace(self.config.evidence, cell_m=self.history.cell_m)
         self._grid = SessionGrid(own)
-        self._search = None if self._new else StartSearch(self.tracker, self.config.search)
-        self._waiting: list[tuple[Frame, Float]] = []  # scans to count when the place is found
+        self._past = Past(self.history, self.config.agreement)
+        self._search = None if self._new else StartSearch(self.tracker, self.config, self._past)
         self._path, self._T_map_own = PosePath(), np.zeros(3)
         self._searched = 0  # poses that are in the session's own frame
         self._found_after_s: float | None = 0.0 if self._new else None
@@ -122,13 +125,10 @@ class Session:
         return self._go_on(frame)
 
     def _look(self, search: StartSearch, frame: Frame) -> Estimate:
-        due = self._grid.due(frame.stamp_ns)
         estimate, place = search.take(frame)
         self._denied = search.denied
         if place is not None:
             return self._begin(search, frame, place, estimate.T_map_robot)
-        if due and estimate.converged and frame.scan is not None:
-            self._waiting.append((frame, estimate.T_map_robot))
         self._path.add(frame.stamp_ns, estimate.T_map_robot)
         self._searched = len(self._path)
         return replace(
@@ -142,9 +142,8 @@ class Session:
         self._T_map_own, self._search = place, None
         self._found_after_s = search.elapsed_s
         self._merged = search.merge(place)
-        for earlier, pose in self._waiting:
+        for earlier, pose in search.seen:
             self._grid.add(earlier, se2.compose(place, pose))
-        self._waiting.clear()
         numbers = self.tracker.config.tracking.relocalise
         self.tracker.place(se2.compose(place, own), coarse(numbers))
         estimate = self._go_on(frame)
@@ -172,15 +171,25 @@ class Session:
         """How it went so far."""
         share = self._tracked / self._after if self._after else 0.0
         ended = self._state in _TRACKED and not self._gave_up
-        fits = self._search is None and ended and share >= self.config.search.fits
+        agreement = self.agreement()
+        known = agreement.known >= self.config.agreement.known
+        denied = known and agreement.disagrees > self.config.agreement.spoils
+        fits = self._search is None and ended and share >= self.config.search.fits and not denied
         return SessionState(
             found_after_s=self._found_after_s,
             first_found=self._first_found,
             denied=self._denied,
             merged=self._merged,
             tracked=share,
+            disagrees=agreement.disagrees,
             fits=fits,
         )
+
+    def agreement(self) -> Agreement:
+        """How what this session saw so far fits the days before; empty while it is not found."""
+        if self._search is not None or not self._grid.scans:
+            return Agreement()
+        return self._past.agreement(self._grid.snapshot(self.time_s))
 
     def known(self) -> History:
         """The history with this session, if it was found and has seen anything."""

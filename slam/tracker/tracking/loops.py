@@ -266,7 +266,8 @@ class Loops(KeyFrames):
     def _holds_present(self) -> bool:
         """Whether closures hold what was driven since the robot was last lost.
 
-        Lost: at two key frames in a row. Else the graph knows of it what odometry said meanwhile: it is not to move the robot.
+        Lost: at two key frames in a row. Else the graph knows of it what odometry said meanwhile,
+        which is not to move the robot.
         """
         written = [key.written for key in self.keys]
         lost = [k for k in range(1, len(written)) if not (written[k - 1] or written[k])]

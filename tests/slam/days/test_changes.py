@@ -47,12 +47,32 @@ def test_what_came_what_went_and_what_stayed():
 
 
 def test_a_thing_of_the_same_size_nearby_has_moved():
-    found = between(room((1.0, 1.0, 1.5, 1.5)), room((3.0, 2.0, 3.5, 2.5)), CELL)
+    found = between(room((1.0, 1.0, 1.5, 1.5)), room((1.7, 1.6, 2.2, 2.1)), CELL)
     assert [c.kind for c in found] == ["moved"]
     assert math.dist(found[0].before, (1.25, 1.25)) < 0.1
-    assert math.dist(found[0].at, (3.25, 2.25)) < 0.1
+    assert math.dist(found[0].at, (1.95, 1.85)) < 0.1
+    assert found[0].places == (found[0].before, found[0].at)
+    far = between(room((1.0, 1.0, 1.5, 1.5)), room((3.0, 2.0, 3.5, 2.5)), CELL)
+    assert sorted(c.kind for c in far) == ["appeared", "gone"]
     other = between(room((1.0, 1.0, 1.3, 1.3)), room((3.0, 2.0, 4.0, 3.0)), CELL)
     assert sorted(c.kind for c in other) == ["appeared", "gone"]
+
+
+def test_the_column_of_a_chair_is_a_change_and_four_legs_are_one():
+    """All that a scan meets of a swivel chair is a column; of another chair, four legs."""
+    column = [(2.0, 2.0, 2.1, 2.1)]
+    legs = [(x, y, x + 0.1, y + 0.1) for x in (4.0, 4.4) for y in (1.0, 1.4)]
+    found = between(room(*column, *legs), room(), CELL)
+    assert [c.kind for c in found] == ["gone", "gone"]
+    assert math.dist(found[0].at, (4.25, 1.25)) < 0.1
+    assert math.dist(found[1].at, (2.05, 2.05)) < 0.1
+    assert found[0].confidence > found[1].confidence
+
+
+def test_a_single_place_at_the_edge_of_what_was_seen_is_no_change():
+    column, beside, below = (2.0, 2.0, 2.1, 2.1), (2.1, 1.0, 6.0, 3.0), (1.0, 1.0, 2.1, 2.0)
+    assert [c.kind for c in between(room(column), room(), CELL)] == ["gone"]
+    assert between(room(column), room(unseen=(beside, below)), CELL) == []
 
 
 def test_a_leaf_that_turned_about_its_hinge_is_a_door():

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from slam.days.config import AgreementConfig, DaysConfig
+from slam.days.evidence import Snapshot
 from slam.days.history import DAY_S, History
 from slam.days.mobility import DaysRaster
 from slam.days.session import Session, keep, read_history
@@ -82,6 +84,34 @@ def test_a_session_elsewhere_leaves_the_map_byte_for_byte_and_lies_apart(first, 
     assert path.read_bytes() == first[0].read_bytes()
     assert ShuntingSlam.load(apart).cell_map.extent() is not None
     assert read_history(apart) is None
+
+
+def other_days(first, config=None):
+    """A session in the map, whose days before saw every wall 0.9 m beside where the map has it."""
+    history = read_history(first[0])
+    (seen,) = history.sessions
+    moved = Snapshot(time_s=NINE, cells=seen.cells + np.int32([9, 6]), standing=seen.standing)
+    past = History(cell_m=history.cell_m, sessions=(moved,))
+    tracker = ShuntingSlam.load(first[0])
+    session = Session(tracker, time_s=DAY_S, history=past, found=False, config=config)
+    driven(session, HOME, Drive((1.0, 0.6, 2.6), ((0.2, 0.4, 12.0),)), seed=9)
+    return session
+
+
+def test_a_start_that_the_days_before_deny_is_not_found(first) -> None:
+    state = other_days(first).state
+    assert state.found_after_s is None
+    assert state.denied > 0
+
+
+def test_a_session_that_the_days_before_deny_lies_apart(first) -> None:
+    """Wherever it was found, and however well it was tracked there."""
+    lenient = AgreementConfig(accepts=1.0, denies=1.0, stood=1.0)
+    state = other_days(first, DaysConfig(agreement=lenient)).state
+    assert state.found_after_s is not None
+    assert state.tracked > 0.9
+    assert state.disagrees > lenient.spoils
+    assert not state.fits
 
 
 def test_a_map_of_days_goes_round_whole_and_loads_as_a_map(first, tmp_path) -> None:

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Of several buildings that ``mobilia lifelong`` has lived in: what was found, does it get worse?
+
+``python -m scripts.experiments.lifelong_bars out/lifelong-*``.
+
+Session 0 maps the building. The error of the last session is compared with that of session 1, the
+first in a map, and with that of session 0. Early and late: sessions 1 to 3, and the last three.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from slam.errors import LogFormatError
+
+SOON_S = 10.0
+Row = dict[str, Any]
+
+
+def read(folder: Path) -> dict[str, Any]:
+    """lifelong.json of a folder; ``LogFormatError`` for one without."""
+    path = folder / "lifelong.json"
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise LogFormatError(path, f"no lifelong.json: {error}") from error
+    if not isinstance(found, dict) or not {"rows", "settings"} <= found.keys():
+        raise LogFormatError(path, "must hold rows and settings, as mobilia lifelong writes it")
+    return found
+
+
+def _mean(rows: Sequence[Row], column: str) -> float:
+    values = [row[column] for row in rows if row.get(column) is not None]
+    return float(np.mean(values)) if values else float("nan")
+
+
+def found_line(rows: Sequence[Row]) -> str:
+    """Of all sessions after the first: how many were found, how soon, and where."""
+    soon = sum(r["found_after_s"] is not None and r["found_after_s"] <= SOON_S for r in rows)
+    known = [r for r in rows if r["start"] != "unknown"]
+    of = sum(r["found_after_s"] is not None and r["found_after_s"] <= SOON_S for r in known)
+    found = sum(r["found_after_s"] is not None for r in rows)
+    wrong = sum(r["place"] == "wrong" for r in rows)
+    return (
+        f"{len(rows)} sessions: {found} found, {soon} within {SOON_S:g} s, {wrong} at a wrong "
+        f"place; of {len(known)} that began where a session before had been, {of} so soon"
+    )
+
+
+def summary(buildings: Sequence[dict[str, Any]], slam: str) -> list[str]:
+    """Lines on one SLAM in these buildings."""
+    own = [[r for r in b["rows"] if r["slam"] == slam] for b in buildings]
+    later = [r for rows in own for r in rows if r["session"] > 0]
+    lines = [found_line(later)]
+
+    def of(pick: Callable[[list[Row]], list[Row]], column: str) -> float:
+        return _mean([r for rows in own for r in pick(rows)], column)
+
+    errors = [_mean([rows[k] for rows in own], "rmse_m") for k in (0, 1, -1)]
+    lines.append(
+        f"error, cm: session 0 {100 * errors[0]:.1f}, session 1 {100 * errors[1]:.1f}, last "
+        f"{100 * errors[2]:.1f}; last to session 1 {errors[2] / errors[1]:.2f}, to session 0 "
+        f"{errors[2] / errors[0]:.2f}"
+    )
+    for column in (
+        "rmse_m",
+        "ghost_rate",
+        "ghost_seen_rate",
+        "recall",
+        "map_kb",
+        "memory_mb",
+        "ms_per_scan",
+        "load_s",
+    ):
+        early, late = of(lambda rows: rows[1:4], column), of(lambda rows: rows[-3:], column)
+        if not np.isnan(late):
+            lines.append(f"{column}: sessions 1 to 3 {early:.3f}, the last three {late:.3f}")
+    told, false = _mean(later, "outdated_told"), _mean(later, "outdated_false")
+    lines.append(
+        f"'map outdated here' where it clearly is {told:.2f}, where it hardly is {false:.2f}"
+    )
+    for age in sorted({r["age"] for b in buildings for r in b.get("ages", [])}):
+        rows = [r for b in buildings for r in b["ages"] if r["age"] == age and r["slam"] == slam]
+        right = [r for r in rows if r["place"] == "right"]
+        soon = sum(r["found_after_s"] <= SOON_S for r in right)
+        lines.append(
+            f"a map {age} sessions old: {len(right)} of {len(rows)} found at the right place, "
+            f"{soon} within {SOON_S:g} s, error {100 * _mean(right, 'rmse_m'):.1f} cm"
+        )
+    return lines
+
+
+def changes_line(buildings: Sequence[dict[str, Any]]) -> str:
+    """Precision and recall of the changes of all."""
+    scores = [b["changes"] for b in buildings if b.get("changes")]
+    listed, right, seen, told = (
+        sum(s[name] for s in scores) for name in ("listed", "right", "seen", "told")
+    )
+    doors, moved = (np.sum([s[name] for s in scores], axis=0) for name in ("doors", "moved"))
+    return (
+        f"changes: precision {right / max(listed, 1):.2f} ({right} of {listed}), recall "
+        f"{told / max(seen, 1):.2f} ({told} of {seen}); truly so: doors {doors[1]} of {doors[0]}, "
+        f"moved {moved[1]} of {moved[0]}"
+    )
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Print the lines, for each share of change."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("--slam", default="shunting")
+    wanted = parser.parse_args(arguments)
+    read_all = [read(folder) for folder in wanted.folders]
+    for change in sorted({b["settings"]["change"] for b in read_all}):
+        chosen = [b for b in read_all if b["settings"]["change"] == change]
+        seeds = ", ".join(str(b["settings"]["seed"]) for b in chosen)
+        print(f"change {change:g}, seeds {seeds}")
+        for line in [*summary(chosen, wanted.slam), changes_line(chosen)]:
+            print(f"  {line}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
