@@ -3,22 +3,20 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-import gymnasium
 import numpy as np
 
-import sim  # noqa: F401  (registers the environments)
+from scripts.experiments.goal_room import bare_room, room
 from sim.driving.drive import Driver, TourConfig
 from sim.driving.navgrid import NavGrid
 from sim.gym.env import OMEGA_MAX_RADPS, V_MAX_MPS, MobiliaEnv
-from sim.gym.wrappers import DynamismCurriculum, GoalVector, LidarMinPooling
 from slam.frames import Float
 
-STACK = 3  # observations that the network sees at once
 ARRIVED_M = 0.3  # of the driver's goal, within that of the environment
 NO_DISCS: Float = np.zeros((0, 5))
 OUTCOMES = ("reached", "collided", "late")
@@ -56,6 +54,17 @@ class Network:
         return self._model.predict(observation, deterministic=True)[0]
 
 
+class Rule:
+    """The reactive rule alone: what the network is before it learns."""
+
+    def start(self, env: MobiliaEnv) -> None:
+        """Nothing to remember."""
+
+    def act(self, env: MobiliaEnv, observation: Any) -> Any:
+        """No correction."""
+        return np.zeros(2)
+
+
 class Blind:
     """The built-in driver on the static layout with the true pose: it does not see what moves."""
 
@@ -80,33 +89,6 @@ class Blind:
         return np.array([v / V_MAX_MPS, omega / OMEGA_MAX_RADPS])
 
 
-class Told(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Of the information only what training needs: frames are large to send to another process."""
-
-    def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
-        """As of the wrapped environment."""
-        return self.env.reset(**arguments)[0], {}
-
-    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """As of the wrapped environment."""
-        seen, reward, terminated, truncated, info = self.env.step(action)
-        return seen, reward, terminated, truncated, {"is_success": info["is_success"]}
-
-
-def room(scene: str, pose_source: str, level: float, seconds: float = 30.0) -> Any:
-    """One room as the network sees it; its dynamism is drawn from 0 to ``level``."""
-    name = scene.title().replace("-", "")
-    env = gymnasium.make(
-        f"mobilia/{name}Goal-v2",
-        disable_env_checker=True,
-        pose_source=pose_source,
-        time_limit_s=seconds,
-        terminate_on_collision=True,
-    )
-    small = GoalVector(LidarMinPooling(DynamismCurriculum(env, level)))
-    return gymnasium.wrappers.FrameStackObservation(small, STACK)
-
-
 def untrained(env: Any, seed: int) -> Any:
     """PPO before its first step."""
     from stable_baselines3 import PPO
@@ -117,24 +99,41 @@ def untrained(env: Any, seed: int) -> Any:
         n_steps=512,
         batch_size=256,
         n_epochs=6,
-        learning_rate=5e-4,
+        learning_rate=3e-4,
         gamma=0.985,
-        ent_coef=0.002,
-        policy_kwargs={"net_arch": [128, 128], "log_std_init": -0.5},
+        gae_lambda=0.95,
+        policy_kwargs={"net_arch": [128, 128], "log_std_init": -1.0},
         seed=seed,
         device="cpu",
     )
 
 
-def drive(
-    who: str, scene: str, pose_source: str, dynamism: float, seeds: Sequence[int], seconds: float
+def digest(who: str) -> str:
+    """Of a file of weights; "" for who needs none."""
+    return "" if who in ("driver", "rule") else hashlib.sha256(Path(who).read_bytes()).hexdigest()
+
+
+def drive(  # noqa: PLR0913 (settings)
+    who: str,
+    scene: str,
+    pose_source: str,
+    dynamism: float,
+    seeds: Sequence[int],
+    seconds: float,
+    version: str = "",
 ) -> list[dict[str, Any]]:
     """One episode a seed: outcome, and s until its end.
 
-    who  file of the weights of a network, or "driver"
+    who      file of the weights of a network, "driver", or "rule"
+    version  ``digest`` of it, for who keeps results by their arguments
     """
-    policy: Policy = Blind() if who == "driver" else Network(Path(who), scene)
-    env = room(scene, pose_source, 0.0, seconds)
+    policy: Policy
+    if who in ("driver", "rule"):
+        policy = Blind() if who == "driver" else Rule()
+    else:
+        policy = Network(Path(who), scene)
+    make = bare_room if who == "driver" else room
+    env = make(scene, pose_source, 0.0, seconds)
     inner: MobiliaEnv = env.unwrapped
     rows = []
     for seed in seeds:
