@@ -26,6 +26,7 @@ IMPORTERS = {
     "scripts/workers.py": "Dask",
     "scripts/film/rerun_log.py": "Rerun",
     "scripts/live/sdk.py": "the Foxglove SDK, by constants",
+    "scripts/live/client.py": "its WebSocket library, by a constant",
     "scripts/verbs/reproduce.py": "experiments of ours",
     "scripts/paper/runs.py": "jobs of ours",
 }
@@ -41,6 +42,8 @@ STARTERS = {
     "scripts/robustness/kills.py": "our own Python",
     "scripts/result_files.py": "git, for the commit of a results file",
     "scripts/experiments/compare_irsim.py": "an interpreter that the user names",
+    "scripts/experiments/covariance_scores.py": "smfeval, as the user names it",
+    "scripts/experiments/live_client.py": "mobilia live, our own",
 }
 
 
