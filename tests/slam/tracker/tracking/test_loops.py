@@ -204,6 +204,9 @@ def test_a_ring_of_335_m_closes_while_driving() -> None:
     assert jumps.max() < 1.0  # the robot drives 0.8 m from scan to scan
     assert error[np.argmax(moved) - 1] > 0.3
     assert error[-1] <= 0.10
+    in_map = slam.poses_in_map()  # past poses moved with the map, the last is the one reported
+    np.testing.assert_array_equal(in_map[-1], poses[-1])
+    assert errors(in_map, truth).max() < error.max()
     assert max(tasks) <= 2 * CONFIG.loops.work + 20
     spent = sum(tasks)
     final = slam.trajectory().poses
@@ -211,6 +214,22 @@ def test_a_ring_of_335_m_closes_while_driving() -> None:
     after = errors(final, truth)
     assert after[-1] <= 0.10
     assert after.max() < 0.6 * error.max()
+
+
+def test_places_found_while_lost_do_not_tear_the_map_alone(drifted: Drifted) -> None:
+    graph = filled(Loops(CONFIG, Matcher(CONFIG), lambda: Network(CONFIG)), drifted)
+    finish(graph)
+    assert graph._torn_keys(1.0)
+    graph._links = {(edge.a, edge.b) for edge in graph.edges}
+    assert not graph._torn_keys(1.0)
+
+
+def test_a_map_that_is_held_is_not_moved() -> None:
+    stream, _ = long_ring()
+    slam = ShuntingSlam({"loops.corrects": 1})
+    slam.hold_map()
+    for frame in stream:
+        assert not any(slam.update(frame.without_truth()).diagnostics["correction"])
 
 
 def test_short_ways_stay_as_they_are() -> None:
