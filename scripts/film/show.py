@@ -118,7 +118,8 @@ class Show:
         if frame.scan is not None and frame.stamp_ns - self._seen_ns >= SEEN_EVERY_NS:
             self.seen.add(frame.scan, self.track().estimates[-1].T_map_robot)
             self._seen_ns = frame.stamp_ns
-            self._scans.append((len(self.track().estimates) - 1, frame.scan))
+            if isinstance(self.track().system, MovingMap):
+                self._scans.append((len(self.track().estimates) - 1, frame.scan))
         seconds = self.seconds(frame)
         for name, track in self.replay.tracks.items():
             estimate = track.estimates[-1]
@@ -161,8 +162,9 @@ class Show:
     def _follow_map(self) -> None:
         """Lay out anew what was seen, where closed loops have moved the map (docs/loops.md)."""
         system = self.track().system
-        moved = any(self.track().estimates[-1].diagnostics.get("correction", ()))
-        if not moved or not isinstance(system, MovingMap):
+        if not isinstance(system, MovingMap):
+            return
+        if not any(self.track().estimates[-1].diagnostics["correction"]):
             return
         poses = system.poses_in_map()
         self.seen, self.redrawn = SeenSpace(), self.redrawn + 1

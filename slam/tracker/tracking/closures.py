@@ -80,8 +80,8 @@ class Closures:
     def tie(self, middle: int, j: int, predicted: Float) -> Edge | None:
         """Key frame ``j`` matched to the map about ``middle``, near where it is predicted.
 
-        Or where it lay online, if as much is explained there: along a corridor, and among what
-        moves, little maps say less than the whole one did.
+        Or where it lay online, if ``alias`` times as much is explained there: along a corridor,
+        and among what moves, little maps say less than the whole one did.
         """
         online = self._online(middle, j)
         found = self._matched(middle, j, online)
@@ -107,7 +107,10 @@ class Closures:
         return support(cell_map, seen, match), match
 
     def search(self, middle: int, j: int, predicted: Float, gate: float) -> Edge | None:
-        """The same, searched for up to ``gate`` m around; None where two places look alike."""
+        """The same, searched for up to ``gate`` m around; None where two places look alike.
+
+        Where it lay online, if that explains ``alias`` times as much as the best of them.
+        """
         cell_map, seen = self._submap(middle), self._keys[j].observations
         short_term = self._matcher.reward.short_term
         found: list[tuple[float, Match]] = []

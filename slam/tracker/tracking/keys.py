@@ -99,7 +99,8 @@ class KeyFrames:
     def anywhere(self, T_map_robot: Float) -> Float:
         """(3, 3) second moment about a pose if the robot is anywhere that it has seen.
 
-        That is in a disc about each key frame, of the mean radius that is seen there.
+        That is in a disc about each key frame, of the root mean square range there. Of a loaded
+        map, what was seen since counts.
         """
         off = np.array([key.T_map_robot[:2] for key in self.keys]) - T_map_robot[:2]
         x, y = off[:, 0], off[:, 1]

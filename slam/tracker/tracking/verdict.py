@@ -41,10 +41,10 @@ class Verdict:
     ) -> None:
         """``here``: the support of the pose, over the usual one; ``elsewhere``: of the best other
         place that is known, 0 where none is; ``ratio``: see ``tracker.standing.agreement``;
-        ``vote``: the mean of the returns. Where all stand, odometry is wrong, and not the pose.
+        ``vote``: the mean of the returns. Where all are 1, odometry is wrong, and not the pose.
 
-        A support is the matched share of the returns, times the share of the old map in view that
-        they confirm. So it counts what still stands against what is denied.
+        A support is the matched share of the returns, or of those that vote, times the share of the
+        old map in view that they confirm. So it counts what still stands against what is denied.
         """
         config = self._config
         odds = config.steep * (config.even - here) + config.rival * max(elsewhere - here, 0.0)

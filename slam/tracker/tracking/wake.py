@@ -8,7 +8,7 @@ itself is neither matched nor written for this.
 
 This also tells whether the robot was *carried*: whoever is carried sees all of its surroundings
 change at once. While each scan agrees with the one before, the robot can only be where its motion
-leads it, and no other place is to be believed, however well it fits.
+leads it. Another place is believed only after long, where it explains far more.
 """
 
 from __future__ import annotations
