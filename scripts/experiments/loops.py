@@ -62,7 +62,8 @@ def backwards(frames: list[Frame]) -> list[Frame]:
     for frame in reversed(frames):
         stamp = ends - frame.stamp_ns
         scan = None if frame.scan is None else replace(frame.scan, stamp_ns=stamp)
-        out.append(replace(frame, stamp_ns=stamp, scan=scan))
+        odometry = replace(frame.odometry, stamp_ns=stamp)
+        out.append(replace(frame, stamp_ns=stamp, odometry=odometry, scan=scan))
     return out
 
 
