@@ -37,6 +37,10 @@ class Sight:
 
     def emptied(self, points: Float) -> NDArray[np.bool_]:
         """(n,) which points (n, 2) m a beam passed and went ``BEYOND_M`` farther."""
+        return np.asarray(self.beyond(points) > BEYOND_M)
+
+    def beyond(self, points: Float) -> Float:
+        """(n,) m by which the nearest beam went farther than points (n, 2) m; -inf without one."""
         spec = self.scan.spec
         T_world_laser = se2.compose(self.truth, spec.T_robot_laser)
         local = se2.transform(se2.inverse(T_world_laser), points)
@@ -44,9 +48,9 @@ class Sight:
         beams = (np.arctan2(local[:, 1], local[:, 0]) - spec.angle_min) / spec.angle_increment
         nearest = np.round(beams).astype(np.int64)
         inside = (nearest >= 0) & (nearest < spec.n_beams)
-        measured = self.scan.ranges[np.clip(nearest, 0, spec.n_beams - 1)]
-        known = np.isfinite(measured)
-        return inside & known & (np.where(known, measured, 0.0) > ranges + BEYOND_M)
+        measured = self.scan.ranges[np.clip(nearest, 0, spec.n_beams - 1)].astype(np.float64)
+        told = inside & np.isfinite(measured)
+        return np.where(told, np.where(told, measured, 0.0) - ranges, -math.inf)
 
     def crossing(self, start: Float, end: Float) -> int:
         """How many beams cross or end at the line from ``start`` to ``end`` (2,) m."""
@@ -69,6 +73,23 @@ def _hits(scan: Scan, truth: Float, twist: Float) -> Float:
         ranges, spec.angles, spec.beam_time_offsets, spec.T_robot_laser, np.asarray(twist)
     )
     return se2.transform(truth, points)
+
+
+def seen_empty(points: Float, drive: Recording) -> NDArray[np.bool_]:
+    """(n,) which points (n, 2) m the last scan with a say on them saw empty.
+
+    It has a say where a beam passes a point, or ends within ``BEYOND_M`` of it along the beam.
+    """
+    empty = np.zeros(len(points), dtype=np.bool_)
+    left = np.arange(len(points))
+    for k in reversed(range(len(drive.frames))):
+        if not len(left):
+            break
+        sight = Sight(drive, k)
+        beyond = sight.beyond(points[left])
+        empty[left] = beyond > BEYOND_M
+        left = left[~(beyond > -BEYOND_M)]
+    return empty
 
 
 def clearance(points: Float, drive: Recording, k: int, *, without: int = -1) -> Float:

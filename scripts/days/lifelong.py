@@ -11,18 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scripts.comparison.maps import NEAR_M, Believed, StaticDistance
 from scripts.comparison.recording import Recording
-from scripts.comparison.sight import clearance
+from scripts.comparison.sight import clearance, seen_empty
 from scripts.days import ages
 from scripts.days.sessions import Drive
 from scripts.days.truth import Still, still_things
 from scripts.names import file_name
 from slam import se2
 from slam.days.evidence import Snapshot
-from slam.days.history import History
 from slam.days.session import Session, keep
 from slam.errors import SlamFailedError
 from slam.frames import Float
@@ -117,7 +115,7 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
     searched = sum(e.diagnostics.get("state") == "searching" for e in track.estimates)
     row |= _errors(building.T_map_world, drive, track, searched)
     if state.found_after_s is not None:
-        row |= _map_scores(building.T_map_world, drive, track, session.known())
+        row |= _map_scores(building.T_map_world, drive, track)
         if building.before is not None and drive.recording is not None:
             shares = ages.changed_share(building.before, drive.recording)
             row |= ages.verdicts(track.estimates, shares, searched)
@@ -203,10 +201,8 @@ def _errors(T_map_world: Float | None, drive: Drive, track: Track, searched: int
     }
 
 
-def _map_scores(
-    T_map_world: Float | None, drive: Drive, track: Track, known: History | None = None
-) -> dict[str, Any]:
-    """Ghosts and recall of the map at the end of a simulated session, the last one of ``known``."""
+def _map_scores(T_map_world: Float | None, drive: Drive, track: Track) -> dict[str, Any]:
+    """Ghosts and recall of the map at the end of a simulated session."""
     recording, raster = drive.recording, track.map()
     if recording is None or raster is None or T_map_world is None:
         return {}
@@ -215,21 +211,14 @@ def _map_scores(
     near = StaticDistance(recording.static_map)(occupied)
     near = np.minimum(near, clearance(occupied, recording, len(recording.frames) - 1))
     held = [believed.holds(thing.points) for thing in _standing(recording)]
-    seen = near[_looked_at(se2.transform(T_map_world, occupied), known)]
+    ghosts = occupied[near > NEAR_M]
     return {
-        "ghost_rate": float((near > NEAR_M).mean()) if len(occupied) else None,
-        "ghost_seen_rate": float((seen > NEAR_M).mean()) if len(seen) else None,
+        "ghost_rate": len(ghosts) / len(occupied) if len(occupied) else None,
+        "ghost_seen_rate": seen_empty(ghosts, recording).sum() / len(occupied)
+        if len(occupied)
+        else None,
         "recall": float(np.mean(held)) if held else None,
     }
-
-
-def _looked_at(points: Float, known: History | None) -> NDArray[np.bool_]:
-    """(n,) which points (n, 2) m in the map lie in places that the last session has a say on."""
-    if known is None or not len(known) or not len(points):
-        return np.zeros(len(points), dtype=np.bool_)
-    places = np.floor(points / known.cell_m).astype(np.int64)
-    seen = {tuple(cell) for cell in known.sessions[-1].cells.tolist()}
-    return np.array([tuple(place) in seen for place in places.tolist()], dtype=np.bool_)
 
 
 def _standing(recording: Recording) -> list[Still]:

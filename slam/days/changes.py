@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What changed between two sessions: things that appeared, are gone or moved, doors that turned.
 
-Only places that both sessions saw can tell. Places where something stood in one and nothing in the
-other are joined to objects; one that is gone and one of about its size that appeared nearby are
-taken for the same thing, moved. Two thin ones that share an end are a door, before and after.
+Only places that both sessions saw can tell. Places where something stood in one and (nearly)
+nothing in the other are joined to objects; one that is gone and one of about its size that appeared
+nearby are taken for the same thing, moved. Two thin ones that share an end are a door, before and
+after.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from slam.days.history import dense
 from slam.frames import Float
 
 KINDS = ("appeared", "gone", "moved", "door")
-_FULL = 6.0  # places of an object that make its extent certain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,8 +35,8 @@ class Change:
     angle_deg   by which a door turned, counter-clockwise; 0 for the others
     places      middles (x, y) m of what was seen to differ: of a moved thing and of a door's leaf
                 before and after, of the others one
-    confidence  in [0, 1]: how clear both sessions are about its places, less for few of them and
-                where one of the sessions saw only part of what is around
+    confidence  in [0, 1]: 1 - exp(-sum over its places of how clear both sessions are about each),
+                less where one of the sessions saw only part of what is around
     """
 
     kind: str
@@ -120,10 +120,7 @@ def _pieces(
     config: ChangeConfig,
 ) -> list[_Piece]:
     """What stands in one image where the other is empty, joined to pieces."""
-    with np.errstate(invalid="ignore"):
-        stands, still = there >= config.stands, other >= config.stands
-        empty = other <= config.empty
-    changed = (stands & empty & ~_grown(still, config.slack_m / cell_m)).astype(np.uint8)
+    changed = _changed(there, other, cell_m, config).astype(np.uint8)
     joined = _grown(changed > 0, 0.5 * config.join_m / cell_m).astype(np.uint8)
     known = _known_around(there, other, config.slack_m / cell_m)
     count, labels = cv2.connectedComponents(joined, connectivity=8)
@@ -135,6 +132,22 @@ def _pieces(
         parts.append(_Part(points=points, clear=clear.astype(np.float64)))
     pieces = [_piece(part, cell_m) for part in _legs_joined(parts, cell_m, config)]
     return [piece for piece in pieces if piece.confidence >= config.least]
+
+
+def _changed(
+    there: NDArray[np.float32], other: NDArray[np.float32], cell_m: float, config: ChangeConfig
+) -> NDArray[np.bool_]:
+    """Where something stands in one image, and in the other nothing does.
+
+    Beams pass beside what is thin, as the legs of a chair: it has a small share. That counts where
+    the other session saw nothing at all around.
+    """
+    slack = config.slack_m / cell_m
+    with np.errstate(invalid="ignore"):
+        went = other <= np.maximum(config.empty, config.rest * there)
+        solid = (there >= config.stands) & went & ~_grown(other >= config.stands, slack)
+        thin = (there >= config.faint) & ~np.isnan(other) & ~_grown(other > config.empty, slack)
+    return np.asarray(solid | thin)
 
 
 def _known_around(
@@ -176,7 +189,7 @@ def _grown(image: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
 
 def _piece(part: _Part, cell_m: float) -> _Piece:
     points = part.points
-    confidence = float(part.clear.mean()) * (1.0 - math.exp(-3.0 * len(points) / _FULL))
+    confidence = 1.0 - math.exp(-max(float(part.clear.sum()), 0.0))
     centre = points.mean(axis=0)
     off = points - centre
     _, _, axes = np.linalg.svd(off, full_matrices=False) if len(off) > 1 else (0, 0, np.eye(2))
@@ -186,7 +199,7 @@ def _piece(part: _Part, cell_m: float) -> _Piece:
     half = 0.5 * (along.max() - along.min() + cell_m)
     return _Piece(
         points=points,
-        confidence=min(max(confidence, 0.0), 1.0),
+        confidence=confidence,
         centre=middle,
         ends=np.array([middle - half * axes[0], middle + half * axes[0]]),
         size_m=float(2.0 * half),

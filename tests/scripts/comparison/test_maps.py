@@ -10,7 +10,7 @@ import pytest
 
 from scripts.comparison.maps import MapJudge, disc
 from scripts.comparison.places import OldPlace
-from scripts.comparison.sight import Sight
+from scripts.comparison.sight import Sight, seen_empty
 from tests.scripts.comparison.hand_made import HZ, WALL_M, raster, recording
 
 HERE, THERE = (2.0, 0.0), (1.5, 1.5)
@@ -133,6 +133,13 @@ def test_what_a_scan_saw():
     assert empty.tolist() == [True, False, False, False, False]
     assert sight.crossing(np.array([3.0, 1.0]), np.array([3.0, 2.0])) == 31  # 18.4 to 33.7 degrees
     assert sight.crossing(np.array([5.0, 1.0]), np.array([5.0, 2.0])) == 0  # behind the wall
+
+
+def test_the_last_scan_with_a_say_tells_whether_a_place_is_empty():
+    """The chair came to ``HERE``; behind it nobody has a say any more, but earlier scans had."""
+    places = np.array([HERE, THERE, [HERE[0] + 1.0, HERE[1]], [-1.0, 0.0]])
+    found = seen_empty(places, recording([THERE, HERE, HERE]))
+    assert found.tolist() == [False, True, True, False]
 
 
 def test_no_map_has_no_scores():

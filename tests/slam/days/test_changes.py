@@ -19,8 +19,11 @@ from tests.world2d import Drive, World2D, frames, rectangle
 CELL = 0.1
 
 
-def room(*things, unseen=()):
-    """6 x 4 m of floor, with (x0, y0, x1, y1) m of things standing; ``unseen`` left out."""
+def room(*things, unseen=(), share=0.9):
+    """6 x 4 m of floor, with (x0, y0, x1, y1) m of things standing; ``unseen`` left out.
+
+    share  of the looks that find something in their places
+    """
     j, i = np.mgrid[0:40, 0:60]
     cells = np.stack([i.ravel(), j.ravel()], axis=1).astype(np.int32)
     middle = (cells + 0.5) * CELL
@@ -30,7 +33,7 @@ def room(*things, unseen=()):
 
     standing = np.zeros(len(cells), np.float32)
     for box in things:
-        standing[inside(box)] = 0.9
+        standing[inside(box)] = share
     known = ~np.any([inside(box) for box in unseen] or [np.zeros(len(cells), bool)], axis=0)
     return Snapshot(time_s=0.0, cells=cells[known], standing=standing[known])
 
@@ -67,6 +70,23 @@ def test_the_column_of_a_chair_is_a_change_and_four_legs_are_one():
     assert math.dist(found[0].at, (4.25, 1.25)) < 0.1
     assert math.dist(found[1].at, (2.05, 2.05)) < 0.1
     assert found[0].confidence > found[1].confidence
+
+
+def test_what_most_beams_pass_beside_is_a_change_where_nothing_was():
+    """One look in five meets a leg. That is no chance where no look at all met any before."""
+    legs = [(x, y, x + 0.1, y + 0.1) for x in (4.0, 4.4) for y in (1.0, 1.4)]
+    found = between(room(), room(*legs, share=0.2), CELL)
+    assert [c.kind for c in found] == ["appeared"]
+    assert math.dist(found[0].at, (4.25, 1.25)) < 0.1
+    assert between(room(*legs, share=0.15), room(*legs, share=0.35), CELL) == []
+    assert between(room(), room(legs[0], share=0.2), CELL) == []
+
+
+def test_what_stood_there_for_a_while_still_went():
+    """A door that is shut all night, and in the morning for one look in four."""
+    leaf = (2.0, 2.0, 2.9, 2.1)
+    assert [c.kind for c in between(room(leaf), room(leaf, share=0.25), CELL)] == ["gone"]
+    assert between(room(leaf), room(leaf, share=0.5), CELL) == []
 
 
 def test_a_single_place_at_the_edge_of_what_was_seen_is_no_change():
