@@ -91,6 +91,20 @@ class ChangeConfig(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class NewsConfig(Settings):
+    """What of a scan the days before do not know."""
+
+    outdated: float = number(0.04, "share", "of the returns: the map is outdated here", high=1.0)
+    stands: float = number(0.5, "share", "of the looks, when last seen: something stood", high=1.0)
+    empty: float = number(0.05, "share", "of the looks, around it too: nothing stood", high=1.0)
+    slack: int = number(1, "places", "that an edge may be off by", high=10)
+    beyond_m: float = number(0.3, "m", "that a beam must go past a place where something stood")
+    range_m: float = number(8.0, "m", "farthest place that is asked", low=1.0, high=100.0)
+    reach: int = number(4, "places", "to others that are of the same thing", high=50)
+    news_s: float = number(2.0, "s", "after its first scan; then the map has learnt it", low=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
 class DaysConfig(Settings):
     """All of them."""
 
@@ -99,3 +113,4 @@ class DaysConfig(Settings):
     agreement: AgreementConfig = field(default=AgreementConfig())
     habit: HabitConfig = field(default=HabitConfig())
     change: ChangeConfig = field(default=ChangeConfig())
+    news: NewsConfig = field(default=NewsConfig())

@@ -21,6 +21,7 @@ from slam.days.config import DaysConfig
 from slam.days.evidence import SessionGrid
 from slam.days.history import NAMES, History
 from slam.days.mobility import DaysRaster, MobilityMap
+from slam.days.news import News
 from slam.days.search import StartSearch
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Changes, Estimate, Raster
@@ -29,6 +30,7 @@ from slam.path import PosePath
 from slam.tracker import map_file
 from slam.tracker.tracker import Tracker
 from slam.tracker.tracking.relocalise import coarse
+from slam.tracker.tracking.verdict import OUTDATED, TRACKING
 from slam.trajectory import Trajectory
 
 _TRACKED = ("tracking", "relocated", "blind")
@@ -106,6 +108,8 @@ class Session:
         own = replace(self.config.evidence, cell_m=self.history.cell_m)
         self._grid = SessionGrid(own)
         self._past = Past(self.history, self.config.agreement)
+        self._news, self._told = News(self.history, self.config.news), 0.0
+        self._asked_ns: int | None = None
         self._search = None if self._new else StartSearch(self.tracker, self.config, self._past)
         self._path, self._T_map_own = PosePath(), np.zeros(3)
         self._searched = 0  # poses that are in the session's own frame
@@ -118,7 +122,9 @@ class Session:
 
     def update(self, frame: Frame) -> Estimate:
         """As a ``SlamSystem``'s. While the start is searched for, poses are in the session's own
-        frame, ``converged`` is False and ``diagnostics["state"]`` is "searching".
+        frame, ``converged`` is False and ``diagnostics["state"]`` is "searching". In a map with
+        days, "news" is the share of the returns that they did not know (``slam.days.news``), and
+        "verdict" is "map outdated here" where that is much.
         """
         if self._search is not None:
             return self._look(self._search, frame)
@@ -161,10 +167,26 @@ class Session:
             give_up_s = self.tracker.config.tracking.quality.give_up_s
             self._gave_up |= self._lost_s > give_up_s
         self._before_ns = frame.stamp_ns
+        told = self._told_by(frame, estimate)
         if estimate.converged:
             self._grid.add(frame, estimate.T_map_robot)
         self._path.add(frame.stamp_ns, estimate.T_map_robot)
-        return estimate
+        return told
+
+    def _told_by(self, frame: Frame, estimate: Estimate) -> Estimate:
+        """The estimate with what of the scan is news; asked as often as scans are counted."""
+        if not self._news.known:
+            return estimate
+        every_s = self.config.evidence.every_s
+        if not estimate.converged:
+            self._told = 0.0
+        elif self._asked_ns is None or to_s(frame.stamp_ns - self._asked_ns) >= every_s:
+            self._told = self._news.share(frame, estimate.T_map_robot)
+            self._asked_ns = frame.stamp_ns
+        found = {**estimate.diagnostics, "news": self._told}
+        if found.get("verdict") == TRACKING and self._told >= self.config.news.outdated:
+            found["verdict"] = OUTDATED
+        return replace(estimate, diagnostics=found)
 
     @property
     def state(self) -> SessionState:

@@ -68,6 +68,23 @@ def test_the_next_day_begins_anywhere_and_is_merged(first, tmp_path) -> None:
         Session.open(path, ShuntingSlam, time_s=DAY_S + NINE)
 
 
+def test_where_a_box_has_come_overnight_the_map_is_outdated(first, tmp_path) -> None:
+    path = tmp_path / "m.npz"
+    path.write_bytes(first[0].read_bytes())
+    box = rectangle(1.9, 0.6, 2.5, 1.4)
+    drive = Drive((-0.6, 0.4, 0.0), ((0.15, 0.0, 11.0),))
+    said = []
+    for world in (HOME, World2D(np.vstack([HOME.segments, box]))):
+        session = Session.open(path, ShuntingSlam, time_s=DAY_S + NINE)
+        estimates, _ = driven(session, world, drive, seed=9)
+        assert session.state.found_after_s is not None
+        said.append([e.diagnostics["verdict"] for e in estimates if e.converged])
+        assert all(0.0 <= e.diagnostics["news"] <= 1.0 for e in estimates if e.converged)
+    assert said[0].count("map outdated here") == 0
+    assert said[1][0] == "map outdated here"
+    assert said[1][-1] == "tracking"  # the map has learnt it
+
+
 def test_a_session_elsewhere_leaves_the_map_byte_for_byte_and_lies_apart(first, tmp_path) -> None:
     path = tmp_path / "m.npz"
     path.write_bytes(first[0].read_bytes())
