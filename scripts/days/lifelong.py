@@ -214,7 +214,7 @@ def _map_scores(T_map_world: Float | None, drive: Drive, track: Track) -> dict[s
     ghosts = occupied[near > NEAR_M]
     return {
         "ghost_rate": len(ghosts) / len(occupied) if len(occupied) else None,
-        "ghost_seen_rate": seen_empty(ghosts, recording).sum() / len(occupied)
+        "ghost_seen_rate": float(seen_empty(ghosts, recording).sum()) / len(occupied)
         if len(occupied)
         else None,
         "recall": float(np.mean(held)) if held else None,

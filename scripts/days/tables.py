@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,8 +26,8 @@ _FORMS = {
     "memory_mb": "{:.2f}", "load_s": "{:.2f}", "ms_per_scan": "{:.2f}",
 }  # fmt: skip
 _PRINTED = {
-    "session": "session", "time_of_day": "time", "map": "map", "start": "start",
-    "found_after_s": "found, s", "place": "place", "rmse_m": "rmse, m", "ghost_rate": "ghosts",
+    "session": "session", "time_of_day": "time", "map": "map", "found_after_s": "found, s",
+    "place": "place", "rmse_m": "rmse, m", "ghost_rate": "ghosts",
     "recall": "recall", "map_kb": "kB", "ms_per_scan": "ms",
 }  # fmt: skip
 _SHOWN = (
@@ -34,6 +35,8 @@ _SHOWN = (
     "outdated_told", "outdated_false", "ghost_rate", "ghost_seen_rate", "recall", "map_kb",
     "load_s", "ms_per_scan",
 )  # fmt: skip
+
+_APART = re.compile(r".*\.apart([0-9]+)\.npz")  # of a session that did not fit
 
 
 def words(column: str, value: object) -> str:
@@ -45,12 +48,15 @@ def printed(slam: str, rows: Sequence[Row]) -> Table:
     """One SLAM's sessions."""
     found = Table(
         title=escape(slam), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0),
-        pad_edge=False, caption=escape(verdict(rows)), caption_justify="left",
+        pad_edge=False,
     )  # fmt: skip
-    for heading in _PRINTED.values():
-        found.add_column(heading, overflow="fold", min_width=len(heading))
+    for column, heading in _PRINTED.items():
+        whole = column in ("time_of_day", "map")
+        found.add_column(heading, overflow="fold", min_width=len(heading), no_wrap=whole)
     for row in rows:
-        found.add_row(*(escape(words(column, row[column])) for column in _PRINTED))
+        cells = {column: words(column, row[column]) for column in _PRINTED}
+        cells["map"] = _APART.sub(r"apart \1", cells["map"])
+        found.add_row(*map(escape, cells.values()))
     return found
 
 

@@ -105,14 +105,16 @@ def _write(
         with working("living through the sessions"):
             for row in life.rows(buildings, _noted(drives, kept)):
                 rows.append(row)
-        own = next((b for b in buildings if not b.anew), None)
-        changes, score = ("", None) if own is None else changes_page(folder, own, kept)
+        living = next((b for b in buildings if not b.anew), None)
+        changes, score = ("", None) if living is None else changes_page(folder, living, kept)
         last = kept[max(kept)]
         aged = [row for b in buildings if not b.anew for row in life.age_rows(b, last)]
         tables.write(folder, rows, settings, changes, aged, score)
         write_recipe(folder, "lifelong", settings)
     for name in names:
-        console.print(tables.printed(name, [row for row in rows if row["slam"] == name]))
+        own = [row for row in rows if row["slam"] == name]
+        console.print(tables.printed(name, own))
+        console.print(escape(tables.verdict(own)), soft_wrap=True)
     note(f"open {escape(str(path / 'lifelong.md'))} first")
 
 

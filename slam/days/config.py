@@ -94,7 +94,7 @@ class ChangeConfig(Settings):
 class NewsConfig(Settings):
     """What of a scan the days before do not know."""
 
-    outdated: float = number(0.04, "share", "of the returns: the map is outdated here", high=1.0)
+    outdated: float = number(0.05, "share", "of the returns: the map is outdated here", high=1.0)
     stands: float = number(0.5, "share", "of the looks, when last seen: something stood", high=1.0)
     empty: float = number(0.05, "share", "of the looks, around it too: nothing stood", high=1.0)
     slack: int = number(1, "places", "that an edge may be off by", high=10)
