@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from scripts.comparison.recording import Recording
 from scripts.comparison.sight import clearance, seen_empty
 from scripts.days import ages
 from scripts.days.sessions import Drive
-from scripts.days.truth import Still, still_things
+from scripts.days.truth import Still, stands_there, still_things
 from scripts.names import file_name
 from slam import se2
 from slam.days.evidence import Snapshot
@@ -223,11 +222,10 @@ def _map_scores(T_map_world: Float | None, drive: Drive, track: Track) -> dict[s
 
 def _standing(recording: Recording) -> list[Still]:
     """Movable things that stood still in the session and were seen, still there at its end."""
-    ends = recording.poses[-1]
     return [
         thing
         for thing in still_things(recording)
         if not thing.kind.startswith("person")
-        and math.dist(ends[thing.row, :2].tolist(), thing.pose[:2]) < NEAR_M
+        and stands_there(thing, recording.poses[-1, thing.row])
         and len(thing.points)
     ]

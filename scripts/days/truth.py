@@ -98,6 +98,12 @@ def rests(recording: Recording) -> list[Still]:
     return found
 
 
+def stands_there(thing: Still, pose: Float) -> bool:
+    """Whether it stands still where it did; of a door, whether its leaf is there."""
+    turned = abs(se2.wrap(float(pose[2]) - thing.pose[2])) if is_door(thing.kind) else 0.0
+    return math.dist(pose[:2].tolist(), thing.pose[:2]) < STILL_M and turned < STILL_RAD
+
+
 def _stays(poses: Float) -> list[tuple[Float, NDArray[np.bool_]]]:
     """Poses of (n, 3) that one thing keeps in ``REST_SHARE`` of them, and in which of them."""
     found = []

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from scripts.days.lifelong import COLUMNS
 from scripts.days.report import summed
 from scripts.days.tables import page, verdict
-from scripts.days.truth import Spot, scored
+from scripts.days.truth import Spot, Still, scored, stands_there
 from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
 from slam.days.changes import Change
 
@@ -81,3 +82,17 @@ def test_sessions_follow_the_clock():
     assert times[0] == 9.0 * 3600.0
     assert times[5] - times[0] == 24.0 * 3600.0
     assert (times[4] / 3600.0) % 24.0 == time_of(4).hour - 24.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "turned", "there"),
+    [("door", 0.3, False), ("chair_visitor", 0.3, True), ("door", 0.1, True)],
+)
+def test_a_door_whose_leaf_has_turned_stands_there_no_more(kind, turned, there):
+    """Its hinge never moves; a chair may turn on the spot."""
+    thing = Still(
+        row=0, name="a", kind=kind, radius_m=0.9, pose=(1.0, 2.0, 3.1), share=1.0, met=1.0,
+        points=np.zeros((0, 2)),
+    )  # fmt: skip
+    assert stands_there(thing, np.array([1.0, 2.0, 3.1 + turned])) == there
+    assert not stands_there(thing, np.array([1.3, 2.0, 3.1]))
