@@ -31,8 +31,9 @@ import numpy as np
 
 from scripts import workers
 from scripts.comparison.recording import load
-from scripts.experiments.crowd_streams import SCENES, TRAIN, CrowdStream, make, train_streams
+from scripts.experiments.crowd_streams import SCENES, TRAIN, CrowdStream, train_streams
 from scripts.experiments.measured import table
+from scripts.experiments.recorded import make_missing
 from scripts.marks import fill_page
 from scripts.metrics.judged import Judged, lost_s, world_truth
 from slam import se2
@@ -221,7 +222,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--set", nargs="*", default=[], metavar="PATH=NUMBER", help="of the config")
     wanted = parser.parse_args(arguments)
     streams = train_streams(wanted.scenes, wanted.motions, wanted.most)
-    make(streams, wanted.folder, wanted.jobs)
+    make_missing(streams, wanted.folder, wanted.jobs)
     (_print_pushes if wanted.push else _print_runs)(streams, wanted.folder, wanted)
     return 0
 

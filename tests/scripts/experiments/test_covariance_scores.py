@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from scripts.experiments.covariance_scores import asked, exported, markdown
-from scripts.experiments.rates import Drive, simulate
+from scripts.experiments.rates import Drive
 from sim.recording.recipe import Recipe
 from slam.errors import MissingDependencyError
 from slam.evaluation.wide_tum import read_wide_tum
@@ -20,7 +20,7 @@ from slam.trajectory import read_tum
 def test_poses_and_truth_are_in_one_map(tmp_path: Path):
     recipe = Recipe(scene="arena", seed=0, dynamism=0.0, seconds=2.0, scanner="noise")
     drive = Drive(stream="arena", level=0.0, recipe=recipe)
-    simulate(drive, tmp_path)
+    drive.make(tmp_path)
     estimate, truth = exported(drive, "shunting", tmp_path)
     online, covariances = read_wide_tum(estimate)
     true = read_tum(truth)
