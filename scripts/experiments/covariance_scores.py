@@ -65,10 +65,18 @@ def exported(one: Drive, slam: str, folder: Path) -> tuple[Path, Path]:
 
 
 def asked(verb: str, estimate: Path, truth: Path) -> dict[str, Any]:
-    """The report of ``smfeval VERB``; ``MissingDependencyError`` where it does not run."""
+    """The report of ``smfeval VERB``.
+
+    Raises ``MissingDependencyError`` where it does not run, ``MobiliaError`` after ``LIMIT_S``.
+    """
     command = [sys.executable, "-m", "smfeval.cli.main", verb, "--json"]
     command += ["--ref-body-frame", "robot", "--ref-pose-frame", "map", str(estimate), str(truth)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LIMIT_S)
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LIMIT_S)
+    except subprocess.TimeoutExpired as error:
+        raise MobiliaError(
+            f"smfeval {verb} must end within {LIMIT_S:g} s, {estimate} takes it longer"
+        ) from error
     if done.returncode != 0:
         raise MissingDependencyError(
             f"smfeval must run (pip install smfeval): {done.stderr.strip()[-300:]}"
