@@ -37,9 +37,10 @@ from scripts.experiments.recorded import make_missing
 from scripts.marks import fill_page
 from scripts.metrics.judged import Judged, lost_s, world_truth
 from slam import se2
+from slam.answers import asked
 from slam.frames import NS_PER_S, Float, Frame
 from slam.oracle import shown
-from slam.replay import Track, asked
+from slam.replay import Track
 from slam.shunting import ShuntingSlam
 
 PUSH_M, PUSH_DEG = 0.3, 5.0
