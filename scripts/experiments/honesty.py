@@ -32,7 +32,7 @@ import numpy as np
 from scripts import workers
 from scripts.comparison.recording import load
 from scripts.experiments.crowd_streams import SCENES, TRAIN, CrowdStream, train_streams
-from scripts.experiments.measured import table
+from scripts.experiments.measured import ended, table
 from scripts.experiments.recorded import make_missing
 from scripts.marks import fill_page
 from scripts.metrics.judged import Judged, lost_s, world_truth
@@ -229,4 +229,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(main))

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 import scenes
 from scripts import workers
 from scripts.benchmark.tracks import chosen
+from scripts.checked import whole
 from scripts.comparison.recording import load
 from scripts.experiments.measured import add_options, head, seeds_of, table
 from scripts.experiments.recorded import RecordedStream, make_missing
@@ -83,7 +84,7 @@ class Drive(RecordedStream):
 def drive(name: str, level: float, seed: int, seconds: float) -> Drive:
     """A scene at that dynamism, or that level of a track, which lasts as the track does.
 
-    Raises ``UnknownNameError`` for neither.
+    Raises ``UnknownNameError`` for neither, ``InvalidValueError`` for a level that a track has not.
     """
     if name in scenes.names():
         recipe = Recipe(
@@ -233,6 +234,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         f"Lost: {lost.LOST_RULE}."
     )
     try:
+        for every in wanted.every:
+            whole("--every", every, 1)
         first = head(wanted, MARK, arguments, "streams", "level", "slams", "every")
         jobs = list(product(drives(wanted), wanted.slams, wanted.every))
         call = partial(judged, folder=wanted.folder)

@@ -29,6 +29,7 @@ import numpy as np
 
 from scripts import workers
 from scripts.benchmark.tracks import chosen
+from scripts.checked import whole
 from scripts.comparison.recording import load
 from scripts.experiments.kidnap import RIGHT_M
 from scripts.experiments.measured import add_options, head, seeds_of, table
@@ -218,6 +219,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         f"{wanted.pushes} pushes in each stream."
     )
     try:
+        whole("--pushes", wanted.pushes, 0)
         first = head(wanted, MARK, arguments, "levels", "pushes")
         asked = streams(wanted)
         make_missing(asked, wanted.folder, wanted.jobs)
