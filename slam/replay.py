@@ -42,7 +42,7 @@ from slam.system import (
 )
 from slam.trajectory import Trajectory
 
-__all__ = ["Replay", "Track", "asked", "primary_of", "systems_named"]
+__all__ = ["Replay", "Track", "primary_of", "systems_named"]
 
 
 @dataclass(eq=False)

@@ -77,7 +77,14 @@ class Track:
         levels: tuple[float, ...] = LEVELS,
         seconds: float | None = None,
     ) -> Plan:
-        """The comparison of these SLAMs and the controls; ``seconds`` as the track has them."""
+        """The comparison of these SLAMs and the controls; ``seconds`` as the track has them.
+
+        Raises ``InvalidValueError`` for a level that is none of ``LEVELS``.
+        """
+        for level in levels:
+            if level not in LEVELS:
+                known = ", ".join(f"{one:g}" for one in LEVELS)
+                raise InvalidValueError(f"the level of a track must be one of {known}, got {level}")
         return Plan(
             slams=tuple(dict.fromkeys((*slams, *self.controls))),
             scenes=(self.scene,),

@@ -15,6 +15,7 @@ from collections import Counter
 
 import numpy as np
 
+from scripts.experiments.measured import ended
 from sim.moments import toured
 from sim.simulation import Simulation
 
@@ -74,4 +75,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(ended(main))

@@ -28,8 +28,8 @@ import numpy as np
 
 from scripts import workers
 from scripts.comparison.recording import load
-from scripts.experiments.measured import add_options, head, seeds_of, table
-from scripts.experiments.rates import LEVEL, SLAMS, Drive, drive, kept, simulate
+from scripts.experiments.measured import head, table
+from scripts.experiments.rates import Drive, add_drive_options, drives, kept
 from scripts.marks import fill_page
 from scripts.names import file_name
 from scripts.result_files import write
@@ -37,7 +37,6 @@ from sim.core.versions import WORLD
 from slam import create, se2
 from slam.errors import MissingDependencyError, MobiliaError
 from slam.evaluation.wide_tum import write_wide_tum
-from slam.files import make_folder
 from slam.oracle import shown
 from slam.replay import Track
 from slam.trajectory import Trajectory, write_tum
@@ -66,10 +65,18 @@ def exported(one: Drive, slam: str, folder: Path) -> tuple[Path, Path]:
 
 
 def asked(verb: str, estimate: Path, truth: Path) -> dict[str, Any]:
-    """The report of ``smfeval VERB``; ``MissingDependencyError`` where it does not run."""
+    """The report of ``smfeval VERB``.
+
+    Raises ``MissingDependencyError`` where it does not run, ``MobiliaError`` after ``LIMIT_S``.
+    """
     command = [sys.executable, "-m", "smfeval.cli.main", verb, "--json"]
     command += ["--ref-body-frame", "robot", "--ref-pose-frame", "map", str(estimate), str(truth)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LIMIT_S)
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LIMIT_S)
+    except subprocess.TimeoutExpired as error:
+        raise MobiliaError(
+            f"smfeval {verb} must end within {LIMIT_S:g} s, {estimate} takes it longer"
+        ) from error
     if done.returncode != 0:
         raise MissingDependencyError(
             f"smfeval must run (pip install smfeval): {done.stderr.strip()[-300:]}"
@@ -128,12 +135,7 @@ def markdown(rows: Sequence[Row], told: str) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--streams", nargs="+", default=list(STREAMS), help="scenes and tracks")
-    parser.add_argument("--level", type=float, default=LEVEL, help="of dynamism, or of the track")
-    parser.add_argument("--slams", nargs="+", default=list(SLAMS))
-    parser.add_argument("--folder", type=Path, default=Path("out/rates"), help="of recordings")
-    add_options(parser, "covariance_scores.json", PAGE)
-    parser.set_defaults(seeds=3, first_seed=0)
+    add_drive_options(parser, STREAMS, "covariance_scores.json", PAGE)
     return parser
 
 
@@ -147,13 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     try:
         first = head(wanted, MARK, arguments, "streams", "level", "slams")
-        make_folder(wanted.folder)
-        drives = [
-            drive(name, wanted.level, seed, wanted.seconds)
-            for name, seed in product(wanted.streams, seeds_of(wanted))
-        ]
-        list(workers.each(partial(simulate, folder=wanted.folder), drives, jobs=wanted.jobs))
-        jobs = list(product(drives, wanted.slams))
+        jobs = list(product(drives(wanted), wanted.slams))
         rows = list(workers.each(partial(scored, folder=wanted.folder), jobs, jobs=wanted.jobs))
         rows.sort(key=lambda row: (row["stream"], wanted.slams.index(row["slam"]), row["seed"]))
         text = markdown(rows, told)

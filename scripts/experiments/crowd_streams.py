@@ -5,13 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
+from typing import Any
 
-from scripts import workers
-from scripts.comparison.recording import record
+from scripts.experiments.recorded import RecordedStream
 from slam.errors import InvalidValueError
-from slam.files import make_folder, replacing
 
 SCENES = ("office", "arena", "gallery", "station")
 TRAIN = {1.0: range(8), 0.75: range(8, 14), 0.5: range(14, 20)}  # seeds of each motion
@@ -19,7 +16,7 @@ EVERY = 8  # of the scans at 37.5 Hz
 
 
 @dataclass(frozen=True, kw_only=True)
-class CrowdStream:
+class CrowdStream(RecordedStream):
     """A tour among a scene's own crowd, with a scanner that errs by noise only."""
 
     scene: str
@@ -35,20 +32,12 @@ class CrowdStream:
             f"{self.scene}_motion{self.motion:g}_seed{self.seed}_{self.seconds:g}s_{self.every}th"
         )
 
-    def path(self, folder: Path) -> Path:
-        """Where it is kept."""
-        return folder / f"{self.name}.npz"
-
-    def make(self, folder: Path) -> None:
-        """Simulate it, unless it is there."""
-        path = self.path(folder)
-        if path.exists():
-            return
-        with replacing(path) as part:
-            record(
-                part, every=self.every, scene=self.scene, seed=self.seed, dynamism=self.motion,
-                motion=self.motion, change=0.0, seconds=self.seconds, scanner="noise",
-            )  # fmt: skip
+    def simulated(self) -> dict[str, Any]:
+        """Its recipe: the crowd alone, nothing changes places."""
+        return {
+            "every": self.every, "scene": self.scene, "seed": self.seed, "dynamism": self.motion,
+            "motion": self.motion, "change": 0.0, "seconds": self.seconds, "scanner": "noise",
+        }  # fmt: skip
 
 
 def train_streams(
@@ -65,15 +54,3 @@ def train_streams(
         for seed in list(TRAIN[motion])[:most]
         for scene in scenes
     ]
-
-
-def make(streams: Sequence[CrowdStream], folder: Path, jobs: int) -> None:
-    """Simulate those that are not in the folder yet."""
-    make_folder(folder)
-    missing = [stream for stream in streams if not stream.path(folder).exists()]
-    for _ in workers.each(partial(_make, folder=folder), missing, jobs=jobs):
-        pass
-
-
-def _make(stream: CrowdStream, folder: Path) -> None:
-    stream.make(folder)

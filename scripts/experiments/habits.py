@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes import build
+from scripts.experiments.measured import ended
 from sim.core.seeds import Seeds
 from sim.world.sessions import Days
 from sim.world.times_of_day import clock_s
@@ -206,4 +207,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(ended(main))

@@ -31,14 +31,16 @@ import numpy as np
 
 from scripts import workers
 from scripts.comparison.recording import load
-from scripts.experiments.crowd_streams import SCENES, TRAIN, CrowdStream, make, train_streams
-from scripts.experiments.measured import table
+from scripts.experiments.crowd_streams import SCENES, TRAIN, CrowdStream, train_streams
+from scripts.experiments.measured import ended, table
+from scripts.experiments.recorded import make_missing
 from scripts.marks import fill_page
 from scripts.metrics.judged import Judged, lost_s, world_truth
 from slam import se2
+from slam.answers import asked
 from slam.frames import NS_PER_S, Float, Frame
 from slam.oracle import shown
-from slam.replay import Track, asked
+from slam.replay import Track
 from slam.shunting import ShuntingSlam
 
 PUSH_M, PUSH_DEG = 0.3, 5.0
@@ -221,10 +223,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--set", nargs="*", default=[], metavar="PATH=NUMBER", help="of the config")
     wanted = parser.parse_args(arguments)
     streams = train_streams(wanted.scenes, wanted.motions, wanted.most)
-    make(streams, wanted.folder, wanted.jobs)
+    make_missing(streams, wanted.folder, wanted.jobs)
     (_print_pushes if wanted.push else _print_runs)(streams, wanted.folder, wanted)
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(main))

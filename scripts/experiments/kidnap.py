@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from scripts.experiments.measured import ended
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.simulation import stream
@@ -233,4 +234,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(main))

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from slam.errors import LogFormatError
+from slam.errors import LogFormatError, MobiliaError
 
 SOON_S = 10.0
 Row = dict[str, Any]
@@ -97,8 +98,10 @@ def summary(buildings: Sequence[dict[str, Any]], slam: str) -> list[str]:
 
 
 def changes_line(buildings: Sequence[dict[str, Any]]) -> str:
-    """Precision and recall of the changes of all."""
+    """Precision and recall of the changes of all; of those whose sessions were found."""
     scores = [b["changes"] for b in buildings if b.get("changes")]
+    if not scores:
+        return "changes: none was looked for, no session was found"
     listed, right, seen, told = (
         sum(s[name] for s in scores) for name in ("listed", "right", "seen", "told")
     )
@@ -116,7 +119,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("folders", type=Path, nargs="+")
     parser.add_argument("--slam", default="shunting")
     wanted = parser.parse_args(arguments)
-    read_all = [read(folder) for folder in wanted.folders]
+    try:
+        read_all = [read(folder) for folder in wanted.folders]
+    except MobiliaError as error:
+        print(error, file=sys.stderr)
+        return 1
+    known = set.intersection(*({row["slam"] for row in b["rows"]} for b in read_all))
+    if wanted.slam not in known:
+        parser.error(f"--slam must be one of {', '.join(sorted(known))}, got {wanted.slam!r:.80}")
     for change in sorted({b["settings"]["change"] for b in read_all}):
         chosen = [b for b in read_all if b["settings"]["change"] == change]
         seeds = ", ".join(str(b["settings"]["seed"]) for b in chosen)

@@ -23,6 +23,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from scripts.checked import whole
+from scripts.experiments.measured import ended
 from sim.simulation import stream
 from slam.evaluation import metrics
 from slam.frames import Float, Frame
@@ -127,6 +129,7 @@ def main(arguments: list[str] | None = None) -> int:
         runs += [(room[0], partial(driven_room, *room)) for room in ROOMS]
     if not runs:
         parser.error("name a log, or --rooms")
+    whole("--every", wanted.every, 1)
     for name, frames_of in runs:
         frames = frames_of()[:: wanted.every]
         frames = backwards(frames) if wanted.backwards else frames
@@ -135,4 +138,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(main))

@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from scripts.machine import machine, versions
 from scripts.marks import filled
 from scripts.result_files import RESULTS, SCHEMA, commit
 from sim.core.versions import WORLD
+from slam.errors import MobiliaError
 
 
 def add_options(parser: argparse.ArgumentParser, out: str, page: Path) -> None:
@@ -55,6 +56,15 @@ def head(
         "seconds": wanted.seconds,
         **{key: getattr(wanted, key) for key in asked},
     }
+
+
+def ended(main: Callable[[], int | None]) -> int:
+    """The exit status of ``main()``; an error of ours ends it with 1, told in one line."""
+    try:
+        return main() or 0
+    except (MobiliaError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

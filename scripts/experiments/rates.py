@@ -30,8 +30,10 @@ from numpy.typing import NDArray
 import scenes
 from scripts import workers
 from scripts.benchmark.tracks import chosen
-from scripts.comparison.recording import load, record
+from scripts.checked import whole
+from scripts.comparison.recording import load
 from scripts.experiments.measured import add_options, head, seeds_of, table
+from scripts.experiments.recorded import RecordedStream, make_missing
 from scripts.marks import fill_page
 from scripts.metrics.judged import Judged, world_truth
 from scripts.result_files import write
@@ -40,7 +42,6 @@ from sim.recording.recipe import Recipe
 from slam import create
 from slam.errors import MobiliaError
 from slam.evaluation import lost
-from slam.files import make_folder, replacing
 from slam.frames import NS_PER_S, Frame
 from slam.frontend.odometry_sum import MotionSum
 from slam.oracle import shown
@@ -63,7 +64,7 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
+class Drive(RecordedStream):
     """One stream at the full rate."""
 
     stream: str
@@ -75,15 +76,15 @@ class Drive:
         """Of its recording, without the ending."""
         return f"{self.stream}_{self.level:g}_s{self.recipe.seed}_{self.recipe.seconds:g}s"
 
-    def path(self, folder: Path) -> Path:
-        """Where its recording is kept."""
-        return folder / f"{self.name}.npz"
+    def simulated(self) -> dict[str, Any]:
+        """Its recipe, with every scan."""
+        return {"every": 1, **asdict(self.recipe)}
 
 
 def drive(name: str, level: float, seed: int, seconds: float) -> Drive:
     """A scene at that dynamism, or that level of a track, which lasts as the track does.
 
-    Raises ``UnknownNameError`` for neither.
+    Raises ``UnknownNameError`` for neither, ``InvalidValueError`` for a level that a track has not.
     """
     if name in scenes.names():
         recipe = Recipe(
@@ -93,13 +94,6 @@ def drive(name: str, level: float, seed: int, seconds: float) -> Drive:
         plan = chosen([name])[0].plan((), (seed,), levels=(level,))
         recipe = plan.recipe(plan.runs()[0])
     return Drive(stream=name, level=level, recipe=recipe)
-
-
-def simulate(one: Drive, folder: Path) -> None:
-    """Record it at the full rate, unless it is there."""
-    if not one.path(folder).exists():
-        with replacing(one.path(folder)) as part:
-            record(part, every=1, **asdict(one.recipe))
 
 
 def kept(frames: Sequence[Frame], every: int) -> list[Frame]:
@@ -202,15 +196,32 @@ def markdown(rows: Sequence[Row], slams: Sequence[str], told: str) -> str:
     return "\n\n".join(parts)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--streams", nargs="+", default=list(STREAMS), help="scenes and tracks")
+def add_drive_options(
+    parser: argparse.ArgumentParser, streams: Sequence[str], out: str, page: Path
+) -> None:
+    """``--streams``, ``--level``, ``--slams``, ``--folder``, and those of every experiment."""
+    parser.add_argument("--streams", nargs="+", default=list(streams), help="scenes and tracks")
     parser.add_argument("--level", type=float, default=LEVEL, help="of dynamism, or of the track")
     parser.add_argument("--slams", nargs="+", default=list(SLAMS))
-    parser.add_argument("--every", type=int, nargs="+", default=list(EVERY), help="scans")
     parser.add_argument("--folder", type=Path, default=Path("out/rates"), help="of recordings")
-    add_options(parser, "rates.json", PAGE)
+    add_options(parser, out, page)
     parser.set_defaults(seeds=3, first_seed=0)
+
+
+def drives(wanted: argparse.Namespace) -> list[Drive]:
+    """All that these options ask for, recorded in the folder; raises as ``drive``."""
+    found = [
+        drive(name, wanted.level, seed, wanted.seconds)
+        for name, seed in product(wanted.streams, seeds_of(wanted))
+    ]
+    make_missing(found, wanted.folder, wanted.jobs)
+    return found
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__)
+    add_drive_options(parser, STREAMS, "rates.json", PAGE)
+    parser.add_argument("--every", type=int, nargs="+", default=list(EVERY), help="scans")
     return parser
 
 
@@ -223,12 +234,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         f"Lost: {lost.LOST_RULE}."
     )
     try:
+        for every in wanted.every:
+            whole("--every", every, 1)
         first = head(wanted, MARK, arguments, "streams", "level", "slams", "every")
-        pairs = product(wanted.streams, seeds_of(wanted))
-        drives = [drive(name, wanted.level, seed, wanted.seconds) for name, seed in pairs]
-        make_folder(wanted.folder)
-        list(workers.each(partial(simulate, folder=wanted.folder), drives, jobs=wanted.jobs))
-        jobs = list(product(drives, wanted.slams, wanted.every))
+        jobs = list(product(drives(wanted), wanted.slams, wanted.every))
         call = partial(judged, folder=wanted.folder)
         rows = list(workers.each(call, jobs, jobs=wanted.jobs))
         order = {(d.stream, d.recipe.seed, s, e): k for k, (d, s, e) in enumerate(jobs)}

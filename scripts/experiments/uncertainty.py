@@ -25,6 +25,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from scripts.experiments.accuracy import FULL_RATE_HZ, SCANNERS
+from scripts.experiments.measured import ended
 from scripts.experiments.parts import Part
 from scripts.metrics.judged import SETTLED_S, world_truth
 from scripts.paper.runs import follow
@@ -216,4 +217,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(main))

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from scripts.experiments.kidnap import RIGHT_M, kidnapped, recording, targets
+from scripts.experiments.measured import ended
 from sim.simulation import stream
 from slam import SlamSystem, create, se2
 from slam.frames import Float, Frame
@@ -129,4 +130,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(main))

@@ -29,17 +29,17 @@ import numpy as np
 
 from scripts import workers
 from scripts.benchmark.tracks import chosen
-from scripts.comparison.recording import load, record
+from scripts.checked import whole
+from scripts.comparison.recording import load
 from scripts.experiments.kidnap import RIGHT_M
 from scripts.experiments.measured import add_options, head, seeds_of, table
+from scripts.experiments.recorded import RecordedStream, make_missing
 from scripts.experiments.verdict import RIGHT_POSE_M, WRONG_POSE_M, Seen, area, follow
 from scripts.marks import fill_page
 from scripts.result_files import write
 from sim.core.versions import WORLD
-from sim.recording.recipe import Recipe
 from slam import create
 from slam.errors import MobiliaError
-from slam.files import make_folder, replacing
 from slam.frames import NS_PER_S, Float, Frame
 from slam.shunting import ShuntingSlam
 
@@ -57,7 +57,7 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stream:
+class Stream(RecordedStream):
     """A track at a level with a seed; ``pushes`` into the pose of the SLAM."""
 
     track: str
@@ -70,23 +70,11 @@ class Stream:
         """Of its recording, without the ending."""
         return f"{self.track}_{self.level:g}_s{self.seed}"
 
-    def path(self, folder: Path) -> Path:
-        """Where it is kept."""
-        return folder / f"{self.name}.npz"
-
-    def recipe(self) -> tuple[Recipe, int]:
-        """Of its simulation, and one scan of how many is kept."""
+    def simulated(self) -> dict[str, Any]:
+        """The recipe of the track, and one scan of how many is kept."""
         track = chosen([self.track])[0]
         plan = track.plan((), (self.seed,), levels=(self.level,))
-        return plan.recipe(plan.runs()[0]), track.every
-
-
-def simulate(one: Stream, folder: Path) -> None:
-    """Record it, unless it is there."""
-    if not one.path(folder).exists():
-        recipe, every = one.recipe()
-        with replacing(one.path(folder)) as part:
-            record(part, every=every, **asdict(recipe))
+        return {"every": track.every, **asdict(plan.recipe(plan.runs()[0]))}
 
 
 def moments(frames: Sequence[Frame], count: int, seed: int) -> list[tuple[int, Float]]:
@@ -231,10 +219,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         f"{wanted.pushes} pushes in each stream."
     )
     try:
+        whole("--pushes", wanted.pushes, 0)
         first = head(wanted, MARK, arguments, "levels", "pushes")
-        make_folder(wanted.folder)
         asked = streams(wanted)
-        list(workers.each(partial(simulate, folder=wanted.folder), asked, jobs=wanted.jobs))
+        make_missing(asked, wanted.folder, wanted.jobs)
         results = list(workers.each(partial(seen, folder=wanted.folder), asked, jobs=wanted.jobs))
         rows = judged(sorted(results, key=lambda result: asked.index(result[0])))
         text = markdown(rows, told)

@@ -12,6 +12,7 @@ import typer
 from rich.markup import escape
 
 from scripts.console import console, working
+from scripts.names import check
 from slam.errors import InvalidValueError
 from slam.files import replacing
 
@@ -44,10 +45,13 @@ def export(
     writers: dict[str, Callable[[Path, Stream], list[Path]]] = {
         "tum": _tum, "carmen": _carmen, "npz": _npz, "smfeval": partial(_smfeval, slam=slam),
     }  # fmt: skip
-    if slam != SLAM and to != "smfeval":
-        raise InvalidValueError(f"--slam is for --to smfeval, got --to {to}")
     if to not in writers:
         raise InvalidValueError(f"--to must be one of {', '.join(writers)}, got {to!r}")
+    if slam != SLAM and to != "smfeval":
+        raise InvalidValueError(f"--slam is for --to smfeval, got --to {to}")
+    check([slam])
+    if out is not None and out.is_dir():
+        raise InvalidValueError(f"--out must be a file, got the folder {out}")
     from sim.recording.verify import check_bag
     from slam.logs import open_log, read_bag
     from slam.logs.bag_topics import is_bag

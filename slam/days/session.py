@@ -84,7 +84,7 @@ class Session:
         if history is not None and len(history) and time_s <= history.times_s[-1]:
             raise InvalidValueError(
                 f"Session.time_s must be later than the map's last session, at "
-                f"{history.times_s[-1]:g} s, got {time_s:g} s"
+                f"{history.times_s[-1]:.15g} s, got {time_s:.15g} s"
             )
         self.tracker, self.time_s = tracker, float(time_s)
         tracker.hold_map()  # what a session keeps of places lies in it

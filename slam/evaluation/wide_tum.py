@@ -25,6 +25,7 @@ from slam.frames import Float
 from slam.trajectory import MAX_TUM_BYTES, Trajectory, tum_pose, tum_stamp
 
 FLAT = 1e-10  # m², rad²: (10 um)², of z, roll, pitch; smfeval takes less than 1e-12 for none
+ROUNDING = 1e-6  # of the trace of a covariance: a few times that of single precision
 FORMAT = "SQUARE/0.3"
 TUM_WORDS, ENTRIES = 8, 21  # in a line: the pose, and the lower triangle
 PLANAR = (0, 1, 5)  # x, y and yaw among x, y, z, roll, pitch, yaw
@@ -65,8 +66,8 @@ def write_wide_tum(
     algorithm, version  words of the header
 
     The known first pose may have no variance: it gets ``FLAT``. Raises ``InvalidValueError`` for
-    covariances of another shape, not finite, not positive semidefinite, or all of them zero:
-    whoever states none cannot be scored.
+    covariances of another shape, not finite, not symmetric or positive semidefinite to
+    ``ROUNDING`` of their trace, or all of them zero: whoever states none cannot be scored.
     """
     covariances = _checked(np.asarray(covariances, dtype=np.float64), len(trajectory))
     lines = [f"#%{key} {value}" for key, value in _header(algorithm, version)]
@@ -107,15 +108,24 @@ def _checked(covariances: Float, n: int) -> Float:
     finite("wide TUM", "covariances", covariances)
     if n and not covariances.any():
         raise InvalidValueError("covariances are all zero: this SLAM states none to be scored")
-    symmetric = 0.5 * (covariances + covariances.transpose(0, 2, 1))
+    rounding = ROUNDING * np.abs(np.trace(covariances, axis1=1, axis2=2))
+    transposed = covariances.transpose(0, 2, 1)
+    skew = np.abs(covariances - transposed).max(axis=(1, 2))
+    if (skew > rounding).any():
+        k = int((skew - rounding).argmax())
+        raise InvalidValueError(
+            f"covariances must be symmetric, got entries {skew[k]:g} apart in scan {k}"
+        )
+    symmetric = 0.5 * (covariances + transposed)
     least = np.linalg.eigvalsh(symmetric)[:, 0]
-    if n and float(least.min()) < -FLAT:
-        k = int(least.argmin())
+    if (least < -rounding).any():
+        k = int((least + rounding).argmin())
         raise InvalidValueError(
             f"covariances must be positive semidefinite, got an eigenvalue of {least[k]:g} in "
             f"scan {k}"
         )
-    return symmetric + np.where(least < FLAT, 2.0 * FLAT, 0.0)[:, None, None] * np.eye(3)
+    more = np.where(least < FLAT, FLAT + np.maximum(FLAT, -least), 0.0)
+    return symmetric + more[:, None, None] * np.eye(3)
 
 
 def read_wide_tum(path: Path) -> tuple[Trajectory, Float]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from slam._jit import inner, njit
 from slam.errors import InvalidValueError
-from slam.frames import Features, Float, Frame, Scan
+from slam.frames import Features, Float, Frame, LaserSpec, Scan
 from slam.frontend.config import FRONTEND, FrontendConfig, Joining
 from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import face, join, unveiled
@@ -207,12 +207,7 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     where that drives more than ``MOST_SWEPT_M`` during it.
     """
     spec = scan.spec
-    swept = spec.sweep_duration * math.hypot(float(twist[0]), float(twist[1]))
-    if swept > MOST_SWEPT_M:
-        raise InvalidValueError(
-            f"Odometry.twist must drive at most {MOST_SWEPT_M:g} m during a scan's sweep, "
-            f"got {swept:g} m"
-        )
+    _check_swept(spec, twist)
     n = spec.n_beams
     points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
     beams = np.empty(n, np.int64)
@@ -232,12 +227,7 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     )
     points, beams = points[:count], beams[:count]
     if not rising and spec.sweep_duration > 0.0:
-        # An interlaced scanner that turns: neighbours are those by bearing, not by number.
-        rank = np.empty(n, np.int64)
-        rank[np.argsort(bearings, kind="stable")] = np.arange(n)
-        beams = rank[beams]
-        in_order = np.argsort(beams)
-        points, beams = points.take(in_order, axis=0), beams[in_order]
+        points, beams = _by_bearing(points, beams, bearings)
     sensor_sigma_m = spec.range_sigma_m or config.sensor_sigma_m
     onward, tangents, facings = (
         np.empty(count, np.bool_),
@@ -264,6 +254,27 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
         T_robot_laser=spec.T_robot_laser,
         sensor_sigma_m=sensor_sigma_m,
     )
+
+
+def _check_swept(spec: LaserSpec, twist: Float) -> None:
+    swept = spec.sweep_duration * math.hypot(float(twist[0]), float(twist[1]))
+    if swept > MOST_SWEPT_M:
+        raise InvalidValueError(
+            f"Odometry.twist must drive at most {MOST_SWEPT_M:g} m during a scan's sweep, "
+            f"got {swept:g} m"
+        )
+
+
+def _by_bearing(
+    points: Float, beams: NDArray[np.int64], bearings: Float
+) -> tuple[Float, NDArray[np.int64]]:
+    """Of an interlaced scanner that turns: neighbours are those by bearing, not by number."""
+    n = len(bearings)
+    rank = np.empty(n, np.int64)
+    rank[np.argsort(bearings, kind="stable")] = np.arange(n)
+    beams = rank[beams]
+    in_order = np.argsort(beams)
+    return points.take(in_order, axis=0), beams[in_order]
 
 
 def from_features(features: Features, grain: Grain) -> Observations:

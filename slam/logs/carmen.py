@@ -176,15 +176,23 @@ def _take(log: Log, number: int, words: list[str]) -> None:
         case "LASER_READING":
             log.scans["LASER_READING"].append(messages.parse_laser_reading(number, words))
         case "ODOM":
-            if log.short_odom is None:
-                log.short_odom = len(words) == messages.SHORT_ODOM_WORDS
-            log.odom.append(messages.parse_odom(number, words, short=log.short_odom))
+            log.odom.append(messages.parse_odom(number, words, short=_odom_is_short(log, words)))
         case "TRUEPOS":
             log.truth.append(messages.parse_truepos(number, words))
         case "PARAM" if len(words) > 1 and words[1] in (_RANGE_MAX_PARAM, _OFFSET_PARAM):
             log.params[words[1]] = messages.parse_param(words)
         case ignored:
             log.ignored[ignored] += 1
+
+
+def _odom_is_short(log: Log, words: list[str]) -> bool:
+    """Whether ODOM lines are: as the first one says, which is damaged if it alone is short."""
+    if log.short_odom is None:
+        log.short_odom = len(words) == messages.SHORT_ODOM_WORDS
+    elif log.short_odom and len(log.odom) == 1 and len(words) == messages.ODOM_WORDS:
+        why = f"ODOM has {messages.ODOM_WORDS} words, got {messages.SHORT_ODOM_WORDS}"
+        raise LogFormatError(log.path, why, log.odom[0].line)
+    return log.short_odom
 
 
 def _check_one_scanner(path: Path, scans: list[LaserMessage]) -> None:

@@ -33,11 +33,11 @@ from slam.tracker.standing.recent import Standing
 from slam.tracker.standing.rival import Rival
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.quality import TrackingQuality
+from slam.tracker.tracking.recovery import Recovery
 from slam.tracker.tracking.relocalise import Relocalisation, coarse
 from slam.tracker.tracking.scan_matching import ScanMatching
 from slam.tracker.tracking.shove import slip
 from slam.tracker.tracking.verdict import Verdict
-from slam.tracker.tracking.wake import Wake
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
 from slam.tracker.uncertainty.residuals import Evidence, look
@@ -74,10 +74,10 @@ class Tracker(abc.ABC):
         self._odometry_noise = OdometryNoise.of_beams(self.config)
         self._quality = TrackingQuality(self.config.freeze_below, self._numbers.quality)
         self._matching = ScanMatching(self.config, self._matcher, self._quality)
-        self._relocalisation: Relocalisation | None = None
-        self._suspected: Relocalisation | None = None  # while frozen
-        self._wake: Wake | None = None  # while frozen or lost
         self._verdict = Verdict(self._numbers.verdict)
+        self._recovery = Recovery(
+            self.config, self._matcher, self._match, self._quality, self._verdict
+        )
         new_map = partial(self._new_map, self.config) if self.map_moves else None
         self._loops = Loops(self.config, self._matcher, self._new_submap, new_map)
         self._T_map_odom, self._corrected_by = np.zeros(3), np.zeros(3)
@@ -130,7 +130,7 @@ class Tracker(abc.ABC):
             observations, prediction, match, evidence, state
         )  # 6 pose, odometry noise
         self._add_to_path(observations, match, prediction, state)  # 7 key frames for loops
-        if state == "tracking" or self._wake is not None:
+        if state == "tracking" or self._recovery.wake is not None:
             self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
         if self._ranges is not None:
             tracked = state == "tracking" and not match.slipped
@@ -156,8 +156,7 @@ class Tracker(abc.ABC):
         """Search for loops; move into the map that they have corrected, if it is ready."""
         self._corrected_by = np.zeros(3)
         self._loops.work()
-        lost = self._wake is not None or self._relocalisation is not None
-        if not self._trusted or lost or self._held or self._resumed is not None:
+        if not self._trusted or self._recovery.active or self._held or self._resumed is not None:
             return
         correction = self._loops.correction(self._path.poses)
         if correction is None and self._ranges is not None:
@@ -202,9 +201,9 @@ class Tracker(abc.ABC):
         if observations.weight >= self._numbers.relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = replace(prediction, carried=self._pose_covariance.odometry_part(motion))
-        if self._relocalisation is not None:
+        if self._recovery.search is not None:
             self._rival.forget()
-            match, state = self._recover(self._relocalisation, observations, prediction)
+            match, state = self._recover(self._recovery.search, observations, prediction)
             return prediction, match, state
         match = _near(self._match(observations, prediction), prediction)
         quality = self._quality
@@ -224,63 +223,15 @@ class Tracker(abc.ABC):
         return self._matching.match(cell_map, observations, prediction)
 
     def _recover(
-        self, recovery: Relocalisation, observations: Observations, prediction: Prediction
+        self, search: Relocalisation, observations: Observations, prediction: Prediction
     ) -> tuple[Match, str]:
-        """Dead reckoning, until one hypothesis alone explains what is seen."""
-        prediction = self._go_on(observations, prediction)
-        observations = observations.with_votes(None)  # they are of another place
-        predicted = prediction.T_map_robot
-        precision = inverted(prediction.prior)
-        here = self._matcher.climb(self.cell_map, observations, predicted, predicted, precision)
-        wake, usual = self._wake, self._quality.usual_whole()
-        carried = wake is None or wake.carried
-        match = recovery.step(observations, prediction, here, usual, carried=carried)
-        self._verdict.take(recovery.here / usual, recovery.elsewhere(predicted) / usual)
-        if match is not None:
-            self._found = True
-            self._go_on_in(wake.map if wake is not None and recovery.went_on else self.cell_map)
-            self._verdict.trust()
-            self._quality.relocated(recovery.accepted)
+        """Dead reckoning, until the robot is found or the map is outdated where it is."""
+        match, state, self.cell_map, self._found = self._recovery.recover(
+            search, self.cell_map, self._T_map_robot, observations, prediction
+        )
+        if self._found:
             self._pose_covariance.relocated(coarse(self._numbers.relocalise))
-            return match, "relocated"
-        unknown = recovery.elsewhere(predicted) < self._numbers.relocalise.enough_last * usual
-        if (
-            wake is not None
-            and unknown
-            and not carried
-            and self._quality.goes_on(wake.agreed, wake.agreed_s)
-        ):
-            self._go_on_in(wake.map)  # the map is outdated here
-            return unmatched(predicted, matched=here.matched, score=here.score), "relocated"
-        if recovery.elapsed_s > self._numbers.quality.give_up_s:
-            # elsewhere: go on from here, as on the first frame
-            self._go_on_in(self.cell_map if wake is None else wake.map)
-            self._quality.give_up()
-        return unmatched(predicted, matched=here.matched, score=here.score), "lost"
-
-    def _go_on_in(self, cell_map: CellMap) -> None:
-        """Be lost no more: track in this map from now on."""
-        self.cell_map = cell_map
-        self._relocalisation = self._wake = None
-        self._quality.count(False)
-
-    def _go_on(self, observations: Observations, prediction: Prediction) -> Prediction:
-        """The pose on the wake's map, where the scan agrees with it; else by odometry."""
-        wake = self._wake
-        if wake is None:
-            return prediction
-        wake.followed = False
-        enough = observations.weight >= self._numbers.relocalise.least_weight
-        match = self._match(observations, prediction, wake.map) if enough else None
-        if match is not None and match.matched >= self._quality.least_continuous():
-            increment = se2.between(self._T_map_robot, match.T_map_robot)
-            prediction = replace(prediction, T_map_robot=match.T_map_robot, increment=increment)
-            wake.followed = True
-        wake.carried |= match is not None and match.matched < self._quality.least_continuous()
-        agreed = match is not None and not self._quality.arises(match.matched)
-        wake.count(agreed, prediction.elapsed)
-        wake.add(observations, prediction.T_map_robot, prediction.elapsed)
-        return prediction
+        return match, state
 
     def _compare(
         self, observations: Observations, match: Match, prediction: Prediction, state: str
@@ -299,8 +250,7 @@ class Tracker(abc.ABC):
         if state != "tracking":
             return match, state
         if self._rival.undecided:
-            if self._wake is not None:
-                self._wake.followed = False
+            self._recovery.skip()
             return match, "frozen"
         rasterise(self.cell_map, observations, match.T_map_robot)
         T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
@@ -318,11 +268,13 @@ class Tracker(abc.ABC):
         quality.count(denied)
         if denied and quality.scans <= quality.config.patience:
             self.cell_map.release()
-            match = self._doubt(observations, prediction, match)
+            match = self._recovery.deny(
+                self.cell_map, self._T_map_robot, observations, prediction, match
+            )
             self._judge(observations, match, confirmed, contradicted)
-            self._suspect(observations, prediction)
+            self._recovery.suspect(self.cell_map, observations, prediction)
             return match, "lost" if quality.scans > quality.config.lost_after else "frozen"
-        self._suspected = self._wake = None
+        self._recovery.end()
         confirmed, contradicted, _ = self.cell_map.integrate(
             observations.view, T_map_laser, step, write=True
         )
@@ -333,16 +285,6 @@ class Tracker(abc.ABC):
             elapsed = prediction.elapsed
             quality.learn(match.matched, confirmed, contradicted, elapsed, match.overlapped)
         return match, "lost" if denied else "tracking"
-
-    def _doubt(self, observations: Observations, prediction: Prediction, match: Match) -> Match:
-        """The map denies the frame: from now on scans are matched to each other, too."""
-        if self._wake is None:
-            self._wake = Wake(self.cell_map)
-            self._wake.carried = match.matched < self._quality.least_continuous()
-            self._wake.add(observations, match.T_map_robot, prediction.elapsed)
-            return match
-        moved = self._go_on(observations, prediction)
-        return replace(match, T_map_robot=moved.T_map_robot)
 
     def _judge(
         self, observations: Observations, match: Match, confirmed: float, contradicted: float
@@ -359,16 +301,6 @@ class Tracker(abc.ABC):
             whole = match.overlapped * share / self._quality.usual_whole()
             voting = match.matched * share / self._quality.usual_support()
             self._verdict.take(max(whole, voting), ratio=self._agreement.ratio, vote=self._vote)
-
-    def _suspect(self, observations: Observations, prediction: Prediction) -> None:
-        """The frame is denied: begin to search the map, and from some such frames on be lost."""
-        quality = self._quality
-        if not quality.suspicious:
-            return
-        suspected = self._suspected or Relocalisation(self.cell_map, self._matcher)
-        suspected.look(observations, prediction)
-        lost = quality.scans >= quality.config.lost_after
-        self._relocalisation, self._suspected = (suspected, None) if lost else (None, suspected)
 
     def _update_uncertainty(
         self,
@@ -409,7 +341,7 @@ class Tracker(abc.ABC):
             off[2] = se2.wrap(float(off[2]))
             covariance = prediction.covariance + coarse(self._numbers.relocalise)
             covariance = covariance + np.diag(off * off)
-        elif self._wake is not None and self._wake.followed:
+        elif self._recovery.followed:
             covariance = prediction.covariance  # matched to the scans before, if not to the map
         elif state != "tracking" or not self._trusted:
             motion, covariance = prediction.increment, prediction.covariance

@@ -157,6 +157,33 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
     out[5] = norm * (pd * m0 - (pb * pb * muu + 2.0 * pb * pd * muv + pd * pd * mvv))
 
 
+@inner
+def _turned(
+    covariances: NDArray[np.float64], k: int, c: float, s: float, scale: float
+) -> tuple[float, float, float]:
+    """Covariance ``k`` (xx, xy, yy) turned by the angle of cosine c and sine s, in cells."""
+    xx, xy, yy = covariances[k, 0], covariances[k, 1], covariances[k, 2]
+    return (
+        (c * c * xx - 2.0 * c * s * xy + s * s * yy) * scale * scale,
+        (c * s * (xx - yy) + (c * c - s * s) * xy) * scale * scale,
+        (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale * scale,
+    )
+
+
+@inner
+def _positive_part(a: float, b: float, d: float) -> tuple[float, float, float]:
+    """[[a, b], [b, d]] without its eigenvectors of a negative eigenvalue."""
+    mean, half = 0.5 * (a + d), 0.5 * (a - d)
+    radius = math.sqrt(half * half + b * b)
+    low, high = mean - radius, mean + radius
+    if high <= 0.0:
+        return 0.0, 0.0, 0.0
+    if low < 0.0:
+        keep = high / (2.0 * radius)
+        return keep * (half + radius), keep * b, keep * (radius - half)
+    return a, b, d
+
+
 @njit
 def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     cells: Cells,
@@ -185,12 +212,7 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     for k in range(len(seen.points)):
         rx = c * seen.points[k, 0] - s * seen.points[k, 1]
         ry = s * seen.points[k, 0] + c * seen.points[k, 1]
-        xx, xy, yy = seen.covariances[k, 0], seen.covariances[k, 1], seen.covariances[k, 2]
-        cov = (
-            (c * c * xx - 2.0 * c * s * xy + s * s * yy) * scale * scale,
-            (c * s * (xx - yy) + (c * c - s * s) * xy) * scale * scale,
-            (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale * scale,
-        )
+        cov = _turned(seen.covariances, k, c, s, scale)
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
         vote = seen.votes[k]
         closed = reward.young_trace * (1.0 - vote)
@@ -210,15 +232,7 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
             a, b, d = a * inverse + gx * gx, b * inverse + gx * gy, d * inverse + gy * gy
         else:
             score += seen.weights[k] * f
-        # keep the positive part of [[a, b], [b, d]]
-        mean, half = 0.5 * (a + d), 0.5 * (a - d)
-        radius = math.sqrt(half * half + b * b)
-        low, high = mean - radius, mean + radius
-        if high <= 0.0:
-            a, b, d = 0.0, 0.0, 0.0
-        elif low < 0.0:
-            keep = high / (2.0 * radius)
-            a, b, d = keep * (half + radius), keep * b, keep * (radius - half)
+        a, b, d = _positive_part(a, b, d)
         w = seen.weights[k]
         gx, gy, a, b, d = w * gx, w * gy, w * a, w * b, w * d
         gradient[0] += gx

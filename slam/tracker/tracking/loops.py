@@ -26,6 +26,7 @@ from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.tracking.closures import DRAWN, Closures
 from slam.tracker.tracking.keys import KeyFrames
+from slam.tracker.tracking.passages import Passages
 from slam.tracker.tracking.redraw import Correction, Redrawing
 from slam.tracker.tracking.relocalise import coarse
 
@@ -50,6 +51,7 @@ class Loops(KeyFrames):
         self._relocalise = config.tracking.relocalise
         self._new_map = new_map if config.loops.corrects else None
         self.closures = Closures(config, matcher, new_submap, self.keys)
+        self._passages = Passages(config.loops, self.keys)
         self.poses: list[Float] = []  # by the graph, of the key frames in it
         self._chain: list[Edge] = []
         self._edges: dict[tuple[int, int], Edge] = {}
@@ -182,10 +184,11 @@ class Loops(KeyFrames):
             self._link(j)
         if any(b >= j - self._numbers.every for b in closures[-self._numbers.batch :]):
             return
-        middle = self._nearest(j)
+        middle = self._passages.nearest_before(j, self.poses)
         if middle is not None:
             predicted = se2.between(self.poses[middle], self.poses[j])
-            edge = self.closures.search(middle, j, predicted, self._gate(j, middle))
+            gate = self._passages.gate(j, middle)
+            edge = self.closures.search(middle, j, predicted, gate)
             if edge is not None:
                 self._rough[j] = middle, j
                 self._take(edge, predicted)
@@ -227,7 +230,7 @@ class Loops(KeyFrames):
 
     def _agree(self, one: Edge, other: Edge) -> bool:
         """Whether two closures put the robot at the same place."""
-        if one.b == other.b or self._way(one.b, other.b) > self._numbers.after_m:
+        if one.b == other.b or self._passages.way(one.b, other.b) > self._numbers.after_m:
             return False
         by_one = se2.compose(self.poses[one.a], one.T_a_b)
         by_one = se2.compose(by_one, se2.between(self.poses[one.b], self.poses[other.b]))
@@ -302,7 +305,7 @@ class Loops(KeyFrames):
     def _tie(self, j: int) -> None:
         """Tie a key frame to all passages along there."""
         first, self._tied[j] = self._tied[j] is None, self.poses[j]
-        for middle in self._passages(j):
+        for middle in self._passages.all_near(j, self.poses):
             predicted = se2.between(self.poses[middle], self.poses[j])
             edge = self.closures.tie(middle, j, predicted)
             if edge is not None:
@@ -338,43 +341,3 @@ class Loops(KeyFrames):
                 self._ties.append(self._again)
                 return 1
         return 0
-
-    def _way(self, a: int, b: int) -> float:
-        return abs(self.keys[a].way_m - self.keys[b].way_m)
-
-    def _passages(self, j: int) -> list[int]:
-        """Middles near key frame ``j``, one of each time the robot came along there."""
-        poses = np.array(self.poses)
-        ways = np.array([key.way_m for key in self.keys[: len(poses)]])
-        numbers = self._numbers
-        middles = np.arange(numbers.submap, len(poses) - numbers.submap, numbers.every)
-        middles = middles[np.abs(ways[middles] - ways[j]) > numbers.after_m]
-        apart = poses[middles, :2] - poses[j, :2]
-        squares = (apart * apart).sum(axis=1)
-        found: list[int] = []
-        for k in np.argsort(squares, kind="stable"):
-            if squares[k] > numbers.again_m**2 or len(found) == numbers.passages:
-                break
-            middle = int(middles[k])
-            if all(abs(ways[middle] - ways[other]) > numbers.after_m for other in found):
-                found.append(middle)
-        return found
-
-    def _gate(self, j: int, middle: int) -> float:
-        way = self.keys[j].way_m - self.keys[middle].way_m
-        return min(self._numbers.gate_m + self._numbers.gate_share * way, self._numbers.widest_m)
-
-    def _nearest(self, j: int) -> int | None:
-        """Middle of the little map nearest to where key frame ``j`` should be."""
-        best, nearest = None, math.inf
-        for middle in range(self._numbers.submap, j - self._numbers.submap, self._numbers.every):
-            if (
-                self.keys[j].way_m - self.keys[middle + self._numbers.submap].way_m
-                < self._numbers.after_m
-            ):
-                break
-            d = self.poses[middle] - self.poses[j]
-            distance = math.hypot(float(d[0]), float(d[1])) - self._gate(j, middle)
-            if distance < min(nearest, self._numbers.near_m):
-                best, nearest = middle, distance
-        return best

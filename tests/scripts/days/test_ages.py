@@ -11,6 +11,7 @@ import pytest
 
 from scripts.days.ages import ages_of, verdicts
 from scripts.days.lifelong import COLUMNS
+from scripts.experiments import lifelong_bars
 from scripts.experiments.lifelong_bars import changes_line, read, summary
 from slam.errors import LogFormatError
 from slam.tracker.tracking.verdict import OUTDATED, TRACKING
@@ -53,6 +54,7 @@ def test_the_sums_over_buildings_are_by_hand():
     assert lines[0].startswith("4 sessions: 3 found, 3 within 10 s, 0 at a wrong place; of 3")
     assert "last to session 1 1.00, to session 0 2.00" in lines[1]
     assert changes_line(both).startswith("changes: precision 0.90 (18 of 20), recall 0.75 (6 of 8)")
+    assert changes_line([{**both[0], "changes": None}]).endswith("no session was found")
 
 
 def test_a_folder_that_lifelong_did_not_write_is_refused(tmp_path):
@@ -61,3 +63,7 @@ def test_a_folder_that_lifelong_did_not_write_is_refused(tmp_path):
     (tmp_path / "lifelong.json").write_text(json.dumps([1]))
     with pytest.raises(LogFormatError, match="rows and settings"):
         read(tmp_path)
+    assert lifelong_bars.main([str(tmp_path)]) == 1
+    (tmp_path / "lifelong.json").write_text(json.dumps(building(1, [0.01, 0.02, 0.03])))
+    with pytest.raises(SystemExit, match="2"):
+        lifelong_bars.main([str(tmp_path), "--slam", "ekf"])

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scripts.experiments import covariance_scores
 from scripts.experiments.covariance_scores import asked, exported, markdown
-from scripts.experiments.rates import Drive, simulate
+from scripts.experiments.rates import Drive
 from sim.recording.recipe import Recipe
-from slam.errors import MissingDependencyError
+from slam.errors import MissingDependencyError, MobiliaError
 from slam.evaluation.wide_tum import read_wide_tum
 from slam.trajectory import read_tum
 
@@ -20,7 +21,7 @@ from slam.trajectory import read_tum
 def test_poses_and_truth_are_in_one_map(tmp_path: Path):
     recipe = Recipe(scene="arena", seed=0, dynamism=0.0, seconds=2.0, scanner="noise")
     drive = Drive(stream="arena", level=0.0, recipe=recipe)
-    simulate(drive, tmp_path)
+    drive.make(tmp_path)
     estimate, truth = exported(drive, "shunting", tmp_path)
     online, covariances = read_wide_tum(estimate)
     true = read_tum(truth)
@@ -32,6 +33,15 @@ def test_poses_and_truth_are_in_one_map(tmp_path: Path):
 @pytest.mark.skipif(importlib.util.find_spec("smfeval") is not None, reason="smfeval is installed")
 def test_without_smfeval_it_says_how_to_get_it(tmp_path: Path):
     with pytest.raises(MissingDependencyError, match="pip install smfeval"):
+        asked("nees", tmp_path / "a.tum", tmp_path / "b.tum")
+
+
+def test_a_run_that_smfeval_does_not_end_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "smfeval" / "cli").mkdir(parents=True)
+    (tmp_path / "smfeval" / "cli" / "main.py").write_text("import time\ntime.sleep(60.0)\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(covariance_scores, "LIMIT_S", 0.3)
+    with pytest.raises(MobiliaError, match=r"smfeval nees must end within 0\.3 s.*a\.tum"):
         asked("nees", tmp_path / "a.tum", tmp_path / "b.tum")
 
 

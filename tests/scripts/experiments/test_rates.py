@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from scripts.experiments import rates
+from scripts.experiments.measured import ended
 from sim.simulation import Simulation, tour
-from slam.errors import UnknownNameError
+from slam.errors import InvalidValueError, UnknownNameError
 
 
 def test_scans_left_out_leave_their_odometry():
@@ -32,6 +33,29 @@ def test_a_stream_is_a_scene_or_a_track_at_its_level():
     assert track.name != rates.drive("rush-hour", 0.75, 3, 20.0).name
     with pytest.raises(UnknownNameError, match="rush-our"):
         rates.drive("rush-our", 0.5, 3, 20.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--every", "0"], "--every must be a whole number >= 1, got 0"),
+        (["--streams", "rush-hour", "--level", "7"], "the level of a track must be one of"),
+    ],
+)
+def test_what_cannot_be_run_is_told_in_a_line(tmp_path: Path, capsys, words, says):
+    folders = ["--folder", str(tmp_path / "a"), "--results", str(tmp_path / "rates.json")]
+    assert rates.main([*words, *folders, "--no-page"]) == 1
+    assert capsys.readouterr().err.startswith(says)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_error_of_ours_ends_an_experiment_in_a_line(capsys: pytest.CaptureFixture):
+    def wrong() -> int:
+        raise InvalidValueError("motion must be one of 1, 0.75, 0.5, got 0.3")
+
+    assert ended(wrong) == 1
+    assert capsys.readouterr().err == "motion must be one of 1, 0.75, 0.5, got 0.3\n"
+    assert ended(lambda: None) == 0
 
 
 def test_a_run_is_recorded_once_replayed_and_told(tmp_path: Path, capsys: pytest.CaptureFixture):

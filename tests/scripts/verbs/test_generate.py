@@ -385,6 +385,22 @@ def test_exports_are_read_back(serial, tmp_path):
         export(tmp_path / "none.mcap", "tum", None)
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("minari", "a.h5", "ekf"), "--to must be one of tum, carmen, npz, smfeval, got 'minari'"),
+        (("tum", "a.tum", "ekf"), "--slam is for --to smfeval, got --to tum"),
+        (("smfeval", "a.tum", "shuntin"), "no SLAM is called 'shuntin'"),
+        (("carmen", ".", "shunting"), "--out must be a file, got the folder"),
+    ],
+)
+def test_an_export_that_cannot_be_is_refused_before_the_log_is_opened(tmp_path, words, says):
+    to, name, slam = words
+    with pytest.raises(MobiliaError, match=says):
+        export(tmp_path / "none.mcap", to, tmp_path / name, slam)
+    assert not list(tmp_path.iterdir())
+
+
 def test_poses_with_covariances_are_exported(serial, tmp_path):
     episode, frames = serial / NAMES[0], list(read_bag(serial / NAMES[0]))
     export(episode, "smfeval", tmp_path / "a.tum")

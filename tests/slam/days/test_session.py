@@ -64,7 +64,7 @@ def test_the_next_day_begins_anywhere_and_is_merged(first, tmp_path) -> None:
     history = read_history(path)
     assert history is not None
     np.testing.assert_array_equal(history.times_s, [NINE, DAY_S + NINE])
-    with pytest.raises(InvalidValueError, match="must be later than the map's last session"):
+    with pytest.raises(InvalidValueError, match="later than the map's last session, at 118800 s"):
         Session.open(path, ShuntingSlam, time_s=DAY_S + NINE)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from slam.errors import InvalidValueError, LogFormatError
-from slam.evaluation.wide_tum import FLAT, read_wide_tum, to_body, to_map, write_wide_tum
+from slam.evaluation.wide_tum import FLAT, ROUNDING, read_wide_tum, to_body, to_map, write_wide_tum
 from slam.frames import NS_PER_S
 from slam.trajectory import Trajectory
 
@@ -77,6 +77,32 @@ def test_the_known_start_gets_a_variance_that_can_be_inverted(tmp_path: Path):
     write_wide_tum(tmp_path / "a.tum", trajectory, covariances)
     _, back = read_wide_tum(tmp_path / "a.tum")
     assert np.linalg.eigvalsh(back).min() >= FLAT / 2.0
+
+
+def turned(least: float, skew: float = 0.0) -> np.ndarray:
+    """(1, 3, 3) with eigenvalues 1, 0.5 and the least; two entries differ by ``skew``."""
+    axes = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    whole = axes @ np.diag([1.0, 0.5, least]) @ axes.T
+    whole[0, 2] += skew
+    return whole[None]
+
+
+@pytest.mark.parametrize("scale", [1e-8, 1.0, 1e4])
+def test_rounding_is_a_part_of_the_covariance_whatever_its_size(tmp_path: Path, scale: float):
+    pose = Trajectory(stamps_ns=np.array([1]), poses=np.array([[1.0, 2.0, 0.5]]))
+    part = 1.5 * ROUNDING  # of the eigenvalues of ``turned``: their sum is 1.5
+    for fine in (turned(-0.9 * part), turned(0.0, 0.9 * part)):
+        write_wide_tum(tmp_path / "a.tum", pose, scale * fine)
+        _, back = read_wide_tum(tmp_path / "a.tum")
+        np.testing.assert_allclose(back, scale * fine, atol=2.0 * part * scale + 2.0 * FLAT)
+        assert np.linalg.eigvalsh(back).min() >= FLAT / 2.0
+    for bad, says in (
+        (turned(-1.2 * part), "positive semidefinite, got an eigenvalue of -"),
+        (turned(0.0, 1.2 * part), r"symmetric, got entries .* apart in scan 0"),
+    ):
+        with pytest.raises(InvalidValueError, match=says):
+            write_wide_tum(tmp_path / "b.tum", pose, scale * bad)
+    assert not (tmp_path / "b.tum").exists()
 
 
 @pytest.mark.parametrize(

@@ -275,6 +275,15 @@ def test_odom_without_speeds_is_read_and_counted(tmp_path, carmen_text, caplog):
             read(tmp_path, "".join(mixed))
 
 
+@pytest.mark.parametrize("at", [0, 1, 6])
+def test_a_short_odom_line_among_others_is_told_by_its_own_number(tmp_path, carmen_text, at):
+    odom = [carmen_text.odom(k + 0.5, pose) for k, pose in enumerate(carmen_text.path_poses(7))]
+    odom[at] = short_odom(odom[at])
+    text = "# a header\n" + "".join(f"{line}NEFF 12.5\n" for line in odom)
+    with pytest.raises(LogFormatError, match=rf"a\.log:{2 + 2 * at}: ODOM has 10 words, got 5"):
+        read(tmp_path, text)
+
+
 def test_the_own_log_of_a_particle_filter(tmp_path, carmen_text):
     poses = carmen_text.path_poses(6)
     lines = ["PARAM particles 30\n"]

@@ -136,7 +136,7 @@ def carried(budget_ms: float) -> tuple[list[str], list[float], Array]:
     for frame in after:
         states.append(system.update(frame.without_truth()).diagnostics["state"])
         spent.append(0.0)
-        looking = system._relocalisation or system._suspected
+        looking = system._recovery.search or system._recovery.suspected
         if looking is not None and states[-1] in ("frozen", "lost"):
             spent[-1] = looking.spent_ns
     truth = after[-1].truth

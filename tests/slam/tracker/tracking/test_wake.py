@@ -103,8 +103,8 @@ def test_a_robot_that_is_carried_is_told_by_its_surroundings() -> None:
         last = system.update(frame.without_truth())
         states.append(last.diagnostics["state"])
         if last.diagnostics["state"] == "frozen":
-            assert system._wake is not None
-            assert system._wake.carried
+            assert system._recovery.wake is not None
+            assert system._recovery.wake.carried
     assert last is not None
     assert "relocated" in states
     off = last.T_map_robot - ELSEWHERE.at(16.0)[0]
@@ -135,8 +135,8 @@ def test_another_place_is_believed_only_after_long_while_scans_agree() -> None:
     system, elsewhere = carried()
     found_s, estimate = None, None
     for k, frame in enumerate(elsewhere):
-        if system._wake is not None:
-            system._wake.carried = False
+        if system._recovery.wake is not None:
+            system._recovery.wake.carried = False
         estimate = system.update(frame.without_truth())
         if estimate.diagnostics["state"] == "relocated" and found_s is None:
             found_s = k / 5.0
