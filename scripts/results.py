@@ -101,6 +101,8 @@ def _wanted(folder: Path) -> list[str]:
             runs = {(row["scene"], row["dynamism"], int(row["seed"])) for row in rows}
             named = [Run(scene=s, dynamism=d, seed=k, axis=axis).name for s, d, k in runs]
             names += [f"runs/{name}.npz" for name in named]
+            if recipe["settings"].get("sessions") is not None:
+                names += [compared.AGES, compared.AGES_LEVELS]
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return [RECIPE]  # damaged, which its hash says
     except LogFormatError:  # the same
