@@ -68,6 +68,7 @@ def compare(
     With levels of --motion or --change instead, the other of the two is at 0 unless it is given.
     It ends with a sentence about the SLAM named first: from which level on it is lost.
     If it is killed, the same command continues. With a SLAM added, only that SLAM runs.
+    With --sessions it also says how the SLAMs do in a map some sessions old.
 
     [bold]mobilia compare --slam shunting ekf odometry --scene arena --dynamism 0:1:0.5 --seeds 3
     --out out/compare[/bold]
