@@ -18,7 +18,7 @@ from scripts.report.study import LEAST_RUNS
 
 NONE = "–"
 STARTS_ANEW = "starts anew: cannot load a map"
-IN_DAYS = "of the days before"
+_ANEW, _DAYS = ("starts anew", "cannot load a map"), ("of the sessions before", "")
 _PRINTED = (
     "found_share", "found_soon_share", "wrong_share", "rmse_session0_m", "rmse_session1_m",
     "rmse_last_m", "rmse_growth", "rmse_age1_m", "rmse_age3_m", "rmse_age10_m", "ghost_rate_early",
@@ -38,13 +38,14 @@ def groups(rows: Sequence[Row]) -> dict[Group, list[Row]]:
     return found
 
 
-def title(group: Group, rows: Sequence[Row]) -> str:
-    """What its buildings are: "random-rooms, motion 0, change 0.3: 6 buildings of 11 sessions"."""
+def where(group: Group) -> str:
+    """Such as "random-rooms, motion 0, change 0.3"."""
     scene, motion, change = group
-    return f"{scene}, motion {motion:g}, change {change:g}: {_size(rows)}"
+    return f"{scene}, motion {motion:g}, change {change:g}"
 
 
-def _size(rows: Sequence[Row]) -> str:
+def size(rows: Sequence[Row]) -> str:
+    """Of a group: "6 buildings of 11 sessions"."""
     n = len({row["seed"] for row in rows})
     return f"{n} building{'s' if n != 1 else ''} of {int(rows[0]['sessions'])} sessions"
 
@@ -63,7 +64,7 @@ def table(rows: Sequence[Row], scores: Sequence[Score] = SCORES) -> list[tuple[s
     found = {(row["slam"], row["metric"]): row for row in levels(rows)}
     kinds = {row["slam"]: row["map"] for row in rows}
     out: list[tuple[str, Cells]] = [
-        ("map", [(STARTS_ANEW if kinds[name] == ANEW else IN_DAYS, "") for name in names])
+        ("map", [_ANEW if kinds[name] == ANEW else _DAYS for name in names])
     ]
     for score in scores:
         own = [found.get((name, score.key)) for name in names]
@@ -90,7 +91,7 @@ def _cell(score: Score, row: Row | None) -> tuple[str, str]:
 def printed(group: Group, rows: Sequence[Row]) -> Table:
     """Of one group for the terminal: a column for each SLAM."""
     found = Table(
-        title=escape(title(group, rows)), title_justify="left", box=box.SIMPLE_HEAD,
+        title=escape(f"{where(group)}: {size(rows)}"), title_justify="left", box=box.SIMPLE_HEAD,
         padding=(0, 1, 0, 0), pad_edge=False,
     )  # fmt: skip
     found.add_column("")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report's section over days: SLAMs in the maps of the sessions before, building by building."""
+"""The report's section over days: SLAMs in the map of the sessions before."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from slam.errors import LogFormatError
 
 @dataclass(frozen=True, kw_only=True)
 class Days:
-    """One scene: at each level what it shows, a sentence a SLAM, and its table."""
+    """The buildings of a scene at a level: what they show, a sentence a SLAM, and the table."""
 
-    scene: str
-    levels: list[tuple[list[str], Table]]
+    heading: str
+    told: list[str]
+    table: Table
 
 
 def days(study: Study) -> list[Days]:
-    """Scene by scene; none of a comparison without buildings.
+    """Scene by scene, level by level; none of a comparison without buildings.
 
     Raises ``LogFormatError`` for tables that are not what ``mobilia compare`` writes.
     """
@@ -31,18 +32,21 @@ def days(study: Study) -> list[Days]:
     if missing:
         where = study.compared.folder / "ages.csv"
         raise LogFormatError(where, f"a table without the column '{missing[0]}'")
-    found: dict[str, list[tuple[list[str], Table]]] = {}
-    for group, own in score_tables.groups(rows).items():
-        told = score_tables.sentences(own)
-        found.setdefault(group[0], []).append((told, _table(group, own)))
-    return [Days(scene=scene, levels=made) for scene, made in found.items()]
+    return [
+        Days(
+            heading=score_tables.where(group),
+            told=score_tables.sentences(own),
+            table=_table(own),
+        )
+        for group, own in score_tables.groups(rows).items()
+    ]
 
 
-def _table(group: score_tables.Group, rows: list[scores.Row]) -> Table:
+def _table(rows: list[scores.Row]) -> Table:
     names = score_tables.slams_of(rows)
     lines = [
         [Cell(text=heading), *(Cell(text=text, small=small) for text, small in cells)]
         for heading, cells in score_tables.table(rows)
     ]
-    caption = score_tables.title(group, rows)
+    caption = score_tables.size(rows)
     return Table(caption=caption, head=["score", *names], rows=lines, slams=names)

@@ -109,11 +109,10 @@ def test_over_buildings_medians_have_intervals_and_shares_are_of_all_sessions():
 def test_the_table_and_the_sentence_say_who_starts_anew():
     rows = [lived([session(k) for k in range(7)], [aged(1), aged(10)], seed=s) for s in range(6)]
     ((group, own),) = score_tables.groups([*rows, anew(0)]).items()
-    assert score_tables.title(group, own) == (
-        "room, motion 0, change 0.3: 6 buildings of 7 sessions"
-    )
+    assert score_tables.where(group) == "room, motion 0, change 0.3"
+    assert score_tables.size(own) == "6 buildings of 7 sessions"
     cells = dict(score_tables.table(own))
-    assert cells["map"][1] == ("starts anew: cannot load a map", "")
+    assert cells["map"][1] == ("starts anew", "cannot load a map")
     assert cells["sessions found"] == [("36 of 36", "90 to 100 %"), ("–", "")]
     assert cells["error of session 1, cm"] == [("3.00", "3.00 to 3.00"), ("3.00", "")]
     assert "sessions that failed" not in cells
