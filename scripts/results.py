@@ -30,6 +30,7 @@ _ALWAYS = {
     "compare": (*_TABLES, "paired.csv"),
     "drive": (*_TABLES, "goals.csv", "closed_loop.png", "paths.png"),
     "blame": ("blame.json", "blame.png"),
+    "days": ("days.csv", "days.json"),
     "benchmark": ("leaderboard.json", "leaderboard.csv", "leaderboard.md"),
 }
 

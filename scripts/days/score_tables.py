@@ -18,7 +18,7 @@ from scripts.report.study import LEAST_RUNS
 
 NONE = "–"
 STARTS_ANEW = "starts anew: cannot load a map"
-_ANEW, _DAYS = ("starts anew", "cannot load a map"), ("of the sessions before", "")
+_ANEW, _DAYS = ("starts anew", "cannot load a map"), ("loaded", "in each session")
 _PRINTED = (
     "found_share", "found_soon_share", "wrong_share", "rmse_session0_m", "rmse_session1_m",
     "rmse_last_m", "rmse_growth", "rmse_age1_m", "rmse_age3_m", "rmse_age10_m", "ghost_rate_early",
@@ -98,11 +98,12 @@ def printed(group: Group, rows: Sequence[Row]) -> Table:
     for name in slams_of(rows):
         found.add_column(escape(name), justify="right", overflow="fold")
     for heading, cells in table(rows, [score for score in SCORES if score.key in _PRINTED]):
-        found.add_row(heading, *(escape(_both(*cell)) for cell in cells))
+        found.add_row(heading, *(escape(both(*cell)) for cell in cells))
     return found
 
 
-def _both(text: str, small: str) -> str:
+def both(text: str, small: str) -> str:
+    """A cell with its small print in brackets."""
     return f"{text} [{small}]" if small else text
 
 
@@ -135,12 +136,12 @@ def _errors(of: dict[str, Any], *, anew: bool) -> list[str]:
     if first is None or last is None:
         return []
     frame = ", each in a frame of its own" if anew else ""
-    said = f"error of session 1 {_cm(first)}, of the last {_cm(last)}{frame}"
+    said = f"error {_cm(first)} in session 1, {_cm(last)} in the last{frame}"
     old = [(age, _value(of, f"rmse_age{age}_m")) for age in (10, 3, 1)]
     there = [(age, value) for age, value in old if value is not None]
     if there:
         age, value = there[0]
-        said += f", {_cm(value)} with a map {age} session{'s' if age > 1 else ''} old"
+        said += f", {_cm(value)} in a map {age} session{'s' if age > 1 else ''} old"
     return [said]
 
 

@@ -119,10 +119,10 @@ def test_the_table_and_the_sentence_say_who_starts_anew():
     mine, guest = score_tables.sentences(own)
     assert mine == (
         "`mine`: found 36 of 36 sessions from an unknown start, 30 within 10 s, never at a wrong "
-        "place; error of session 1 3.00 cm, of the last 8.00 cm, 5.00 cm with a map 10 sessions "
+        "place; error 3.00 cm in session 1, 8.00 cm in the last, 5.00 cm in a map 10 sessions "
         "old; ghosts 2.00 % early, 5.00 % late."
     )
-    assert guest.startswith("`guest`: starts anew: cannot load a map; error of session 1 3.00 cm")
+    assert guest.startswith("`guest`: starts anew: cannot load a map; error 3.00 cm in session 1")
     assert guest.count("in a frame of its own") == 1
 
 

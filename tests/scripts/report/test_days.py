@@ -38,10 +38,10 @@ def test_it_says_what_the_buildings_show(text: str):
     assert own.count("<caption>6 buildings of 5 sessions</caption>") == 2
     assert (
         "<code>shunting</code>: found 24 of 24 sessions from an unknown start, 24 within 10 s, "
-        "never at a wrong place; error of session 1 2.75 cm, of the last 4.25 cm, 3.30 cm with a "
+        "never at a wrong place; error 2.75 cm in session 1, 4.25 cm in the last, 3.30 cm in a "
         "map 3 sessions old; ghosts 1.40 % early, 1.60 % late." in own
     )
-    assert "<code>ekf</code>: starts anew: cannot load a map; error of session 1" in own
+    assert "<code>ekf</code>: starts anew: cannot load a map; error 2.75 cm" in own
     assert "failed in 6 of 30 sessions, first: scan 3, raised <RuntimeError>: enough" in own
     assert "<td>24 of 24<small>86 to 100 %</small></td><td>–</td>" in own
     assert "<td>starts anew<small>cannot load a map</small></td>" in own
