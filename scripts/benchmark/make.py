@@ -66,6 +66,8 @@ class Wanted:
         most = min(len(self.seeds_of(track)) for track in self.tracks)
         if not 1 <= self.seeds <= most:
             raise InvalidValueError(f"--seeds must be 1 to {most}, got {self.seeds}")
+        if self.days:
+            self.buildings()  # complains of what cannot be
 
     @property
     def levels(self) -> tuple[float, ...]:

@@ -39,6 +39,7 @@ def carry_out(
         registry.build(name)  # wrong names are told before anything starts
     for name in plan.slams:
         limited(name, Limits())
+    buildings = of_comparison(plan)
     out = out.absolute()
     with locked_folder(out):
         settings = {"compare_schema": files.SCHEMA, **plan.settings(), "lost_rule": LOST_RULE}
@@ -50,7 +51,6 @@ def carry_out(
         recordings = run_jobs(simulations.values(), out / RECORDINGS, title="simulating", **ways)
         only: list[Job] = [job for _, _, job in entries]
         done = run_jobs(only, out / ENTRIES, title="running SLAMs", **ways)
-        buildings = of_comparison(plan)
         aged = [] if buildings is None else live(buildings, out / DAYS, jobs=jobs, cluster=cluster)
         with together(out) as staged:
             rows: list[dict[str, Any]] = []

@@ -72,6 +72,8 @@ class Buildings:
             raise InvalidValueError(
                 f"Buildings.recipes must be one or more, each once, got {names}"
             )
+        for recipe in self.recipes:
+            self.session(recipe, 0)  # complains of one that would be too long
 
     def session(self, recipe: Recipe, number: int) -> Recipe:
         """Of that session of a building."""
