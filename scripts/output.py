@@ -42,7 +42,8 @@ RECIPE = "recipe.json"
 # What comparisons, drives and benchmarks consist of: all else in their folders is somebody else's.
 GROWING = (
     "*.npz", "*.npz.sha256", "*.csv", "*.png", "runs.json", RECIPE, "report.html",
-    "leaderboard.json", "leaderboard.md", "submission_*.json",
+    "leaderboard.json", "leaderboard.md", "submission_*.json", "days.json",
+    "*lives/*.json", "*lives/*.json.sha256",
 )  # fmt: skip
 OLD = ".old"  # of the earlier run, while a new one takes its place
 STAGED, READY = ".tables.part", ".tables.ready"  # of ``together``, before and after it counts

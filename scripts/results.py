@@ -30,6 +30,7 @@ _ALWAYS = {
     "compare": (*_TABLES, "paired.csv"),
     "drive": (*_TABLES, "goals.csv", "closed_loop.png", "paths.png"),
     "blame": ("blame.json", "blame.png"),
+    "days": ("days.csv", "days.json"),
     "benchmark": ("leaderboard.json", "leaderboard.csv", "leaderboard.md"),
 }
 
@@ -101,6 +102,8 @@ def _wanted(folder: Path) -> list[str]:
             runs = {(row["scene"], row["dynamism"], int(row["seed"])) for row in rows}
             named = [Run(scene=s, dynamism=d, seed=k, axis=axis).name for s, d, k in runs]
             names += [f"runs/{name}.npz" for name in named]
+            if recipe["settings"].get("sessions") is not None:
+                names += [compared.AGES, compared.AGES_LEVELS]
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return [RECIPE]  # damaged, which its hash says
     except LogFormatError:  # the same

@@ -37,6 +37,8 @@ class Board:
     runs     by track: rows as of ``runs.csv``, of every SLAM and control
     missing  SLAMs that are not installed, and how to get them
     merged   of each submission of others: its SLAM, and what it was made with
+    days     the table over days for ``leaderboard.json``, and ``days_page`` its section
+             (``scripts.benchmark.days``); empty where it was not asked for
     """
 
     subject: str
@@ -45,6 +47,8 @@ class Board:
     runs: Mapping[str, Sequence[Row]]
     missing: Mapping[str, str] = field(default_factory=dict)
     merged: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    days: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    days_page: str = ""
 
     @cached_property
     def _scores(self) -> dict[str, tuple[Row, list[Row]]]:
@@ -140,7 +144,11 @@ class Board:
             f"{track} {slam}": self._shares(track, slam)
             for track in self.runs for slam in self.slams if self.row(track, slam)
         }  # fmt: skip
-        tables = {"tracks": tracks, "leaderboard": rows, "lost_shares": shares}
+        tables: dict[str, Mapping[str, Any]] = {
+            "tracks": tracks, "leaderboard": rows, "lost_shares": shares,
+        }  # fmt: skip
+        if self.days:
+            tables["days"] = self.days
         write_results(folder / NAMES[0], head, tables)
         write_text(folder / NAMES[2], self.markdown())
 
@@ -165,6 +173,7 @@ class Board:
         parts.append(markdown_table(heads, lines, left=1))
         for track in self.tracks:
             parts += self._section(track)
+        parts += [self.days_page] if self.days_page else []
         return "\n\n".join(parts) + "\n"
 
     def _notes(self) -> list[str]:

@@ -8,15 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark import submission
+from scripts.benchmark import days, submission
 from scripts.benchmark.board import Board
 from scripts.benchmark.submission import Submission
 from scripts.benchmark.systems import installed
-from scripts.benchmark.tracks import LEVELS, TRACKS, Track
+from scripts.benchmark.tracks import LEVELS, TEST, TRACKS, TRAIN, Track
 from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
 from scripts.comparison.recording import digest
 from scripts.console import note
+from scripts.days.make import carry_out as live
+from scripts.days.plan import Buildings
+from scripts.days.scores import Row
 from scripts.machine import machine, versions
 from scripts.output import RECIPE, locked_folder, together, write_recipe
 from sim.core.versions import WORLD
@@ -41,6 +44,7 @@ class Wanted:
     seconds  of each run, instead of the track's own; such a board is for trying out
     submit   name of a submission to write of the subject's runs
     missing  SLAMs that would run too if they were installed, and how to get them
+    days     also in buildings that go on over sessions (``scripts.benchmark.days``)
     """
 
     tracks: tuple[Track, ...]
@@ -52,6 +56,7 @@ class Wanted:
     seconds: float | None = None
     submit: str | None = None
     missing: Mapping[str, str] = field(default_factory=dict)
+    days: bool = False
 
     def __post_init__(self) -> None:
         if self.submit is not None:
@@ -61,6 +66,8 @@ class Wanted:
         most = min(len(self.seeds_of(track)) for track in self.tracks)
         if not 1 <= self.seeds <= most:
             raise InvalidValueError(f"--seeds must be 1 to {most}, got {self.seeds}")
+        if self.days:
+            self.buildings()  # complains of what cannot be
 
     @property
     def levels(self) -> tuple[float, ...]:
@@ -75,6 +82,13 @@ class Wanted:
         """The comparison of a track."""
         seeds = self.seeds_of(track)[: self.seeds]
         return track.plan(self.slams, seeds, levels=self.levels, seconds=self.seconds)
+
+    def buildings(self) -> Buildings:
+        """Of the section over days."""
+        known = TRAIN if self.train else TEST
+        return days.buildings(
+            self.slams, known[: self.seeds], quick=self.quick, seconds=self.seconds
+        )
 
     def head(self) -> dict[str, Any]:
         """What a leaderboard says of how it was made."""
@@ -133,24 +147,29 @@ def carry_out(
             note(f"{name}: {TRACKS[name].about}")
             runs[name] = compare(plan, out / name, jobs=jobs, cluster=cluster)
         digests = {name: _digests(plan, out / name) for name, plan in plans.items()}
+        lives = wanted.buildings() if wanted.days else None
+        aged = [] if lives is None else live(lives, out / days.FOLDER, jobs=jobs, cluster=cluster)
         own = None if wanted.submit is None else _submission(wanted, runs, digests, wanted.submit)
         for one in merge:
             for name in plans:
                 runs[name] = runs[name] + _on_the_same_scans(one, name, digests[name])
         with together(out) as staged:
-            made = _board(wanted, runs, merge)
+            made = _board(wanted, runs, merge, aged)
             made.write(staged)
+            if lives is not None:
+                days.write(staged, days.head(lives), aged)
             if own is not None:
                 submission.write(staged / submission.file_of(own.name), own)
             write_recipe(staged, COMMAND, settings)
     return made
 
 
-def _board(wanted: Wanted, runs: Runs, merge: Sequence[Submission]) -> Board:
+def _board(wanted: Wanted, runs: Runs, merge: Sequence[Submission], aged: Sequence[Row]) -> Board:
     head = {**wanted.head(), "versions": versions(), "machine": machine()}
     return Board(
         subject=wanted.subject, head=head, tracks=wanted.tracks, runs=runs, missing=wanted.missing,
         merged={one.name: one.origin() for one in merge},
+        days=days.summary(aged), days_page=days.section(aged) if aged else "",
     )  # fmt: skip
 
 

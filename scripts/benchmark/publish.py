@@ -3,6 +3,9 @@
 
 Copies ``leaderboard.json`` to ``docs/results`` and ``leaderboard.md`` to ``docs``, draws the two
 pictures of ``scripts.benchmark.picture``, and writes a row for each SLAM into docs/benchmark.md.
+
+Scores over days (``days.json``) go to ``docs/results`` too; the section of docs/leaderboard.md is
+made from that file. A folder of ``scripts.benchmark.days`` has nothing else, and the rest stays.
 """
 
 from __future__ import annotations
@@ -11,11 +14,11 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark import picture
+from scripts.benchmark import days, picture
 from scripts.benchmark.board import markdown_table
 from scripts.benchmark.scores import SILENT, TRACKING
 from scripts.marks import fill_page
@@ -26,7 +29,7 @@ from slam.evaluation.statistics import quantile
 from slam.files import write_text
 
 DOCS = ROOT / "docs"
-PAGE, MARK = "benchmark.md", "leaderboard"
+PAGE, MARK, BOARD = "benchmark.md", "leaderboard", "leaderboard.md"
 CM, PERCENT = 100.0, 100.0
 HEADS = (
     "SLAM", "tracks on which half of the runs are lost", "lost at level 1, %",
@@ -104,27 +107,58 @@ def _broken(board: dict[str, Any]) -> str:
 
 def publish(folder: Path, docs: Path, results: Path, commit: str) -> None:
     """Copy, draw and fill; raises ``LogFormatError`` for what is no leaderboard."""
+    source, aged = folder / "leaderboard.json", folder / days.NAMES[1]
+    if aged.exists():
+        days.read(aged)
+    if source.exists() or not aged.exists():
+        _publish_board(folder, docs, results, commit)
+    if aged.exists():
+        _copy(aged, results / aged.name, commit, _made_days)
+    _publish_days(docs / BOARD, results / aged.name)
+
+
+def _publish_board(folder: Path, docs: Path, results: Path, commit: str) -> None:
     source = folder / "leaderboard.json"
     lost = picture.read(source)
-    board = json.loads(source.read_text(encoding="utf-8"))
-    text = told(board)
-    if commit:
-        command = f"mobilia benchmark --slam {' '.join(board['slams'])}"
-        first = f'{{\n "command": {json.dumps(command)},\n "commit": {json.dumps(commit)},\n'
-        copied = source.read_text(encoding="utf-8").replace("{\n", first, 1)
-    else:
-        copied = source.read_text(encoding="utf-8")
-    write_text(results / "leaderboard.json", copied)
-    write_text(docs / "leaderboard.md", (folder / "leaderboard.md").read_text(encoding="utf-8"))
+    text = told(json.loads(source.read_text(encoding="utf-8")))
+    _copy(source, results / "leaderboard.json", commit, _made_board)
+    write_text(docs / BOARD, (folder / BOARD).read_text(encoding="utf-8"))
     picture.overall(lost, docs / "pictures" / "benchmark.png")
     picture.by_track(lost, docs / "pictures" / "benchmark_tracks.png")
     fill_page(docs / PAGE, MARK, text)
 
 
+def _copy(source: Path, copy: Path, commit: str, made: Callable[[dict[str, Any]], str]) -> None:
+    """The file, with the command that makes it and the commit on top if there is a commit."""
+    text = source.read_text(encoding="utf-8")
+    if commit:
+        command = json.dumps(made(json.loads(text)))
+        head = f'{{\n "command": {command},\n "commit": {json.dumps(commit)},\n'
+        text = text.replace("{\n", head, 1)
+    write_text(copy, text)
+
+
+def _made_board(board: dict[str, Any]) -> str:
+    return f"mobilia benchmark --slam {' '.join(board['slams'])}"
+
+
+def _made_days(told: dict[str, Any]) -> str:
+    words = ["python -m scripts.benchmark.days out/days --slam", *told["slams"]]
+    return " ".join([*words, "--seeds", str(len(told["seeds"]))])
+
+
+def _publish_days(page: Path, results: Path) -> None:
+    """The section at the end of the leaderboard's page, from the results; none without them."""
+    if not results.exists() or not page.exists():
+        return
+    before, _, _ = page.read_text(encoding="utf-8").partition(f"\n{days.HEADING}\n")
+    write_text(page, f"{before.rstrip()}\n\n{days.section(days.read(results))}\n")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Publish one."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="of mobilia benchmark")
+    parser.add_argument("folder", type=Path, help="of mobilia benchmark, or of benchmark.days")
     parser.add_argument("--docs", type=Path, default=DOCS)
     parser.add_argument("--results", type=Path, default=RESULTS)
     parser.add_argument("--commit", default="", help="of the code that ran")

@@ -36,6 +36,7 @@ from slam.system import Raster
 
 SCHEMA = 1
 RUNS, RUNS_JSON, LEVELS, PAIRED = "runs.csv", "runs.json", "levels.csv", "paired.csv"
+AGES, AGES_LEVELS = "ages.csv", "ages_levels.csv"
 UNKNOWN = 255
 Row = dict[str, Any]
 
@@ -214,6 +215,20 @@ class Compared:
         """Rows of ``paired.csv``."""
         return read_csv(self.folder / PAIRED, self.axis)
 
+    @cached_property
+    def ages(self) -> list[Row]:
+        """Rows of ``ages.csv``, a building and SLAM each; none where no SLAM lived in any."""
+        return self._if_there(AGES)
+
+    @cached_property
+    def ages_levels(self) -> list[Row]:
+        """Rows of ``ages_levels.csv``, their summary; none where there is none."""
+        return self._if_there(AGES_LEVELS)
+
+    def _if_there(self, name: str) -> list[Row]:
+        there = self.recipe["settings"].get("sessions") is not None
+        return read_csv(self.folder / name) if there else []
+
     def run(self, scene: str, dynamism: float, seed: int) -> RunFile:
         """One simulated run with all SLAMs."""
         name = Run(scene=scene, dynamism=dynamism, seed=int(seed), axis=self.axis).name
@@ -231,7 +246,7 @@ def read(folder: Path) -> Compared:
 
 
 _WORDS = frozenset(
-    {"scene", "slam", "slam_a", "slam_b", "outcome", "failure", "metric", "statistic"}
+    {"scene", "slam", "slam_a", "slam_b", "outcome", "failure", "metric", "statistic", "map"}
 )
 
 

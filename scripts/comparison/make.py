@@ -17,6 +17,9 @@ from scripts.comparison.columns import COLUMNS
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.recording import load
 from scripts.console import level_table
+from scripts.days import scores
+from scripts.days.make import carry_out as live
+from scripts.days.plan import of_comparison
 from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
 from scripts.metrics.table import DRIVES
@@ -24,6 +27,8 @@ from scripts.output import RECIPE, locked_folder, together, write_recipe
 from slam.evaluation.lost import LOST_RULE
 from slam.frames import BeamClass
 from slam.guests import Limits, limited
+
+DAYS = "days"  # folder of what the buildings take
 
 
 def carry_out(
@@ -34,9 +39,10 @@ def carry_out(
         registry.build(name)  # wrong names are told before anything starts
     for name in plan.slams:
         limited(name, Limits())
+    buildings = of_comparison(plan)
     out = out.absolute()
     with locked_folder(out):
-        settings = {"compare_schema": files.SCHEMA, **asdict(plan), "lost_rule": LOST_RULE}
+        settings = {"compare_schema": files.SCHEMA, **plan.settings(), "lost_rule": LOST_RULE}
         settings["machine"] = machine()
         if not (out / RECIPE).exists():  # else that of the tables there stays with them
             write_recipe(out, "compare", settings)
@@ -45,6 +51,7 @@ def carry_out(
         recordings = run_jobs(simulations.values(), out / RECORDINGS, title="simulating", **ways)
         only: list[Job] = [job for _, _, job in entries]
         done = run_jobs(only, out / ENTRIES, title="running SLAMs", **ways)
+        aged = [] if buildings is None else live(buildings, out / DAYS, jobs=jobs, cluster=cluster)
         with together(out) as staged:
             rows: list[dict[str, Any]] = []
             for run in plan.runs():
@@ -60,6 +67,10 @@ def carry_out(
                 (files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS),
             ):
                 files.write_csv(staged / name, table, columns, plan.axis)
+            if aged:
+                files.write_csv(staged / files.AGES, aged, scores.COLUMNS)
+                summary = scores.levels(aged)
+                files.write_csv(staged / files.AGES_LEVELS, summary, scores.LEVEL_COLUMNS)
             write_recipe(staged, "compare", settings)
     return rows
 

@@ -22,6 +22,7 @@ from scripts.knobs import axis_of, options_with
 from scripts.names import file_name
 from sim.recording.recipe import Recipe
 from sim.simulation import n_frames
+from sim.world.times_of_day import MOST_SESSIONS
 from slam.errors import InvalidValueError
 from slam.guests import Limits
 from slam.names import join_folders, loaded
@@ -70,6 +71,8 @@ class Plan:
     scan_limit_s  that module:Class and pipe:COMMAND may take for a scan before they count as hung
     judge_maps  once a second against the truth (``scripts.comparison.maps``); it can take as long
              as the SLAM does
+    sessions  of a building beside each run, in whose map SLAMs live from session to session
+             (``scripts.days.plan``); None: no buildings
     """
 
     slams: tuple[str, ...]
@@ -87,6 +90,7 @@ class Plan:
     odometry: str = "pioneer3dx"
     sets: tuple[Mapping[str, Any], ...] = ()
     judge_maps: bool = True
+    sessions: int | None = None
 
     def __post_init__(self) -> None:
         Limits(scan_s=self.scan_limit_s)
@@ -100,6 +104,7 @@ class Plan:
             raise InvalidValueError(f"a comparison has at most {MAX_RUNS} runs")
         for run in self.runs():
             self.recipe(run)  # complains of values that cannot be
+        self._check_sessions()
         period_s = self.recipe(self.runs()[0]).laser().scanner().period_s
         if n_frames(self.seconds, float(period_s)) <= self.every:
             raise InvalidValueError(
@@ -117,6 +122,22 @@ class Plan:
             raise InvalidValueError(
                 f"Plan.sets must have a mapping a level of axis 'level', got {self.sets!r:.80}"
             )
+
+    def _check_sessions(self) -> None:
+        if self.sessions is None:
+            return
+        whole("--sessions", self.sessions, 2, MOST_SESSIONS)
+        changes = self.levels if self.axis == "change" else (self.change or 0.0,)
+        if self.axis == LEVEL or not max(changes) > 0.0:
+            raise InvalidValueError(
+                "--sessions needs a share of things that stand elsewhere from one session to the "
+                "next: levels of it, as --change 0.3 0.6, or one held beside levels of --motion "
+                "or --dynamism, as --change 0.3. Without it all sessions would find the same room"
+            )
+
+    def settings(self) -> dict[str, Any]:
+        """For a recipe; without ``sessions`` where there are none, as it was before these."""
+        return {k: v for k, v in asdict(self).items() if k != "sessions" or v is not None}
 
     def runs(self) -> list[Run]:
         """Every simulated run, scene by scene, level by level."""

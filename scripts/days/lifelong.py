@@ -23,6 +23,7 @@ from slam.days.evidence import Snapshot
 from slam.days.session import Session, keep
 from slam.errors import SlamFailedError
 from slam.frames import Float
+from slam.guests import Limits, limited
 from slam.replay import Track
 from slam.system import SlamSystem, create
 from slam.tracker.tracker import Tracker
@@ -48,6 +49,8 @@ class Building:
     copies      its map after each of them, where maps of some age are asked for
     aged        rows (``ages.COLUMNS``) of the last session in older maps
     before      the session before, where it was simulated
+    limits      of a SLAM from outside, which then runs in a process of its own; None: here
+    failures    what was said when it failed, in order
     """
 
     name: str
@@ -58,13 +61,26 @@ class Building:
     copies: dict[int, Path] = field(default_factory=dict)
     aged: list[dict[str, Any]] = field(default_factory=list)
     before: Recording | None = None
+    limits: Limits | None = None
+    failures: list[str] = field(default_factory=list)
+
+    def system(self) -> SlamSystem:
+        """The SLAM anew; ``SlamFailedError`` for one from outside that cannot start."""
+        return limited(self.name, self.limits)
 
 
-def started(names: Sequence[str], folder: Path) -> list[Building]:
-    """Buildings of which nothing is known."""
+def started(names: Sequence[str], folder: Path, limits: Limits | None = None) -> list[Building]:
+    """Buildings of which nothing is known. With ``limits`` a SLAM from outside cannot load a map:
+    it is in another process, and no message there is about one.
+    """
     return [
-        Building(name=n, map=folder / f"map_{file_name(n)}.npz", anew=not _has_days(create(n)))
-        for n in names
+        Building(
+            name=name,
+            map=folder / f"map_{file_name(name)}.npz",
+            anew=(limits is not None and ":" in name) or not _has_days(create(name)),
+            limits=limits,
+        )
+        for name in names
     ]
 
 
@@ -154,28 +170,38 @@ def _start(session: Session, T_map_world: Float | None, drive: Drive) -> str:
 
 def _anew(building: Building, drive: Drive) -> dict[str, Any]:
     """A session on its own: the SLAM cannot load a map."""
-    track = Track(building.name, create(building.name))
-    row = _row(building, drive, "anew", track)
-    if "place" in row:
-        return row
-    truth = drive.frames[0].truth
-    T_map_world = None if truth is None else se2.inverse(truth)
-    row |= _errors(T_map_world, drive, track, 0)
-    row["place"] = ""
-    return row | _map_scores(T_map_world, drive, track)
+    try:
+        track = Track(building.name, building.system())
+        row = _row(building, drive, "anew", track)
+        if "place" in row:
+            return row
+        truth = drive.frames[0].truth
+        T_map_world = None if truth is None else se2.inverse(truth)
+        row |= _errors(T_map_world, drive, track, 0)
+        row["place"] = ""
+        return row | _map_scores(T_map_world, drive, track)
+    except SlamFailedError as error:  # at its start, or what it gave as its map
+        building.failures.append(str(error))
+        return _head(building, drive, "anew") | {"place": "failed"}
 
 
 def _row(building: Building, drive: Drive, state: str, track: Track) -> dict[str, Any]:
     """Let it see every frame; the row so far, with ``place`` "failed" if it failed."""
-    row: dict[str, Any] = dict.fromkeys(COLUMNS)
-    row |= {"slam": building.name, "session": drive.number, "time_of_day": drive.time_of_day}
-    row["map"] = state
+    row = _head(building, drive, state)
     failure: SlamFailedError | None = track.survive(drive.frames)
     if failure is not None:
+        building.failures.append(str(failure))
         return row | {"place": "failed", "map": "kept" if state == "kept" else state}
     del row["place"]
     row["ms_per_scan"] = 1e3 * float(np.median(track.durations_s))
     return row
+
+
+def _head(building: Building, drive: Drive, state: str) -> dict[str, Any]:
+    """Who and when; the rest of the columns None."""
+    row: dict[str, Any] = dict.fromkeys(COLUMNS)
+    row |= {"slam": building.name, "session": drive.number, "time_of_day": drive.time_of_day}
+    return row | {"map": state}
 
 
 def _errors(T_map_world: Float | None, drive: Drive, track: Track, searched: int) -> dict[str, Any]:

@@ -44,6 +44,13 @@ def simulated(recipe: Recipe, sessions: int, first_seconds: float) -> Iterator[D
         yield _drive(number, drive.frames, drive)
 
 
+def loaded(files: Sequence[Path]) -> Iterator[Drive]:
+    """The same from files, one for each session from 0 on, as ``record`` wrote them."""
+    for number, path in enumerate(files):
+        drive = load(path)
+        yield _drive(number, drive.frames, drive)
+
+
 def _words(recipe: Recipe) -> dict[str, object]:
     return {name: getattr(recipe, name) for name in recipe.__dataclass_fields__}
 

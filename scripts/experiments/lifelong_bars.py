@@ -18,10 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from scripts.days.scores import OVER_TIME, SOON_S, Row, counts, early, late, later, mean
 from slam.errors import LogFormatError, MobiliaError
-
-SOON_S = 10.0
-Row = dict[str, Any]
 
 
 def read(folder: Path) -> dict[str, Any]:
@@ -37,31 +35,28 @@ def read(folder: Path) -> dict[str, Any]:
 
 
 def _mean(rows: Sequence[Row], column: str) -> float:
-    values = [row[column] for row in rows if row.get(column) is not None]
-    return float(np.mean(values)) if values else float("nan")
+    found = mean(rows, column)
+    return float("nan") if found is None else found
 
 
 def found_line(rows: Sequence[Row]) -> str:
     """Of all sessions after the first: how many were found, how soon, and where."""
-    soon = sum(r["found_after_s"] is not None and r["found_after_s"] <= SOON_S for r in rows)
-    known = [r for r in rows if r["start"] != "unknown"]
-    of = sum(r["found_after_s"] is not None and r["found_after_s"] <= SOON_S for r in known)
-    found = sum(r["found_after_s"] is not None for r in rows)
-    wrong = sum(r["place"] == "wrong" for r in rows)
+    of = counts(rows)
     return (
-        f"{len(rows)} sessions: {found} found, {soon} within {SOON_S:g} s, {wrong} at a wrong "
-        f"place; of {len(known)} that began where a session before had been, {of} so soon"
+        f"{of['to_find']} sessions: {of['found']} found, {of['found_soon']} within {SOON_S:g} s, "
+        f"{of['wrong']} at a wrong place; of {of['known']} that began where a session before had "
+        f"been, {of['known_soon']} so soon"
     )
 
 
 def summary(buildings: Sequence[dict[str, Any]], slam: str) -> list[str]:
     """Lines on one SLAM in these buildings."""
     own = [[r for r in b["rows"] if r["slam"] == slam] for b in buildings]
-    later = [r for rows in own for r in rows if r["session"] > 0]
-    lines = [found_line(later)]
+    after = [row for rows in own for row in later(rows)]
+    lines = [found_line(after)]
 
-    def of(pick: Callable[[list[Row]], list[Row]], column: str) -> float:
-        return _mean([r for rows in own for r in pick(rows)], column)
+    def of(pick: Callable[[Sequence[Row]], list[Row]], column: str) -> float:
+        return _mean([row for rows in own for row in pick(rows)], column)
 
     errors = [_mean([rows[k] for rows in own], "rmse_m") for k in (0, 1, -1)]
     lines.append(
@@ -69,20 +64,11 @@ def summary(buildings: Sequence[dict[str, Any]], slam: str) -> list[str]:
         f"{100 * errors[2]:.1f}; last to session 1 {errors[2] / errors[1]:.2f}, to session 0 "
         f"{errors[2] / errors[0]:.2f}"
     )
-    for column in (
-        "rmse_m",
-        "ghost_rate",
-        "ghost_seen_rate",
-        "recall",
-        "map_kb",
-        "memory_mb",
-        "ms_per_scan",
-        "load_s",
-    ):
-        early, late = of(lambda rows: rows[1:4], column), of(lambda rows: rows[-3:], column)
-        if not np.isnan(late):
-            lines.append(f"{column}: sessions 1 to 3 {early:.3f}, the last three {late:.3f}")
-    told, false = _mean(later, "outdated_told"), _mean(later, "outdated_false")
+    for column in ("rmse_m", *OVER_TIME):
+        first, last = of(early, column), of(late, column)
+        if not np.isnan(last):
+            lines.append(f"{column}: sessions 1 to 3 {first:.3f}, the last three {last:.3f}")
+    told, false = _mean(after, "outdated_told"), _mean(after, "outdated_false")
     lines.append(
         f"'map outdated here' where it clearly is {told:.2f}, where it hardly is {false:.2f}"
     )

@@ -17,6 +17,7 @@ from scripts.comparison.plan import Run
 from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, of_section
 from scripts.report import answer, closed, curves, pictures, style, tables, words
 from scripts.report.closed import Driven
+from scripts.report.days import days
 from scripts.report.study import LEAST_RUNS, Study
 from sim.recording.sums import add_to_sums
 from slam.files import write_text
@@ -55,6 +56,7 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
         honesty=_levels(study, of_section("honesty")),
         costs=tables.costs(study, of_section("costs")),
         maps=_levels(study, of_section("maps")),
+        days=days(study),
         scenes=scenes,
         numbers=_levels(study, of_section("errors")),
         measures=[metric for metric in EXPLAINED if study.has(metric.key)],
@@ -207,6 +209,8 @@ def _command(settings: dict[str, Any]) -> str:
     for name in ("motion", "change", "crowd"):
         if settings.get(name) is not None:
             words_ += [f"--{name}", str(settings[name])]
+    if settings.get("sessions") is not None:
+        words_ += ["--sessions", str(settings["sessions"])]
     words_ += ["--seeds", str(len(seeds)), "--first-seed", str(seeds[0])]
     words_ += ["--seconds", f"{settings['seconds']:g}", "--every", str(settings["every"])]
     words_ += ["--scanner", settings["scanner"], "--scan-limit", f"{settings['scan_limit_s']:g}"]

@@ -23,6 +23,7 @@ _OTHERS = {
     "mobilia report COMPARISON --drive {folder}",
     "benchmark": "is of mobilia benchmark: leaderboard.md there is its report; "
     "each track has one, mobilia report {folder}/TRACK",
+    "days": "is of the benchmark's section over days: days.csv has its scores",
     "blame": "is of mobilia blame: blame.png there is its report",
 }
 _DATASET = (

@@ -56,6 +56,10 @@ def benchmark(
     seconds: Annotated[
         float | None, typer.Option(help="Length of a run, s, to try out; default the track's own.")
     ] = None,
+    days: Annotated[
+        bool,
+        typer.Option("--days", help="Also in buildings that go on over sessions: days.csv."),
+    ] = False,
     submit: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="Also write OUT/submission_NAME.json of the subject."),
@@ -91,6 +95,7 @@ def benchmark(
         chosen(named(tracks or [])), [numbered[name] for name in slams],
         None if subject is None else numbered[subject],
         train=train, seeds=count, quick=quick, seconds=seconds, submit=submit,
+        days=days,
     )  # fmt: skip
     started = time.perf_counter()
     board = carry_out(wanted, out, jobs=jobs, cluster=cluster, merge=others)
@@ -122,7 +127,21 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
         note(failure)
     for line in board.said():
         console.print(escape(line), soft_wrap=True)
+    if board.days_page:
+        _tell_days(out)
+    more = ", days.csv, days.json" if board.days_page else ""
     console.print(
-        f"{escape(str(out))}: leaderboard.md, leaderboard.csv, leaderboard.json ({spent_s:.0f} s)",
+        f"{escape(str(out))}: leaderboard.md, leaderboard.csv, leaderboard.json{more} "
+        f"({spent_s:.0f} s)",
         soft_wrap=True,
     )
+
+
+def _tell_days(out: Path) -> None:
+    from scripts.benchmark.days import NAMES, read
+    from scripts.days import score_tables
+
+    for group, rows in score_tables.groups(read(out / NAMES[1])).items():
+        console.print(f"Over days, {score_tables.where(group)}, {score_tables.size(rows)}:")
+        for line in score_tables.sentences(rows):
+            console.print(escape(line), soft_wrap=True)

@@ -48,6 +48,14 @@ def compare(
         int | None, typer.Option(help="Use one scan in N; default about 4.7 a second.")
     ] = None,
     scanner: Scanner = "full",
+    sessions: Annotated[
+        int | None,
+        typer.Option(
+            help="Also let the SLAMs live in buildings of N sessions, one beside each run, where "
+            "--change is put elsewhere from one to the next.",
+            metavar="N",
+        ),
+    ] = None,
     scan_limit: Annotated[
         float, typer.Option(help="Time limit of a scan for a SLAM from outside, s.")
     ] = Limits.scan_s,
@@ -60,6 +68,7 @@ def compare(
     With levels of --motion or --change instead, the other of the two is at 0 unless it is given.
     It ends with a sentence about the SLAM named first: from which level on it is lost.
     If it is killed, the same command continues. With a SLAM added, only that SLAM runs.
+    With --sessions it also says how the SLAMs do in a map some sessions old.
 
     [bold]mobilia compare --slam shunting ekf odometry --scene arena --dynamism 0:1:0.5 --seeds 3
     --out out/compare[/bold]
@@ -86,13 +95,15 @@ def compare(
         every=every_of(scanner, every, 8),
         scanner=scanner,
         scan_limit_s=scan_limit,
+        sessions=sessions,
     )
     started = time.perf_counter()
     rows = carry_out(plan, out, jobs=jobs, cluster=cluster)
     spent_s = time.perf_counter() - started
     tell(plan, rows)
+    more = tell_ages(out) if sessions is not None else ""
     console.print(
-        f"{escape(str(out))}: runs.csv, levels.csv, paired.csv, runs/ ({spent_s:.0f} s)",
+        f"{escape(str(out))}: runs.csv, levels.csv, paired.csv, runs/{more} ({spent_s:.0f} s)",
         soft_wrap=True,
     )
 
@@ -109,3 +120,15 @@ def tell(plan: Plan, rows: list[dict[str, Any]]) -> None:
     said = (answer(standing(rows, plan.slams[0], name, plan.axis)) for name in plan.scenes)
     for line in dict.fromkeys(said):
         fact(line)
+
+
+def tell_ages(out: Path) -> str:
+    """Print the scores of age of each scene and level; the names of their files."""
+    from scripts.comparison import folder as files
+    from scripts.days import score_tables
+
+    for group, rows in score_tables.groups(files.read(out).ages).items():
+        console.print(score_tables.printed(group, rows))
+        for line in score_tables.sentences(rows):
+            fact(line)
+    return f", {files.AGES}, {files.AGES_LEVELS}"

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ from scripts.closed_loop import tables as closed_loop
 from scripts.comparison import folder as files
 from scripts.comparison import tables
 from scripts.comparison.columns import COLUMNS
+from scripts.days import scores
+from scripts.days.lifelong import COLUMNS as SESSION
 from scripts.output import write_recipe
 from slam.evaluation.lost import LOST_RULE
 
@@ -92,6 +95,45 @@ def run_of() -> dict[str, Any]:
         "slam0_T_map_origin": np.array([-1.0, -3.0, 0.0]),
     }  # fmt: skip
     return arrays
+
+
+def add_days(folder: Path, buildings: int = 6) -> Path:
+    """What ``mobilia compare --sessions 5`` writes besides: ours finds all, the others start anew,
+    and the guest fails in one session of each building."""
+    recipe = json.loads((folder / "recipe.json").read_text())
+    recipe["settings"] |= {"sessions": 5, "change": 0.3}
+    rows = []
+    for slam in (OURS, EKF, OWN):
+        for seed in range(buildings):
+            sessions = [session_of(slam, k, seed) for k in range(5)]
+            failure = "scan 3, raised <RuntimeError>: enough" if slam == OWN else None
+            aged = [
+                {"age": age, "place": "right", "rmse_m": 0.03 + 0.001 * age}
+                for age in (1, 3) if slam == OURS
+            ]  # fmt: skip
+            for motion in LEVELS:
+                of = {"scene": SCENE, "motion": motion, "change": 0.3, "seed": seed, "slam": slam}
+                rows.append(scores.of_building(of, sessions, aged, failure))
+    (folder / "recipe.json").write_text(json.dumps(recipe))
+    files.write_csv(folder / files.AGES, rows, scores.COLUMNS)
+    files.write_csv(folder / files.AGES_LEVELS, scores.levels(rows), scores.LEVEL_COLUMNS)
+    return folder
+
+
+def session_of(slam: str, number: int, seed: int) -> dict[str, Any]:
+    """A row of ``lifelong.csv``."""
+    row = {
+        **dict.fromkeys(SESSION), "session": number, "map": "anew", "place": "",
+        "rmse_m": 0.02 + 0.005 * number + 0.001 * seed, "ms_per_scan": 2.0,
+    }  # fmt: skip
+    if slam == OWN and number == 2:
+        return row | {"place": "failed", "rmse_m": None}
+    if slam == OURS:
+        row |= {
+            "map": "merged" if number else "new", "place": "right", "found_after_s": 1.0 * number,
+            "start": "known", "ghost_rate": 0.01 + 0.002 * number, "recall": 0.9, "map_kb": 340.0,
+        }  # fmt: skip
+    return row
 
 
 def make_drive(folder: Path, reached: int = 6) -> Path:

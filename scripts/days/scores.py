@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scores of age: one row for each building and SLAM, and their summary over buildings.
+
+Rows of sessions are those of ``scripts.days.lifelong``. Session 0 maps the building, all later ones
+are to be found in its map. Early are sessions 1 to 3, late are the last three.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from scripts.days.ages import AGES
+from slam.evaluation.statistics import median_interval, quantile, share_interval
+
+Row = Mapping[str, Any]
+SOON_S = 10.0  # within which a session is to be found
+DAYS, ANEW = "days", "anew"  # of the column "map"
+IDENTITY = ("scene", "motion", "change", "seed", "slam")
+OVER_TIME = (
+    "ghost_rate", "ghost_seen_rate", "recall", "map_kb", "memory_mb", "ms_per_scan", "load_s",
+)  # fmt: skip
+"""Columns of sessions of which there is an early and a late one. The last two are times."""
+_OF_A_MAP = ("ghost_seen_rate", "map_kb", "memory_mb", "load_s")  # none for a SLAM without days
+EARLY, LATE = 3, 3  # sessions
+_ERRORS = ("rmse_session0_m", "rmse_session1_m", "rmse_last_m")
+COLUMNS = (
+    *IDENTITY, "map", "sessions", "failed", "failure",
+    "to_find", "found", "found_soon", "wrong", "known", "known_soon",
+    "found_share", "found_soon_share", *_ERRORS, "rmse_growth",
+    *(column for age in AGES for column in (f"right_age{age}", f"rmse_age{age}_m")),
+    *(f"{column}_{when}" for column in OVER_TIME for when in ("early", "late")),
+    "outdated_told", "outdated_false",
+)  # fmt: skip
+"""Of ages.csv: docs/days.md says what they are."""
+LEVEL_COLUMNS = (
+    "scene", "motion", "change", "slam", "metric", "statistic", "n", "value", "low", "high",
+)  # fmt: skip
+"""Of ages_levels.csv."""
+
+
+def later(rows: Sequence[Row]) -> list[Row]:
+    """Those that are to be found in the map of the sessions before."""
+    return [row for row in rows if row["session"] > 0 and row["map"] != "new"]
+
+
+def early(rows: Sequence[Row]) -> list[Row]:
+    """The first sessions after the one that maps the building."""
+    return list(rows[1 : 1 + EARLY])
+
+
+def late(rows: Sequence[Row]) -> list[Row]:
+    """The last sessions; of a short building the same as the early ones."""
+    return list(rows[1:][-LATE:])
+
+
+def mean(rows: Sequence[Row], column: str) -> float | None:
+    """Of the rows that have a number there; None where none has."""
+    values = [float(row[column]) for row in rows if row.get(column) is not None]
+    return sum(values) / len(values) if values else None
+
+
+def counts(rows: Sequence[Row]) -> dict[str, int]:
+    """Of ``later`` sessions: how many there are, were found, soon, and at a wrong place.
+
+    known       those that began where a session before had been (all, without truth)
+    """
+    known = [row for row in rows if row["start"] != "unknown"]
+    return {
+        "to_find": len(rows),
+        "found": sum(row["found_after_s"] is not None for row in rows),
+        "found_soon": _soon(rows),
+        "wrong": sum(row["place"] == "wrong" for row in rows),
+        "known": len(known),
+        "known_soon": _soon(known),
+    }
+
+
+def _soon(rows: Sequence[Row]) -> int:
+    return sum(r["found_after_s"] is not None and r["found_after_s"] <= SOON_S for r in rows)
+
+
+def of_building(
+    identity: Row, rows: Sequence[Row], aged: Sequence[Row], failure: str | None = None
+) -> dict[str, Any]:
+    """The row (``COLUMNS``) of one SLAM in one building.
+
+    rows   of its sessions, in order; ``aged``: of the last one in older maps
+    failure  what was said when it first failed
+
+    Of a SLAM that starts anew, all that is about a map of before is None; its errors are in the
+    frame of each session. A session that failed has an infinite error, one not found has none.
+    """
+    anew = all(row["map"] == ANEW for row in rows)
+    row: dict[str, Any] = dict.fromkeys(COLUMNS)
+    row |= dict(identity)
+    row |= {"map": ANEW if anew else DAYS, "sessions": len(rows), "failure": failure}
+    row["failed"] = sum(one["place"] == "failed" for one in rows)
+    for column, k in zip(_ERRORS, (0, 1, len(rows) - 1), strict=True):
+        row[column] = _error(rows[k]) if k < len(rows) else None
+    for column in OVER_TIME:
+        if not (anew and column in _OF_A_MAP):
+            row[f"{column}_early"] = mean(early(rows), column)
+            row[f"{column}_late"] = mean(late(rows), column)
+    return row if anew else row | _of_days(row, rows, aged)
+
+
+def _of_days(row: Row, rows: Sequence[Row], aged: Sequence[Row]) -> dict[str, Any]:
+    """What only a SLAM that can load a map has."""
+    own = later(rows)
+    found: dict[str, Any] = dict(counts(own))
+    if own:
+        found["found_share"] = found["found"] / len(own)
+        found["found_soon_share"] = found["found_soon"] / len(own)
+    first, last = row["rmse_session1_m"], row["rmse_last_m"]
+    if first and last is not None and math.isfinite(first):
+        found["rmse_growth"] = last / first
+    for one in aged:
+        found[f"right_age{one['age']}"] = int(one["place"] == "right")
+        found[f"rmse_age{one['age']}_m"] = _error(one)
+    found["outdated_told"] = mean(own, "outdated_told")
+    found["outdated_false"] = mean(own, "outdated_false")
+    return found
+
+
+def _error(row: Row) -> float | None:
+    return math.inf if row["place"] == "failed" else row["rmse_m"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """One number over buildings.
+
+    hits, of  columns that are added up over buildings for a share; "" for a median of ``key``
+    name      in tables; its unit is ``shown``, ``factor`` times that of the column
+    """
+
+    key: str
+    name: str
+    shown: str = ""
+    factor: float = 1.0
+    hits: str = ""
+    of: str = ""
+
+    @property
+    def heading(self) -> str:
+        """Name and unit."""
+        return f"{self.name}, {self.shown}" if self.shown else self.name
+
+
+def _pair(column: str, name: str, shown: str, factor: float = 1.0) -> tuple[Score, ...]:
+    return tuple(
+        Score(key=f"{column}_{when}", name=f"{name}, {when}", shown=shown, factor=factor)
+        for when in ("early", "late")
+    )
+
+
+def _aged(age: int) -> tuple[Score, Score]:
+    words = f"{age} session{'s' if age > 1 else ''} old"
+    return (
+        Score(key=f"rmse_age{age}_m", name=f"error in a map {words}", shown="cm", factor=100.0),
+        Score(key=f"right_age{age}_share", name=f"found at the right place in a map {words}",
+              hits=f"right_age{age}"),
+    )  # fmt: skip
+
+
+SCORES = (
+    Score(key="found_share", name="sessions found", hits="found", of="to_find"),
+    Score(key="found_soon_share", name="found within 10 s", hits="found_soon", of="to_find"),
+    Score(key="wrong_share", name="found at a wrong place", hits="wrong", of="to_find"),
+    Score(key="rmse_session0_m", name="error of session 0", shown="cm", factor=100.0),
+    Score(key="rmse_session1_m", name="error of session 1", shown="cm", factor=100.0),
+    Score(key="rmse_last_m", name="error of the last session", shown="cm", factor=100.0),
+    Score(key="rmse_growth", name="the last to session 1"),
+    *(score for age in AGES for score in _aged(age)),
+    *_pair("ghost_rate", "ghosts", "%", 100.0),
+    *_pair("ghost_seen_rate", "ghosts where it looked", "%", 100.0),
+    *_pair("recall", "recall", "%", 100.0),
+    *_pair("map_kb", "map file", "kB"),
+    *_pair("memory_mb", "cells in memory", "MB"),
+    *_pair("ms_per_scan", "time of a scan", "ms"),
+    *_pair("load_s", "loading", "s"),
+    Score(key="outdated_told", name='"outdated here" where it is', shown="%", factor=100.0),
+    Score(key="outdated_false", name='"outdated here" where it is not', shown="%", factor=100.0),
+    Score(key="failed_share", name="sessions that failed", hits="failed", of="sessions"),
+)  # fmt: skip
+
+
+def levels(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Summary (``LEVEL_COLUMNS``) over the buildings of a scene, motion and change, SLAM by SLAM.
+
+    Medians with their bootstrap interval; shares of all sessions with Wilson's. Both are of 95 %.
+    """
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        key = tuple(row[name] for name in ("scene", "motion", "change", "slam"))
+        groups.setdefault(key, []).append(row)
+    out = []
+    for (scene, motion, change, slam), group in groups.items():
+        head = {"scene": scene, "motion": motion, "change": change, "slam": slam}
+        for score in SCORES:
+            if summed := _share(score, group) if score.hits else _median(score, group):
+                out.append({**head, "metric": score.key, **summed})
+    return out
+
+
+def _share(score: Score, group: Sequence[Row]) -> dict[str, Any]:
+    own = [row for row in group if row[score.hits] is not None]
+    hits = sum(int(row[score.hits]) for row in own)
+    n = sum(int(row[score.of]) for row in own) if score.of else len(own)
+    if not n:
+        return {}
+    low, high = share_interval(hits, n)
+    return {"statistic": "share", "n": n, "value": hits / n, "low": low, "high": high}
+
+
+def _median(score: Score, group: Sequence[Row]) -> dict[str, Any]:
+    values = [float(row[score.key]) for row in group if row[score.key] is not None]
+    if not values:
+        return {}
+    low, high = median_interval(values)
+    value = quantile(values, 0.5)
+    return {"statistic": "median", "n": len(values), "value": value, "low": low, "high": high}
