@@ -114,9 +114,9 @@ _ABOUT = (
     "Each SLAM lives in buildings of {n} sessions. Session 0 maps a building and lasts three times "
     "as long. From each session to the next the share *change* of things and doors is put "
     "elsewhere, and a session begins at an unknown start in the map of those before. A SLAM that "
-    "cannot load a map starts anew in each, in a frame of its own. Early: sessions 1 to 3, late: "
-    "the last three. Shares are of all sessions; the rest are medians over buildings, with 95 % "
-    "intervals where there are six or more."
+    "cannot load a map starts anew in each, in a frame of its own. Early: sessions 1 to 5, late: "
+    "the last five, a day each. Shares are of all sessions; the rest are medians over buildings, "
+    "with 95 % intervals where there are six or more."
 )
 
 

@@ -2,7 +2,8 @@
 """Scores of age: one row for each building and SLAM, and their summary over buildings.
 
 Rows of sessions are those of ``scripts.days.lifelong``. Session 0 maps the building, all later ones
-are to be found in its map. Early are sessions 1 to 3, late are the last three.
+are to be found in its map. Early are the five sessions after it, late are the last five: a day
+each. At night doors are shut that the map of the evening holds open.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from scripts.days.ages import AGES
+from sim.world.times_of_day import DAY
 from slam.evaluation.statistics import median_interval, quantile, share_interval
 
 Row = Mapping[str, Any]
@@ -24,7 +26,7 @@ OVER_TIME = (
 )  # fmt: skip
 """Columns of sessions of which there is an early and a late one. The last two are times."""
 _OF_A_MAP = ("ghost_seen_rate", "map_kb", "memory_mb", "load_s")  # none for a SLAM without days
-EARLY, LATE = 3, 3  # sessions
+A_DAY = len(DAY)  # sessions
 _ERRORS = ("rmse_session0_m", "rmse_session1_m", "rmse_last_m")
 COLUMNS = (
     *IDENTITY, "map", "sessions", "failed", "failure",
@@ -48,12 +50,12 @@ def later(rows: Sequence[Row]) -> list[Row]:
 
 def early(rows: Sequence[Row]) -> list[Row]:
     """The first sessions after the one that maps the building."""
-    return list(rows[1 : 1 + EARLY])
+    return list(rows[1 : 1 + A_DAY])
 
 
 def late(rows: Sequence[Row]) -> list[Row]:
     """The last sessions; of a short building the same as the early ones."""
-    return list(rows[1:][-LATE:])
+    return list(rows[1:][-A_DAY:])
 
 
 def mean(rows: Sequence[Row], column: str) -> float | None:

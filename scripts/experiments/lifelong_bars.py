@@ -4,7 +4,7 @@
 ``python -m scripts.experiments.lifelong_bars out/lifelong-*``.
 
 Session 0 maps the building. The error of the last session is compared with that of session 1, the
-first in a map, and with that of session 0. Early and late: sessions 1 to 3, and the last three.
+first in a map, and with that of session 0. Early and late: sessions 1 to 5, and the last five.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def summary(buildings: Sequence[dict[str, Any]], slam: str) -> list[str]:
     for column in ("rmse_m", *OVER_TIME):
         first, last = of(early, column), of(late, column)
         if not np.isnan(last):
-            lines.append(f"{column}: sessions 1 to 3 {first:.3f}, the last three {last:.3f}")
+            lines.append(f"{column}: sessions 1 to 5 {first:.3f}, the last five {last:.3f}")
     told, false = _mean(after, "outdated_told"), _mean(after, "outdated_false")
     lines.append(
         f"'map outdated here' where it clearly is {told:.2f}, where it hardly is {false:.2f}"

@@ -39,7 +39,7 @@ def test_it_says_what_the_buildings_show(text: str):
     assert (
         "<code>shunting</code>: found 24 of 24 sessions from an unknown start, 24 within 10 s, "
         "never at a wrong place; error 2.75 cm in session 1, 4.25 cm in the last, 3.30 cm in a "
-        "map 3 sessions old; ghosts 1.40 % early, 1.60 % late." in own
+        "map 3 sessions old; ghosts 1.50 % early, 1.50 % late." in own
     )
     assert "<code>ekf</code>: starts anew: cannot load a map; error 2.75 cm" in own
     assert "failed in 6 of 30 sessions, first: scan 3, raised <RuntimeError>: enough" in own
