@@ -7,9 +7,10 @@ import math
 
 import pytest
 
-from scripts.days import score_tables, scores
+from scripts.days import scores
 from scripts.days.ages import COLUMNS as AGE_COLUMNS
 from scripts.days.lifelong import COLUMNS
+from scripts.report import score_tables
 from slam.evaluation.statistics import median_interval, share_interval
 
 ROOM = {"scene": "room", "motion": 0.0, "change": 0.3}
