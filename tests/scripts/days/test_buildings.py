@@ -19,6 +19,7 @@ from scripts.days.make import beside
 from scripts.days.plan import Buildings, identity, name_of, of_comparison
 from scripts.output import read_recipe_words
 from scripts.results import check
+from scripts.verbs import compare
 from sim.recording.recipe import Recipe
 from slam.errors import InvalidValueError, LogFormatError
 from tests.slam.guests import misbehaving
@@ -64,6 +65,14 @@ def test_each_slam_has_a_row_of_each_building(compared):
     assert summed["shunting", "found_share"]["n"] == 1.0
     assert summed[CRASHES, "failed_share"]["value"] == 1.0
     assert tuple(compared.ages_levels[0]) == scores.LEVEL_COLUMNS
+
+
+def test_the_command_prints_the_scores(compared, capsys):
+    assert compare.tell_ages(compared.folder) == ", ages.csv, ages_levels.csv"
+    told = " ".join(capsys.readouterr().out.split())
+    assert "arena, motion 0, change 0.3: 1 building of 2 sessions" in told
+    assert "`odometry`: starts anew: cannot load a map; error" in told
+    assert "failed in 2 of 2 sessions, first: `SLAM 'pipe:" in told
 
 
 def test_the_folder_is_vouched_for(compared):

@@ -130,4 +130,4 @@ def test_the_table_and_the_sentence_say_who_starts_anew():
 def test_what_failed_is_told_as_words():
     rows = [session(0), session(1, place="failed", rmse_m=None, found_after_s=None)]
     (line,) = score_tables.sentences([lived(rows, failure="scan 3, `x` raised\nmore")])
-    assert line.endswith("failed in 1 of 2 sessions, first: scan 3, 'x' raised.")
+    assert line.endswith("failed in 1 of 2 sessions, first: `scan 3, 'x' raised`.")
