@@ -17,11 +17,12 @@ from scripts.benchmark.board import markdown_table
 from scripts.benchmark.tracks import TEST, TRAIN
 from scripts.checked import whole
 from scripts.comparison.folder import write_csv
-from scripts.days import make, score_tables, scores
+from scripts.days import make, scores
 from scripts.days.plan import Buildings
 from scripts.days.scores import Row
 from scripts.machine import machine, versions
 from scripts.output import RECIPE, locked_folder, together, write_recipe
+from scripts.report import score_tables
 from scripts.report.answer import ODOMETRY
 from scripts.result_files import SCHEMA, load
 from scripts.result_files import write as write_results
@@ -30,7 +31,6 @@ from sim.recording.recipe import Recipe
 from slam.errors import LogFormatError, MobiliaError
 
 COMMAND = "days"
-FOLDER = "days"  # within a benchmark: what the section takes
 NAMES = ("days.csv", "days.json")
 HEADING = "## Over days"
 SCENE, CHANGES, SESSIONS, SECONDS = "random-rooms", (0.3, 0.6), 11, 60.0
@@ -138,7 +138,7 @@ def carry_out(
         settings = head(of)
         if not (out / RECIPE).exists():
             write_recipe(out, COMMAND, settings)
-        rows = make.carry_out(of, out / FOLDER, jobs=jobs, cluster=cluster)
+        rows = make.carry_out(of, out / make.DAYS, jobs=jobs, cluster=cluster)
         with together(out) as staged:
             write(staged, settings, rows)
             write_recipe(staged, COMMAND, settings)

@@ -17,6 +17,7 @@ from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
 from scripts.comparison.recording import digest
 from scripts.console import note
+from scripts.days.make import DAYS
 from scripts.days.make import carry_out as live
 from scripts.days.plan import Buildings
 from scripts.days.scores import Row
@@ -148,7 +149,7 @@ def carry_out(
             runs[name] = compare(plan, out / name, jobs=jobs, cluster=cluster)
         digests = {name: _digests(plan, out / name) for name, plan in plans.items()}
         lives = wanted.buildings() if wanted.days else None
-        aged = [] if lives is None else live(lives, out / days.FOLDER, jobs=jobs, cluster=cluster)
+        aged = [] if lives is None else live(lives, out / DAYS, jobs=jobs, cluster=cluster)
         own = None if wanted.submit is None else _submission(wanted, runs, digests, wanted.submit)
         for one in merge:
             for name in plans:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,29 +18,38 @@ from scripts.comparison.columns import COLUMNS
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.recording import load
 from scripts.console import level_table
-from scripts.days import scores
-from scripts.days.make import carry_out as live
-from scripts.days.plan import of_comparison
 from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
 from scripts.metrics.table import DRIVES
 from scripts.output import RECIPE, locked_folder, together, write_recipe
+from slam.errors import InvalidValueError
 from slam.evaluation.lost import LOST_RULE
 from slam.frames import BeamClass
 from slam.guests import Limits, limited
 
-DAYS = "days"  # folder of what the buildings take
+Tables = Mapping[str, tuple[Sequence[Mapping[str, Any]], Sequence[str]]]
+"""By the name of a file its rows and columns."""
 
 
 def carry_out(
-    plan: Plan, out: Path, *, jobs: int = 1, cluster: str | None = None
+    plan: Plan,
+    out: Path,
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+    more: Callable[..., Tables] | None = None,
 ) -> list[dict[str, Any]]:
-    """Make what is missing and write the tables; the rows of ``runs.csv``."""
+    """Make what is missing and write the tables; the rows of ``runs.csv``.
+
+    more  called as ``more(out, jobs=jobs, cluster=cluster)`` after the runs: what else is to be
+          made in ``out``, and the tables of it (``scripts.days.make.beside``)
+    """
     for name in plan.scenes:
         registry.build(name)  # wrong names are told before anything starts
     for name in plan.slams:
         limited(name, Limits())
-    buildings = of_comparison(plan)
+    if plan.sessions is not None and more is None:
+        raise InvalidValueError("Plan.sessions needs more=scripts.days.make.beside(plan)")
     out = out.absolute()
     with locked_folder(out):
         settings = {"compare_schema": files.SCHEMA, **plan.settings(), "lost_rule": LOST_RULE}
@@ -51,7 +61,7 @@ def carry_out(
         recordings = run_jobs(simulations.values(), out / RECORDINGS, title="simulating", **ways)
         only: list[Job] = [job for _, _, job in entries]
         done = run_jobs(only, out / ENTRIES, title="running SLAMs", **ways)
-        aged = [] if buildings is None else live(buildings, out / DAYS, jobs=jobs, cluster=cluster)
+        added = {} if more is None else more(out, jobs=jobs, cluster=cluster)
         with together(out) as staged:
             rows: list[dict[str, Any]] = []
             for run in plan.runs():
@@ -67,10 +77,8 @@ def carry_out(
                 (files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS),
             ):
                 files.write_csv(staged / name, table, columns, plan.axis)
-            if aged:
-                files.write_csv(staged / files.AGES, aged, scores.COLUMNS)
-                summary = scores.levels(aged)
-                files.write_csv(staged / files.AGES_LEVELS, summary, scores.LEVEL_COLUMNS)
+            for name, (lines, heads) in added.items():
+                files.write_csv(staged / name, lines, heads)
             write_recipe(staged, "compare", settings)
     return rows
 

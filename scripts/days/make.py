@@ -3,12 +3,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from scripts.comparison.folder import AGES, AGES_LEVELS
+from scripts.comparison.make import Tables
+from scripts.comparison.plan import Plan
 from scripts.days import living, scores
-from scripts.days.plan import LIVES, SESSIONS, Buildings, identity
+from scripts.days.plan import LIVES, SESSIONS, Buildings, identity, of_comparison
 from scripts.jobs import run_jobs
+
+DAYS = "days"  # folder of what buildings take, within a comparison or a benchmark
 
 
 def carry_out(
@@ -27,3 +33,19 @@ def carry_out(
         of = {**identity(recipe), "slam": slam}
         rows.append(scores.of_building(of, found["rows"], found["ages"], found["failure"]))
     return rows
+
+
+def beside(plan: Plan) -> Callable[..., Tables] | None:
+    """For ``scripts.comparison.make.carry_out``: the buildings of a comparison, and the tables of
+    their scores; None of one without sessions. Raises ``InvalidValueError`` for what cannot be.
+    """
+    buildings = of_comparison(plan)
+    if buildings is None:
+        return None
+
+    def make(out: Path, **ways: Any) -> Tables:
+        rows = carry_out(buildings, out / DAYS, **ways)
+        summary = scores.levels(rows)
+        return {AGES: (rows, scores.COLUMNS), AGES_LEVELS: (summary, scores.LEVEL_COLUMNS)}
+
+    return make

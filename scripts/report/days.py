@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scripts.days import score_tables, scores
+from scripts.days import scores
+from scripts.report import score_tables
 from scripts.report.study import Study
 from scripts.report.tables import Cell, Table
 from slam.errors import LogFormatError

@@ -139,7 +139,7 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
 
 def _tell_days(out: Path) -> None:
     from scripts.benchmark.days import NAMES, read
-    from scripts.days import score_tables
+    from scripts.report import score_tables
 
     for group, rows in score_tables.groups(read(out / NAMES[1])).items():
         console.print(f"Over days, {score_tables.where(group)}, {score_tables.size(rows)}:")

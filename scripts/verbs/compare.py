@@ -98,7 +98,12 @@ def compare(
         sessions=sessions,
     )
     started = time.perf_counter()
-    rows = carry_out(plan, out, jobs=jobs, cluster=cluster)
+    ways: dict[str, Any] = {"jobs": jobs, "cluster": cluster}
+    if sessions is not None:
+        from scripts.days.make import beside
+
+        ways["more"] = beside(plan)
+    rows = carry_out(plan, out, **ways)
     spent_s = time.perf_counter() - started
     tell(plan, rows)
     more = tell_ages(out) if sessions is not None else ""
@@ -125,7 +130,7 @@ def tell(plan: Plan, rows: list[dict[str, Any]]) -> None:
 def tell_ages(out: Path) -> str:
     """Print the scores of age of each scene and level; the names of their files."""
     from scripts.comparison import folder as files
-    from scripts.days import score_tables
+    from scripts.report import score_tables
 
     for group, rows in score_tables.groups(files.read(out).ages).items():
         console.print(score_tables.printed(group, rows))

@@ -63,7 +63,7 @@ def test_what_is_written_is_read_back_and_makes_the_same_section(tmp_path):
     assert "### r, motion 0, change 0.6: 6 buildings of 5 sessions" in text
     assert "- `shunting`: found 24 of 24 sessions from an unknown start" in text
     assert "| map | loaded [in each session] | starts anew [cannot load a map] |" in text
-    assert "failed in 6 of 30 sessions, first: it 'raised'" in text
+    assert "failed in 6 of 30 sessions, first: `it 'raised'`." in text
     assert days.summary(back)["0.3 shunting"]["found_share"]["n"] == 24
 
 

@@ -15,9 +15,11 @@ import pytest
 from scripts.comparison import folder, make
 from scripts.comparison.plan import Plan
 from scripts.days import living, scores
+from scripts.days.make import beside
 from scripts.days.plan import Buildings, identity, name_of, of_comparison
 from scripts.output import read_recipe_words
 from scripts.results import check
+from scripts.verbs import compare
 from sim.recording.recipe import Recipe
 from slam.errors import InvalidValueError, LogFormatError
 from tests.slam.guests import misbehaving
@@ -34,7 +36,7 @@ TABLES = ("runs.csv", "runs.json", "levels.csv", "paired.csv")
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory: pytest.TempPathFactory) -> folder.Compared:
     out = tmp_path_factory.mktemp("ages") / "out"
-    make.carry_out(PLAN, out)
+    make.carry_out(PLAN, out, more=beside(PLAN))
     return folder.read(out)
 
 
@@ -65,6 +67,14 @@ def test_each_slam_has_a_row_of_each_building(compared):
     assert tuple(compared.ages_levels[0]) == scores.LEVEL_COLUMNS
 
 
+def test_the_command_prints_the_scores(compared, capsys):
+    assert compare.tell_ages(compared.folder) == ", ages.csv, ages_levels.csv"
+    told = " ".join(capsys.readouterr().out.split())
+    assert "arena, motion 0, change 0.3: 1 building of 2 sessions" in told
+    assert "`odometry`: starts anew: cannot load a map; error" in told
+    assert "failed in 2 of 2 sessions, first: `SLAM 'pipe:" in told
+
+
 def test_the_folder_is_vouched_for(compared):
     (finding,) = check(compared.folder)
     assert finding.verdict == "whole", finding
@@ -80,7 +90,7 @@ def test_what_was_killed_is_made_again_and_nothing_else(compared, tmp_path):
         f for f in out.glob("*/**/arena*") if "runs" not in f.parts and gone.stem not in f.name
     ]
     kept = {file: file.stat().st_mtime_ns for file in files}
-    make.carry_out(PLAN, out)
+    make.carry_out(PLAN, out, more=beside(PLAN))
     assert gone.exists()
     assert {file: file.stat().st_mtime_ns for file in kept} == kept
     assert len(list(out.glob("days/lives/*"))) == 2 * len(PLAN.slams)  # and their hashes
@@ -91,7 +101,8 @@ def test_without_sessions_the_tables_are_the_same_bytes_and_nothing_is_added(com
     for name in ("recordings", "entries"):
         shutil.copytree(compared.folder / name, tmp_path / "out" / name)
     shutil.copy(compared.folder / "recipe.json", tmp_path / "out")
-    make.carry_out(replace(PLAN, sessions=None), tmp_path / "out")
+    plain = replace(PLAN, sessions=None)
+    make.carry_out(plain, tmp_path / "out", more=beside(plain))
     for name in TABLES:
         assert (tmp_path / "out" / name).read_bytes() == (compared.folder / name).read_bytes()
     there = {path.name for path in (tmp_path / "out").iterdir()}
@@ -134,6 +145,12 @@ def test_a_longer_building_goes_on_from_a_shorter_one():
 def test_sessions_without_change_are_refused(values):
     with pytest.raises(InvalidValueError, match=r"--sessions needs a share.*--change 0\.3 0\.6"):
         replace(PLAN, **values)
+
+
+def test_sessions_take_what_makes_the_buildings(tmp_path):
+    with pytest.raises(InvalidValueError, match="needs more="):
+        make.carry_out(PLAN, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("sessions", [1, 51, 2.5])

@@ -7,9 +7,10 @@ import math
 
 import pytest
 
-from scripts.days import score_tables, scores
+from scripts.days import scores
 from scripts.days.ages import COLUMNS as AGE_COLUMNS
 from scripts.days.lifelong import COLUMNS
+from scripts.report import score_tables
 from slam.evaluation.statistics import median_interval, share_interval
 
 ROOM = {"scene": "room", "motion": 0.0, "change": 0.3}
@@ -129,4 +130,4 @@ def test_the_table_and_the_sentence_say_who_starts_anew():
 def test_what_failed_is_told_as_words():
     rows = [session(0), session(1, place="failed", rmse_m=None, found_after_s=None)]
     (line,) = score_tables.sentences([lived(rows, failure="scan 3, `x` raised\nmore")])
-    assert line.endswith("failed in 1 of 2 sessions, first: scan 3, 'x' raised.")
+    assert line.endswith("failed in 1 of 2 sessions, first: `scan 3, 'x' raised`.")

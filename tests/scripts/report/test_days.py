@@ -42,7 +42,10 @@ def test_it_says_what_the_buildings_show(text: str):
         "map 3 sessions old; ghosts 1.50 % early, 1.50 % late." in own
     )
     assert "<code>ekf</code>: starts anew: cannot load a map; error 2.75 cm" in own
-    assert "failed in 6 of 30 sessions, first: scan 3, raised <RuntimeError>: enough" in own
+    assert (
+        "failed in 6 of 30 sessions, first: <code>scan 3, raised <RuntimeError>: enough</code>"
+        in own
+    )
     assert "<td>24 of 24<small>86 to 100 %</small></td><td>–</td>" in own
     assert "<td>starts anew<small>cannot load a map</small></td>" in own
 

@@ -158,8 +158,8 @@ def _failures(rows: Sequence[Row]) -> list[str]:
         return []
     told = next(str(row["failure"]) for row in rows if row["failed"])
     n = sum(int(row["sessions"]) for row in rows)
-    first = told.partition("\n")[0][:200].replace("`", "'")
-    return [f"failed in {failed} of {n} sessions, first: {first}"]
+    first = " ".join(told.partition("\n")[0][:200].replace("`", "'").split())
+    return [f"failed in {failed} of {n} sessions, first: `{first}`"]  # its words, as they are
 
 
 def _value(of: dict[str, Any], key: str) -> float | None:
