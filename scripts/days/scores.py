@@ -178,7 +178,7 @@ SCORES = (
     Score(key="rmse_growth", name="the last to session 1"),
     *(score for age in AGES for score in _aged(age)),
     *_pair("ghost_rate", "ghosts", "%", 100.0),
-    *_pair("ghost_seen_rate", "ghosts where it looked", "%", 100.0),
+    *_pair("ghost_seen_rate", "ghosts seen empty", "%", 100.0),
     *_pair("recall", "recall", "%", 100.0),
     *_pair("map_kb", "map file", "kB"),
     *_pair("memory_mb", "cells in memory", "MB"),
