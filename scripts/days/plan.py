@@ -24,7 +24,6 @@ from scripts.days.sessions import EVERY, checked_count
 from scripts.jobs import Job
 from scripts.names import file_name
 from sim.recording.recipe import Recipe
-from sim.world.times_of_day import checked
 from slam.errors import InvalidValueError
 from slam.guests import Limits
 
@@ -65,7 +64,7 @@ class Buildings:
     scan_limit_s: float = Limits.scan_s
 
     def __post_init__(self) -> None:
-        checked(checked_count(self.sessions) - 1)
+        checked_count(self.sessions)
         Limits(scan_s=self.scan_limit_s)
         names = [name_of(recipe) for recipe in self.recipes]
         if not names or len(set(names)) != len(names):
