@@ -29,6 +29,7 @@ from scripts.result_files import write as write_results
 from sim.core.versions import WORLD
 from sim.recording.recipe import Recipe
 from slam.errors import LogFormatError, MobiliaError
+from slam.guests import Limits, limited
 
 COMMAND = "days"
 NAMES = ("days.csv", "days.json")
@@ -133,6 +134,8 @@ def carry_out(
     of: Buildings, out: Path, *, jobs: int = 1, cluster: str | None = None
 ) -> list[dict[str, Any]]:
     """The section alone, into a folder of its own; its rows."""
+    for name in of.slams:
+        limited(name, Limits())  # wrong names are told before anything starts
     out = out.absolute()
     with locked_folder(out):
         settings = head(of)
