@@ -29,6 +29,7 @@ from scripts.result_files import write as write_results
 from sim.core.versions import WORLD
 from sim.recording.recipe import Recipe
 from slam.errors import LogFormatError, MobiliaError
+from slam.guests import Limits, limited
 
 COMMAND = "days"
 NAMES = ("days.csv", "days.json")
@@ -133,6 +134,8 @@ def carry_out(
     of: Buildings, out: Path, *, jobs: int = 1, cluster: str | None = None
 ) -> list[dict[str, Any]]:
     """The section alone, into a folder of its own; its rows."""
+    for name in of.slams:
+        limited(name, Limits())  # wrong names are told before anything starts
     out = out.absolute()
     with locked_folder(out):
         settings = head(of)
@@ -150,7 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--slam", nargs="+", default=["shunting", "occupancy", "kiss-icp"])
-    parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--seeds", type=int, help=f"default {SEEDS}, {QUICK_SEEDS} if --quick")
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--train", action="store_true")
     parser.add_argument("--quick", action="store_true")
@@ -159,8 +162,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         workers.check_jobs(wanted.jobs)
         known = TRAIN if wanted.train else TEST
-        whole("--seeds", wanted.seeds, 1, len(known))
-        seeds = known[: wanted.seeds]
+        count = (QUICK_SEEDS if wanted.quick else SEEDS) if wanted.seeds is None else wanted.seeds
+        whole("--seeds", count, 1, len(known))
+        seeds = known[:count]
         of = buildings(wanted.slam, seeds, quick=wanted.quick, seconds=wanted.seconds)
         rows = carry_out(of, wanted.out, jobs=wanted.jobs)
     except (MobiliaError, OSError) as error:

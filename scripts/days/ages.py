@@ -45,7 +45,7 @@ def ages_of(copies: Sequence[int], number: int) -> Iterator[tuple[int, int]]:
 
 def changed_share(before: Recording, now: Recording) -> Float:
     """(scans,) share of the beams with a return that met a thing where it did not stand in the
-    session before, or passed through the place that one has left; each while it is news, for
+    session ``before``, or passed through the place that one has left; each while it is news, for
     ``NEWS_S`` from its first beam on. Then the map has learnt it.
     """
     old, new = still_things(before), still_things(now)

@@ -48,7 +48,7 @@ class Building:
     snapshots   what each session that fitted saw, by its number
     copies      its map after each of them, where maps of some age are asked for
     aged        rows (``ages.COLUMNS``) of the last session in older maps
-    before      the session before, where it was simulated
+    before      the last session that was merged, where it was simulated
     limits      of a SLAM from outside, which then runs in a process of its own; None: here
     failures    what was said when it failed, in order
     """
@@ -134,7 +134,8 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
         if building.before is not None and drive.recording is not None:
             shares = ages.changed_share(building.before, drive.recording)
             row |= ages.verdicts(track.estimates, shares, searched)
-    building.before = drive.recording
+    if state.fits:  # else the map knows nothing of it
+        building.before = drive.recording
     return row
 
 

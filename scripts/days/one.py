@@ -43,6 +43,11 @@ def session_of(name: str, maps: Maps, stream: Stream) -> Session:
         )
     history = None if maps.map_in is None else read_history(maps.map_in)
     time_s = _time_s(maps, stream, history)
+    if history is not None and len(history) and time_s <= history.times_s[-1]:
+        raise InvalidValueError(
+            f"the session begins at {time_s:.15g} s, not after the last one of the map, at "
+            f"{history.times_s[-1]:.15g} s: say when it was, as --at 2026-05-04T09:00"
+        )
     if maps.map_in is None:
         return Session(system, time_s=time_s)
     return Session.open(maps.map_in, type(system), time_s=time_s)

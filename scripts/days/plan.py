@@ -23,8 +23,7 @@ from scripts.days import living
 from scripts.days.sessions import EVERY, checked_count
 from scripts.jobs import Job
 from scripts.names import file_name
-from sim.recording.recipe import Recipe
-from sim.world.times_of_day import checked
+from sim.recording.recipe import MAX_SECONDS, Recipe
 from slam.errors import InvalidValueError
 from slam.guests import Limits
 
@@ -65,15 +64,19 @@ class Buildings:
     scan_limit_s: float = Limits.scan_s
 
     def __post_init__(self) -> None:
-        checked(checked_count(self.sessions) - 1)
+        checked_count(self.sessions)
         Limits(scan_s=self.scan_limit_s)
         names = [name_of(recipe) for recipe in self.recipes]
         if not names or len(set(names)) != len(names):
             raise InvalidValueError(
                 f"Buildings.recipes must be one or more, each once, got {names}"
             )
-        for recipe in self.recipes:
-            self.session(recipe, 0)  # complains of one that would be too long
+        longest = max(recipe.seconds for recipe in self.recipes)
+        if FIRST * longest > MAX_SECONDS:
+            raise InvalidValueError(
+                f"--seconds must be at most {MAX_SECONDS / FIRST:g}, as session 0 lasts {FIRST:g} "
+                f"times as long, got {longest:g}"
+            )
 
     def session(self, recipe: Recipe, number: int) -> Recipe:
         """Of that session of a building."""

@@ -127,6 +127,11 @@ def _of_days(row: Row, rows: Sequence[Row], aged: Sequence[Row]) -> dict[str, An
     return found
 
 
+def first_words(failure: str) -> str:
+    """What a SLAM said when it failed, as one line that Markdown leaves as it is in backticks."""
+    return " ".join(failure.partition("\n")[0][:200].replace("`", "'").split())
+
+
 def _error(row: Row) -> float | None:
     return math.inf if row["place"] == "failed" else row["rmse_m"]
 

@@ -8,10 +8,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from scripts.checked import whole
 from scripts.comparison.recording import Recording, load, record
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
-from sim.world.times_of_day import clock_s, time_of
-from slam.errors import InvalidValueError, LogFormatError
+from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
+from slam.errors import LogFormatError, MissingPathError
 from slam.frames import Frame
 from slam.logs import open_log
 
@@ -68,7 +69,8 @@ def _drive(number: int, frames: Sequence[Frame], recording: Recording | None = N
 def recorded(folder: Path) -> list[tuple[int, Path]]:
     """Numbers and folders of the episodes of a dataset of sessions, in order.
 
-    Raises ``LogFormatError`` for a folder without any, or with sessions of several buildings.
+    Raises ``MissingPathError`` for no folder, ``LogFormatError`` for one without any, or with
+    sessions of several buildings.
     """
     found: dict[int, Path] = {}
     buildings = set()
@@ -81,6 +83,8 @@ def recorded(folder: Path) -> list[tuple[int, Path]]:
         found[recipe.session] = path
         buildings.add((recipe.scene, recipe.seed, recipe.share_changed))
     if not found:
+        if not folder.is_dir():
+            raise MissingPathError(folder, "no such folder")
         raise LogFormatError(
             folder, "holds no sessions: mobilia generate SCENE --sessions 10 makes some"
         )
@@ -96,7 +100,6 @@ def read(folder: Path) -> Iterator[Drive]:
 
 
 def checked_count(sessions: int) -> int:
-    """At least two; ``InvalidValueError`` otherwise."""
-    if sessions < 2:
-        raise InvalidValueError(f"--sessions must be >= 2, got {sessions}")
+    """From 2 to ``MOST_SESSIONS``; ``InvalidValueError`` otherwise."""
+    whole("--sessions", sessions, 2, MOST_SESSIONS)
     return sessions

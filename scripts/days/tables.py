@@ -15,6 +15,7 @@ from rich.table import Table
 
 from scripts.days.ages import COLUMNS as AGE_COLUMNS
 from scripts.days.lifelong import COLUMNS
+from scripts.days.scores import first_words
 from sim.recording.tables import table
 from slam.files import write_text
 
@@ -60,10 +61,15 @@ def printed(slam: str, rows: Sequence[Row]) -> Table:
     return found
 
 
-def verdict(rows: Sequence[Row]) -> str:
-    """How many sessions were found, and whether the last is as good as the second."""
+def verdict(rows: Sequence[Row], failure: str | None = None) -> str:
+    """How many sessions were found, whether the last is as good as the first, and ``failure``:
+    what the SLAM said when it first failed.
+    """
+    failed = sum(row["place"] == "failed" for row in rows)
+    end = f"; failed in {failed} of {len(rows)} sessions" if failed else ""
+    end += f", first: `{first_words(failure)}`" if failure else ""
     if all(row["map"] == "anew" for row in rows):
-        return "cannot load a map: every session starts anew, in a frame of its own"
+        return "cannot load a map: every session starts anew, in a frame of its own" + end
     later = [row for row in rows if row["map"] != "new"]
     found = [row for row in later if row["found_after_s"] is not None]
     soon = sum(row["found_after_s"] <= 10.0 for row in found)
@@ -77,21 +83,23 @@ def verdict(rows: Sequence[Row]) -> str:
     measured = [row["rmse_m"] for row in rows if row["rmse_m"] is not None]
     if len(measured) > 1 and measured[0]:
         text += f"; error of the last session {measured[-1] / measured[0]:.2f} of the first's"
-    return text
+    return text + end
 
 
 def write(
     folder: Path,
     rows: Sequence[Row],
     settings: Mapping[str, Any],
-    changes: str,
+    changes: tuple[str, Mapping[str, Any] | None],
     aged: Sequence[Row] = (),
-    score: Mapping[str, Any] | None = None,
+    failures: Mapping[str, str] | None = None,
 ) -> None:
     """lifelong.csv, lifelong.json, lifelong.md, and ages.csv if there are ``aged`` rows.
 
-    ``changes`` is the page's part on them, ``score`` what of them is true (``report.added``).
+    ``changes`` is the page's part on them, and what of them is true (``report.changes_page``),
+    ``failures`` by SLAM what it said when it first failed.
     """
+    part, score = changes
     cells = [[words_exactly(row[column]) for column in COLUMNS] for row in rows]
     write_text(folder / "lifelong.csv", table(COLUMNS, cells))
     whole = {
@@ -105,7 +113,7 @@ def write(
     if aged:
         old = [[words_exactly(row[column]) for column in AGE_COLUMNS] for row in aged]
         write_text(folder / "ages.csv", table(AGE_COLUMNS, old))
-    write_text(folder / "lifelong.md", page(rows, settings) + ages_part(aged) + changes)
+    write_text(folder / "lifelong.md", page(rows, settings, failures) + ages_part(aged) + part)
 
 
 def ages_part(aged: Sequence[Row]) -> str:
@@ -125,7 +133,9 @@ def words_exactly(value: object) -> str:
     return "" if value is None else repr(value) if isinstance(value, float) else str(value)
 
 
-def page(rows: Sequence[Row], settings: Mapping[str, Any]) -> str:
+def page(
+    rows: Sequence[Row], settings: Mapping[str, Any], failures: Mapping[str, str] | None = None
+) -> str:
     """The tables of all SLAMs as Markdown."""
     building = ", ".join(f"{key} {value}" for key, value in settings.items())
     parts = [f"# A building over {len({r['session'] for r in rows})} sessions\n\n{building}\n"]
@@ -134,5 +144,6 @@ def page(rows: Sequence[Row], settings: Mapping[str, Any]) -> str:
         head = "| " + " | ".join(c.replace("_", " ") for c in _SHOWN) + " |\n"
         rule = "|" + "---|" * len(_SHOWN) + "\n"
         body = "".join("| " + " | ".join(words(c, row[c]) for c in _SHOWN) + " |\n" for row in own)
-        parts.append(f"\n## {slam}\n\n{verdict(own)}\n\n{head}{rule}{body}")
+        said = verdict(own, (failures or {}).get(slam))
+        parts.append(f"\n## {slam}\n\n{said}\n\n{head}{rule}{body}")
     return "".join(parts)

@@ -11,7 +11,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
-from scripts.days.scores import ANEW, SCORES, Row, Score, levels
+from scripts.days.scores import ANEW, SCORES, Row, Score, first_words, levels
 from scripts.metrics.row import digits
 from scripts.report.answer import percent
 from scripts.report.study import LEAST_RUNS
@@ -158,8 +158,7 @@ def _failures(rows: Sequence[Row]) -> list[str]:
         return []
     told = next(str(row["failure"]) for row in rows if row["failed"])
     n = sum(int(row["sessions"]) for row in rows)
-    first = " ".join(told.partition("\n")[0][:200].replace("`", "'").split())
-    return [f"failed in {failed} of {n} sessions, first: `{first}`"]  # its words, as they are
+    return [f"failed in {failed} of {n} sessions, first: `{first_words(told)}`"]
 
 
 def _value(of: dict[str, Any], key: str) -> float | None:

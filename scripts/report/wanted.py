@@ -24,6 +24,7 @@ _OTHERS = {
     "benchmark": "is of mobilia benchmark: leaderboard.md there is its report; "
     "each track has one, mobilia report {folder}/TRACK",
     "days": "is of the benchmark's section over days: days.csv has its scores",
+    "lifelong": "is of mobilia lifelong: lifelong.md there is its report",
     "blame": "is of mobilia blame: blame.png there is its report",
 }
 _DATASET = (

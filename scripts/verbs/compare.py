@@ -51,8 +51,8 @@ def compare(
     sessions: Annotated[
         int | None,
         typer.Option(
-            help="Also let the SLAMs live in buildings of N sessions, one beside each run, where "
-            "--change is put elsewhere from one to the next.",
+            help="Also let the SLAMs live in buildings of N sessions, one beside each run. From "
+            "each session to the next the share --change of what can move is put elsewhere.",
             metavar="N",
         ),
     ] = None,

@@ -55,12 +55,13 @@ def lifelong(
     """
     if (folder is None) == (scene is None):
         raise InvalidValueError("name exactly one of FOLDER and --scene")
-    names = [name.strip() for name in slam.split(",") if name.strip()]
+    names = list(dict.fromkeys(name.strip() for name in slam.split(",") if name.strip()))
     if not names:
         raise InvalidValueError("--slam must name at least one SLAM")
     check(names, *([scene] if scene else []))
     from scripts.days import sessions as days
-    from sim.recording.recipe import Recipe
+    from scripts.days.plan import FIRST
+    from sim.recording.recipe import MAX_SECONDS, Recipe
 
     if folder is not None:
         days.recorded(folder)  # complains before anything is written
@@ -71,15 +72,20 @@ def lifelong(
         scene=scene, seed=seed, dynamism=dynamism, motion=motion, change=change, seconds=seconds,
         scanner=scanner, session=days.checked_count(sessions) - 1, options=options_with(crowd),
     )  # fmt: skip
-    drives = days.simulated(recipe, sessions, first_seconds or 3.0 * seconds)
-    _write(names, drives, _settings(recipe, sessions, first_seconds), out, overwrite)
+    first_s = FIRST * seconds if first_seconds is None else first_seconds
+    if not 0.0 < first_s <= MAX_SECONDS:
+        raise InvalidValueError(
+            f"--first-seconds must be > 0 and at most {MAX_SECONDS:g}, got {first_s}"
+        )
+    drives = days.simulated(recipe, sessions, first_s)
+    _write(names, drives, _settings(recipe, sessions, first_s), out, overwrite)
 
 
-def _settings(recipe: Recipe, sessions: int, first_seconds: float | None) -> dict[str, Any]:
+def _settings(recipe: Recipe, sessions: int, first_seconds: float) -> dict[str, Any]:
     return {
         "scene": recipe.scene, "seed": recipe.seed, "dynamism": recipe.dynamism,
         "motion": recipe.motion, "change": recipe.change, "sessions": sessions,
-        "seconds": recipe.seconds, "first_seconds": first_seconds or 3.0 * recipe.seconds,
+        "seconds": recipe.seconds, "first_seconds": first_seconds,
         "scanner": recipe.scanner, "options": dict(recipe.options),
     }  # fmt: skip
 
@@ -106,15 +112,16 @@ def _write(
             for row in life.rows(buildings, _noted(drives, kept)):
                 rows.append(row)
         living = next((b for b in buildings if not b.anew), None)
-        changes, score = ("", None) if living is None else changes_page(folder, living, kept)
+        changes = ("", None) if living is None else changes_page(folder, living, kept)
         last = kept[max(kept)]
         aged = [row for b in buildings if not b.anew for row in life.age_rows(b, last)]
-        tables.write(folder, rows, settings, changes, aged, score)
+        failures = {b.name: b.failures[0] for b in buildings if b.failures}
+        tables.write(folder, rows, settings, changes, aged, failures)
         write_recipe(folder, "lifelong", settings)
     for name in names:
         own = [row for row in rows if row["slam"] == name]
         console.print(tables.printed(name, own))
-        console.print(escape(tables.verdict(own)), soft_wrap=True)
+        console.print(escape(tables.verdict(own, failures.get(name))), soft_wrap=True)
     note(f"open {escape(str(path / 'lifelong.md'))} first")
 
 

@@ -20,6 +20,7 @@ from slam.frames import Float
 UNSEEN, LEVELS = 0, 254  # bytes of a share: 0 unseen, 1 to 255 for 0 to 1
 NAMES = ("day_cell_m", "day_times_s", "day_cells", "day_standing")
 FARTHEST = 1 << 24  # places from the origin
+WIDEST = 1 << 26  # places in the rectangle around all, which is held whole: 820 m square of 10 cm
 MOST_SESSIONS, MOST_TIME_S = 1000, 1e12
 DAY_S = 86_400.0
 
@@ -43,7 +44,7 @@ class History:
         if self.sessions and snapshot.time_s <= self.sessions[-1].time_s:
             raise InvalidValueError(
                 f"a session must begin after the last one of the map, at "
-                f"{self.sessions[-1].time_s:g} s, got {snapshot.time_s:g} s"
+                f"{self.sessions[-1].time_s:.15g} s, got {snapshot.time_s:.15g} s"
             )
         most = DaysConfig().evidence.sessions if most is None else most
         return replace(self, sessions=(*self.sessions, snapshot)[-most:])
@@ -110,6 +111,8 @@ def _check(
         raise LogFormatError(path, "day_cells must be int32 of shape (n, 2)")
     if len(cells) and int(np.abs(cells.astype(np.int64)).max()) > FARTHEST:
         raise LogFormatError(path, f"day_cells must lie within {FARTHEST} places")
+    if len(cells) and math.prod((np.ptp(cells.astype(np.int64), axis=0) + 1).tolist()) > WIDEST:
+        raise LogFormatError(path, f"day_cells must lie in a rectangle of {WIDEST} places")
     if len(np.unique(cells, axis=0)) != len(cells):
         raise LogFormatError(path, "day_cells: a place occurs twice")
     if levels.shape != (len(times), len(cells)) or levels.dtype != np.uint8:

@@ -8,6 +8,8 @@ learnt it.
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +86,11 @@ class News:
     def _went(self, eye: Float, ends: Float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Beams (n,) that pass through a place where something stood, and those places (n, 2)."""
         away = ends - eye
-        order = np.argsort(np.arctan2(away[:, 1], away[:, 0]), kind="stable")
-        bearings = np.arctan2(away[order, 1], away[order, 0])
+        bearings = np.arctan2(away[:, 1], away[:, 0])
+        order = np.argsort(bearings, kind="stable")
+        turns = np.repeat((-2.0 * math.pi, 0.0, 2.0 * math.pi), len(order))
+        order = np.tile(order, 3)  # a place behind, at +-pi, has beams at both ends
+        bearings = bearings[order] + turns
         ranges = np.hypot(away[order, 0], away[order, 1])
         to = self._stood_at - eye
         far = np.hypot(to[:, 0], to[:, 1])

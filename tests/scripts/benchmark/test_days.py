@@ -51,6 +51,16 @@ def test_it_is_eleven_sessions_at_two_shares_of_change_and_a_quick_one_begins_it
     assert [job.file_name() for job in own] == [job.file_name() for job in its[:4]]
 
 
+@pytest.mark.parametrize(
+    ("words", "said"), [("--slam shuntin", "Did you mean 'shunting'"), ("--seeds 0", "--seeds")]
+)
+def test_wrong_words_are_told_before_anything_starts(tmp_path, capsys, words, said):
+    out = tmp_path / "days"
+    assert days.main([str(out), "--quick", *words.split()]) == 1
+    assert said in capsys.readouterr().err
+    assert not out.exists()
+
+
 def test_what_is_written_is_read_back_and_makes_the_same_section(tmp_path):
     days.write(tmp_path, {"schema": 1}, rows())
     back = days.read(tmp_path / "days.json")

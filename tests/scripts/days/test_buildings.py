@@ -159,6 +159,12 @@ def test_a_count_that_cannot_be_is_refused(sessions):
         replace(PLAN, sessions=sessions)
 
 
+def test_a_first_session_that_would_be_too_long_is_refused():
+    recipe = Recipe(scene="arena", seed=7, dynamism=0.0, change=0.3, seconds=40_000.0)
+    with pytest.raises(InvalidValueError, match=r"--seconds must be at most 28800.*got 40000"):
+        Buildings(slams=("odometry",), recipes=(recipe,), sessions=2)
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [("{", "no rows"), ("[]", "schema 1"), ('{"schema": 1, "rows": []}', "without 'ages'"),

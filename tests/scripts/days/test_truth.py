@@ -73,7 +73,11 @@ def test_the_verdict_counts_sessions_found_and_the_last_error_against_the_first(
     assert said.startswith("2 of 3 sessions found, 1 within 10 s, 0 at a wrong place")
     assert "1.50 of the first's" in said
     assert "| 3 |" in page(rows, {"scene": "office"})
-    assert "anew" in verdict([row(0, map="anew"), row(1, map="anew")])
+    alone = [row(0, map="anew"), row(1, map="anew", place="failed")]
+    said = "in a frame of its own; failed in 1 of 2 sessions, first: `scan 3: 'x'`"
+    assert verdict(alone, "scan 3: `x`\nmore").endswith(said)
+    assert said in page(alone, {}, {"s": "scan 3: `x`"})
+    assert verdict(alone[:1]).endswith("in a frame of its own")
 
 
 def test_sessions_follow_the_clock():

@@ -381,6 +381,8 @@ def other_folder(tmp_path: Path, kind: str) -> Path:
         ("episode", "is an episode of mobilia generate"),
         ("drive", "mobilia report COMPARISON --drive"),
         ("benchmark", "leaderboard.md there is its report"),
+        ("days", "days.csv has its scores"),
+        ("lifelong", "lifelong.md there is its report"),
         ("blame", "blame.png there is its report"),
         ("compare", "is unfinished: the same mobilia compare again goes on"),
         ("empty", "holds no comparison: mobilia compare --slam A B --out DIR"),

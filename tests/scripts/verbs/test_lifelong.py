@@ -5,10 +5,14 @@ from __future__ import annotations
 
 import csv
 import json
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from scripts.days.one import Maps, session_of
+from slam.days.evidence import Snapshot
+from slam.days.history import History
 from slam.errors import InvalidValueError
 from slam.frames import Stream, StreamMetadata
 
@@ -20,7 +24,9 @@ from slam.frames import Stream, StreamMetadata
         ("lifelong --scene aren", "Did you mean 'arena'"),
         ("lifelong --scene arena --slam shuntin", "Did you mean 'shunting'"),
         ("lifelong --scene arena --slam ,", "--slam must name at least one SLAM"),
-        ("lifelong --scene arena --sessions 1", "--sessions must be >= 2, got 1"),
+        ("lifelong --scene arena --sessions 1", "--sessions must be 2 to 50, got 1"),
+        ("lifelong --scene arena --sessions 51", "--sessions must be 2 to 50, got 51"),
+        ("lifelong --scene arena --first-seconds 0", "--first-seconds must be > 0 and at most"),
         ("lifelong docs", "docs: holds no sessions"),
         ("run shunting --scene arena --map-out m.npz", "--map-in, --map-out and --at are about"),
     ],
@@ -29,6 +35,12 @@ def test_what_cannot_be_done_is_said_in_one_line(called, words, said):
     ended = called(*words.split())
     assert ended.returncode == 1
     assert said in " ".join(ended.stderr.split())
+
+
+def test_a_folder_that_is_not_there_is_told(called):
+    ended = called("lifelong", "no-such")
+    assert ended.returncode == 2
+    assert "no-such: no such folder" in ended.stderr
 
 
 def test_the_time_of_a_session_is_given_or_the_logs_own():
@@ -44,6 +56,17 @@ def test_the_time_of_a_session_is_given_or_the_logs_own():
         Maps(at="1970-01-02T01:00")
     with pytest.raises(InvalidValueError, match="'odometry' cannot go on in a map"):
         session_of("odometry", Maps(map_out="m.npz"), stream)
+
+
+def test_a_session_that_is_not_later_than_the_map_is_asked_for_its_time(monkeypatch):
+    seen = Snapshot(time_s=5.0, cells=np.zeros((1, 2), np.int32), standing=np.ones(1, np.float32))
+    history = History(cell_m=0.1, sessions=(seen,))
+    monkeypatch.setattr("scripts.days.one.read_history", lambda _: history)
+    stream = Stream(
+        metadata=StreamMetadata(source="test", extra={"epoch_ns": 5_000_000_000}), frames=list
+    )
+    with pytest.raises(InvalidValueError, match=r"begins at 5 s.*at 5 s: say when.*--at 2026-"):
+        session_of("shunting", Maps(map_in=Path("m.npz")), stream)
 
 
 def test_a_small_building_is_lived_in(called, tmp_path):

@@ -53,6 +53,20 @@ def test_a_room_as_it_was_tells_nothing(world):
     assert max(shares(world, world)) < 0.01
 
 
+@pytest.mark.parametrize("heading", [0.0, math.pi])
+def test_what_left_is_news_in_every_direction(heading):
+    """Also where bearings wrap, at pi in the map: a post 2 m ahead, a place wide."""
+    ahead = 1.0 if heading == 0.0 else -1.0
+    room = ahead * WALLS
+    post = World2D(np.vstack([room, ahead * rectangle(2.0, 0.01, 2.08, 0.09)]))
+    grid, still = SessionGrid(), Drive((0.0, ahead * 0.05, heading), ((0.0, 0.0, 3.0),))
+    for frame in frames(post, still, rate_hz=5.0, seed=1):
+        grid.add(frame, frame.truth)
+    news = News(History(cell_m=0.1).with_session(grid.snapshot(0.0)))
+    frame = frames(World2D(room), still, rate_hz=5.0, seed=2)[0]
+    assert news.share(frame, frame.truth) > 0.9 * 0.1 / 2.0 / math.pi  # a place, seen from there
+
+
 def test_without_days_before_nothing_is_news():
     news = News(History(cell_m=0.1))
     assert not news.known
