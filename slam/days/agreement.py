@@ -63,6 +63,11 @@ class Past:
         """Whether there is anything to agree with."""
         return bool((np.nan_to_num(self._standing) >= self.config.always).any())
 
+    def always_stands(self) -> tuple[NDArray[np.uint8], Float]:
+        """1 where something always stands, else 0, as an image; its corner (x, y) m in the map."""
+        always = (np.nan_to_num(self._standing) >= self.config.always).astype(np.uint8)
+        return always, np.asarray(self._low * self.cell_m, dtype=np.float64)
+
     def agreement(self, snapshot: Snapshot) -> Agreement:
         """Of what a session saw; on the same places."""
         config, standing = self.config, self._standing
@@ -106,6 +111,12 @@ class Trial:
         x, y, turn = se2.between(self._T_map_own, T_map_own).tolist()
         config = self._past.config
         return bool(x * x + y * y <= config.same_m**2 and abs(turn) <= config.same_rad)
+
+    def taken(self) -> Float:
+        """(n, 2) m in the session's own frame: where it found something."""
+        found = self._grid.snapshot(0.0)
+        cells = found.cells[found.standing >= self._past.config.stands]
+        return se2.transform(se2.inverse(self._T_map_own), (cells + 0.5) * self._past.cell_m)
 
     def agreement(self, seen: Sequence[tuple[Frame, Float]]) -> Agreement:
         """Of scans and poses in the session's own frame; only those that were added are new."""

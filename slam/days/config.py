@@ -60,6 +60,24 @@ class AgreementConfig(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class AlikeConfig(Settings):
+    """Other places where a session would fit the days before as well."""
+
+    more: float = number(
+        0.045, "share", "that disagrees there and not at the place found", high=1.0
+    )
+    share: float = number(0.8, "ratio", "of nearness to what stands, to that of the place found")
+    near_m: float = number(0.3, "m", "from what always stands: not near")
+    step_deg: float = number(2.0, "deg", "between two angles that are tried", low=0.5, high=10.0)
+    apart_m: float = number(0.5, "m", "places nearer than this are one, if turned by apart_rad")
+    apart_rad: float = number(0.35, "rad", "or less")
+    asked: int = number(60, "places", "the best, that are refined", low=1)
+    most: int = number(6, "places", "that are asked for their agreement", low=1)
+    every_m: float = number(1.0, "m", "driven before it is asked again", low=0.0)
+    every_s: float = number(5.0, "s", "or so long", low=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
 class HabitConfig(Settings):
     """How often and how long things stand."""
 
@@ -111,6 +129,7 @@ class DaysConfig(Settings):
     evidence: EvidenceConfig = field(default=EvidenceConfig())
     search: SearchConfig = field(default=SearchConfig())
     agreement: AgreementConfig = field(default=AgreementConfig())
+    alike: AlikeConfig = field(default=AlikeConfig())
     habit: HabitConfig = field(default=HabitConfig())
     change: ChangeConfig = field(default=ChangeConfig())
     news: NewsConfig = field(default=NewsConfig())

@@ -16,6 +16,7 @@ import numpy as np
 
 from slam import se2
 from slam.days.agreement import Past, Trial
+from slam.days.alike import Alike
 from slam.days.config import DaysConfig
 from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame, to_s
@@ -46,6 +47,8 @@ class StartSearch:
         self._known, self._config, self._past = known, config.search, past
         self._every_ns = round(config.evidence.every_s * NS_PER_S)
         self._trial: Trial | None = None
+        self._alike = Alike(past, config.alike) if past.known else None
+        self._alike_since: tuple[float, float] | None = None  # way m, time s, of the last answer
         self.seen: list[tuple[Frame, Float]] = []
         self.alone = type(known)(known.config)
         self.alone.hold_map()
@@ -102,9 +105,30 @@ class StartSearch:
         if found.disagrees > config.denies:
             return False
         if self._way_m >= config.on_m:
-            return True if found.disagrees <= config.accepts else None
-        stood = self.elapsed_s >= config.on_s and found.disagrees <= config.stood
-        return True if stood else None
+            fits = found.disagrees <= config.accepts
+        else:
+            fits = self.elapsed_s >= config.on_s and found.disagrees <= config.stood
+        return True if fits and not self._is_alike(self._trial, T_map_own) else None
+
+    def _is_alike(self, trial: Trial, T_map_own: Float) -> bool:
+        """Whether the session would fit the days before at another place, too.
+
+        What was true is kept until the robot has driven on, or some time has passed.
+        """
+        assert self._alike is not None  # there are days
+        numbers, since = self._alike.config, self._alike_since
+        if since is not None:
+            way_m, elapsed_s = since
+            moved = self._way_m - way_m >= numbers.every_m
+            if not moved and self.elapsed_s - elapsed_s < numbers.every_s:
+                return True
+        others = self._alike.others(trial.taken(), T_map_own)
+        most = trial.agreement(self.seen).disagrees + numbers.more
+        asked = (Trial(self._past, one).agreement(self.seen) for one in others)
+        known = self._past.config.known
+        alike = any(o.known >= known and o.disagrees <= most for o in asked)
+        self._alike_since = (self._way_m, self.elapsed_s) if alike else None
+        return alike
 
     def _begin_again(self, estimate: Estimate) -> None:
         """Its own map is in doubt: motion and kept scans are worth nothing from before."""

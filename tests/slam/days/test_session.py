@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slam.days.config import AgreementConfig, DaysConfig
+from slam.days.config import AgreementConfig, AlikeConfig, DaysConfig
 from slam.days.evidence import Snapshot
 from slam.days.history import DAY_S, History
 from slam.days.mobility import DaysRaster
@@ -85,6 +85,20 @@ def test_where_a_box_has_come_overnight_the_map_is_outdated(first, tmp_path) -> 
     assert said[1][-1] == "tracking"  # the map has learnt it
 
 
+def test_in_a_room_alike_after_half_a_turn_nothing_is_found(tmp_path) -> None:
+    """A box that has come, and one that has gone, cannot tell: both ends are as good."""
+    path = tmp_path / "m.npz"
+    ends = np.vstack([rectangle(-4.0, -3.0, 4.0, 3.0), rectangle(2.0, 1.0, 2.4, 1.4)])
+    day = Session(ShuntingSlam(CONFIG), time_s=NINE)
+    driven(day, World2D(ends), wander(16.0), seed=7)
+    keep(day, path)
+    session = Session.open(path, ShuntingSlam, time_s=DAY_S + NINE)
+    now = np.vstack([rectangle(-4.0, -3.0, 4.0, 3.0), rectangle(-2.4, -1.4, -2.0, -1.0)])
+    driven(session, World2D(now), wander(16.0), seed=9)
+    assert session.state.found_after_s is None
+    assert keep(session, path).name == "m.apart1.npz"
+
+
 def test_a_session_elsewhere_leaves_the_map_byte_for_byte_and_lies_apart(first, tmp_path) -> None:
     path = tmp_path / "m.npz"
     path.write_bytes(first[0].read_bytes())
@@ -124,7 +138,8 @@ def test_a_start_that_the_days_before_deny_is_not_found(first) -> None:
 def test_a_session_that_the_days_before_deny_lies_apart(first) -> None:
     """Wherever it was found, and however well it was tracked there."""
     lenient = AgreementConfig(accepts=1.0, denies=1.0, stood=1.0)
-    state = other_days(first, DaysConfig(agreement=lenient)).state
+    alone = AlikeConfig(share=100.0)  # nowhere else fits so well
+    state = other_days(first, DaysConfig(agreement=lenient, alike=alone)).state
     assert state.found_after_s is not None
     assert state.tracked > 0.9
     assert state.disagrees > lenient.spoils
