@@ -132,11 +132,12 @@ def _found(of: dict[str, Any]) -> list[str]:
 
 
 def _errors(of: dict[str, Any], *, anew: bool) -> list[str]:
-    first, last = _value(of, "rmse_session1_m"), _value(of, "rmse_last_m")
-    if first is None or last is None:
+    both_ends = (("rmse_session1_m", "in session 1"), ("rmse_last_m", "in the last"))
+    ends = [(value, at) for key, at in both_ends if (value := _value(of, key)) is not None]
+    if not ends:
         return []
     frame = ", each in a frame of its own" if anew else ""
-    said = f"error {_cm(first)} in session 1, {_cm(last)} in the last{frame}"
+    said = f"error {', '.join(f'{_cm(value)} {at}' for value, at in ends)}{frame}"
     old = [(age, _value(of, f"rmse_age{age}_m")) for age in (10, 3, 1)]
     there = [(age, value) for age, value in old if value is not None]
     if there:

@@ -127,6 +127,13 @@ def test_the_table_and_the_sentence_say_who_starts_anew():
     assert guest.count("in a frame of its own") == 1
 
 
+def test_where_session_1_was_not_found_the_error_of_the_last_is_told():
+    rows = [session(k) for k in range(7)]
+    rows[1] |= {"found_after_s": None, "place": "not found", "rmse_m": None}
+    (line,) = score_tables.sentences([lived(rows)])
+    assert "; error 8.00 cm in the last; ghosts" in line
+
+
 def test_what_failed_is_told_as_words():
     rows = [session(0), session(1, place="failed", rmse_m=None, found_after_s=None)]
     (line,) = score_tables.sentences([lived(rows, failure="scan 3, `x` raised\nmore")])
