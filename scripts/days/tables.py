@@ -51,9 +51,8 @@ def printed(slam: str, rows: Sequence[Row]) -> Table:
         title=escape(slam), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0),
         pad_edge=False,
     )  # fmt: skip
-    for column, heading in _PRINTED.items():
-        whole = column in ("time_of_day", "map")
-        found.add_column(heading, overflow="fold", min_width=len(heading), no_wrap=whole)
+    for heading in _PRINTED.values():
+        found.add_column(heading, no_wrap=True)
     for row in rows:
         cells = {column: words(column, row[column]) for column in _PRINTED}
         cells["map"] = _APART.sub(r"apart \1", cells["map"])
