@@ -29,7 +29,7 @@ _FORMS = {
 _PRINTED = {
     "session": "session", "time_of_day": "time", "map": "map", "found_after_s": "found, s",
     "place": "place", "rmse_m": "rmse, m", "ghost_rate": "ghosts",
-    "recall": "recall", "map_kb": "kB", "ms_per_scan": "ms",
+    "map_kb": "kB", "ms_per_scan": "ms",
 }  # fmt: skip
 _SHOWN = (
     "session", "time_of_day", "map", "start", "found_after_s", "place", "rmse_m", "worst_m",
