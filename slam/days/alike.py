@@ -81,14 +81,15 @@ class Alike:
         product = fft.irfft2(image * np.conj(fft.rfft2(template, shape)), shape)
         # place (j, i) of the middle is at lag (j - reach, i - reach), which wraps round
         tall, wide = self._stands.shape
-        lags = np.roll(product, (reach, reach), axis=(0, 1))[:tall, :wide].astype(np.float32)
-        best = cv2.dilate(lags, np.ones((5, 5), np.uint8))
-        j, i = np.nonzero((lags == best) & (lags > 0.5 * max(float(lags.max()), 1.0)))
-        order = np.argsort(-lags[j, i], kind="stable")[:_PEAKS]
+        lags = np.roll(product, (reach, reach), axis=(0, 1))[:tall, :wide]
+        counts = np.rint(lags).astype(np.float32)  # of 0 and 1: whole numbers, on any processor
+        best = cv2.dilate(counts, np.ones((5, 5), np.uint8))
+        j, i = np.nonzero((counts == best) & (counts > 0.5 * max(float(counts.max()), 1.0)))
+        order = _apart(np.stack([i, j], axis=1), np.argsort(-counts[j, i], kind="stable"))
         count = max(int(template.sum()), 1)
         middles = (np.stack([i, j], axis=1)[order] + 0.5) * self._cell_m + self._corner_m
         return [
-            (float(lags[b, a]) / count, m)
+            (float(counts[b, a]) / count, m)
             for b, a, m in zip(j[order], i[order], middles, strict=True)
         ]
 
@@ -127,6 +128,17 @@ class Alike:
             and abs(se2.wrap(float(pose[2] - one[2]))) < self.config.apart_rad
             for one in others
         )
+
+
+def _apart(cells: NDArray[np.int64], order: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The first ``_PEAKS`` of an order of cells (n, 2) that are more than two cells apart."""
+    chosen: list[int] = []
+    for k in order.tolist():
+        if all(np.abs(cells[k] - cells[c]).max() > 2 for c in chosen):
+            chosen.append(k)
+            if len(chosen) == _PEAKS:
+                break
+    return np.array(chosen, dtype=np.int64)
 
 
 def _turned(points: Float, turn: float) -> Float:
