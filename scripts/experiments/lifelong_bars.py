@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from scripts.days.scores import OVER_TIME, SOON_S, Row, counts, early, late, later, mean
+from scripts.days.scores import A_DAY, OVER_TIME, SOON_S, Row, counts, early, late, later, mean
 from slam.errors import LogFormatError, MobiliaError
 
 
@@ -68,6 +68,7 @@ def summary(buildings: Sequence[dict[str, Any]], slam: str) -> list[str]:
         first, last = of(early, column), of(late, column)
         if not np.isnan(last):
             lines.append(f"{column}: sessions 1 to 5 {first:.3f}, the last five {last:.3f}")
+    lines += [*_ratios(own), *_by_day(own), _by_hour(after)]
     told, false = _mean(after, "outdated_told"), _mean(after, "outdated_false")
     lines.append(
         f"'map outdated here' where it clearly is {told:.2f}, where it hardly is {false:.2f}"
@@ -81,6 +82,33 @@ def summary(buildings: Sequence[dict[str, Any]], slam: str) -> list[str]:
             f"{soon} within {SOON_S:g} s, error {100 * _mean(right, 'rmse_m'):.1f} cm"
         )
     return lines
+
+
+def _ratios(own: Sequence[Sequence[Row]]) -> list[str]:
+    """The last error to that of session 1, from the best to the worst building."""
+    pairs = [(rows[-1]["rmse_m"], rows[1]["rmse_m"]) for rows in own if len(rows) > 1]
+    found = sorted(last / first for last, first in pairs if last is not None and first)
+    return [f"last to session 1, by building: {found[0]:.2f} to {found[-1]:.2f}"] if found else []
+
+
+def _by_day(own: Sequence[Sequence[Row]]) -> list[str]:
+    """Means of each whole day of sessions, of two days and more."""
+    days = min(len(rows) - 1 for rows in own) // A_DAY
+    lines = []
+    for column in ("rmse_m", *OVER_TIME) if days > 1 else ():
+        means = (
+            _mean([r for rows in own for r in rows[1 + A_DAY * d : 1 + A_DAY * (d + 1)]], column)
+            for d in range(days)
+        )
+        lines.append(f"{column}, day by day: " + ", ".join(f"{m:.4f}" for m in means))
+    return lines
+
+
+def _by_hour(rows: Sequence[Row]) -> str:
+    """Mean ghost rate at each time of the day."""
+    hours = dict.fromkeys(row["time_of_day"] for row in rows)
+    means = {h: _mean([r for r in rows if r["time_of_day"] == h], "ghost_rate") for h in hours}
+    return "ghost_rate by hour: " + ", ".join(f"{h} {m:.4f}" for h, m in means.items())
 
 
 def changes_line(buildings: Sequence[dict[str, Any]]) -> str:

@@ -20,9 +20,11 @@ from slam.days.agreement import Past
 from slam.days.config import AlikeConfig, DaysConfig
 from slam.frames import Float
 
-_PEAKS = 3  # of each angle
-_TURNS_RAD = np.radians(np.arange(-2.0, 2.01, 0.5))  # of the refinement, about a place
-_STEPS_M = np.arange(-0.2, 0.201, 0.05)
+_PEAKS = 3  # places, the best of each angle, by hand: rooms of one plan side by side
+_TURNS_RAD = np.radians(np.arange(-2.0, 2.01, 0.5))  # rad, of the refinement: one step_deg each way
+_STEPS_M = np.arange(
+    -0.2, 0.201, 0.05
+)  # m, of the refinement along x and y: a coarse cell each way
 
 
 class Alike:
@@ -46,6 +48,8 @@ class Alike:
         """Poses (3,) that explain ``points`` (n, 2) m, in the session's frame, nearly as well as
         ``T_map_own``, the best first.
         """
+        if not len(points):
+            return []
         middle = points.mean(axis=0)
         off = points - middle
         reach = math.ceil(float(np.hypot(off[:, 0], off[:, 1]).max()) / self._cell_m) + 1
@@ -105,7 +109,7 @@ class Alike:
         return np.where(inside, self._near[j, i], np.float32(0.0))
 
     def _refined(self, points: Float, middle: Float, pose: Float) -> Float:
-        """The best pose within a few degrees and two coarse cells."""
+        """The best pose within 2 degrees and one coarse cell."""
         dx, dy = np.meshgrid(_STEPS_M, _STEPS_M)
         steps = np.stack([dx.ravel(), dy.ravel()], axis=1)
         at = se2.transform(pose, middle[None])[0]

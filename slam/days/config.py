@@ -68,7 +68,7 @@ class AlikeConfig(Settings):
     )
     share: float = number(0.8, "ratio", "of nearness to what stands, to that of the place found")
     near_m: float = number(0.3, "m", "from what always stands: not near")
-    step_deg: float = number(2.0, "deg", "between two angles that are tried", low=0.5, high=10.0)
+    step_deg: float = number(2.0, "deg", "between two angles that are tried", low=0.5, high=2.0)
     apart_m: float = number(0.5, "m", "places nearer than this are one, if turned by apart_rad")
     apart_rad: float = number(0.35, "rad", "or less")
     asked: int = number(60, "places", "the best, that are refined", low=1)

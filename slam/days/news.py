@@ -2,8 +2,8 @@
 """What a scan shows that the days before do not know: the map is outdated here.
 
 A return counts where nothing stood when the place was last seen; a beam counts that passes through
-a place where something stood then. Each place is news for some looks only. After that the map has
-learnt it.
+a place where something stood then. Each place is news for ``news_s``. Then the map has learnt
+it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.days.config import DaysConfig, NewsConfig
-from slam.days.history import History
+from slam.days.history import History, dense
 from slam.frames import NS_PER_S, Float, Frame
 from slam.scan_points import deskewed
 
@@ -30,16 +30,13 @@ class News:
         self.config, self.cell_m = config or DaysConfig().news, history.cell_m
         cells, last = _last_seen(history)
         stood = last >= self.config.stands
-        slack = self.config.slack
-        low = cells.min(axis=0).astype(np.int64) - slack if len(cells) else np.zeros(2, np.int64)
-        size = cells.max(axis=0) + slack - low + 1 if len(cells) else np.zeros(2, np.int64)
-        image = np.full((int(size[1]), int(size[0])), np.nan, np.float32)
-        self._low, at = low, cells - low
-        image[at[:, 1], at[:, 0]] = last
-        self._empty: NDArray[np.bool_] = ~np.isnan(image)
+        self._low = np.zeros(2, np.int64)
+        self._empty: NDArray[np.bool_] = np.zeros((0, 0), np.bool_)
         if len(cells):
-            side = np.ones((2 * slack + 1, 2 * slack + 1), np.uint8)
-            self._empty &= cv2.dilate(np.nan_to_num(image), side) <= self.config.empty
+            self._low, (image,) = dense(cells, last)
+            side = np.ones((2 * self.config.slack + 1,) * 2, np.uint8)
+            near = cv2.dilate(np.nan_to_num(image), side)
+            self._empty = ~np.isnan(image) & (near <= self.config.empty)
         self._stood = cells[stood] - self._low
         self._stood_at: Float = np.asarray((cells[stood] + 0.5) * self.cell_m, dtype=np.float64)
         self._since_ns: NDArray[np.int64] = np.full(self._empty.shape, _NEVER, np.int64)

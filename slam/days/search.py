@@ -108,12 +108,13 @@ class StartSearch:
             fits = found.disagrees <= config.accepts
         else:
             fits = self.elapsed_s >= config.on_s and found.disagrees <= config.stood
-        return True if fits and not self._is_alike(self._trial, T_map_own) else None
+        alike = fits and self._is_alike(self._trial, T_map_own, found.disagrees)
+        return True if fits and not alike else None
 
-    def _is_alike(self, trial: Trial, T_map_own: Float) -> bool:
+    def _is_alike(self, trial: Trial, T_map_own: Float, disagrees: float) -> bool:
         """Whether the session would fit the days before at another place, too.
 
-        What was true is kept until the robot has driven on, or some time has passed.
+        A yes is kept until the robot has driven on, or some time has passed.
         """
         assert self._alike is not None  # there are days
         numbers, since = self._alike.config, self._alike_since
@@ -123,7 +124,7 @@ class StartSearch:
             if not moved and self.elapsed_s - elapsed_s < numbers.every_s:
                 return True
         others = self._alike.others(trial.taken(), T_map_own)
-        most = trial.agreement(self.seen).disagrees + numbers.more
+        most = disagrees + numbers.more
         asked = (Trial(self._past, one).agreement(self.seen) for one in others)
         known = self._past.config.known
         alike = any(o.known >= known and o.disagrees <= most for o in asked)
@@ -136,7 +137,7 @@ class StartSearch:
             self._search, self._trial = self._known.relocalisation(), None
             self._kept.clear()
             self.seen.clear()
-            self._way_m = 0.0
+            self._way_m, self._alike_since = 0.0, None
 
     @staticmethod
     def _twist(frame: Frame, before: Float, pose: Float, elapsed: float) -> Float:
