@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What moves in a stream of the plane, and what the robot has to see it with: a table of kinds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+
+from slam.errors import InvalidValueError, UnknownNameError
+
+LAYOUTS = ("flat", "halfturn", "corridor", "hall", "office")
+ODOMETRIES = ("fifth", "biased", "stated", "good")
+PARTS = ("layout", "chairs", "boards", "people", "odometry", "lidar", "driving")
+MOST_SECONDS = 3600.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """Settings of a stream.
+
+    chairs, boards, people   how many of each
+    chair_rest_s             longest rest of a chair between two slides, s
+    board_rest_s             the same of a board, s
+    board_m                  shortest and longest board, m
+    escort                   share of the people who walk with the robot, 0.6 to 1.6 m around it
+    hug                      share of a board's ways that lead past the robot
+    moved_every_s            s; so often all chairs and boards stand elsewhere once out of sight
+    beams, fov_deg, rate_hz  of the scanner; its first and last beam are ``fov_deg`` apart
+    sigma_m, range_max_m     noise of a range (m, 1 sigma) and its end
+    dropouts                 share of the beams without a return
+    layout, odometry         one of ``LAYOUTS`` (or "bare") and ``ODOMETRIES``; "" is by the seed
+    """
+
+    chairs: int = 0
+    boards: int = 0
+    people: int = 0
+    chair_rest_s: float = 8.0
+    board_rest_s: float = 4.0
+    board_m: tuple[float, float] = (1.2, 2.0)
+    escort: float = 0.0
+    hug: float = 0.6
+    moved_every_s: float = math.inf
+    beams: int = 181
+    fov_deg: float = 180.0
+    rate_hz: float = 10.0
+    sigma_m: float = 0.01
+    range_max_m: float = 30.0
+    dropouts: float = 0.0
+    layout: str = ""
+    odometry: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("chairs", "boards", "people"):
+            _within(name, getattr(self, name), 0, 200)
+        _within("beams", self.beams, 2, 4000)
+        _within("fov_deg", self.fov_deg, 1.0, 360.0)
+        _within("rate_hz", self.rate_hz, 0.1, 100.0)
+        _within("moved_every_s", self.moved_every_s, 1.0, math.inf)
+        for name in ("dropouts", "escort", "hug"):
+            _within(name, getattr(self, name), 0.0, 1.0)
+        for name, known in (("layout", (*LAYOUTS, "bare", "")), ("odometry", (*ODOMETRIES, ""))):
+            if getattr(self, name) not in known:
+                raise UnknownNameError(
+                    f"{name} must be one of {', '.join(filter(None, known))}, "
+                    f"got {getattr(self, name)!r}"
+                )
+
+
+def _within(name: str, value: float, low: float, high: float) -> None:
+    if not low <= value <= high:
+        raise InvalidValueError(f"Kind.{name} must be {low:g} to {high:g}, got {value}")
+
+
+KINDS = {
+    "quiet": Kind(),
+    "chairs8": Kind(chairs=8),
+    "chairs16": Kind(chairs=16),
+    "chairs24": Kind(chairs=24, chair_rest_s=0.5),
+    "boards6": Kind(chairs=8, boards=6),
+    "boards10": Kind(chairs=8, boards=10, board_rest_s=0.5),
+    "crowd6": Kind(people=6, escort=1.0),
+    "crowd10": Kind(people=10, escort=1.0),
+    "crowd16": Kind(people=16, escort=1.0),
+    "moved30": Kind(chairs=24, boards=6, moved_every_s=30.0),
+    "moved15": Kind(chairs=24, boards=6, moved_every_s=15.0),
+    "slow2hz": Kind(chairs=16, rate_hz=2.0),
+    "wide270": Kind(chairs=16, beams=271, fov_deg=270.0),
+    "fast37": Kind(chairs=8, boards=6, rate_hz=37.5),
+    "poor": Kind(chairs=8, people=4, beams=61, sigma_m=0.03, dropouts=0.05, range_max_m=12.0),
+    "alike": Kind(chairs=4, boards=8, board_rest_s=1.0, layout="halfturn"),
+    "empty_corridor": Kind(layout="bare", range_max_m=8.0),
+}
+"""Every kind of stream by its name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StreamSpec:
+    """One stream of the plane: which kind, which seed, and what is other than in the kind.
+
+    again    another time in the same building: other chairs, boards, people, noise and way
+    seconds  simulated
+    changes  pairs of a field of ``Kind`` and its value
+
+    Raises ``UnknownNameError`` for a kind that is none, ``InvalidValueError`` for other values.
+    """
+
+    kind: str
+    seed: int
+    again: int = 0
+    seconds: float = 150.0
+    changes: tuple[tuple[str, float | int | str], ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise UnknownNameError(f"kind must be one of {', '.join(KINDS)}, got {self.kind!r}")
+        if not 1.0 <= self.seconds <= MOST_SECONDS:
+            raise InvalidValueError(
+                f"StreamSpec.seconds must be 1 to {MOST_SECONDS:g}, got {self.seconds}"
+            )
+        if self.seed < 0 or self.again < 0:
+            raise InvalidValueError(
+                f"StreamSpec.seed and again must be >= 0, got {self.seed} and {self.again}"
+            )
+        known = {one.name for one in fields(Kind)}
+        for name, _ in self.changes:
+            if name not in known:
+                raise UnknownNameError(f"Kind has no field {name!r}: {', '.join(sorted(known))}")
+
+    @property
+    def settings(self) -> Kind:
+        """Of the kind, with the changes; layout and odometry named."""
+        changed = replace(KINDS[self.kind], **dict(self.changes))  # type: ignore[arg-type]
+        place = self.seed + list(KINDS).index(self.kind)
+        layout = changed.layout or LAYOUTS[place % len(LAYOUTS)]
+        odometry = changed.odometry or ODOMETRIES[self.seed % len(ODOMETRIES)]
+        return replace(changed, layout=layout, odometry=odometry)
+
+    def rng(self, part: str) -> np.random.Generator:
+        """The generator of one of ``PARTS``."""
+        again = 0 if part == "layout" else self.again
+        return np.random.default_rng([self.seed, PARTS.index(part), again])
