@@ -130,13 +130,14 @@ def pushed(job: tuple[CrowdStream, int], folder: Path) -> list[tuple[str, str, f
     for k in moments.tolist():
         for kind in KINDS:
             system = copy.deepcopy(kept[k])
-            system.displace(_push(kind, rng))
+            system.displace(push(kind, rng))
             back = _back_s(system, frames[k:], poses[k:])
             found.append((f"{stream.name}, scan {k}", kind, back))
     return found
 
 
-def _push(kind: str, rng: np.random.Generator) -> Float:
+def push(kind: str, rng: np.random.Generator) -> Float:
+    """(3,) m, m, rad: one of ``KINDS``, in a random direction."""
     if kind == "deg":
         return np.array([0.0, 0.0, math.radians(PUSH_DEG) * rng.choice([-1.0, 1.0])])
     way = rng.uniform(0.0, math.tau)

@@ -126,7 +126,14 @@ def kidnapped(mapped: list[Frame], later: list[Frame], start: int, scans: int) -
             ),
             scan=Scan(stamp_ns=stamp_ns, ranges=now.scan.ranges, spec=now.scan.spec),
             truth=now.truth,
+            labels=now.labels,
         )
+
+
+def scans_after(mapped: list[Frame]) -> int:
+    """So many scans follow a kidnap: those of ``AFTER_S``, and ``LEAST_AFTER`` at least."""
+    period_ns = float(np.median(np.diff([frame.stamp_ns for frame in mapped])))
+    return max(round(AFTER_S * 1e9 / period_ns), LEAST_AFTER)
 
 
 def follow(
@@ -167,8 +174,7 @@ def kidnaps(
     """``count`` kidnaps of ``slam``, which has seen ``mapped``, to places of ``later``."""
     T_world_map = mapped[0].truth
     assert T_world_map is not None
-    period_ns = float(np.median(np.diff([frame.stamp_ns for frame in mapped])))
-    scans = max(round(AFTER_S * 1e9 / period_ns), LEAST_AFTER)
+    scans = scans_after(mapped)
     for start in targets(mapped, later, scans, count):
         frames = list(kidnapped(mapped, later, start, scans))
         from_, to = mapped[-1].truth, frames[0].truth

@@ -20,6 +20,11 @@ from slam.errors import MobiliaError
 def add_options(parser: argparse.ArgumentParser, out: str, page: Path) -> None:
     """``--seeds``, ``--first-seed``, ``--seconds``, ``--jobs``, ``--results``, ``--page``."""
     parser.add_argument("--seeds", type=int, default=10, help="how many")
+    add_run_options(parser, out, page)
+
+
+def add_run_options(parser: argparse.ArgumentParser, out: str, page: Path) -> None:
+    """The same without ``--seeds``, where these follow from something else."""
     parser.add_argument("--first-seed", type=int, default=500, help="nobody tuned on these")
     parser.add_argument("--seconds", type=float, default=60.0, help="of each run, simulated")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
@@ -34,9 +39,15 @@ def seeds_of(wanted: argparse.Namespace) -> list[int]:
 
 
 def head(
-    wanted: argparse.Namespace, mark: str, arguments: Sequence[str] | None, *asked: str
+    wanted: argparse.Namespace,
+    mark: str,
+    arguments: Sequence[str] | None,
+    *asked: str,
+    package: str = "scripts.experiments",
 ) -> dict[str, Any]:
     """The head of the results file, with the options ``asked``; call it before anything is run.
+
+    ``mark`` names the module of ``package``, and its place in the page.
 
     Raises ``InvalidValueError`` where the page has no such mark, or where the project's own results
     would name a commit that is not the code here; ``OSError`` for no such page.
@@ -47,7 +58,7 @@ def head(
     words = sys.argv[1:] if arguments is None else arguments
     return {
         "schema": SCHEMA,
-        "command": shlex.join(["python", "-m", f"scripts.experiments.{mark}", *words]),
+        "command": shlex.join(["python", "-m", f"{package}.{mark}", *words]),
         "commit": commit() if own else None,
         "world": WORLD,
         "machine": machine(),

@@ -9,56 +9,44 @@ stands elsewhere from then on. Each thing draws from a generator of its own.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scripts.integrity.crew import (
+    BOARD,
+    BOX,
+    CRUMB,
+    DUE,
+    FAST,
+    FOLLOWS,
+    GX,
+    GY,
+    HALF,
+    KEEP_M,
+    LEGS,
+    NEAR,
+    RADIUS,
+    REST_S,
+    RESTS,
+    SLOW,
+    SPEED,
+    TURN,
+    UNTIL,
+    WIDE,
+    WITH,
+    Crew,
+    Drive,
+    Place,
+)
 from scripts.integrity.geometry import clear_of_building, point_to_segment2, sees, segments2
 from slam._jit import inner, njit
 from slam.frames import Float
 
-CHAIR, BOX, BOARD, LEGS, COAT = 0, 1, 2, 3, 4
-KEEP_M = 0.35
-# columns of what a thing is: half length, radius (m); slow, fast (m/s); longest rest (s); share of
-# its ways that it rests; share that it goes with the robot; nearest and farthest it goes there (m)
-HALF, RADIUS, SLOW, FAST, REST_S, RESTS, FOLLOWS, NEAR, WIDE = range(9)
-TRAITS = WIDE + 1
-# columns of what it is about to do: until when (s); goal x, y (m), or distance and bearing from the
-# robot; speed (m/s); does it follow; turn (rad or rad/s); the last step of the robot's that it saw,
-# -1 for none; is it to be moved
-UNTIL, GX, GY, SPEED, WITH, TURN, CRUMB, DUE = range(8)
-MINDS = DUE + 1
 SIDESTEPS = (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6)  # rad, from the way it would go
 SPIN_RADPS = 0.5  # of a board
 TRIES = 40
 AHEAD_S = 0.5  # of the robot's trail, looked for at a time
-
-
-class Place(NamedTuple):
-    """The building: rooms (r, 4), walls (n, 4) and pillars (k, 3), m."""
-
-    rooms: Float
-    walls: Float
-    pillars: Float
-
-
-class Crew(NamedTuple):
-    """All things: what they are, (m, 3) where they stand, what they are about, their generators."""
-
-    kinds: NDArray[np.int64]
-    traits: Float
-    at: Float
-    minds: Float
-    states: NDArray[np.uint64]
-
-
-class Drive(NamedTuple):
-    """The robot: (n, 3) its poses, s between two of them, and what it sees (rad)."""
-
-    path: Float
-    dt: float
-    fov: float
 
 
 @inner

@@ -15,11 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scripts.integrity.crew import BOARD, BOX, CHAIR, COAT, LEGS, Crew, Drive, Place
 from scripts.integrity.driving import driven, odometry
 from scripts.integrity.geometry import first_hits
 from scripts.integrity.kinds import KINDS, StreamSpec
 from scripts.integrity.layouts import Layout, layout
-from scripts.integrity.movers import BOARD, BOX, CHAIR, COAT, LEGS, Crew, Drive, Place, live
+from scripts.integrity.movers import live
 from scripts.integrity.things import outlines, things
 from slam.frames import (
     BeamClass,

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from scripts.integrity.kinds import StreamSpec
-from scripts.integrity.movers import (
+from scripts.integrity.crew import (
     BOARD,
     BOX,
     CHAIR,
@@ -31,8 +30,9 @@ from scripts.integrity.movers import (
     WIDE,
     Crew,
     Place,
-    may_stand,
 )
+from scripts.integrity.kinds import StreamSpec
+from scripts.integrity.movers import may_stand
 from slam._jit import njit
 from slam.frames import Float
 

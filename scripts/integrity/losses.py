@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one case of a way to get lost comes to: one SLAM over one stream, carried or pushed."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scripts.experiments import honesty
+from scripts.experiments.kidnap import AFTER_S, kidnapped, scans_after, targets
+from scripts.integrity.counting import Moments, binned, stretches
+from scripts.integrity.plane import frames
+from scripts.integrity.ways import EACH, WAYS, Case
+from scripts.metrics.judged import Judged, world_truth
+from slam import se2
+from slam.errors import InvalidValueError
+from slam.frames import Float, Frame, Stream
+from slam.logs import open_log
+from slam.replay import Track
+from slam.system import MovingMap, SlamSystem, create, refuse_at_the_end
+
+PUSHED = (0.3, 0.85)  # of the stream: when it is pushed
+LOG_SHARES = (0.4, 1.0)  # of a log: how much of it was seen when the robot is carried
+STEADY = 5  # the first scans may compile: no timings
+Row = dict[str, Any]
+
+
+@dataclass(eq=False)
+class Tally:
+    """What a case comes to: the drive itself, and each loss."""
+
+    drive: Row = field(default_factory=dict)
+    losses: list[Row] = field(default_factory=list)
+    failed: str = ""
+
+    def row(self) -> Row:
+        """As written to a file."""
+        return {"drive": self.drive, "losses": self.losses, "failed": self.failed}
+
+
+def run(case: Case) -> Row:
+    """Raises ``InvalidValueError`` for a SLAM to which this cannot be done."""
+    system = create(case.slam)
+    refuse_at_the_end(system, case.slam, "a loss")
+    event = WAYS[case.way].event
+    if event == "log":
+        return _in_log(case, system).row()
+    return {"": _stream, "kidnap": _carried, "push": _pushed}[event](case, system).row()
+
+
+def _stream(case: Case, system: SlamSystem) -> Tally:
+    """The whole stream is the loss."""
+    stream, track = frames(case.spec), Track(case.slam, system)
+    error = track.survive(stream)
+    if error is not None:
+        return Tally(failed=str(error))
+    drive, run_ = _drive(track, stream)
+    return Tally(drive, [{"event": ""} | _loss(run_, trusted_before=True)])
+
+
+def _carried(case: Case, system: SlamSystem) -> Tally:
+    """Kidnaps to where it stands at moments of another tour through the same building."""
+    mapped, later = frames(case.spec), frames(replace(case.spec, again=1))
+    track = Track(case.slam, system)
+    error = track.survive(mapped)
+    if error is not None:
+        return Tally(failed=str(error))
+    drive, run_ = _drive(track, mapped)
+    tally = Tally(drive)
+    if run_.right()[-1]:
+        _kidnap(tally, track, mapped, later)
+    return tally
+
+
+def _kidnap(tally: Tally, track: Track, mapped: list[Frame], later: list[Frame]) -> None:
+    """``EACH`` losses after ``mapped``, to the poses of ``later``."""
+    scans = scans_after(mapped)
+    for start in targets(mapped, later, scans, EACH):
+        after = list(kidnapped(mapped, later, start, scans))
+        moved = se2.between(_truth(mapped[-1]), _truth(after[0]))
+        then = _followed(track, len(mapped), after, np.zeros(3))
+        if isinstance(then, str):
+            tally.failed = then
+            return
+        run_ = _moments(then, [*mapped, *after]).since(len(mapped))
+        loss = {"event": "kidnap", "moved_m": math.hypot(*moved[:2].tolist())}
+        tally.losses.append(loss | _event(run_, run_) | _spent(then, len(mapped)))
+
+
+def _pushed(case: Case, system: SlamSystem) -> Tally:
+    """Pushes at drawn moments, of each kind in turn."""
+    if not hasattr(system, "displace"):
+        raise InvalidValueError(f"SLAM '{case.slam}' cannot be pushed: it has no displace()")
+    stream, track = frames(case.spec), Track(case.slam, system)
+    rng = np.random.default_rng([case.spec.seed, case.number])
+    low, high = (round(share * len(stream)) for share in PUSHED)
+    moments = {int(k): n for n, k in enumerate(rng.choice(range(low, high), EACH, replace=False))}
+    kept = {}
+    for k, frame in enumerate(stream):
+        if k in moments:
+            kept[k] = copy.deepcopy(track)
+        error = track.survive([frame])
+        if error is not None:
+            return Tally(failed=str(error))
+    drive, run_ = _drive(track, stream)
+    tally, right = Tally(drive), run_.right()
+    scans = round(AFTER_S * case.spec.settings.rate_hz)
+    for k, before in kept.items():
+        kind = honesty.KINDS[moments[k] % len(honesty.KINDS)]
+        by, end = honesty.push(kind, rng), k + scans
+        then = _followed(before, k, stream[k:end], by)
+        if isinstance(then, str):
+            return replace(tally, failed=then)
+        if right[k - 1]:
+            unpushed = [
+                replace(frame, truth=estimate.T_map_robot)
+                for frame, estimate in zip(stream[:end], track.estimates, strict=False)
+            ]
+            run_, beside = (_moments(then, truth).since(k) for truth in (stream[:end], unpushed))
+            loss = _event(run_, beside, honesty.BACK_M, math.radians(honesty.BACK_DEG))
+            tally.losses.append({"event": f"push {kind}"} | loss | _spent(then, k))
+    return tally
+
+
+def _in_log(case: Case, system: SlamSystem) -> Tally:
+    """Kidnaps in a log: the places where the first pass saw it count as the true ones."""
+    rng = np.random.default_rng([case.first_seed, case.number])
+    log = open_log(Path(case.log))
+    if isinstance(log, Stream) and not log.metadata.odometry:
+        raise InvalidValueError(f"{case.log} has no odometry, which a carried robot must have")
+    stream = [frame for frame in log if frame.scan is not None]
+    stream = stream[: max(round(rng.uniform(*LOG_SHARES) * len(stream)), 2)]
+    track = Track(case.slam, system)
+    error = track.survive(stream)
+    if error is not None:
+        return Tally(failed=str(error))
+    places = [estimate.T_map_robot for estimate in track.estimates]
+    if isinstance(system, MovingMap):
+        places = list(system.poses_in_map())
+    places[0] = np.zeros(3)  # the first pose is the map's frame, in which the others are told
+    mapped = [replace(frame, truth=place) for frame, place in zip(stream, places, strict=True)]
+    tally = Tally(_spent(track, STEADY))
+    _kidnap(tally, track, mapped, mapped)
+    return tally
+
+
+def _truth(frame: Frame) -> Float:
+    assert frame.truth is not None
+    return frame.truth
+
+
+def _followed(track: Track, k: int, after: Sequence[Frame], by: Float) -> Track | str:
+    """A copy of ``track`` up to scan ``k``, displaced by ``by``, that saw ``after`` too.
+
+    Why it failed, where it did.
+    """
+    system = copy.deepcopy(track.system)
+    if by.any():
+        system.displace(by)  # type: ignore[attr-defined]
+    then = Track(track.name, system, track.estimates[:k], track.durations_s[:k])
+    error = then.survive(after)
+    return then if error is None else str(error)
+
+
+def _moments(track: Track, stream: Sequence[Frame]) -> Moments:
+    return Moments.of(Judged.of(track, world_truth(stream)))
+
+
+def _event(run_: Moments, beside: Moments, *near: float) -> Row:
+    """A loss after an event; recovered when it is right by ``beside``, ``near`` (m, rad)."""
+    return _loss(run_.after_alert(), trusted_before=False) | {
+        "seconds": float(run_.seconds[-1] - run_.seconds[0]),
+        "recovered_s": beside.recovered_s(0, *near),
+        "right": bool(beside.right(*near)[-1]),
+    }
+
+
+def _spent(track: Track, k: int) -> Row:
+    spent_ms = 1e3 * np.array(track.durations_s[k:])
+    return {"ms": binned(spent_ms), "max_ms": float(spent_ms.max())}
+
+
+def _loss(run_: Moments, *, trusted_before: bool) -> Row:
+    hazardous = run_.hazardous()
+    return {
+        "scans": len(hazardous),
+        "hazardous": int(hazardous.sum()),
+        "denied": int((hazardous & ~run_.told).sum()),
+        "stretches": stretches(hazardous),
+        "misleading": int(run_.misleading().sum()),
+        "unavailable": int((~run_.trusted).sum()),
+        "wrong_places": run_.wrong_places(trusted_before),
+    }
+
+
+def _drive(track: Track, stream: Sequence[Frame]) -> tuple[Row, Moments]:
+    """What the run without an event comes to, and its scans."""
+    judged = Judged.of(track, world_truth(stream))
+    run_ = Moments.of(judged)
+    drive = _loss(run_, trusted_before=True) | {
+        "seconds": float(run_.seconds[-1] - run_.seconds[0]),
+        "silent": judged.silent_share(),
+        "ate": judged.ate(),
+        "se2": judged.ate("se2"),
+        "max_m": float(run_.off.max()),
+        "outages": run_.outages(),
+    }
+    return drive | _spent(track, STEADY), run_
