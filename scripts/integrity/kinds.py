@@ -91,6 +91,10 @@ KINDS = {
     "poor": Kind(chairs=8, people=4, beams=61, sigma_m=0.03, dropouts=0.05, range_max_m=12.0),
     "alike": Kind(chairs=4, boards=8, board_rest_s=1.0, layout="halfturn"),
     "empty_corridor": Kind(layout="bare", range_max_m=8.0),
+    "pass6": Kind(chairs=8, boards=6, hug=0.2),
+    "pass10": Kind(chairs=8, boards=10, board_rest_s=0.5, hug=0.2),
+    "crowd_corridor": Kind(people=10, escort=1.0, layout="bare", range_max_m=12.0),
+    "moved30_calm": Kind(chairs=24, boards=6, board_rest_s=15.0, hug=0.0, moved_every_s=30.0),
 }
 """Every kind of stream by its name."""
 

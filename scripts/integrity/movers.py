@@ -13,28 +13,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from scripts.integrity.aims import draw, goal, look, plan, somewhere, turned
 from scripts.integrity.crew import (
     BOARD,
     BOX,
-    CRUMB,
     DUE,
-    FAST,
-    FOLLOWS,
-    GX,
-    GY,
     HALF,
     KEEP_M,
     LEGS,
-    NEAR,
     RADIUS,
-    REST_S,
-    RESTS,
-    SLOW,
     SPEED,
-    TURN,
     UNTIL,
-    WIDE,
-    WITH,
     Crew,
     Drive,
     Place,
@@ -44,20 +33,7 @@ from slam._jit import inner, njit
 from slam.frames import Float
 
 SIDESTEPS = (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6)  # rad, from the way it would go
-SPIN_RADPS = 0.5  # of a board
 TRIES = 40
-AHEAD_S = 0.5  # of the robot's trail, looked for at a time
-
-
-@inner
-def _draw(crew: Crew, i: int) -> float:
-    """In [0, 1): splitmix64 of thing ``i``."""
-    crew.states[i] += np.uint64(0x9E3779B97F4A7C15)
-    z = crew.states[i]
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
-    return float(z >> np.uint64(11)) / 9007199254740992.0
 
 
 @inner
@@ -110,20 +86,12 @@ def _in_sight(crew: Crew, i: int, pose: Float, robot: Float, fov: float, place: 
 
 
 @inner
-def _somewhere(crew: Crew, i: int, place: Place) -> tuple[float, float]:
-    """A drawn point of a drawn room, m."""
-    k = int(_draw(crew, i) * place.rooms.shape[0])
-    x0, y0, x1, y1 = place.rooms[k]
-    return x0 + _draw(crew, i) * (x1 - x0), y0 + _draw(crew, i) * (y1 - y0)
-
-
-@inner
 def _elsewhere(crew: Crew, i: int, robot: Float, fov: float, place: Place) -> bool:
     """Put thing ``i`` where it is free and out of sight; whether a place was found."""
     pose = np.zeros(3)
     for _ in range(TRIES):
-        pose[0], pose[1] = _somewhere(crew, i, place)
-        pose[2] = _draw(crew, i) * 2.0 * math.pi
+        pose[0], pose[1] = somewhere(crew, i, place)
+        pose[2] = draw(crew, i) * 2.0 * math.pi
         if _spare_m(crew, i, pose[0], pose[1], pose[2], robot) < 0.3:
             continue
         if _in_sight(crew, i, pose, robot, fov, place):
@@ -135,103 +103,28 @@ def _elsewhere(crew: Crew, i: int, robot: Float, fov: float, place: Place) -> bo
 
 
 @inner
-def _plan(crew: Crew, i: int, t: float, place: Place) -> None:
-    """What thing ``i`` does next: rest, slide, go somewhere in sight, or go with the robot."""
-    mind, traits = crew.minds[i], crew.traits[i]
-    mind[WITH] = 0.0
-    mind[UNTIL] = t + 1.0 + 4.0 * _draw(crew, i)
-    mind[SPEED] = traits[SLOW] + (traits[FAST] - traits[SLOW]) * _draw(crew, i)
-    if _draw(crew, i) < traits[RESTS]:
-        mind[UNTIL] = t + traits[REST_S] * _draw(crew, i)
-        mind[SPEED] = 0.0
-        return
-    if crew.kinds[i] <= BOX:
-        way = _draw(crew, i) * 2.0 * math.pi
-        mind[GX] = crew.at[i, 0] + 20.0 * math.cos(way)
-        mind[GY] = crew.at[i, 1] + 20.0 * math.sin(way)
-        mind[TURN] = 1.6 * (_draw(crew, i) - 0.5)
-        return
-    mind[UNTIL] += 5.0
-    mind[TURN] = 0.9 * (_draw(crew, i) - 0.5)
-    if mind[CRUMB] >= 0.0 and _draw(crew, i) < traits[FOLLOWS]:
-        mind[WITH] = 1.0
-        mind[GX] = traits[NEAR] + (traits[WIDE] - traits[NEAR]) * _draw(crew, i)
-        mind[GY] = 2.0 * math.pi * _draw(crew, i)
-        return
-    mind[GX], mind[GY] = crew.at[i, 0], crew.at[i, 1]
-    for _ in range(TRIES):
-        x, y = _somewhere(crew, i, place)
-        if sees(crew.at[i, 0], crew.at[i, 1], x, y, place.walls):
-            mind[GX], mind[GY] = x, y
-            return
-
-
-@inner
-def _goal(crew: Crew, i: int, drive: Drive, step: int) -> tuple[float, float]:
-    """Where thing ``i`` goes now, m: beside the robot, or on its trail where that is hidden."""
-    mind = crew.minds[i]
-    if mind[WITH] < 0.5:
-        return mind[GX], mind[GY]
-    x, y, heading = drive.path[int(mind[CRUMB])]
-    if mind[CRUMB] < step:
-        return x, y
-    bearing = mind[GY] + heading
-    return x + mind[GX] * math.cos(bearing), y + mind[GX] * math.sin(bearing)
-
-
-@inner
-def _look(crew: Crew, i: int, drive: Drive, step: int, place: Place) -> None:
-    """Does thing ``i`` see the robot, or the next piece of its trail?"""
-    x, y, last = crew.at[i, 0], crew.at[i, 1], crew.minds[i, CRUMB]
-    if sees(x, y, drive.path[step, 0], drive.path[step, 1], place.walls):
-        crew.minds[i, CRUMB] = step
-    elif last >= 0.0:
-        ahead = min(int(last) + math.ceil(AHEAD_S / drive.dt), step - 1)
-        if sees(x, y, drive.path[ahead, 0], drive.path[ahead, 1], place.walls):
-            crew.minds[i, CRUMB] = ahead
-
-
-@inner
-def _turned(crew: Crew, i: int, way: float, drive: Drive, step: int) -> float:
-    """Which way thing ``i`` looks after a step towards ``way``, rad."""
-    a: float = crew.at[i, 2]
-    mind = crew.minds[i]
-    if crew.kinds[i] <= BOX:
-        return a + float(mind[TURN]) * drive.dt
-    if crew.kinds[i] >= LEGS:
-        return way
-    robot, wanted = drive.path[step], way  # a board: along its way, across the robot's sight
-    if mind[CRUMB] >= step:
-        wanted = math.atan2(crew.at[i, 1] - robot[1], crew.at[i, 0] - robot[0]) + mind[TURN]
-        wanted += 0.5 * math.pi
-    off = 0.5 * math.atan2(math.sin(2.0 * (wanted - a)), math.cos(2.0 * (wanted - a)))
-    most = SPIN_RADPS * drive.dt
-    return a + min(max(off, -most), most)
-
-
-@inner
 def _move(crew: Crew, i: int, drive: Drive, step: int, place: Place) -> bool:
     """One step towards the goal, round what is in the way; whether it moved."""
     x, y, robot = crew.at[i, 0], crew.at[i, 1], drive.path[step]
-    gx, gy = _goal(crew, i, drive, step)
+    gx, gy = goal(crew, i, drive, step, place)
     far = min(crew.minds[i, SPEED] * drive.dt, math.sqrt((gx - x) ** 2 + (gy - y) ** 2))
     if far < 1e-9 and crew.kinds[i] != BOARD:
         return False
     way = math.atan2(gy - y, gx - x)
-    turned = _turned(crew, i, way, drive, step)
+    look_at = turned(crew, i, way, drive, step)
     for side in SIDESTEPS:
         nx, ny = x + far * math.cos(way + side), y + far * math.sin(way + side)
         for turn in range(2):
-            a = turned if turn == 0 else crew.at[i, 2]
+            a = look_at if turn == 0 else crew.at[i, 2]
             if crew.kinds[i] >= LEGS:
-                a = turned + side  # people look where they go
+                a = look_at + side  # people look where they go
             if _spare_m(crew, i, nx, ny, a, robot) >= 0.0 and _free(crew, i, nx, ny, a, place):
                 crew.at[i, 0], crew.at[i, 1], crew.at[i, 2] = nx, ny, a
                 return True
         if crew.kinds[i] <= BOX:
             break  # a chair stops
-    if _spare_m(crew, i, x, y, turned, robot) >= 0.0 and _free(crew, i, x, y, turned, place):
-        crew.at[i, 2] = turned
+    if _spare_m(crew, i, x, y, look_at, robot) >= 0.0 and _free(crew, i, x, y, look_at, place):
+        crew.at[i, 2] = look_at
     crew.minds[i, UNTIL] = min(crew.minds[i, UNTIL], step * drive.dt + 0.5)
     return False
 
@@ -267,9 +160,9 @@ def _one(crew: Crew, i: int, drive: Drive, step: int, place: Place) -> bool:
     if (hidden or not there) and _elsewhere(crew, i, robot, drive.fov, place):
         crew.minds[i, DUE], crew.minds[i, UNTIL] = 0.0, -1.0
     if crew.kinds[i] >= BOARD:
-        _look(crew, i, drive, step, place)
+        look(crew, i, drive, step, place)
     if t >= crew.minds[i, UNTIL]:
-        _plan(crew, i, t, place)
+        plan(crew, i, t, place)
     return crew.minds[i, SPEED] > 0.0 and _move(crew, i, drive, step, place)
 
 

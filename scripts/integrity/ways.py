@@ -45,11 +45,17 @@ class Way:
 
 WAYS = {
     "chairs": Way(kinds=("chairs8", "chairs16", "chairs24", "wide270"), about="8 to 24 chairs"),
-    "boards": Way(kinds=("boards6", "boards10"), about="6 or 10 boards that go past the robot"),
+    "boards": Way(kinds=("pass6", "pass10"), about="6 or 10 boards that slide past"),
+    "herd": Way(kinds=("boards6", "boards10"), about="6 or 10 boards that come along"),
     "crowd": Way(kinds=("crowd6", "crowd10", "crowd16"), about="6 to 16 people who walk along"),
-    "outdated": Way(kinds=("moved30", "moved15"), about="everything moved out of sight"),
+    "outdated": Way(
+        kinds=("moved30_calm", "moved30", "moved15"), about="everything moved out of sight"
+    ),
     "alike": Way(kinds=("alike",), about="boards, and rooms that are alike after half a turn"),
-    "corridor": Way(kinds=("empty_corridor",), about="a bare corridor, its ends out of range"),
+    "corridor": Way(
+        kinds=("empty_corridor", "crowd_corridor"),
+        about="a bare corridor, its ends out of range, empty or with 10 people",
+    ),
     "poor": Way(kinds=("poor",), about="61 beams, 30 mm of noise, 5 % of the returns missing"),
     "rates": Way(
         kinds=("slow2hz", "fast37"), rates=(2.0, 5.0, 20.0, 37.0), about="2 to 37 scans a second"
@@ -62,11 +68,11 @@ WAYS = {
         about="carried elsewhere, from one crowd into another",
     ),
     "kidnap-moved": Way(
-        kinds=("moved30", "boards6"), event="kidnap", layouts=DECIDABLE,
+        kinds=("moved30_calm", "pass6"), event="kidnap", layouts=DECIDABLE,
         about="carried elsewhere, where chairs and boards stand elsewhere too",
     ),
     "push": Way(
-        kinds=("chairs16", "boards6", "crowd6"), event="push",
+        kinds=("chairs16", "pass6", "crowd6"), event="push",
         about="pushed by 0.3 m or 5 degrees, which odometry does not notice",
     ),
     "log": Way(event="log", about="logs of real robots: put back to an earlier part"),
