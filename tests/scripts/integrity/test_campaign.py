@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A campaign has as many losses as asked for, goes on where it was stopped, and tells the truth."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scripts.integrity import campaign, losses, ways
+from scripts.integrity.tables import markdown, summary
+from scripts.integrity.ways import EACH, WAYS, Case, cases
+from slam.errors import InvalidValueError
+from slam.odometry import OdometrySlam
+
+WORDS = ["--ways", "chairs", "corridor", "--slams", "odometry", "--losses", "2", "--no-page"]
+
+
+def words(folder: Path, *more: str) -> list[str]:
+    results = ["--seconds", "3", "--results", str(folder / "integrity.json")]
+    return [*WORDS, "--folder", str(folder / "cases"), *results, *more]
+
+
+def case(way: str, number: int = 0, slam: str = "odometry", first_seed: int = 100) -> Case:
+    return Case(way=way, number=number, slam=slam, first_seed=first_seed, seconds=8.0)
+
+
+def test_every_way_gets_its_losses_in_turn():
+    plan = list(cases(list(WAYS), ["a", "b"], 12, 100, 60.0, [Path("x.log"), Path("y.log")]))
+    for name, way in WAYS.items():
+        own = [one for one in plan if (one.way, one.slam) == (name, "a")]
+        assert len(own) * way.each >= 12 > (len(own) - 1) * way.each
+    assert [one.log for one in plan if one.way == "log"][::2] == ["x.log", "y.log", "x.log"]
+    assert {one.way for one in plan[: 2 * len(WAYS)]} == set(WAYS)
+    assert not list(cases(["log"], ["a"], 12, 100, 60.0))
+    with pytest.raises(InvalidValueError, match="--ways must be of chairs"):
+        list(cases(["boats"], ["a"], 1, 1, 1.0))
+
+
+def test_no_two_cases_share_a_stream():
+    plan = cases(list(WAYS), ["a"], 300, 100, 60.0)
+    specs = [one.spec for one in plan]
+    assert len(set(specs)) == len(specs)
+    kept = {spec.settings.layout for spec in specs if spec.seconds == ways.MAPPED_S}
+    assert kept == set(ways.DECIDABLE)
+
+
+def test_what_was_done_is_not_done_again(tmp_path, monkeypatch, capsys):
+    assert campaign.campaign(words(tmp_path)) == 0
+    told = capsys.readouterr().out
+    files = sorted((tmp_path / "cases").rglob("*.json"))
+    assert [path.parent.name for path in files] == 2 * ["chairs"] + 2 * ["corridor"]
+    files[1].unlink()  # as if it had been killed before
+    files[2].write_text("{")  # or something else was there
+    done = []
+    monkeypatch.setattr(campaign, "run", lambda one: done.append(one) or losses.run(one))
+    assert campaign.campaign(words(tmp_path)) == 0
+    assert [(one.way, one.number) for one in done] == [("corridor", 0), ("chairs", 1)]
+    table = "| chairs | 2 |"
+    assert table in told
+    assert table in capsys.readouterr().out
+    done.clear()
+    monkeypatch.setattr(campaign, "code", lambda: "another")
+    assert campaign.campaign(words(tmp_path)) == 0
+    assert len(done) == 4  # other code: all of it anew
+    found = json.loads((tmp_path / "integrity.json").read_text())
+    assert found["found"]["odometry all"]["losses"] == 4
+    assert found["command"].startswith("python -m scripts.integrity.campaign --ways chairs")
+
+
+def test_no_run_sums_up_what_is_there(tmp_path, capsys):
+    assert campaign.campaign(words(tmp_path, "--no-run")) == 0
+    assert "| all | 0 | 0 | – (≤ –) |" in capsys.readouterr().out
+
+
+def test_a_case_gives_the_same_numbers_twice():
+    first, second = (losses.run(case("boards")) for _ in range(2))
+    for row in (first, second):
+        for part in (row["drive"], *row["losses"]):
+            for key in ("ms", "max_ms"):
+                part.pop(key, None)
+    assert first == second
+    assert first["losses"][0]["event"] == ""
+
+
+@pytest.fixture
+def short_tours(monkeypatch):
+    monkeypatch.setattr(ways, "MAPPED_S", 40.0)
+
+
+def test_who_never_doubts_takes_a_wrong_place_at_every_kidnap(short_tours):
+    first_seed = 103 - ways.APART * list(WAYS).index("kidnap") % 4  # its odometry is "good"
+    one = case("kidnap", first_seed=first_seed)
+    assert one.spec.settings.odometry == "good"
+    row = losses.run(one)
+    assert row["drive"]["hazardous"] == 0
+    assert len(row["losses"]) == EACH
+    for loss in row["losses"]:
+        assert math.isinf(loss["recovered_s"])
+        assert loss["moved_m"] > 0.0
+        far = loss["moved_m"] > 3.0
+        assert (loss["wrong_places"] == 1 and loss["hazardous"] > 0) or not far
+    found = summary([row])
+    assert (found["losses"], found["not_recovered"]) == (EACH, EACH)
+    assert found["hazardous"] >= sum(loss["moved_m"] > 3.0 for loss in row["losses"])
+
+
+class Cautious(OdometrySlam):
+    """Trusts nothing after a while."""
+
+    def update(self, frame):
+        estimate = super().update(frame)
+        return replace(estimate, converged=frame.stamp_ns < 2_000_000_000)
+
+
+class Failing(OdometrySlam):
+    """Raises after a while."""
+
+    def update(self, frame):
+        if frame.stamp_ns > 1_000_000_000:
+            raise ValueError("no more")
+        return super().update(frame)
+
+
+def test_who_trusts_nothing_is_never_hazardous_and_never_recovers(monkeypatch):
+    monkeypatch.setattr(losses, "create", lambda name: Cautious())
+    row = losses.run(case("crowd"))
+    assert row["drive"]["unavailable"] == 60
+    assert row["drive"]["hazardous"] == row["losses"][0]["hazardous"] == 0
+    assert row["drive"]["outages"] == [math.inf]
+
+
+def test_a_slam_that_fails_leaves_no_loss(monkeypatch):
+    monkeypatch.setattr(losses, "create", lambda name: Failing())
+    row = losses.run(case("crowd"))
+    assert "no more" in row["failed"]
+    assert row["losses"] == []
+    found = summary([row])
+    assert (found["failed"], found["losses"], found["scans"]) == (1, 0, 0)
+
+
+def test_who_cannot_be_pushed_is_named():
+    with pytest.raises(InvalidValueError, match="'odometry' cannot be pushed"):
+        losses.run(case("push"))
+
+
+def test_a_push_is_undone_or_counted(monkeypatch):
+    class Pushed(OdometrySlam):
+        by = np.zeros(3)
+
+        def displace(self, by):
+            self.by = by
+
+        def update(self, frame):
+            estimate = super().update(frame)
+            return replace(estimate, T_map_robot=estimate.T_map_robot + self.by)
+
+    monkeypatch.setattr(losses, "create", lambda name: Pushed())
+    row = losses.run(case("push"))
+    assert [loss["event"] for loss in row["losses"]].count("push m") in (2, 3)
+    assert all(math.isinf(loss["recovered_s"]) for loss in row["losses"])  # odometry never can
+
+
+def test_logs_are_found_below_folders(tmp_path):
+    for name in ("b/one.log.xz", "a/two.log", "a/notes.txt"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    names = [path.name for path in campaign.logs_in([tmp_path])]
+    assert names == ["two.log", "one.log.xz"]
+    with pytest.raises(InvalidValueError, match="--logs must name a log"):
+        campaign.logs_in([tmp_path / "a" / "notes.txt"])
+
+
+def test_tables_have_a_row_for_each_way():
+    rows = {("odometry", "chairs"): summary([losses.run(case("chairs"))])}
+    text = markdown(rows)
+    assert text.count("| chairs |") == 3
+    assert "0.00 (≤ 95.00)" in text  # of one loss
