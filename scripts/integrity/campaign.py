@@ -13,13 +13,9 @@ done. ``--no-run`` sums up what is there. Writes ``docs/results/integrity.json``
 from __future__ import annotations
 
 import argparse
-import functools
-import hashlib
-import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,66 +23,16 @@ from typing import Any
 from scripts import workers
 from scripts.checked import whole
 from scripts.experiments.measured import add_run_options, ended, head
-from scripts.integrity.losses import run
+from scripts.integrity.settling import settle, settled
 from scripts.integrity.tables import ALL, markdown, summary
 from scripts.integrity.ways import WAYS, Case, cases
-from scripts.machine import versions
 from scripts.marks import fill_page
-from scripts.names import file_name
-from scripts.output import configs_of
-from scripts.result_files import ROOT, write
+from scripts.result_files import write
 from slam.errors import InvalidValueError
-from slam.files import make_folder
 
 PAGE, MARK = Path("docs/integrity.md"), "campaign"
-CODE = (
-    "slam", "scripts/integrity", "scripts/metrics", "scripts/experiments/kidnap.py",
-    "scripts/experiments/honesty.py",
-)  # fmt: skip
-NOT_CODE = ("campaign.py", "tables.py")  # of ``scripts/integrity``: they only sum up
 LOGS = (".log", ".clf", ".log.gz", ".log.xz")
 SAID_S = 60.0  # between two lines on how far it is
-
-
-def path_of(case: Case, folder: Path) -> Path:
-    """The file of a case."""
-    return folder / file_name(case.slam) / case.way / f"{case.number:06d}.json"
-
-
-@functools.cache
-def code() -> str:
-    """SHA-256 of the source files that a case depends on."""
-    digest = hashlib.sha256()
-    for part in CODE:
-        place = ROOT / part
-        for path in [place] if place.is_file() else sorted(place.rglob("*.py")):
-            if path.parent != ROOT / "scripts" / "integrity" or path.name not in NOT_CODE:
-                digest.update(f"{path.relative_to(ROOT)}\n".encode() + path.read_bytes())
-    return digest.hexdigest()
-
-
-def digest_of(case: Case) -> str:
-    """What the result of a case depends on: itself, the stream, the config, and the code."""
-    spec = "" if case.log else asdict(case.spec) | {"settings": asdict(case.spec.settings)}
-    words = [asdict(case), spec, configs_of([case.slam]), versions()["mobilia"], code()]
-    return hashlib.sha256(json.dumps(words, sort_keys=True).encode()).hexdigest()
-
-
-def settled(case: Case, folder: Path) -> dict[str, Any] | None:
-    """The file of a case; None where it is not there or was made by other code."""
-    try:
-        row = json.loads(path_of(case, folder).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return row if isinstance(row, dict) and row.get("digest") == digest_of(case) else None
-
-
-def settle(case: Case, folder: Path) -> Case:
-    """Run a case and write its file."""
-    path = path_of(case, folder)
-    make_folder(path.parent)
-    write(path, {"digest": digest_of(case), "case": asdict(case), **run(case)}, {})
-    return case
 
 
 def logs_in(places: Sequence[Path]) -> list[Path]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.integrity import campaign, losses, ways
+from scripts.integrity import campaign, losses, settling, ways
 from scripts.integrity.tables import markdown, summary
 from scripts.integrity.ways import EACH, WAYS, Case, cases
 from slam.errors import InvalidValueError
@@ -57,19 +57,28 @@ def test_what_was_done_is_not_done_again(tmp_path, monkeypatch, capsys):
     files[1].unlink()  # as if it had been killed before
     files[2].write_text("{")  # or something else was there
     done = []
-    monkeypatch.setattr(campaign, "run", lambda one: done.append(one) or losses.run(one))
+    monkeypatch.setattr(settling, "run", lambda one: done.append(one) or losses.run(one))
     assert campaign.campaign(words(tmp_path)) == 0
     assert [(one.way, one.number) for one in done] == [("corridor", 0), ("chairs", 1)]
     table = "| chairs | 2 |"
     assert table in told
     assert table in capsys.readouterr().out
     done.clear()
-    monkeypatch.setattr(campaign, "code", lambda: "another")
+    monkeypatch.setattr(settling, "code", lambda: "another")
     assert campaign.campaign(words(tmp_path)) == 0
     assert len(done) == 4  # other code: all of it anew
     found = json.loads((tmp_path / "integrity.json").read_text())
     assert found["found"]["odometry all"]["losses"] == 4
     assert found["command"].startswith("python -m scripts.integrity.campaign --ways chairs")
+
+
+def test_two_processes_do_what_one_does(tmp_path, capsys):
+    tables = []
+    for jobs in ("1", "2"):
+        assert campaign.campaign(words(tmp_path / jobs, "--jobs", jobs)) == 0
+        told = capsys.readouterr().out
+        tables.append(told[told.index("| way |") : told.index("| way | scans | p50, ms")])
+    assert tables[0] == tables[1]
 
 
 def test_no_run_sums_up_what_is_there(tmp_path, capsys):
