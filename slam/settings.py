@@ -90,6 +90,7 @@ class Settings:
     """
 
     presets: ClassVar[tuple[str, ...]] = ()  # names of class methods, each of which makes a tree
+    gone: ClassVar[Mapping[str, str]] = {}  # paths of before, and what is set in their place
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -126,7 +127,7 @@ class Settings:
         for given, value in changes.items():
             path = aliases.get(given, given)
             if path not in known:
-                raise UnknownNameError(_no_path(type(self).__name__, given, [*known, *aliases]))
+                raise UnknownNameError(_no_path(type(self), given, [*known, *aliases]))
             if known[path].about.fixed:
                 raise InvalidValueError(
                     f"{type(self).__name__}: '{path}' is fixed at {known[path].value}: a compiled "
@@ -172,7 +173,7 @@ class Settings:
         values: dict[str, Any] = {}
         for name, value in words.items():
             if name not in fields:
-                raise InvalidValueError(_no_path(cls.__name__, str(name), list(fields)))
+                raise InvalidValueError(_no_path(cls, str(name), list(fields)))
             group = _group(fields[name])
             values[name] = value if group is None else group.from_words(value)
         return cls(**values)
@@ -219,14 +220,16 @@ def _checked(name: str, value: Any, field: dataclasses.Field[Any], about: About)
     return int(value) if whole else float(value)
 
 
-def _no_path(owner: str, given: str, known: list[str]) -> str:
+def _no_path(owner: type[Settings], given: str, known: list[str]) -> str:
+    if given in owner.gone:
+        return f"{owner.__name__} has no '{given}' any more; set '{owner.gone[given]}'"
     near = difflib.get_close_matches(given, known, n=1, cutoff=0.5)
     if not near:  # the right name in another group
         last = given.rpartition(".")[2]
         near = [path for path in known if path.rpartition(".")[2] == last][:1]
     groups = dict.fromkeys(path.partition(".")[0] for path in known)
     hint = f" Did you mean '{near[0]}'?" if near else f" It has: {', '.join(groups)}."
-    return f"{owner} has no '{given}'.{hint}"
+    return f"{owner.__name__} has no '{given}'.{hint}"
 
 
 def _replaced(tree: S, nested: Mapping[str, Any]) -> S:

@@ -18,7 +18,7 @@ from scripts.comparison.sight import Sight
 from scripts.days.truth import Still, moved_since, still_things
 from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float
-from slam.tracker.tracking.verdict import OUTDATED
+from slam.tracker.belief.status import Status
 
 AGES = (1, 3, 10)  # sessions
 NEWS_S = 2.0  # after which the map has learnt what it saw
@@ -84,7 +84,7 @@ def verdicts(estimates: Sequence[Estimate], shares: Float, first: int) -> dict[s
     """From scan ``first`` on: how often "map outdated here" is said where the room clearly changed,
     and where it hardly did; None without such scans.
     """
-    said = np.array([e.diagnostics.get("verdict") == OUTDATED for e in estimates])[first:]
+    said = np.array([e.diagnostics.get("verdict") == Status.OUTDATED for e in estimates])[first:]
     shares = shares[first:]
     clearly, hardly = shares >= CLEARLY, shares < HARDLY
     return {

@@ -41,9 +41,8 @@ PARTS: Mapping[str, Mapping[str, float]] = {
     "what left is not looked for (`standing.left_s` 0)": {"standing.left_s": 0.0},
     "what came is not looked for (`standing.came_s` 0)": {"standing.came_s": 0.0},
     "odometry over seconds not asked (`standing.disagreed` 0)": {"standing.disagreed": 0.0},
-    "one pose (`standing.fallen` 0)": {"standing.fallen": 0.0},
-    "never in doubt (`freeze_below` 0)": {"freeze_below": 0.0},
-    "shoves not undone (`relocalise.least_near` 1e6)": {"tracking.relocalise.least_near": 1e6},
+    "never in doubt (`carried_per_h` 0)": {"carried_per_h": 0.0},
+    "slips not looked for (`relocalise.least_near` 1e6)": {"tracking.relocalise.least_near": 1e6},
 }
 
 

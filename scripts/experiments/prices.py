@@ -22,11 +22,12 @@ from slam.frames import Frame
 from slam.frontend.observations import observe
 from slam.frontend.odometry_prior import inverted
 from slam.shunting import ShuntingSlam
+from slam.tracker.belief.evidence import Evidence
+from slam.tracker.belief.places import coarse
 from slam.tracker.matching.budget import NS_PER_MS, Budget
 from slam.tracker.matching.coarse_map import CoarseMap
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.matching.whole_search import WholeSearch
-from slam.tracker.tracking.relocalise import coarse, support
 
 ENDLESS = 1e9  # share of a budget that is never spent
 
@@ -54,7 +55,7 @@ def work(slam: ShuntingSlam, frame: Frame) -> Iterator[tuple[str, float, float]]
         start = matcher.approach(slam.cell_map, seen, place, spread)
         middle = _now_ns()
         match = matcher.climb(slam.cell_map, seen, start, place, inverted(spread))
-        support(slam.cell_map, seen, match)
+        Evidence().add(slam.cell_map, seen, match.T_map_robot)
         yield "approach a place", middle - began, few * matching.budget.approach_ns
         price = len(seen.points_robot) * matching.budget.climb_ns
         yield "match there", _now_ns() - middle, price

@@ -37,7 +37,7 @@ VARIANTS: dict[str, Mapping[str, object]] = {
     "thin things judged": {"standing.thin_m": 0.0},
     "vague poses judge": {"standing.vague_m": 1000.0, "standing.sigmas": 0.0},
     "odometry not asked": {"standing.disagreed": 0.0},
-    "no second pose": {"standing.fallen": 0.0},
+    "never in doubt": {"carried_per_h": 0.0},
 }
 
 

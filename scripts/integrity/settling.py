@@ -22,7 +22,10 @@ CODE = (
     "slam", "scripts/integrity", "scripts/metrics", "scripts/experiments/kidnap.py",
     "scripts/experiments/honesty.py",
 )  # fmt: skip
-NOT_CODE = ("campaign.py", "tables.py")  # of ``scripts/integrity``: they only sum up
+NOT_CODE = (  # of ``scripts/integrity``: they only sum up, or fit
+    "campaign.py", "tables.py", "fit.py", "labelled.py", "sources.py", "weights.py",
+    "reliability.py", "belief_picture.py",
+)  # fmt: skip
 
 
 def path_of(case: Case, folder: Path) -> Path:

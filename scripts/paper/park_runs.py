@@ -19,7 +19,7 @@ from slam.replay import Track
 
 EVERY = 25  # scans between two looks at which landmarks there are
 SHUNTING: dict[str, Any] = {
-    "cell_m": 0.3, "range_m": 30.0, "freeze_below": 0.0, "reward": 1.5, "trace_s": 10.0,
+    "cell_m": 0.3, "range_m": 30.0, "carried_per_h": 0.0, "reward": 1.5, "trace_s": 10.0,
 }  # fmt: skip
 SYSTEMS: dict[str, tuple[str, dict[str, Any]]] = {
     "odometry": ("odometry", {}),

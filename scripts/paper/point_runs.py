@@ -23,7 +23,7 @@ from slam.shunting.featured import FeaturedShuntingSlam
 from slam.trajectory import Trajectory
 
 EVERY = 10  # steps between two looks at which landmarks there are
-SHUNTING: dict[str, Any] = {"cell_m": 0.01, "range_m": 12.5, "freeze_below": 0.0}
+SHUNTING: dict[str, Any] = {"cell_m": 0.01, "range_m": 12.5, "carried_per_h": 0.0}
 
 
 def told(frames: Sequence[Frame], static: set[int]) -> Iterator[EkfFilter]:

@@ -196,7 +196,7 @@ def _colours(report: Report, points: list[Frame]) -> None:
 
 def _overlap(report: Report, points: list[Frame]) -> None:
     """Fig. 5 from a real update: map before a frame, the frame's input, and what they share."""
-    slam = FeaturedShuntingSlam(cell_m=0.05, range_m=12.5, freeze_below=0.0)
+    slam = FeaturedShuntingSlam(cell_m=0.05, range_m=12.5, carried_per_h=0.0)
     slam.update(points[0].without_truth())
     for before, frame in pairwise(points):
         activity, given, corner = _about_nearest(slam, before, frame)

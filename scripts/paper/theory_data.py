@@ -19,7 +19,7 @@ from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.energy import energy
 from slam.shunting.map.network import Network, lateral_mu
 from slam.shunting.slam import ShuntingSlam
-from slam.tracker.cells import SIDE
+from slam.tracker.cells import SIDE, Look
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.rasterise import rasterise
 
@@ -110,7 +110,7 @@ def scaling(frame: Frame, rooms: Sequence[int], repeats: int = 15) -> Scaling:
         update, match, visited = [], [], 0
         for _ in range(repeats):
             start = time.process_time()
-            _, _, visited = _look(network, seen, np.zeros(3))
+            visited = _look(network, seen, np.zeros(3)).visited
             middle = time.process_time()
             matcher.climb(network, seen, np.array([0.02, 0.01, 0.01]), np.zeros(3), np.eye(3))
             update.append(middle - start)
@@ -136,7 +136,7 @@ def _place(k: int) -> Float:
     return np.array([x * PITCH_M, y * PITCH_M, 0.0])
 
 
-def _look(network: Network, seen: Observations, pose: Float) -> tuple[float, float, int]:
+def _look(network: Network, seen: Observations, pose: Float) -> Look:
     rasterise(network, seen, pose)
     T_map_laser = se2.compose(pose, seen.T_robot_laser)
     return network.integrate(seen.view, T_map_laser, EVERY_S, write=True)

@@ -143,7 +143,7 @@ def _loaded(folder: Path) -> Outcome:
     """A map to go on in."""
     config, state, arrays = memory.read(folder / "map.npz", ShuntingConfig)
     values = {name: array.tolist() for name, array in arrays.items()}
-    return config, state.T_map_robot.tolist(), state.usual, state.supports, values
+    return config, state.T_map_robot.tolist(), state.usual, values
 
 
 def _report(folder: Path) -> Outcome:

@@ -8,6 +8,7 @@ the share that was never taken. Chairs and doors make few of both, a wrong place
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -63,11 +64,6 @@ class Past:
         """Whether there is anything to agree with."""
         return bool((np.nan_to_num(self._standing) >= self.config.always).any())
 
-    def always_stands(self) -> tuple[NDArray[np.uint8], Float]:
-        """1 where something always stands, else 0, as an image; its corner (x, y) m in the map."""
-        always = (np.nan_to_num(self._standing) >= self.config.always).astype(np.uint8)
-        return always, np.asarray(self._low * self.cell_m, dtype=np.float64)
-
     def agreement(self, snapshot: Snapshot) -> Agreement:
         """Of what a session saw; on the same places."""
         config, standing = self.config, self._standing
@@ -102,21 +98,15 @@ class Trial:
     """A place where the session may have begun, and what it saw as seen from there."""
 
     def __init__(self, past: Past, T_map_own: Float) -> None:
-        evidence = replace(DaysConfig().evidence, cell_m=past.cell_m, least_looks=1, every_s=0.0)
+        every = replace(DaysConfig().evidence, cell_m=past.cell_m, least_looks=1, every_s=0.0)
         self._past, self._T_map_own = past, T_map_own
-        self._grid, self._taken = SessionGrid(evidence), 0
+        self._grid, self._taken = SessionGrid(every), 0
+        self._same_rad = past.config.slack * past.cell_m / every.range_m
 
     def is_at(self, T_map_own: Float) -> bool:
         """Whether that place is the same, as far as the slack of the comparison goes."""
         x, y, turn = se2.between(self._T_map_own, T_map_own).tolist()
-        config = self._past.config
-        return bool(x * x + y * y <= config.same_m**2 and abs(turn) <= config.same_rad)
-
-    def taken(self) -> Float:
-        """(n, 2) m in the session's own frame: where it found something."""
-        found = self._grid.snapshot(0.0)
-        cells = found.cells[found.standing >= self._past.config.stands]
-        return se2.transform(se2.inverse(self._T_map_own), (cells + 0.5) * self._past.cell_m)
+        return bool(math.hypot(x, y) <= self._past.cell_m and abs(turn) <= self._same_rad)
 
     def agreement(self, seen: Sequence[tuple[Frame, Float]]) -> Agreement:
         """Of scans and poses in the session's own frame; only those that were added are new."""

@@ -29,13 +29,11 @@ class SearchConfig(Settings):
     buffer: int = number(200, "scans", "kept to be merged when the place is found", low=1)
     buffer_m: float = number(0.1, "m", "driven between two of them, or buffer_rad")
     buffer_rad: float = number(0.15, "rad", "turned between two of them, or buffer_m")
-    agreed: float = number(
-        0.75, "share", "of the usual support that all kept scans need at the place found", high=1.0
+    asked: int = number(
+        20, "scans", "of those kept, evenly taken, that a place found late is asked for", low=1
     )
-    asked: int = number(20, "scans", "of those kept, evenly taken, that are asked", low=1)
-    said: float = number(0.5, "share", "least of those asked that must have a say", high=1.0)
-    in_view: float = number(
-        0.5, "trace", "of the known map in view, for each of the scan's weight: it has a say"
+    agreed: float = number(
+        0.75, "share", "of the usual match, in a map without days, of those asked", high=1.0
     )
     fits: float = number(0.5, "share", "of the scans after the find that must be tracked", high=1.0)
 
@@ -48,33 +46,11 @@ class AgreementConfig(Settings):
     stands: float = number(0.5, "share", "of a session's looks: something stands", high=1.0)
     empty: float = number(0.2, "share", "most of the looks, around it too: nothing", high=1.0)
     slack: int = number(2, "places", "that an edge may be off by", high=10)
-    same_m: float = number(0.1, "m", "starts nearer than this are one")
-    same_rad: float = number(0.03, "rad", "and turned by less than this")
     known: int = number(120, "places", "that always stand and were looked at: it has a say", low=1)
-    on_m: float = number(1.0, "m", "driven since the start before a place is accepted, or on_s")
-    on_s: float = number(8.0, "s", "since the start, if the robot stands")
-    accepts: float = number(0.05, "share", "that may disagree where the session began", high=1.0)
-    stood: float = number(0.02, "share", "the same after on_s, if it has not driven on_m", high=1.0)
-    denies: float = number(0.12, "share", "that disagrees: it did not begin there", high=1.0)
-    spoils: float = number(0.1, "share", "of a whole session: it is kept apart", high=1.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class AlikeConfig(Settings):
-    """Other places where a session would fit the days before as well."""
-
     more: float = number(
-        0.045, "share", "that disagrees there and not at the place found", high=1.0
+        0.045, "share", "that disagrees at any other place than where it began", high=1.0
     )
-    share: float = number(0.8, "ratio", "of nearness to what stands, to that of the place found")
-    near_m: float = number(0.3, "m", "from what always stands: not near")
-    step_deg: float = number(2.0, "deg", "between two angles that are tried", low=0.5, high=2.0)
-    apart_m: float = number(0.5, "m", "places nearer than this are one, if turned by apart_rad")
-    apart_rad: float = number(0.35, "rad", "or less")
-    asked: int = number(60, "places", "the best, that are refined", low=1)
-    most: int = number(6, "places", "that are asked for their agreement", low=1)
-    every_m: float = number(1.0, "m", "driven before it is asked again", low=0.0)
-    every_s: float = number(5.0, "s", "or so long", low=0.0)
+    spoils: float = number(0.1, "share", "of a whole session: it is kept apart", high=1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +105,6 @@ class DaysConfig(Settings):
     evidence: EvidenceConfig = field(default=EvidenceConfig())
     search: SearchConfig = field(default=SearchConfig())
     agreement: AgreementConfig = field(default=AgreementConfig())
-    alike: AlikeConfig = field(default=AlikeConfig())
     habit: HabitConfig = field(default=HabitConfig())
     change: ChangeConfig = field(default=ChangeConfig())
     news: NewsConfig = field(default=NewsConfig())

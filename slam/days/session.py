@@ -28,9 +28,9 @@ from slam.estimate import Changes, Estimate, Raster
 from slam.frames import Float, Frame, to_s
 from slam.path import PosePath
 from slam.tracker import map_file
+from slam.tracker.belief.places import coarse
+from slam.tracker.belief.status import Status
 from slam.tracker.tracker import Tracker
-from slam.tracker.tracking.relocalise import coarse
-from slam.tracker.tracking.verdict import OUTDATED, TRACKING
 from slam.trajectory import Trajectory
 
 _TRACKED = ("tracking", "relocated", "blind")
@@ -42,7 +42,6 @@ class SessionState:
 
     found_after_s   until the start was found; 0 in a new map, None: not found
     first_found     (3,) pose in the map at that scan; None before
-    denied          places that were found and denied by what else the session saw
     merged          scans of the search that were merged
     tracked         share of the scans after the find that were tracked
     disagrees       share of what it saw that does not fit the days before (``Agreement``)
@@ -51,7 +50,6 @@ class SessionState:
 
     found_after_s: float | None
     first_found: Float | None
-    denied: int
     merged: int
     tracked: float
     disagrees: float
@@ -115,7 +113,7 @@ class Session:
         self._searched = 0  # poses that are in the session's own frame
         self._found_after_s: float | None = 0.0 if self._new else None
         self._first_found: Float | None = np.zeros(3) if self._new else None
-        self._merged = self._denied = 0
+        self._merged = 0
         self._after = self._tracked = 0  # scans since it was found
         self._state, self._lost_s, self._gave_up = "", 0.0, False
         self._before_ns: int | None = None
@@ -132,7 +130,6 @@ class Session:
 
     def _look(self, search: StartSearch, frame: Frame) -> Estimate:
         estimate, place = search.take(frame)
-        self._denied = search.denied
         if place is not None:
             return self._begin(search, frame, place, estimate.T_map_robot)
         self._path.add(frame.stamp_ns, estimate.T_map_robot)
@@ -164,7 +161,7 @@ class Session:
         if self._before_ns is not None:
             elapsed = to_s(frame.stamp_ns - self._before_ns)
             self._lost_s = 0.0 if tracked else self._lost_s + elapsed
-            give_up_s = self.tracker.config.tracking.quality.give_up_s
+            give_up_s = self.tracker.config.tracking.give_up_s
             self._gave_up |= self._lost_s > give_up_s
         self._before_ns = frame.stamp_ns
         told = self._told_by(frame, estimate)
@@ -184,8 +181,8 @@ class Session:
             self._told = self._news.share(frame, estimate.T_map_robot)
             self._asked_ns = frame.stamp_ns
         found = {**estimate.diagnostics, "news": self._told}
-        if found.get("verdict") == TRACKING and self._told >= self.config.news.outdated:
-            found["verdict"] = OUTDATED
+        if found.get("verdict") == Status.TRACKING and self._told >= self.config.news.outdated:
+            found["verdict"] = Status.OUTDATED.value
         return replace(estimate, diagnostics=found)
 
     @property
@@ -200,7 +197,6 @@ class Session:
         return SessionState(
             found_after_s=self._found_after_s,
             first_found=self._first_found,
-            denied=self._denied,
             merged=self._merged,
             tracked=share,
             disagrees=agreement.disagrees,

@@ -21,7 +21,17 @@ from slam.frontend.visibility import View, block_is_hidden, seen_empty
 from slam.grid.config import OccupancyConfig
 from slam.system import Raster, register
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells, in_reach
+from slam.tracker.cells import (
+    ANEW,
+    FREE_COUNT,
+    MASK,
+    SHIFT,
+    SIDE,
+    Cells,
+    Look,
+    fresh,
+    in_reach,
+)  # fmt: skip
 from slam.tracker.tracker import Tracker
 from slam.tracker.two_memories import TwoMemories
 
@@ -64,16 +74,18 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
 
 
 @njit
-def integrate(  # noqa: C901, PLR0913 (kernel)
+def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
     cells: Cells, log_odds: NDArray[np.float32], view: View, T_map_laser: NDArray[np.float64],
-    cell: float, step: float, odds: Odds, write: bool,
-) -> tuple[float, float, int]:  # fmt: skip
+    cell: float, step: float, odds: Odds, known_s: float, write: bool, counted: NDArray[np.uint8],
+) -> Look:  # fmt: skip
     """Add one scan, ``step`` s after the last, to ``log_odds`` (S, 8, 8) by slot.
 
     ``cells.y`` becomes 2 p - 1 above 0, ``cells.age`` the s that a cell was
-    looked at. Returns confirmed and contradicted evidence and the cells visited, as the network.
+    looked at.
     """
     confirmed, contradicted, visited = 0.0, 0.0, 0
+    known, through = 0.0, 0.0
+    once = counted.shape[1] > 0
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
@@ -92,27 +104,30 @@ def integrate(  # noqa: C901, PLR0913 (kernel)
             for jj in range(SIDE):
                 for ii in range(SIDE):
                     given = cells.impression[scratch, jj, ii] if scratch >= 0 else np.float32(0.0)
-                    y = cells.y[slot, jj, ii]
+                    y, age = cells.y[slot, jj, ii], cells.age[slot, jj, ii]
+                    weight = y * age / (age + known_s)
                     if given == 0.0:
                         px = (i0 + ii + 0.5) * cell - ox
                         py = (j0 + jj + 0.5) * cell - oy
                         if not seen_empty(view, c * px + s * py, c * py - s * px):
                             continue
                         contradicted += y
+                        through += fresh(counted, once, 1, slot, jj, ii, weight)
                         more = odds.miss
                     else:
                         confirmed += y * given
+                        known += fresh(counted, once, 0, slot, jj, ii, weight * given)
                         if given < odds.struck:
                             continue
                         more = odds.hit
                     visited += 1
                     if write:
-                        known = float(log_odds[slot, jj, ii]) + more
-                        known = min(max(known, -odds.most), odds.most)
-                        log_odds[slot, jj, ii] = known
+                        now = float(log_odds[slot, jj, ii]) + more
+                        now = min(max(now, -odds.most), odds.most)
+                        log_odds[slot, jj, ii] = now
                         cells.age[slot, jj, ii] += step
-                        cells.y[slot, jj, ii] = max(math.tanh(0.5 * known), 0.0)
-    return confirmed, contradicted, visited
+                        cells.y[slot, jj, ii] = max(math.tanh(0.5 * now), 0.0)
+    return Look(confirmed, contradicted, visited, known * cell, through * cell)
 
 
 @njit
@@ -168,8 +183,14 @@ class Grid(CellMap):
         self.cells.age[slot] = np.ceil(looks) * self.config.map.resumed_look_s
 
     def integrate(
-        self, view: View, T_map_laser: Float, step: float, *, write: bool
-    ) -> tuple[float, float, int]:
+        self,
+        view: View,
+        T_map_laser: Float,
+        step: float,
+        *,
+        write: bool,
+        counted: NDArray[np.uint8] = ANEW,
+    ) -> Look:
         """As ``CellMap.integrate``; a grid counts scans, but keeps for how long it has looked."""
         if write:
             reach = view.farthest
@@ -178,8 +199,9 @@ class Grid(CellMap):
             while not _open(self.cells, view, T_map_laser, self.cell):
                 self.grow()
         result = integrate(
-            self.cells, self.log_odds, view, T_map_laser, self.cell, step, self._odds, write
-        )
+            self.cells, self.log_odds, view, T_map_laser, self.cell, step, self._odds,
+            self.config.map.known_s, write, counted,
+        )  # fmt: skip
         if write:
             self.release()
         return result

@@ -116,7 +116,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
         return super()._first(frame)
 
     def _match(
-        self, observations: Observations, prediction: Prediction, wake: CellMap | None = None
+        self, observations: Observations, prediction: Prediction, cell_map: CellMap
     ) -> Match:
         step = min(max(prediction.elapsed, 1e-3), self.config.map.longest_look_s)
         self._steps_s.append(step)
@@ -126,7 +126,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
             self._first_counts_s = 0.0
         agreed = self._agreed(observations, prediction)
         if int(agreed.accepted.sum()) < self.config.features.enough_pairs:
-            return super()._match(observations, prediction, wake)
+            return super()._match(observations, prediction, cell_map)
         pulling = dataclasses.replace(observations, weights=agreed.accepted.astype(np.float64))
         if self.config.objective == "log":
             return self._climbed(pulling, agreed, prediction)

@@ -18,7 +18,16 @@ from numpy.typing import NDArray
 from slam.errors import InvalidValueError
 from slam.estimate import SQUARE, MapSquares
 from slam.frontend.visibility import View
-from slam.tracker.cells import SIDE, Cells, forget_impressions, living, no_cells, with_room
+from slam.tracker.cells import (
+    ANEW,
+    SIDE,
+    Cells,
+    Look,
+    forget_impressions,
+    living,
+    no_cells,
+    with_room,
+)  # fmt: skip
 from slam.tracker.config import TrackerConfig
 from slam.tracker.windows import dense
 
@@ -99,12 +108,17 @@ class CellMap(abc.ABC):
 
     @abc.abstractmethod
     def integrate(
-        self, view: View, T_map_laser: NDArray[np.float64], step: float, *, write: bool
-    ) -> tuple[float, float, int]:
+        self,
+        view: View,
+        T_map_laser: NDArray[np.float64],
+        step: float,
+        *,
+        write: bool,
+        counted: NDArray[np.uint8] = ANEW,
+    ) -> Look:
         """Take the present impressions in for ``step`` s; ``write`` False only looks.
 
-        Returns the map confirmed by the present scan, that contradicted by it (sums over cells),
-        and the number of cells visited.
+        ``counted``: (2, S, 8, 8) as of ``cells.uncounted``; by default each look counts anew.
         """
 
     def window(

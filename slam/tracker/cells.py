@@ -54,6 +54,46 @@ class Cells(NamedTuple):
     counts: NDArray[np.int64]
 
 
+class Look(NamedTuple):
+    """What one scan says of the map in view, by sums over its cells.
+
+    confirmed     trace that it confirms; ``contradicted``: that it sees through
+    visited       cells that it says something of
+    known         m of long-known surface that it confirms; ``through``: that it sees through. A
+                  trace y that was looked at for ``age`` s counts y age / (age + known_s), and one
+                  that was ``counted`` before counts by what is more of it now
+    """
+
+    confirmed: float
+    contradicted: float
+    visited: int
+    known: float
+    through: float
+
+
+ANEW = np.zeros((2, 0, SIDE, SIDE), np.uint8)  # nothing was counted, and nothing is kept of it
+_WHOLE = 255.0  # of a cell that is counted
+
+
+def uncounted(cells: Cells) -> NDArray[np.uint8]:
+    """(2, S, 8, 8) what was counted of each cell as known and as seen through: nothing so far."""
+    return np.zeros((2, len(cells.free), SIDE, SIDE), np.uint8)
+
+
+@inner
+def fresh(  # noqa: PLR0913 (kernel)
+    counted: NDArray[np.uint8], once: bool, kind: int, slot: int, j: int, i: int, weight: float
+) -> float:
+    """What of a weight in [0, 1] was not counted before; it is now."""
+    if not once:
+        return weight
+    now, before = np.uint8(_WHOLE * weight + 0.5), counted[kind, slot, j, i]
+    if now <= before:
+        return 0.0
+    counted[kind, slot, j, i] = now
+    return (float(now) - float(before)) / _WHOLE
+
+
 def no_cells() -> Cells:
     """A plane on which nothing lives yet."""
     shape = (_FIRST_SLOTS, SIDE, SIDE)

@@ -17,6 +17,7 @@ from slam.frontend.corner_config import CornerConfig
 from slam.frontend.range_error_config import RangeErrorConfig
 from slam.landmarks.hypotheses import Gates
 from slam.settings import Settings, number, word
+from slam.tracker.belief.config import BeliefConfig
 from slam.tracker.map_config import MapConfig
 from slam.tracker.matching.config import MatchingConfig
 from slam.tracker.standing.config import ALL_VOTE, StandingConfig
@@ -55,6 +56,11 @@ class TrackerConfig(Settings):
     """
 
     presets: ClassVar[tuple[str, ...]] = ("robust", "paper")
+    gone: ClassVar[Mapping[str, str]] = {
+        "freeze_below": "carried_per_h",
+        "tracking.freeze_below": "carried_per_h",
+        "tracking.quality.give_up_s": "tracking.give_up_s",
+    }
 
     cell_m: float = number(
         0.03, "m", "edge of a neuron's square. 0.05: twice as fast; 0.10: error three times",
@@ -103,15 +109,15 @@ class TrackerConfig(Settings):
         40.0, "m", "returns beyond are ignored. 8 errs by 70 % more in rooms", SEEDS,
         low=0.5, high=1000.0, alias="frontend.range_m",
     )  # fmt: skip
-    freeze_below: float = number(
-        0.6, "share", "of the usual match: below it, and with the map in view contradicted, nothing"
-        " is written; 0: never. Flat between 0 and 0.8 where nobody moves the robot", SEEDS,
-        high=1.0, alias="tracking.freeze_below",
+    carried_per_h: float = number(
+        3.0, "1/h", "how often somebody carries the robot elsewhere, odometry unknowing; 0: never, "
+        "and no pose is doubted", alias="belief.carried_per_h",
     )  # fmt: skip
     frontend: FrontendConfig = field(default=FrontendConfig())
     map: MapConfig = field(default=MapConfig())
     matching: MatchingConfig = field(default=MatchingConfig())
     tracking: TrackingConfig = field(default=TrackingConfig())
+    belief: BeliefConfig = field(default=BeliefConfig())
     loops: LoopsConfig = field(default=LoopsConfig())
     uncertainty: UncertaintyConfig = field(default=UncertaintyConfig())
     features: FeaturesConfig = field(default=FeaturesConfig())
@@ -152,7 +158,7 @@ class TrackerConfig(Settings):
             "reward": 0.3,
             "reward_exponent": 0.0,
             "objective": "log",
-            "freeze_below": 0.0,
+            "carried_per_h": 0.0,
             "standing": ALL_VOTE,
             "loops": LoopsConfig(corrects=0),
         }

@@ -37,6 +37,10 @@ class MapConfig(Settings):
         0.2, "s", "the first frame on a loaded map acts so long", low=1e-3
     )
     longest_look_s: float = number(3.0, "s", "longest that one frame acts", low=1e-3)
+    known_s: float = number(
+        5.0, "s", "of looking after which half of a trace is long known: evidence of where one is",
+        low=1e-3,
+    )  # fmt: skip
     beside_cells: int = number(
         2, "cells", "a surface displaced by less is no change", low=0, high=64
     )

@@ -33,9 +33,11 @@ from slam.frames import Float
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import FREE_COUNT, SIDE, living
 from slam.tracker.config import TrackerConfig
+from slam.tracker.former import updated
 
 FORMAT, VERSION = "mobilia shunting memory", 2
 PLAIN = 1  # version of a map without extra arrays
+FORMER = ("supports", "tracked_s", "tracked")  # of a state, no longer asked
 Config = TypeVar("Config", bound=TrackerConfig)
 _ARRAYS = ("places", "x", "y", "age", "facing")
 _WORDS = {"format", "version", "config", "config_sha256", "state", "sha256"}
@@ -57,17 +59,13 @@ class State:
 
     kind         which SLAM wrote the map: "ShuntingSlam", "OccupancySlam", ...
     T_map_robot  (3,) where the robot was, and its (3, 3) covariance
-    usual        latest matched fractions; ``supports`` the same times the confirmed map
-    tracked_s    s of tracking on this map, and in how many scans
+    usual        latest matched fractions
     """
 
     kind: str
     T_map_robot: Float
     covariance: Float
     usual: tuple[float, ...]
-    supports: tuple[float, ...]
-    tracked_s: float
-    tracked: int
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_map_robot", pose("State", "T_map_robot", self.T_map_robot))
@@ -78,14 +76,10 @@ class State:
             raise InvalidValueError(f"State.T_map_robot must lie within {MOST_POSE:g} m and rad")
         if self.covariance.max() > MOST_POSE**2:
             raise InvalidValueError(f"State.covariance must lie within {MOST_POSE:g}^2")
-        for name in ("usual", "supports"):
-            values = getattr(self, name)
-            if not isinstance(values, (list, tuple)) or len(values) > MOST_VALUES:
-                raise InvalidValueError(f"State.{name} must be up to {MOST_VALUES} numbers")
-            for value in values:
-                _positive(name, value, (int, float))
-        _positive("tracked_s", self.tracked_s, (int, float))
-        _positive("tracked", self.tracked, (int,))
+        if not isinstance(self.usual, (list, tuple)) or len(self.usual) > MOST_VALUES:
+            raise InvalidValueError(f"State.usual must be up to {MOST_VALUES} numbers")
+        for value in self.usual:
+            _positive("usual", value, (int, float))
 
 
 def _positive(name: str, value: object, kinds: tuple[type, ...]) -> None:
@@ -157,7 +151,7 @@ def read(path: Path, kind: type[Config]) -> tuple[Config, State, dict[str, NDArr
     """
     header, state, arrays = _whole(path)
     try:
-        config = kind.from_words(header["config"])
+        config = kind.from_words(updated(header["config"]))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise LogFormatError(path, f"damaged {FORMAT}: {error}") from error
     return config, state, arrays
@@ -172,7 +166,8 @@ def _whole(path: Path) -> tuple[dict[str, Any], State, dict[str, NDArray[Any]]]:
     elif header["sha256"] != _sum(header, arrays):
         raise LogFormatError(path, f"damaged {FORMAT}: its content is not what was written")
     try:
-        state = State(**header["state"])
+        words = header["state"].items()
+        state = State(**{name: value for name, value in words if name not in FORMER})
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise LogFormatError(path, f"damaged {FORMAT}: {error}") from error
     _check_ages(path, arrays["age"], state.kind)

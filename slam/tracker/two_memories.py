@@ -17,7 +17,17 @@ from slam._jit import inner, njit
 from slam.frontend.surfaces import opposite
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, Cells, in_reach
+from slam.tracker.cells import (
+    ANEW,
+    FREE_COUNT,
+    MASK,
+    SHIFT,
+    SIDE,
+    Cells,
+    Look,
+    fresh,
+    in_reach,
+)  # fmt: skip
 
 
 class Law(NamedTuple):
@@ -33,6 +43,7 @@ class Law(NamedTuple):
     reach       r0, cells
     trace       whether a long-term trace is kept
     faded       a trace below ends where the input is below ``unseen``
+    known_s     s of looking after which half of a trace counts as long known
     """
 
     step: float
@@ -46,6 +57,7 @@ class Law(NamedTuple):
     trace: bool
     faded: float
     unseen: float
+    known_s: float
 
 
 @inner
@@ -67,16 +79,23 @@ def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
 
 
 @njit
-def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
-    cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float, law: Law, write: bool
-) -> tuple[float, float, int]:
+def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
+    cells: Cells,
+    view: View,
+    T_map_laser: NDArray[np.float64],
+    cell: float,
+    law: Law,
+    write: bool,
+    counted: NDArray[np.uint8],
+) -> Look:
     """One semi-implicit Gauss-Seidel sweep of Eq. (8) over the neurons in view.
 
-    Returns the long-term trace confirmed by the present scan, that contradicted by it (its sums
-    over neurons) and the number of neurons visited. ``write`` False only looks. Impressions are
-    consumed (their scratch is released) when written.
+    ``write`` False only looks. Impressions are consumed (their scratch is released) when written.
+    ``counted``: see ``cells.Look``.
     """
     confirmed, contradicted, visited = 0.0, 0.0, 0
+    known, through = 0.0, 0.0
+    once = counted.shape[1] > 0
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
@@ -111,8 +130,16 @@ def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
                             alive = True
                             continue
                         contradicted += y
+                        weight = (
+                            y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
+                        )
+                        through += fresh(counted, once, 1, slot, jj, ii, weight)
                     elif not behind:
                         confirmed += y * given
+                        weight = (
+                            y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
+                        )
+                        known += fresh(counted, once, 0, slot, jj, ii, weight * given)
                     visited += 1
                     if not write:
                         continue
@@ -141,7 +168,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
                 cells.directory[row, column] = -1
                 cells.free[cells.counts[FREE_COUNT]] = slot
                 cells.counts[FREE_COUNT] += 1
-    return confirmed, contradicted, visited
+    return Look(confirmed, contradicted, visited, known * cell, through * cell)
 
 
 class TwoMemories(CellMap):
@@ -168,13 +195,21 @@ class TwoMemories(CellMap):
             trace=self.config.trace_s > 0.0,
             faded=numbers.faded,
             unseen=numbers.unseen,
+            known_s=numbers.known_s,
         )
 
     def integrate(
-        self, view: View, T_map_laser: NDArray[np.float64], step: float, *, write: bool
-    ) -> tuple[float, float, int]:
+        self,
+        view: View,
+        T_map_laser: NDArray[np.float64],
+        step: float,
+        *,
+        write: bool,
+        counted: NDArray[np.uint8] = ANEW,
+    ) -> Look:
         """Take the present impressions in for ``step`` s; see the kernel of the same name."""
-        result = integrate(self.cells, view, T_map_laser, self.cell, self.law(step), write)
+        law = self.law(step)
+        result = integrate(self.cells, view, T_map_laser, self.cell, law, write, counted)
         if write:
             self.release()
         return result

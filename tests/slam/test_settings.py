@@ -146,6 +146,7 @@ STAY = {
     "frontend/surfaces.py": "layout of a byte; AWAY, from the tree",
     "shunting/featured.py": "PAPER_REWARD, which makes a preset",
     "shunting/map/peaks.py": "capacity of the list of peaks",
+    "tracker/belief/posterior.py": "a unit; guards against logarithms of nothing",
     "tracker/cell_map.py": "bounds of the directory's memory",
     "tracker/cells.py": "layout: a block is 8 x 8; how fast arrays grow",
     "tracker/map_file.py": "version of the file, and what a file may claim",
@@ -155,10 +156,10 @@ STAY = {
     "tracker/matching/global_search.py": "how the work is laid out; no result depends on it",
     "tracker/matching/local_search.py": "how the work is laid out; integers of a field in bytes",
     "tracker/matching/planes.py": "how the work is laid out; places in an array",
+    "tracker/matching/usual.py": "a guard against division by zero",
     "tracker/matching/whole_search.py": "how the work is laid out; no result depends on it",
     "tracker/standing/recent.py": "an empty array",
     "tracker/tracking/closures.py": "what a piece of work counts, in units of loops.work",
-    "tracker/tracking/quality.py": "a guard against division by zero",
     "tracker/uncertainty/residuals.py": "places in an array",
 }
 

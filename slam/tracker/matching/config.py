@@ -38,6 +38,21 @@ class ClimbConfig(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class UsualConfig(Settings):
+    """Which scans match worse than usual: those are worth a search, and the map is asked."""
+
+    remembered: int = number(50, "scans", "whose median matched share is usual", low=1, high=MANY)
+    odd: float = number(0.7, "share", "of the usual match: with less, the map is asked", high=1.0)
+    fallen: float = number(
+        0.8, "share", "of the usual reward: with less, the map is asked", high=1.0
+    )
+    fallen_s: float = number(1.0, "s", "memory of the usual reward", low=1e-3)
+    outvoted: float = number(
+        0.75, "vote", "mean vote from which on a reward that fell means nothing", high=1.0
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class LocalConfig(Settings):
     """Branch and bound in a window around the prediction."""
 
@@ -96,6 +111,7 @@ class BudgetConfig(Settings):
     climb_ns: float = number(
         4500.0, "ns", "to match a point at one hypothesis and to weigh it", PRICE, low=1.0
     )
+    weigh_ns: float = number(1500.0, "ns", "to weigh a point of a kept scan there", PRICE, low=1.0)
     approach_ns: float = number(
         20_000.0,
         "ns",
@@ -134,6 +150,7 @@ class MatchingConfig(Settings):
     )
     tail_cells: float = number(3.0, "cells", "least distance at which it ends", low=1.0, high=16.0)
     climb: ClimbConfig = field(default=ClimbConfig())
+    usual: UsualConfig = field(default=UsualConfig())
     local: LocalConfig = field(default=LocalConfig())
     whole: GlobalConfig = field(default=GlobalConfig())
     budget: BudgetConfig = field(default=BudgetConfig())

@@ -59,31 +59,6 @@ class StandingConfig(Settings):
     doubtful_m: float = number(
         0.15, "m", "deviation by being dragged: not converged; 0: never", SEEDS
     )
-    fallen: float = number(
-        0.8, "share", "of the usual reward: with less, a second pose is looked for; 0: never",
-        SEEDS, high=1.0,
-    )  # fmt: skip
-    fallen_s: float = number(1.0, "s", "memory of the usual reward", SEEDS, low=1e-3)
-    outvoted: float = number(
-        0.75, "vote", "mean vote from which on nothing speaks for a slip", SEEDS, high=1.0
-    )
-    rival_m: float = number(0.6, "m", "farthest that a second pose is looked for", SEEDS, high=5.0)
-    rival_rad: float = number(
-        0.5, "rad", "farthest turn that a second pose is looked for", SEEDS, low=1e-3, high=1.6
-    )
-    rival_points: int = number(
-        60, "points", "about so many are used to look for a second pose", SEEDS, low=1, high=100_000
-    )
-    explains: float = number(
-        0.5, "share", "of the usual reward, at least, for a second pose", SEEDS, high=1.0
-    )
-    better: float = number(
-        1.7, "ratio", "trace that a scan confirms from a second pose over the first", SEEDS, low=1.0
-    )
-    rival_gain: float = number(0.1, "overlap", "least gain of a new second pose", SEEDS)
-    rival_scans: int = number(3, "scans", "at least, that a second pose is ahead", SEEDS, low=1)
-    rival_s: float = number(0.4, "s", "at least, that a second pose is ahead", SEEDS)
-    undecided_s: float = number(2.0, "s", "then the first pose stays", SEEDS)
 
 
-ALL_VOTE = StandingConfig(settled_s=0.0, disagreed=0.0, fallen=0.0)  # every return; one pose
+ALL_VOTE = StandingConfig(settled_s=0.0, disagreed=0.0)  # every return

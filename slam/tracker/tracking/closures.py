@@ -15,15 +15,17 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Float
+from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import inverted
 from slam.posegraph import Edge
+from slam.tracker.belief.evidence import Evidence
+from slam.tracker.belief.places import coarse, spread
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.global_search import coarse_field, places
 from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracking.keys import KeyFrame
-from slam.tracker.tracking.relocalise import coarse, spread, support
 
 # What things cost, in units of drawing one key frame; measured on a log of 5 cm and 180 beams.
 DRAWN = 1  # the unit
@@ -36,6 +38,17 @@ def draw(cell_map: CellMap, key: KeyFrame, pose: Float, look_s: float) -> None:
     rasterise(cell_map, key.observations, pose)
     T_map_laser = se2.compose(pose, key.observations.T_robot_laser)
     cell_map.integrate(key.observations.view, T_map_laser, look_s, write=True)
+
+
+def support(cell_map: CellMap, observations: Observations, match: Match) -> float:
+    """Matched share of the observations times the share of the trace in view that they confirm.
+
+    The second factor distinguishes a corridor from the room beside it: there the beams pass where
+    walls are known to be.
+    """
+    look = Evidence().add(cell_map, observations, match.T_map_robot)
+    total = look.confirmed + look.contradicted
+    return match.matched * look.confirmed / total if total > 0.0 else 0.0
 
 
 class Closures:

@@ -11,8 +11,8 @@ import numpy as np
 from slam import se2
 from slam.frames import Float
 from slam.frontend.observations import Observations
+from slam.tracker.belief.places import spread
 from slam.tracker.tracking.config import LoopsConfig
-from slam.tracker.tracking.relocalise import spread
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -21,6 +21,7 @@ from slam import se2
 from slam.frames import Float
 from slam.frontend.odometry_prior import inverted
 from slam.posegraph import Edge, Relaxation, carried, least_moved, relative
+from slam.tracker.belief.places import coarse
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Matcher
@@ -28,7 +29,6 @@ from slam.tracker.tracking.closures import DRAWN, Closures
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.passages import Passages
 from slam.tracker.tracking.redraw import Correction, Redrawing
-from slam.tracker.tracking.relocalise import coarse
 
 _log = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from scripts.days.lifelong import COLUMNS
 from scripts.experiments import lifelong_bars
 from scripts.experiments.lifelong_bars import changes_line, read, summary
 from slam.errors import LogFormatError
-from slam.tracker.tracking.verdict import OUTDATED, TRACKING
+from slam.tracker.belief.status import Status
 
 
 def test_an_age_counts_sessions_back_and_a_session_that_lay_apart_makes_it_older():
@@ -25,7 +25,8 @@ def test_an_age_counts_sessions_back_and_a_session_that_lay_apart_makes_it_older
 
 
 def test_the_verdict_is_asked_where_the_room_clearly_changed_and_where_it_did_not():
-    said = [OUTDATED, OUTDATED, TRACKING, OUTDATED, TRACKING]
+    outdated, tracking = Status.OUTDATED.value, Status.TRACKING.value
+    said = [outdated, outdated, tracking, outdated, tracking]
     estimates = [SimpleNamespace(diagnostics={"verdict": word}) for word in said]
     shares = np.array([0.9, 0.2, 0.3, 0.0, 0.0])
     assert verdicts(estimates, shares, 1) == {"outdated_told": 0.5, "outdated_false": 0.5}

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from scripts.experiments.verdict import Seen
+from scripts.experiments.verdict import Seen, area
 from scripts.experiments.verdict_tracks import (
     AFTER_S,
     CHANGES,
@@ -72,3 +72,9 @@ def test_pushes_come_when_a_map_is_there_and_the_end_is_not_near():
     assert ((far >= PUSH_M[0]) & (far <= PUSH_M[1])).all()
     again = moments(frames, 10, seed=3)  # type: ignore[arg-type]
     assert all(np.array_equal(a[1], b[1]) for a, b in zip(found, again, strict=True))
+
+
+def test_the_area_under_a_roc_counts_pairs_and_ties_half():
+    assert area(np.array([0.9, 0.8]), np.array([0.1, 0.2])) == 1.0
+    assert area(np.array([0.1, 0.5]), np.array([0.5, 0.1])) == 0.5
+    assert area(np.array([0.1]), np.array([0.9])) == 0.0

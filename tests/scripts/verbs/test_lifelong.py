@@ -73,7 +73,9 @@ def test_a_small_building_is_lived_in(called, tmp_path):
     out = tmp_path / "life"
     words = "--sessions 2 --seconds 12 --first-seconds 30 --change 0.2 --motion 0"
     slams = "shunting,odometry"
-    ended = called("lifelong", "--scene", "arena", "--slam", slams, *words.split(), "--out", out)
+    ended = called(
+        "lifelong", "--scene", "apartment", "--slam", slams, *words.split(), "--out", out
+    )
     assert ended.returncode == 0, ended.stderr
     rows = list(csv.DictReader((out / "lifelong.csv").read_text().splitlines()))
     assert [(r["slam"], r["session"]) for r in rows] == [

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slam.days.config import AgreementConfig, AlikeConfig, DaysConfig
+from slam.days.config import AgreementConfig, DaysConfig
 from slam.days.evidence import Snapshot
 from slam.days.history import DAY_S, History
 from slam.days.mobility import DaysRaster
@@ -117,32 +117,31 @@ def test_a_session_elsewhere_leaves_the_map_byte_for_byte_and_lies_apart(first, 
     assert read_history(apart) is None
 
 
-def other_days(first, config=None):
+def other_days(first, *, found):
     """A session in the map, whose days before saw every wall 0.9 m beside where the map has it."""
     history = read_history(first[0])
     (seen,) = history.sessions
     moved = Snapshot(time_s=NINE, cells=seen.cells + np.int32([9, 6]), standing=seen.standing)
     past = History(cell_m=history.cell_m, sessions=(moved,))
-    tracker = ShuntingSlam.load(first[0])
-    session = Session(tracker, time_s=DAY_S, history=past, found=False, config=config)
+    session = Session(ShuntingSlam.load(first[0]), time_s=DAY_S, history=past, found=found)
     driven(session, HOME, Drive((1.0, 0.6, 2.6), ((0.2, 0.4, 12.0),)), seed=9)
     return session
 
 
 def test_a_start_that_the_days_before_deny_is_not_found(first) -> None:
-    state = other_days(first).state
-    assert state.found_after_s is None
-    assert state.denied > 0
+    """However sure the map alone would be."""
+    session = other_days(first, found=False)
+    assert session.state.found_after_s is None
+    search = session._search
+    assert search is not None
+    assert max(start.probability for start in search.starts()) > 0.99
 
 
 def test_a_session_that_the_days_before_deny_lies_apart(first) -> None:
-    """Wherever it was found, and however well it was tracked there."""
-    lenient = AgreementConfig(accepts=1.0, denies=1.0, stood=1.0)
-    alone = AlikeConfig(share=100.0)  # nowhere else fits so well
-    state = other_days(first, DaysConfig(agreement=lenient, alike=alone)).state
-    assert state.found_after_s is not None
-    assert state.tracked > 0.9
-    assert state.disagrees > lenient.spoils
+    """Though it was tracked in the map."""
+    state = other_days(first, found=True).state
+    assert state.tracked > DaysConfig().search.fits
+    assert state.disagrees > AgreementConfig().spoils
     assert not state.fits
 
 

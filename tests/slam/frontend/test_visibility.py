@@ -35,9 +35,9 @@ def seen_from(pose: Array, n_beams: int) -> Observations:
 def look(network: Network, seen: Observations, pose: Array, *, write: bool) -> tuple[float, float]:
     rasterise(network, seen, pose)
     T_map_laser = se2.compose(pose, seen.T_robot_laser)
-    confirmed, contradicted, _ = network.integrate(seen.view, T_map_laser, 0.2, write=write)
+    look = network.integrate(seen.view, T_map_laser, 0.2, write=write)
     network.release()
-    return confirmed, contradicted
+    return look.confirmed, look.contradicted
 
 
 @pytest.mark.parametrize("n_beams", [181, 361])
@@ -123,8 +123,8 @@ def test_the_cost_is_that_of_the_neurons_in_view() -> None:
     network = Network(CONFIG)
     look(network, seen_from(np.zeros(3), 361), np.zeros(3), write=True)
     near = from_scan(scan_of(np.full(361, 0.6)), np.zeros(3), CONFIG)
-    _, _, visited = network.integrate(near.view, near.T_robot_laser, 0.2, write=False)
+    visited = network.integrate(near.view, near.T_robot_laser, 0.2, write=False).visited
     seen = seen_from(np.zeros(3), 361)
-    _, _, whole = network.integrate(seen.view, seen.T_robot_laser, 0.2, write=False)
+    whole = network.integrate(seen.view, seen.T_robot_laser, 0.2, write=False).visited
     assert visited == 0
     assert whole > 0

@@ -81,7 +81,7 @@ def rmse(world: PointWorldConfig, seed: int, cell_m: float) -> float:
     frames = list(PointWorld(world, seed=seed).stream())
     track = Track(
         name="",
-        system=create("shunting-features", cell_m=cell_m, range_m=12.5, freeze_below=0.0),
+        system=create("shunting-features", cell_m=cell_m, range_m=12.5, carried_per_h=0.0),
     )
     for frame in frames:
         track.take(frame.without_truth())
@@ -117,8 +117,8 @@ class Seen(FeaturedShuntingSlam):
 
     matches: list[Match]
 
-    def _match(self, observations, prediction):
-        match = super()._match(observations, prediction)
+    def _match(self, observations, prediction, cell_map):
+        match = super()._match(observations, prediction, cell_map)
         self.matches.append(match)
         return match
 
@@ -129,7 +129,7 @@ def test_a_match_informs_by_what_the_covariances_of_points_say():
     points = np.array([[4.0, 1.0], [1.0, -5.0], [-3.0, 2.0]])
     covariances = np.repeat(sd**2 * np.eye(2)[None], 3, axis=0)
     # without the short-term activity, whose bell is flatter on top, so looks wider
-    system = Seen(cell_m=cell, range_m=12.5, freeze_below=0.0, short_term_weight=0.0)
+    system = Seen(cell_m=cell, range_m=12.5, carried_per_h=0.0, short_term_weight=0.0)
     system.matches = []
     for k in range(2):
         stamp_ns = k * 10**9
@@ -149,7 +149,7 @@ def test_a_match_informs_by_what_the_covariances_of_points_say():
 def test_odometry_is_never_trusted_more_than_it_states_beside_points():
     """What points get wrong stays the same from frame to frame, so odometry looks too good."""
     frames = list(PointWorld(PointWorldConfig(n_steps=80), seed=1).stream())
-    system = FeaturedShuntingSlam(cell_m=0.01, range_m=12.5, freeze_below=0.0)
+    system = FeaturedShuntingSlam(cell_m=0.01, range_m=12.5, carried_per_h=0.0)
     for frame in frames:
         system.update(frame.without_truth())
         assert (system._odometry_noise.scales >= 1.0).all()
@@ -189,7 +189,7 @@ def test_a_look_is_a_look_at_any_rate(every_s):
     """The first frame acts for a second, and none for more than three; each is one look."""
     points = np.array([[4.0, 1.0], [1.0, -5.0], [-3.0, 2.0]])
     covariances = np.repeat(0.02**2 * np.eye(2)[None], 3, axis=0)
-    system = Counting(cell_m=0.02, range_m=12.5, freeze_below=0.0, short_term_weight=0.0)
+    system = Counting(cell_m=0.02, range_m=12.5, carried_per_h=0.0, short_term_weight=0.0)
     for k in range(4):
         stamp_ns = round(k * every_s * 1e9)
         features = Features(stamp_ns=stamp_ns, points_robot=points, covariances=covariances)
@@ -215,7 +215,7 @@ def test_it_is_as_sure_on_points_as_it_may_be():
     values = []
     for seed in range(4):
         frames = list(PointWorld(PointWorldConfig(n_steps=120), seed=seed).stream())
-        system = FeaturedShuntingSlam(cell_m=0.01, range_m=12.5, freeze_below=0.0)
+        system = FeaturedShuntingSlam(cell_m=0.01, range_m=12.5, carried_per_h=0.0)
         T_first_world = se2.inverse(frames[0].truth)
         for k, frame in enumerate(frames):
             estimate = system.update(frame.without_truth())

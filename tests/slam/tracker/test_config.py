@@ -5,23 +5,24 @@ from __future__ import annotations
 
 import pytest
 
+from slam.errors import UnknownNameError
 from slam.grid.config import OccupancyConfig
 from slam.shunting.config import ShuntingConfig
 from slam.tracker.config import TrackerConfig
 
 TOP = [
     "cell_m", "decay_per_s", "lateral_sum", "lateral_reach_cells", "threshold", "trace_s",
-    "short_term_weight", "reward", "reward_exponent", "objective", "range_m", "freeze_below",
-    "frontend", "map", "matching", "tracking", "loops", "uncertainty", "features", "standing",
-    "range_error",
+    "short_term_weight", "reward", "reward_exponent", "objective", "range_m", "carried_per_h",
+    "frontend", "map", "matching", "tracking", "belief", "loops", "uncertainty", "features",
+    "standing", "range_error",
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("9e067d843682", "109a56f81e12")),
-        (OccupancyConfig, ["grid"], ("319e780a1b16", "672901a12eb7")),
+        (ShuntingConfig, [], ("7f3179651099", "7a795330754a")),
+        (OccupancyConfig, ["grid"], ("45e0a6e53496", "dd0119d8edab")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
@@ -29,3 +30,19 @@ def test_a_tree_keeps_its_paths_its_order_and_its_digest(
 ) -> None:
     assert list(tree().as_words()) == TOP + more
     assert (tree.robust().sha256()[:12], tree.paper().sha256()[:12]) == digests
+
+
+@pytest.mark.parametrize(
+    ("path", "instead"),
+    [
+        ("freeze_below", "carried_per_h"),
+        ("tracking.freeze_below", "carried_per_h"),
+        ("tracking.quality.give_up_s", "tracking.give_up_s"),
+    ],
+)
+def test_a_number_that_is_gone_is_refused_by_the_name_of_what_took_its_place(
+    path: str, instead: str
+) -> None:
+    with pytest.raises(UnknownNameError, match=f"no '{path}' any more; set '{instead}'"):
+        ShuntingConfig().changed({path: 0.0})
+    assert instead in {row.path for row in ShuntingConfig().rows()}

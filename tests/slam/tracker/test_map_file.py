@@ -83,7 +83,6 @@ def test_a_robot_that_was_carried_off_finds_itself_in_the_loaded_map(
     saved: tuple[Path, ShuntingSlam, list[Frame]],
 ) -> None:
     slam = ShuntingSlam.load(saved[0])
-    slam._quality.tracked_s = max(slam._quality.tracked_s, 10.0)
     drive = Drive((2.0, -2.0, 2.0), ((0.2, 0.3, 6.0),))
     for frame in frames(ROOMS, drive, rate_hz=5.0, seed=9):
         estimate = slam.update(frame.without_truth())
@@ -215,6 +214,39 @@ def test_a_map_of_before_sums_is_read_and_said_so(
     back = ShuntingSlam.load(path)
     assert back.cell_map.extent() == saved[1].cell_map.extent()
     assert "older.npz: a map of before sums" in caplog.text
+
+
+@pytest.mark.parametrize(("freeze_below", "carried_per_h"), [(0.6, None), (0.0, 0.0)])
+def test_a_map_of_before_one_belief_is_read(
+    saved: tuple[Path, ShuntingSlam, list[Frame]],
+    tmp_path: Path,
+    freeze_below: float,
+    carried_per_h: float | None,
+) -> None:
+    """What it says of mechanisms that are gone is passed over, but whether a pose is doubted."""
+    path, slam, stream = saved
+    with np.load(path) as archive:
+        header = json.loads(str(archive["header"]))
+    config, state = header["config"], header["state"]
+    for name in ("belief", "carried_per_h"):
+        del config[name]
+    config["freeze_below"] = freeze_below
+    config["standing"] |= {"fallen": 0.8, "rival_scans": 3, "undecided_s": 2.0}
+    config["tracking"] |= {
+        "quality": {"lost_after": 3, "give_up_s": 60.0}, "verdict": {"even": 0.45, "steep": 20.0},
+    }  # fmt: skip
+    config["tracking"]["relocalise"] |= {"enough": 0.8, "sure": 0.65}
+    state |= {"supports": [0.5, 0.6], "tracked_s": 14.0, "tracked": 70}
+    old = rewritten(path, tmp_path / "old.npz", config=config, state=state)
+    back = ShuntingSlam.load(old)
+    wanted = CONFIG if carried_per_h is None else CONFIG.changed({"carried_per_h": carried_per_h})
+    assert back.config == wanted
+    assert back.cell_map.extent() == slam.cell_map.extent()
+    estimate = back.update(stream[-1].without_truth())
+    np.testing.assert_allclose(estimate.T_map_robot, slam._T_map_robot, atol=0.03)
+    config["standing"]["falen"] = 0.8
+    with pytest.raises(LogFormatError, match="falen"):
+        ShuntingSlam.load(rewritten(path, tmp_path / "typo.npz", config=config))
 
 
 def test_a_small_file_that_unpacks_to_very_much_is_refused(

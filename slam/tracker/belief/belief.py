@@ -1,0 +1,376 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the robot may be, scan by scan, and all that follows from it.
+
+At most five kinds of hypotheses: where motion led, a place nearby (a slip), places elsewhere that
+the map knows, and carried to nobody knows where. Each has a log-weight from what scans confirm of
+the long-known map and what they see through (``evidence``), and a prior that is a rate
+(``posterior``). The pose, whether it is believed, and whether the map is written are read off the
+posterior. docs/belief.md has the mathematics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float
+from slam.frontend import odometry_steps
+from slam.frontend.observations import Observations
+from slam.frontend.odometry_prior import Prediction, inverted
+from slam.tracker.belief.episode import Episode, second_moment
+from slam.tracker.belief.places import Place, spread
+from slam.tracker.belief.posterior import Odds, probabilities
+from slam.tracker.belief.status import State, Status
+from slam.tracker.cell_map import CellMap
+from slam.tracker.cells import Look
+from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.local_search import SearchWindow
+from slam.tracker.matching.matcher import Match, Matcher, unmatched
+from slam.tracker.matching.usual import Usual
+from slam.tracker.standing.agreement import Agreement
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judged:
+    """What is to be done with a scan.
+
+    match       its pose, whichever place it is
+    prediction  as given, or wider after a slip
+    cell_map    the map to go on in; ``writes``: it takes the scan in
+    followed    whether the pose is a match to a map, be it the local copy
+    """
+
+    match: Match
+    prediction: Prediction
+    state: State
+    cell_map: CellMap
+    writes: bool = False
+    followed: bool = True
+
+
+class Belief:
+    """Of one robot.
+
+    p_lost  probability that the pose is wrong
+    status  what may be wrong
+    """
+
+    def __init__(
+        self,
+        config: TrackerConfig,
+        matcher: Matcher,
+        match: Callable[[Observations, Prediction, CellMap], Match],
+        usual: Usual,
+        agreement: Agreement,
+    ) -> None:
+        """``match`` matches a scan to a map as the SLAM does; ``usual``: what scans so far were;
+        ``agreement``: of matches and odometry, which is taken on here.
+        """
+        self._agreement = agreement
+        self._config, self._numbers = config.belief, config.tracking.relocalise
+        self._matcher, self._match, self._usual = matcher, match, usual
+        self._odds = Odds(config.belief, config.carried_per_h)
+        self._give_up_s = config.tracking.give_up_s
+        self._episode: Episode | None = None
+        self.p_lost, self.status = 0.0, Status.TRACKING
+        self._since_near_s = np.inf
+        self._suspect = False
+
+    def first(self, observations: Observations) -> State:
+        """The first scan: the map begins with it."""
+        self.status = Status.TRACKING if len(observations.points_robot) else Status.BLIND
+        return State.TRACKING if len(observations.points_robot) else State.BLIND
+
+    @property
+    def certain(self) -> bool:
+        """Whether no other place is followed."""
+        return self._episode is None
+
+    def judge(
+        self,
+        cell_map: CellMap,
+        T_map_before: Float,
+        observations: Observations,
+        prediction: Prediction,
+    ) -> Judged:
+        """Where the robot is; ``T_map_before``: where it was at the scan before."""
+        self._since_near_s += prediction.elapsed
+        if not len(observations.points_robot):
+            return self._blind(cell_map, prediction)
+        if self._episode is not None:
+            return self._go_on(self._episode, cell_map, T_map_before, observations, prediction)
+        match = near(self._match(observations, prediction, cell_map), prediction)
+        self._agreement.take(prediction, match.T_map_robot)
+        odd = self._suspect or self._usual.is_odd(match, observations)
+        if not self._odds.asked or not odd:
+            return self._settled(cell_map, match, prediction)
+        episode = self._begun(cell_map, observations, prediction, match)
+        if self.p_lost <= self._config.frozen_above:
+            return self._settled(cell_map, match, prediction)
+        self._episode, episode.matched = episode, True
+        self._usual.follow(match, prediction.elapsed)
+        episode.places.remember(observations.with_votes(None))
+        episode.write(observations, match.T_map_robot, prediction.elapsed)
+        return self._decided(episode, cell_map, observations, match, prediction)
+
+    def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
+        """A scan without a return says nothing: odometry alone."""
+        self.status, episode = Status.BLIND, self._episode
+        match = unmatched(prediction.T_map_robot, matched=0.0, score=0.0)
+        if episode is not None:
+            episode.moved(prediction)
+            episode.match = match
+            episode.places.wait(prediction)
+        return Judged(
+            match=match, prediction=prediction, state=State.BLIND, cell_map=cell_map,
+            writes=episode is None, followed=False,
+        )  # fmt: skip
+
+    def _note_break(
+        self, episode: Episode, observations: Observations, prediction: Prediction, match: Match
+    ) -> None:
+        corrected, lost = self._broken(observations, prediction, match)
+        episode.broken = max(episode.broken, corrected, lost)
+        episode.break_nats = max(episode.break_nats, lost)
+
+    def learn(self, observations: Observations, judged: Judged, look: Look) -> None:
+        """The map took a scan in, and ``look`` is what that said of it."""
+        match, elapsed = judged.match, judged.prediction.elapsed
+        here = self._odds.evidence(look) - max(self._broken(observations, judged.prediction, match))
+        self._usual.learn(match, elapsed)
+        self._usual.follow(match, elapsed)
+        self.p_lost = probabilities([here, self._odds.carried(elapsed)])[1]
+        self._suspect = self._odds.asked and self.p_lost > self._config.frozen_above
+        self._tell(look.through)
+
+    def _broken(
+        self, observations: Observations, prediction: Prediction, match: Match
+    ) -> tuple[float, float]:
+        """Nats against a match as the motion: it corrects odometry, and does not go on."""
+        if match.slipped or observations.weight < self._numbers.least_weight:
+            return 0.0, 0.0  # paid for, or too little in view
+        corrected = self._odds.corrected(prediction, match.T_map_robot)
+        return corrected, self._odds.broken(self._usual.share(match))
+
+    @staticmethod
+    def _settled(cell_map: CellMap, match: Match, prediction: Prediction) -> Judged:
+        return Judged(
+            match=match, prediction=prediction, state=State.TRACKING, cell_map=cell_map,
+            writes=True,
+        )  # fmt: skip
+
+    def _begun(
+        self,
+        cell_map: CellMap,
+        observations: Observations,
+        prediction: Prediction,
+        match: Match,
+    ) -> Episode:
+        """What one scan says of where motion led, and of a place nearby."""
+        episode = Episode(cell_map, self._matcher, self._odds, prediction.elapsed)
+        episode.moved(prediction)
+        episode.match = match
+        episode.evidence.add(cell_map, observations, match.T_map_robot)
+        self._note_break(episode, observations, prediction, match)
+        self._search_near(episode, cell_map, observations, prediction, match)
+        self._weigh(episode)
+        return episode
+
+    def _search_near(
+        self,
+        episode: Episode,
+        cell_map: CellMap,
+        observations: Observations,
+        prediction: Prediction,
+        match: Match,
+    ) -> None:
+        """Look for the best place as far around as a slip may have led."""
+        numbers = self._numbers
+        if self._since_near_s < numbers.again_near_s or observations.weight < numbers.least_near:
+            return
+        self._since_near_s = 0.0
+        everyone = observations.with_votes(None)
+        every = max(1, len(everyone.points_robot) // numbers.near_points)
+        few = replace(
+            everyone,
+            points_robot=everyone.points_robot[::every],
+            weights=everyone.weights[::every] * every,
+        )
+        loose = inverted(spread(self._config.slip_m, self._config.slip_rad))
+        window = SearchWindow(reach_m=numbers.near_m, turn_rad=numbers.near_rad)
+        start = prediction.T_map_robot
+        found = self._matcher.search(cell_map, few, start, loose, window)
+        found = self._matcher.climb(cell_map, everyone, found.T_map_robot, start, loose)
+        if not _same(found, match):
+            place = episode.places.begun(everyone, found, episode.before)
+            place = self._told_nearby(episode, place, match)
+            episode.places.keep([place], episode.weight, self._config.hopeless)
+
+    @staticmethod
+    def _told_nearby(episode: Episode, place: Place, here: Match) -> Place:
+        """A new place, with the prior of a slip to there."""
+        return replace(
+            place,
+            prior=episode.prior(place.match, here.T_map_robot),
+            gain_m=place.evidence.latest_m - episode.evidence.latest_m,
+        )
+
+    def _go_on(
+        self,
+        episode: Episode,
+        cell_map: CellMap,
+        T_map_before: Float,
+        observations: Observations,
+        prediction: Prediction,
+    ) -> Judged:
+        """Another scan of an episode."""
+        episode.moved(prediction)
+        match = self._followed(episode, cell_map, observations, prediction)
+        moved = prediction
+        if episode.matched:
+            increment = se2.between(T_map_before, match.T_map_robot)
+            moved = replace(prediction, T_map_robot=match.T_map_robot, increment=increment)
+        everyone = observations.with_votes(None)
+        new = episode.places.step(everyone, moved, self._share(), episode.evidence)
+        new = [self._told_nearby(episode, place, match) for place in new]
+        episode.places.keep(new, episode.weight, self._config.hopeless)
+        if self.p_lost > self._config.frozen_above:
+            self._search_near(episode, cell_map, observations, prediction, match)
+        episode.places.remember(everyone)
+        self._weigh(episode)
+        return self._decided(episode, cell_map, observations, match, prediction)
+
+    def _share(self) -> float:
+        prices = self._matcher.config.matching.budget
+        return prices.lost_share if self.p_lost > 0.5 else prices.frozen_share
+
+    def _followed(
+        self,
+        episode: Episode,
+        cell_map: CellMap,
+        observations: Observations,
+        prediction: Prediction,
+    ) -> Match:
+        """The pose on the local copy, where the scan agrees with it; else by odometry."""
+        episode.matched = False
+        match = unmatched(prediction.T_map_robot, matched=0.0, score=0.0)
+        if observations.weight >= self._numbers.least_weight:
+            found = near(self._match(observations, prediction, episode.local), prediction)
+            goes_on = self._usual.share(found) >= self._config.breaks
+            self._note_break(episode, observations, prediction, found)
+            self._usual.follow(found, prediction.elapsed)
+            pose = self._undragged(observations, prediction, found, episode.evidence.latest_m)
+            episode.matched = goes_on and pose is None
+            match = found if episode.matched else replace(match, matched=found.matched)
+            if pose is not None:
+                match = replace(match, T_map_robot=pose)
+        episode.before = episode.evidence.copy()
+        episode.evidence.add(cell_map, observations, match.T_map_robot)
+        episode.match = match
+        return match
+
+    def _undragged(
+        self, observations: Observations, prediction: Prediction, match: Match, seen_m: float
+    ) -> Float | None:
+        """Where odometry leads, (3,), if movers hide the map and rather carried the matches off.
+
+        ``seen_m``: m of the map that the scan before confirmed.
+        """
+        agreement = self._agreement
+        agreement.take(prediction, match.T_map_robot)
+        if seen_m >= self._config.confirmed_m or agreement.dragged(observations.mean_vote) <= 0.5:
+            return None
+        pose = agreement.undragged(match.T_map_robot)
+        agreement.forget()
+        return pose
+
+    def _weigh(self, episode: Episode) -> None:
+        self._weighed = episode.weighed()
+        at_same = (
+            p
+            for place, p in zip(episode.places.followed, self._weighed.places, strict=True)
+            if _same(place.match, episode.match)
+        )
+        self.p_lost = max(0.0, 1.0 - self._weighed.followed - sum(at_same))
+        self._tell(episode.evidence.through_m)
+
+    def _tell(self, through_m: float) -> None:
+        """In a word."""
+        if self.p_lost >= 0.5:
+            self.status = Status.LOST
+        else:
+            outdated = self._odds.denied(through_m) >= self._config.outdated
+            self.status = Status.OUTDATED if outdated else Status.TRACKING
+
+    def _decided(
+        self,
+        episode: Episode,
+        cell_map: CellMap,
+        observations: Observations,
+        match: Match,
+        prediction: Prediction,
+    ) -> Judged:
+        """Whether one place is certain: where motion led, or another; else wait."""
+        sure, weighed = 1.0 - self._config.frozen_above, self._weighed
+        for place, p in zip(episode.places.followed, weighed.places, strict=True):
+            same = _same(place.match, match) and p > weighed.followed
+            if place.waited == 0 and (p >= sure or (same and 1.0 - self.p_lost >= sure)):
+                return self._found(place, episode, cell_map, observations, prediction)
+        if 1.0 - self.p_lost >= sure or episode.elapsed_s > self._give_up_s:
+            self._episode = None
+            return self._settled(episode.local, match, prediction)
+        if episode.elapsed_s > prediction.elapsed:
+            episode.write(observations, match.T_map_robot, prediction.elapsed)
+        state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
+        return Judged(
+            match=match, prediction=prediction, state=state, cell_map=cell_map,
+            followed=episode.matched,
+        )  # fmt: skip
+
+    def _found(
+        self,
+        place: Place,
+        episode: Episode,
+        cell_map: CellMap,
+        observations: Observations,
+        prediction: Prediction,
+    ) -> Judged:
+        self._episode, self.p_lost, self.status = None, 0.0, Status.TRACKING
+        self._agreement.forget()
+        slipped = place.prior > episode.carried_there
+        if slipped:
+            wide = spread(self._config.slip_m, self._config.slip_rad)
+            return Judged(
+                match=replace(place.match, slipped=True),
+                prediction=replace(prediction, covariance=wide),
+                state=State.TRACKING, cell_map=cell_map, writes=True,
+            )  # fmt: skip
+        return Judged(
+            match=place.match, prediction=prediction, state=State.RELOCATED, cell_map=cell_map,
+        )  # fmt: skip
+
+    def spread_about(self, T_map_robot: Float, anywhere: Callable[[Float], Float]) -> Float:
+        """(3, 3) that the other places add to the covariance of a pose."""
+        if self._episode is None:
+            return np.zeros((3, 3))
+        poses = [place.match.T_map_robot for place in self._episode.places.followed]
+        spreads = second_moment(poses, self._weighed.places, T_map_robot)
+        # the places that are followed need not be all: who is lost may be anywhere
+        return spreads + self.p_lost * anywhere(T_map_robot)
+
+
+def near(match: Match, prediction: Prediction) -> Match:
+    """The match, or odometry alone where rounding has carried it past all places and numbers."""
+    off = np.abs(match.T_map_robot - prediction.T_map_robot)
+    if off.max() <= odometry_steps.MOST_STEP_M and np.isfinite(match.information).all():
+        return match
+    return unmatched(prediction.T_map_robot, matched=0.0, score=0.0)
+
+
+def _same(one: Match, other: Match) -> bool:
+    """Nearer than what a match may be off."""
+    x, y, turn = (one.T_map_robot - other.T_map_robot).tolist()
+    return bool(np.hypot(x, y) < 0.1 and abs(se2.wrap(turn)) < 0.05)

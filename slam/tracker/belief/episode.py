@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the first scan at which the pose is not certain until it is again.
+
+The map is not written meanwhile. The scans are written to a local copy of it, as if nothing were
+wrong, and matched there: where boards or people have closed in on the robot, nothing that it sees
+is in the map, and its scans still agree with one another. If the robot turns out to be where its
+motion led, the copy becomes the map.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float
+from slam.frontend.observations import Observations
+from slam.frontend.odometry_prior import Prediction
+from slam.tracker.belief.evidence import Evidence
+from slam.tracker.belief.places import Place, Places
+from slam.tracker.belief.posterior import MOST_NATS, Odds, probabilities
+from slam.tracker.cell_map import CellMap
+from slam.tracker.matching.matcher import Match, Matcher, unmatched
+from slam.tracker.rasterise import rasterise
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weighed:
+    """What the scans so far make of it.
+
+    followed    probability of the place that motion led to
+    places      of each other place, as in ``Places.followed``
+    unknown     of having been carried, nobody knows where
+    """
+
+    followed: float
+    places: list[float]
+    unknown: float
+
+
+class Episode:
+    """One of one robot.
+
+    evidence  of the place that motion led to; ``before``: without the latest scan
+    match     of the latest scan at that place
+    broken    nats against the motion of any scan so far, at most; of them break_nats are those of
+              returns that do not go on
+    matched   whether the latest scan was matched to the copy
+    """
+
+    def __init__(self, cell_map: CellMap, matcher: Matcher, odds: Odds, elapsed: float) -> None:
+        self._odds, self._cell_map = odds, cell_map
+        self._local: CellMap | None = None
+        self.evidence = Evidence()
+        self.places = Places(cell_map, matcher)
+        self.before = Evidence()
+        self.broken = self.break_nats = 0.0
+        self.way_m = self.elapsed_s = 0.0
+        self._carried = odds.carried(elapsed)
+        self.match = unmatched(np.zeros(3), matched=0.0, score=0.0)
+        self.matched = False
+
+    @property
+    def local(self) -> CellMap:
+        """The copy, made when it is first asked for."""
+        if self._local is None:
+            self._local = self._cell_map.twin()
+        return self._local
+
+    def write(self, observations: Observations, T_map_robot: Float, elapsed: float) -> None:
+        """Let the copy see a scan."""
+        rasterise(self.local, observations, T_map_robot)
+        T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
+        step = min(elapsed, self.local.config.map.longest_look_s)
+        self.local.integrate(observations.view, T_map_laser, step, write=True)
+
+    def moved(self, prediction: Prediction) -> None:
+        """The robot has moved on."""
+        self.elapsed_s += prediction.elapsed
+        x, y, _ = prediction.increment.tolist()
+        self.way_m = math.hypot(x, y)
+
+    def prior(self, place: Match, here: Float) -> float:
+        """Nats of a slip from ``here`` to that place."""
+        x, y, turn = (place.T_map_robot - here).tolist()
+        return self._odds.slipped(self.way_m, math.hypot(x, y), se2.wrap(turn))
+
+    def weight(self, place: Place) -> float:
+        """Nats of having been carried to a place, or of having slipped there."""
+        return self._odds.evidence(place.evidence) + max(place.prior, self.carried_there)
+
+    @property
+    def carried_there(self) -> float:
+        """Nats of having been carried to any one place."""
+        return self._carried - self._odds.config.place
+
+    def weighed(self) -> Weighed:
+        """The posterior."""
+        places = self.places.followed
+        weights = [self.weight(place) for place in places]
+        here = self._odds.evidence(self.evidence) - self.broken
+        slipped = [k for k, place in enumerate(places) if place.prior > self.carried_there]
+        for k in slipped:
+            here, weights[k] = self._compared(places[k], here, weights[k])
+        nearby = max((weights[k] for k in slipped), default=-MOST_NATS)
+        of_here, unknown, *others = probabilities([here, self._unknown(nearby), *weights])
+        return Weighed(followed=of_here, places=others, unknown=unknown)
+
+    def _compared(self, place: Place, here: float, there: float) -> tuple[float, float]:
+        """Nats of where motion led and of a place nearby, no farther apart than a scan tells.
+
+        What has changed in the room speaks alike against both; they differ by what is confirmed.
+        """
+        ahead = self._odds.config.nearby_per_m * place.gain_m + place.prior
+        return (
+            (min(here, there - ahead), there) if ahead > 0.0 else (here, min(there, here + ahead))
+        )
+
+    def _unknown(self, nearby: float) -> float:
+        """Nats of having been carried to nobody knows where; ``nearby``: of the best slip.
+
+        After a break, a map that was not searched may hold a place as good as the one nearby.
+        """
+        config = self._odds.config
+        if self.places.searches:
+            searches = min(self.places.searches, config.searches)
+            return self._carried - config.searched * searches
+        share = min(self.break_nats / config.broken, 1.0)
+        unknown = self._carried + config.unsearched * share
+        return max(unknown, nearby) if share == 1.0 else unknown
+
+
+def second_moment(poses: list[Float], shares: list[float], T_map_robot: Float) -> Float:
+    """(3, 3) about a pose of places with these probabilities."""
+    total = np.zeros((3, 3))
+    for pose, share in zip(poses, shares, strict=True):
+        off = pose - T_map_robot
+        off[2] = se2.wrap(float(off[2]))
+        total += share * np.multiply.outer(off, off)
+    return total

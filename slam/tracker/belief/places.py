@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Other places where the robot may be, each followed from scan to scan.
+
+They come from a search nearby and from a search of the whole map; each is carried along by odometry
+and matched to the scans. A scan does no more of this than its budget allows: the search goes on
+over the scans that follow, and where there are many places, they are matched by turns.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float
+from slam.frontend.observations import Observations
+from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.tracker.belief.config import RelocaliseConfig
+from slam.tracker.belief.evidence import Evidence
+from slam.tracker.belief.posterior import MOST_NATS
+from slam.tracker.cell_map import CellMap
+from slam.tracker.matching.budget import Budget
+from slam.tracker.matching.coarse_map import CoarseMap
+from slam.tracker.matching.matcher import Match, Matcher
+from slam.tracker.matching.whole_search import WholeSearch
+
+
+def spread(m: float, rad: float) -> Float:
+    """Covariance (3, 3) of these standard deviations of position and heading."""
+    return np.diag([m**2, m**2, rad**2])
+
+
+def coarse(config: RelocaliseConfig) -> Float:
+    """Covariance (3, 3) of what a search of the whole map finds."""
+    return spread(config.coarse_m, math.radians(config.coarse_deg))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Place:
+    """One where the robot may be.
+
+    match     of the latest scan that was matched there, carried on by odometry
+    evidence  of all scans that were
+    prior     nats of having slipped there; none: it cannot have
+    gain_m    mean of the trace that a scan confirms more from there than from where motion led
+    scans     that were matched there
+    waited    scans since it was matched, ``drift`` (3, 3) what odometry may be off since
+    """
+
+    match: Match
+    evidence: Evidence
+    prior: float = -MOST_NATS
+    gain_m: float = 0.0
+    scans: int = 1
+    waited: int = 0
+    drift: Float = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def is_at(self, T_map_robot: Float, config: RelocaliseConfig) -> bool:
+        """Whether that is the same place."""
+        x, y, turn = (self.match.T_map_robot - T_map_robot).tolist()
+        near = x * x + y * y < config.same_m**2
+        return bool(near and abs(se2.wrap(turn)) < config.same_rad)
+
+
+class Places:
+    """The places that are followed from one scan on, on a map that is not written meanwhile.
+
+    followed  with evidence, in no order
+    searches  of the whole map that were finished, all their places tried
+    spent_ns  work of the latest scan, counted
+    """
+
+    def __init__(self, cell_map: CellMap, matcher: Matcher) -> None:
+        self._cell_map, self._matcher = cell_map, matcher
+        self._config = matcher.config.tracking.relocalise
+        self._prices = matcher.config.matching.budget
+        self.followed: list[Place] = []
+        self.searches, self.spent_ns = 0, 0.0
+        self._kept: list[tuple[Observations, Float]] = []  # earlier scans, and the motion since
+        self._coarse: CoarseMap | None = None
+        self._search: WholeSearch | None = None
+        self._since_search_s = math.inf
+        self._found: list[Float] = []  # by the search, to be tried
+        self._motion, self._drift = np.zeros(3), np.zeros((3, 3))  # since the scan searched for
+
+    def remember(self, observations: Observations) -> None:
+        """Keep a scan for places that are found later; of too many, every second one goes."""
+        self._kept.append((observations, np.zeros(3)))
+        if len(self._kept) > self._config.kept:
+            self._kept = self._kept[::2]
+
+    def step(
+        self, observations: Observations, prediction: Prediction, share: float, here: Evidence
+    ) -> list[Place]:
+        """Follow all to the next scan and go on with the search; places that are new.
+
+        ``share`` of the budget of a scan is spent; ``here``: of where motion led.
+        """
+        self._go_on(prediction)
+        budget = Budget(self._prices, share)
+        price = self._prices.climb_ns * max(len(observations.points_robot), 1)
+        most = max(1, int(self._prices.known_share * budget.left_ns / price))
+        turns = sorted(self.followed, key=lambda place: -place.waited)
+        matched = {id(place) for place in turns[:most]}
+        self.followed = [
+            self._matched(place, observations, prediction, here)
+            if id(place) in matched
+            else self._waiting(place, prediction)
+            for place in self.followed
+        ]
+        budget.spend(price * len(matched))
+        new = self._tried(observations, budget, price)
+        self._look_around(observations, budget)
+        new += self._tried(observations, budget, price)
+        self.spent_ns = budget.spent_ns
+        return new
+
+    def wait(self, prediction: Prediction) -> None:
+        """Carry all on by odometry."""
+        self._go_on(prediction)
+        self.followed = [self._waiting(place, prediction) for place in self.followed]
+
+    def keep(self, new: list[Place], weight: Callable[[Place], float], hopeless: float) -> None:
+        """Follow the best, one of each place, the longest followed; none that is hopeless."""
+        kept: list[Place] = []
+        for place in sorted(self.followed + new, key=lambda one: -one.scans):
+            at = place.match.T_map_robot
+            if not any(other.is_at(at, self._config) for other in kept):
+                kept.append(place)
+        kept.sort(key=lambda one: -weight(one))
+        best = weight(kept[0]) if kept else 0.0
+        self.followed = [one for one in kept if weight(one) >= best - hopeless][: self._config.most]
+
+    def _go_on(self, prediction: Prediction) -> None:
+        """The robot has moved on since the scan that is searched for."""
+        self._since_search_s += prediction.elapsed
+        tracked = float(prediction.T_map_robot[2]) - float(prediction.increment[2])
+        step = turned(prediction.step, -tracked)
+        self._drift = se2.propagate(self._drift, self._motion, prediction.increment, step)
+        self._motion = se2.compose(self._motion, prediction.increment)
+        self._kept = [
+            (seen, se2.compose(motion, prediction.increment)) for seen, motion in self._kept
+        ]
+
+    def _look_around(self, observations: Observations, budget: Budget) -> None:
+        """Go on with the search of the whole map, or begin one for this scan."""
+        idle = self._search is None and not self._found
+        if idle and self._since_search_s >= self._config.again_s and len(observations.points_robot):
+            if self._coarse is None:
+                self._coarse = CoarseMap(self._cell_map, self._matcher.reward.short_term)
+            whole = self._matcher.config.matching.whole
+            points = observations.points_robot
+            self._search = WholeSearch(self._coarse, points, self._config.most, whole)
+            self._since_search_s = 0.0
+            self._motion, self._drift = np.zeros(3), np.zeros((3, 3))
+        if self._search is not None and budget.left_ns > 0.0:
+            self._found += self._search.advance(budget)
+            if self._search.done:
+                self._search = None
+                self.searches += not self._found
+
+    def _tried(self, observations: Observations, budget: Budget, price: float) -> list[Place]:
+        """Places found, carried on to this scan, as many as the budget allows."""
+        new = []
+        while self._found and budget.left_ns > 0.0:
+            place = self._found.pop(0)
+            covariance = se2.propagate(coarse(self._config), place, self._motion, self._drift)
+            here = se2.compose(place, self._motion)
+            new.append(self.begun(observations, self._climb(observations, here, covariance)))
+            few = min(len(observations.points_robot), self._matcher.numbers.climb.few)
+            points = max(len(observations.points_robot), 1)
+            weighed = self._prices.weigh_ns * points * len(self._kept)
+            budget.spend(price + weighed + few * self._prices.approach_ns)
+            self.searches += self._search is None and not self._found
+        return new
+
+    def begun(
+        self, observations: Observations, match: Match, before: Evidence | None = None
+    ) -> Place:
+        """A place with what this scan says of it, and those before it: what was said ``before``
+        of where motion led, or, of a place elsewhere, what kept scans say of where it came from.
+        """
+        evidence = Evidence() if before is None else before.copy()
+        for seen, motion in self._kept if before is None else ():
+            evidence.add(self._cell_map, seen, se2.compose(match.T_map_robot, se2.inverse(motion)))
+        evidence.add(self._cell_map, observations, match.T_map_robot)
+        return Place(match=match, evidence=evidence)
+
+    def _matched(
+        self, old: Place, observations: Observations, prediction: Prediction, here: Evidence
+    ) -> Place:
+        moved = self._waiting(old, prediction)
+        match = self._climb(observations, moved.match.T_map_robot, moved.drift)
+        old.evidence.add(self._cell_map, observations, match.T_map_robot)
+        gain_m, scans = old.evidence.latest_m - here.latest_m, old.scans + 1
+        return replace(
+            moved, match=match, gain_m=old.gain_m + (gain_m - old.gain_m) / scans, scans=scans,
+            waited=0, drift=np.zeros((3, 3)),
+        )  # fmt: skip
+
+    def _waiting(self, old: Place, prediction: Prediction) -> Place:
+        """Carried on by odometry alone."""
+        increment, before = prediction.increment, old.match.T_map_robot
+        tracked = float(prediction.T_map_robot[2]) - float(increment[2])
+        if old.waited:
+            drift = se2.propagate(old.drift, before, increment, turned(prediction.step, -tracked))
+        else:
+            drift = turned(prediction.step, float(before[2]) - tracked)
+        match = replace(old.match, T_map_robot=se2.compose(before, increment))
+        return replace(old, match=match, waited=old.waited + 1, drift=drift)
+
+    def _climb(self, observations: Observations, T_map_robot: Float, covariance: Float) -> Match:
+        start = self._matcher.approach(self._cell_map, observations, T_map_robot, covariance)
+        precision = inverted(covariance)
+        return self._matcher.climb(self._cell_map, observations, start, T_map_robot, precision)

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Log-weights of the places where the robot may be, and their probabilities: docs/belief.md."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from slam import se2
+from slam.frames import Float
+from slam.frontend.odometry_prior import Prediction, inverted
+from slam.tracker.belief.config import BeliefConfig
+from slam.tracker.belief.evidence import Evidence
+from slam.tracker.cells import Look
+
+S_PER_H = 3600.0
+LEAST_M = 0.01  # m of way that a scan counts at least: who stands can be pushed, too
+LEAST_S = 1e-3
+MOST_NATS = 700.0  # exp of less is no zero
+
+
+class Odds:
+    """The equations, with their numbers.
+
+    carried_per_h  how often the robot is carried elsewhere; 0: never
+    """
+
+    def __init__(self, config: BeliefConfig, carried_per_h: float) -> None:
+        self.config, self._carried_per_h = config, carried_per_h
+        self._pulled = np.diag([config.pulled_m**2, config.pulled_m**2, config.pulled_rad**2])
+
+    @property
+    def asked(self) -> bool:
+        """Whether a pose may be doubted at all."""
+        return self._carried_per_h > 0.0
+
+    def evidence(self, of: Evidence | Look) -> float:
+        """Nats for a place: a log(1 + C / c) - D, where a changed room explains most of D."""
+        config = self.config
+        known, through = (of.known, of.through) if isinstance(of, Look) else (
+            of.known_m, of.through_m
+        )  # fmt: skip
+        chance = config.confirmed_m + config.confirmed_share * through
+        one_view = min(known, config.linear_m)
+        more = (known - one_view) / (chance + one_view)
+        return config.confirmed * (math.log1p(one_view / chance) + more) - self.denied(through)
+
+    def denied(self, through_m: float) -> float:
+        """Nats against a place: b a metre, or the price of a room that has changed."""
+        config = self.config
+        beyond_m = through_m - config.outdated / config.through_per_m
+        if beyond_m <= 0.0:
+            return config.through_per_m * through_m
+        return config.outdated + config.changed_per_m * beyond_m
+
+    def broken(self, share: float) -> float:
+        """Nats against a place where so much of the usual match goes on from the scans before."""
+        config = self.config
+        least, enough = config.breaks, max(config.goes_on, config.breaks + 1e-6)
+        return config.broken * min(max((enough - share) / (enough - least), 0.0), 1.0)
+
+    def corrected(self, prediction: Prediction, T_map_robot: Float) -> float:
+        """Nats against a match that corrects odometry: its innovation, or a slip.
+
+        Movers pull matches by ``pulled_m`` and ``pulled_rad``, which is neither.
+        """
+        x, y, turn = (T_map_robot - prediction.T_map_robot).tolist()
+        turn = se2.wrap(turn)
+        (a, b, c), (_, d, e), (_, _, f) = inverted(prediction.prior + self._pulled).tolist()
+        squares = x * (a * x + 2.0 * (b * y + c * turn)) + y * (d * y + 2.0 * e * turn)
+        way_m = math.hypot(*prediction.increment[:2].tolist())
+        slip = -self.slipped(way_m, math.hypot(x, y), turn)
+        return min(0.5 * float(squares + f * turn * turn), slip)
+
+    def carried(self, elapsed_s: float) -> float:
+        """Log prior of having been carried in that time."""
+        if self._carried_per_h == 0.0:
+            return -MOST_NATS
+        return math.log(self._carried_per_h * max(elapsed_s, LEAST_S) / S_PER_H)
+
+    def slipped(self, way_m: float, off_m: float, off_rad: float) -> float:
+        """Log prior of a slip by so much on that way."""
+        config = self.config
+        rate = math.log(config.slips_per_m * max(way_m, LEAST_M))
+        return rate - 0.5 * ((off_m / config.slip_m) ** 2 + (off_rad / config.slip_rad) ** 2)
+
+
+def sum_of(nats: Sequence[float]) -> float:
+    """Log of the sum of weights."""
+    most = max(nats)
+    return most + math.log(sum(math.exp(max(n - most, -MOST_NATS)) for n in nats))
+
+
+def probabilities(nats: Sequence[float]) -> list[float]:
+    """Of weights that are given by their logarithms."""
+    total = sum_of(nats)
+    return [math.exp(max(n - total, -MOST_NATS)) for n in nats]

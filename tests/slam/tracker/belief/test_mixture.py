@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The covariance of a pose that may be at several places, and where they are followed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from slam.frontend.odometry_prior import Prediction
+from slam.tracker.belief.episode import second_moment
+from slam.tracker.belief.evidence import Evidence
+from slam.tracker.belief.places import Place, Places
+from slam.tracker.cell_map import CellMap
+from slam.tracker.matching.matcher import Matcher, unmatched
+from tests.slam.tracker.belief.rooms import CONFIGS, KINDS, ORIGIN, known, seen
+from tests.world2d import World2D, arena
+
+ROOM = World2D(arena())
+NETWORK: type[CellMap] = KINDS[0]
+CONFIG = CONFIGS[NETWORK]
+
+
+def place(x: float, y: float, heading: float = 0.0, scans: int = 1) -> Place:
+    pose = np.array([x, y, heading])
+    return Place(match=unmatched(pose, matched=1.0, score=0.0), evidence=Evidence(), scans=scans)
+
+
+def test_the_moment_about_a_pose_is_that_of_samples() -> None:
+    """Of poses drawn with these shares, about the one that is reported; headings wrap."""
+    rng = np.random.default_rng(2)
+    here = np.array([1.0, -2.0, 3.0])
+    poses = [np.array([4.0, 1.0, -3.1]), np.array([-2.0, 0.5, 1.0]), here.copy()]
+    shares = [0.2, 0.5, 0.3]
+    drawn = np.array(poses)[rng.choice(3, 200_000, p=shares)] - here
+    drawn[:, 2] = (drawn[:, 2] + math.pi) % math.tau - math.pi
+    expected = drawn.T @ drawn / len(drawn)
+    before = [pose.copy() for pose in poses]
+    found = second_moment(poses, shares, here)
+    np.testing.assert_allclose(found, expected, rtol=0.02, atol=0.02)
+    np.testing.assert_array_equal(found, found.T)
+    np.testing.assert_array_equal(poses, before)
+
+
+def test_places_that_are_one_are_followed_once_and_hopeless_ones_not() -> None:
+    places = Places(known(NETWORK, ROOM, 1.0, ORIGIN), Matcher(CONFIG))
+    numbers = CONFIG.tracking.relocalise
+    old = place(0.0, 0.0, scans=5)
+    same = place(0.5 * numbers.same_m, 0.0, 0.5 * numbers.same_rad)
+    turned = place(0.0, 0.0, 2.0 * numbers.same_rad)
+    far, hopeless = place(3.0, 0.0), place(-3.0, 0.0)
+    nats = {id(old): 0.0, id(same): 9.0, id(turned): 2.0, id(far): 5.0, id(hopeless): -50.0}
+    places.keep([same, turned, hopeless, far, old], lambda one: nats[id(one)], 20.0)
+    assert [id(one) for one in places.followed] == [id(far), id(turned), id(old)]
+    many = [place(float(k), 0.0) for k in range(2 * numbers.most)]
+    places.keep(many, lambda one: float(one.match.T_map_robot[0]), 1e6)
+    assert len(places.followed) == numbers.most
+    assert places.followed[0] is many[-1]
+
+
+def test_a_place_is_carried_on_by_odometry_and_matched_to_the_scan() -> None:
+    """It begins at the origin while the robot is believed to be elsewhere, turned."""
+    cell_map = known(NETWORK, ROOM, 20.0, ORIGIN)
+    places = Places(cell_map, Matcher(CONFIG))
+    places.followed = [place(0.0, 0.0)]
+    truth = np.array([0.2, 0.0, 0.05])
+    believed = np.array([3.0, 1.0, 2.0])
+    prediction = Prediction(
+        T_map_robot=believed, increment=truth + np.array([0.02, -0.02, 0.01]),
+        covariance=np.diag([0.03**2, 0.03**2, 0.02**2]), twist=np.zeros(3), elapsed=0.2,
+    )  # fmt: skip
+    places.step(seen(ROOM, truth, NETWORK), prediction, 0.5, Evidence())
+    followed = places.followed[0]
+    np.testing.assert_allclose(followed.match.T_map_robot, truth, atol=0.01)
+    assert (followed.scans, followed.waited) == (2, 0)
+    assert followed.evidence.known_m > 5.0
+    assert followed.gain_m == followed.evidence.latest_m / 2.0  # the mean of its two scans
+
+
+def test_the_search_of_the_whole_map_finds_the_robot_over_several_scans() -> None:
+    """However little of it a scan may do."""
+    cell_map = known(NETWORK, ROOM, 20.0, ORIGIN, np.array([0.0, 0.0, math.pi]))
+    truth = np.array([1.5, -1.0, 0.7])
+    view = seen(ROOM, truth, NETWORK)
+    still = Prediction(
+        T_map_robot=ORIGIN, increment=np.zeros(3), covariance=np.diag([1e-6] * 3),
+        twist=np.zeros(3), elapsed=0.2,
+    )  # fmt: skip
+    took = []
+    for share in (0.5, 0.05):
+        places, steps = Places(cell_map, Matcher(CONFIG)), 0
+        new: list[Place] = []
+        while not new and steps < 1000:
+            new, steps = places.step(view, still, share, Evidence()), steps + 1
+        while places.searches == 0 and steps < 1000:
+            new, steps = new + places.step(view, still, share, Evidence()), steps + 1
+        off = min(np.abs(one.match.T_map_robot - truth).max() for one in new)
+        assert off < 0.02
+        took.append(steps)
+    assert took[1] > took[0]

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What matches were like so far, and which scan is odd by that."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from slam.tracker.matching.config import UsualConfig
+from slam.tracker.matching.matcher import Match
+from slam.tracker.matching.usual import Usual
+
+CONFIG = UsualConfig()
+STEP_S = 0.2
+LONG = round(10.0 * CONFIG.fallen_s / STEP_S)  # scans after which nothing of before is remembered
+
+
+def match(matched: float = 0.8, *, overlapped: float = 0.8, rewarded: float = 0.5) -> Match:
+    return Match(
+        T_map_robot=np.zeros(3), information=np.eye(3), matched=matched, score=0.0, tau=1.0,
+        overlapped=overlapped, rewarded=rewarded,
+    )  # fmt: skip
+
+
+def voting(vote: float) -> Any:
+    """Observations, as far as they are asked."""
+    return SimpleNamespace(mean_vote=vote)
+
+
+def settled(of: Match, step_s: float = STEP_S, scans: int = LONG) -> Usual:
+    usual = Usual(CONFIG)
+    for _ in range(scans):
+        usual.learn(of, step_s)
+        usual.follow(of, step_s)
+    return usual
+
+
+def test_the_usual_match_is_the_median_of_the_latest() -> None:
+    usual = Usual(replace(CONFIG, remembered=3), [0.1])
+    assert usual.match == 0.1
+    for matched in (0.9, 0.5, 0.7, 0.8):
+        usual.learn(match(matched), STEP_S)
+    assert list(usual.matches) == [0.5, 0.7, 0.8]
+    assert usual.match == 0.7
+
+
+def test_before_anything_is_known_all_is_expected_to_match() -> None:
+    assert Usual(CONFIG).match == 1.0
+    assert Usual(CONFIG).is_odd(match(0.9 * CONFIG.odd), voting(1.0))
+    assert not Usual(CONFIG).is_odd(match(1.1 * CONFIG.odd), voting(1.0))
+
+
+def test_a_match_far_below_the_usual_is_odd_whoever_votes() -> None:
+    usual = settled(match(0.6))
+    for vote in (0.0, 1.0):
+        assert usual.is_odd(match(0.59 * CONFIG.odd), voting(vote))
+        assert not usual.is_odd(match(0.61 * CONFIG.odd), voting(vote))
+
+
+def test_a_reward_that_fell_is_odd_where_returns_lost_their_votes() -> None:
+    """That is a slip; where all vote, it is something new."""
+    usual, few, all_ = settled(match()), voting(0.9 * CONFIG.outvoted), voting(1.0)
+    fell = match(rewarded=0.5 * 0.95 * CONFIG.fallen)
+    assert usual.is_odd(fell, few)
+    assert not usual.is_odd(fell, all_)
+    assert not usual.is_odd(match(rewarded=0.5 * 1.05 * CONFIG.fallen), few)
+
+
+def test_a_share_is_of_what_the_second_before_matched() -> None:
+    usual = settled(match(overlapped=0.8))
+    assert usual.share(match(overlapped=0.8)) == pytest.approx(1.0, abs=1e-3)
+    assert usual.share(match(overlapped=0.2)) == pytest.approx(0.25, abs=1e-3)
+    usual.learn(match(overlapped=0.1), STEP_S)  # the map took it in: that alone says nothing
+    assert usual.share(match(overlapped=0.8)) == pytest.approx(1.0, abs=1e-3)
+    for _ in range(LONG):  # the scans that follow are what goes on
+        usual.follow(match(overlapped=0.2), STEP_S)
+    assert usual.share(match(overlapped=0.2)) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("fast_s", [0.027, 0.1])
+def test_a_second_is_forgotten_alike_at_any_rate(fast_s: float) -> None:
+    """Where scans are not so rare that one may replace most of what is remembered."""
+    shares = []
+    for step_s in (fast_s, 2.0 * fast_s):
+        usual = settled(match(overlapped=0.8), step_s, round(10.0 * CONFIG.fallen_s / step_s))
+        for _ in range(round(CONFIG.fallen_s / fast_s / 2.0) * (2 if step_s == fast_s else 1)):
+            usual.follow(match(overlapped=0.4), step_s)
+        shares.append(usual.share(match(overlapped=0.4)))
+    assert shares[0] == pytest.approx(shares[1], rel=1e-6)
+    assert 0.5 < shares[0] < 1.0
+
+
+def test_one_scan_alone_never_makes_the_usual() -> None:
+    """After a gap of a minute too: a board in that scan must not be what goes on."""
+    usual = settled(match(overlapped=0.8))
+    usual.follow(match(overlapped=0.1), 60.0)
+    assert usual.share(match(overlapped=0.8)) < 1.5
+    assert usual.share(match(overlapped=0.1)) < 0.3
+
+
+def test_nothing_before_is_no_division_by_nothing() -> None:
+    assert np.isfinite(Usual(CONFIG).share(match()))
+    assert Usual(CONFIG).share(match(overlapped=0.0)) == 0.0
