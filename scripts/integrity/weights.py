@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Evidence weights that make labelled scans likeliest: the model of ``slam.tracker.belief``.
+
+Of each scan one place of those that a search found is right, or none is: a conditional logit with
+``place`` nats for none. A true place against one beside it: a logistic regression. Both have the
+same evidence, and each kind of scan counts alike. Intervals are of fits to resampled streams.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy  # scipy.optimize comes with its first use
+from numpy.typing import NDArray
+
+from scripts.integrity.labelled import Labelled
+from slam.errors import InvalidValueError
+from slam.frames import Float
+from slam.tracker.belief.config import BeliefConfig
+
+JOINT = ("confirmed", "confirmed_m", "through_per_m", "outdated", "changed_per_m", "place")
+FREE = ("confirmed_share", "linear_m")  # may be fitted with them
+ALONE = ("nearby_per_m", "searched", "broken")
+SCANS = 500.0  # that all labels together count, against the prior of ``SPREAD``
+SPREAD = 3.0  # deviation of the logarithm of a weight about its start: keeps what no scan tells
+LOW, HIGH = 1e-3, 1e3  # of a weight
+RESAMPLED, SURE = 100, 0.95
+STARTS = (1.0, 0.5, 2.0)  # times the first
+Values = dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Scans with the places of each; the last axis is padded.
+
+    known, through  (n, places) C and D, m; ``there`` (n, places) where there is a place
+    right           (n, places) the true ones
+    stream          (n,) of which stream, counted
+    """
+
+    known: Float
+    through: Float
+    there: NDArray[np.bool_]
+    right: NDArray[np.bool_]
+    stream: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, scans: Sequence[tuple[int, Sequence[tuple[float, float, bool]]]]) -> Places:
+        """Of (stream, places) of each scan."""
+        width = max((len(places) for _, places in scans), default=0)
+        table = np.zeros((3, len(scans), width))
+        there = np.zeros((len(scans), width), dtype=np.bool_)
+        for n, (_, places) in enumerate(scans):
+            table[:, n, : len(places)] = np.array(places, dtype=np.float64).reshape(-1, 3).T
+            there[n, : len(places)] = True
+        known, through, right = table
+        streams = np.array([stream for stream, _ in scans], dtype=np.int64)
+        return cls(known, through, there, right > 0.5, streams)
+
+
+@dataclass(frozen=True, eq=False)
+class Scans:
+    """All labelled scans of some streams.
+
+    found, none  groups of places, one of them right, or none
+    pairs        one place each
+    """
+
+    found: Places
+    none: Places
+    pairs: Places
+    streams: int
+
+    @classmethod
+    def of(cls, many: Sequence[Labelled]) -> Scans:
+        """Raises ``InvalidValueError`` where a kind of label is missing."""
+        found = [(k, g) for k, one in enumerate(many) for g in one.found if any(p[2] for p in g)]
+        none = [(k, group) for k, one in enumerate(many) for group in one.none]
+        pairs = [(k, [pair]) for k, one in enumerate(many) for pair in one.pairs]
+        if not found or not none or not pairs:
+            raise InvalidValueError(
+                f"a fit needs scans that are found, scans of elsewhere and pairs, got {len(found)},"
+                f" {len(none)} and {len(pairs)}"
+            )
+        return cls(Places.of(found), Places.of(none), Places.of(pairs), len(many))
+
+
+def evidence(values: Values, known: Float, through: Float) -> Float:
+    """Nats for places, as ``slam.tracker.belief.posterior.Odds.evidence`` (a test holds that)."""
+    chance = values["confirmed_m"] + values["confirmed_share"] * through
+    one_view = np.minimum(known, values["linear_m"])
+    more = np.log1p(one_view / chance) + (known - one_view) / (chance + one_view)
+    denied = values["through_per_m"] * through
+    beyond = through - values["outdated"] / values["through_per_m"]
+    denied = np.where(
+        beyond > 0.0, values["outdated"] + values["changed_per_m"] * beyond, denied
+    )  # fmt: skip
+    return np.asarray(values["confirmed"] * more - denied)
+
+
+def likelihood(values: Values, scans: Scans, counts: Float) -> float:
+    """Mean log-likelihood of the four kinds of scans, added; ``counts`` (streams,) of each."""
+    total = 0.0
+    for places in (scans.found, scans.none):
+        nats = np.where(places.there, evidence(values, places.known, places.through), -np.inf)
+        none = np.full((len(nats), 1), values["place"])
+        every = np.logaddexp.reduce(np.concatenate([nats, none], axis=1), axis=1)
+        of = np.where(places.right, nats, -np.inf) if places is scans.found else none
+        right = np.logaddexp.reduce(of, axis=1)
+        total += _mean(right - every, counts[places.stream])
+    nats = evidence(values, scans.pairs.known, scans.pairs.through)[:, 0]
+    right = scans.pairs.right[:, 0]
+    said = -np.logaddexp(0.0, np.where(right, -nats, nats))
+    weights = counts[scans.pairs.stream]
+    return total + _mean(said[right], weights[right]) + _mean(said[~right], weights[~right])
+
+
+def _mean(values: Float, weights: Float) -> float:
+    return float((values * weights).sum() / max(weights.sum(), 1e-9))
+
+
+def fit(
+    scans: Scans, start: Values, free: Sequence[str] = JOINT, counts: Float | None = None,
+    tries: Sequence[float] = STARTS,
+) -> Values:  # fmt: skip
+    """The likeliest values of the settings ``free``; the others stay as in ``start``.
+
+    counts  (streams,) how often each stream counts; once where there are none
+    tries   begin at so many times ``start``
+    """
+    often = np.ones(scans.streams) if counts is None else counts
+    centre = np.log([start[name] for name in free])
+
+    def values(logs: Float) -> Values:
+        return start | dict(zip(free, np.exp(logs).tolist(), strict=True))
+
+    def loss(logs: Float) -> float:
+        shy = 0.5 * float((((logs - centre) / SPREAD) ** 2).sum())
+        return shy - SCANS * likelihood(values(logs), scans, often)
+
+    bounds = [(math.log(LOW), math.log(HIGH))] * len(free)
+    ends = [
+        scipy.optimize.minimize(loss, centre + math.log(k), method="L-BFGS-B", bounds=bounds)
+        for k in tries
+    ]
+    return values(min(ends, key=lambda end: float(end.fun)).x)
+
+
+def nearby(slips: Sequence[tuple[float, float, bool]], start: float) -> float:
+    """Nats a metre of trace by which a place nearby is right: a logistic regression.
+
+    Right and wrong places count alike; ``start`` where one of the two is missing.
+    """
+    gains, priors, is_right = np.array(slips, dtype=np.float64).reshape(-1, 3).T
+    right = is_right > 0.5
+    if right.all() or not right.any():
+        return start
+    weights = np.where(right, 0.5 / right.sum(), 0.5 / (~right).sum())
+
+    def loss(log: Float) -> float:
+        nats = math.exp(float(log[0])) * gains + priors
+        said = (weights * np.logaddexp(0.0, np.where(right, -nats, nats))).sum()
+        return 2.0 * SCANS * float(said) + 0.5 * float((log[0] - math.log(start)) / SPREAD) ** 2
+
+    bounds = [(math.log(LOW), math.log(HIGH))]
+    end = scipy.optimize.minimize(loss, [math.log(start)], method="L-BFGS-B", bounds=bounds)
+    return math.exp(float(end.x[0]))
+
+
+def log_odds(hits: int, n: int) -> float:
+    """Of a share, half a hit and half a miss beside (Jeffreys)."""
+    return math.log((hits + 0.5) / (n - hits + 0.5))
+
+
+def alone(many: Sequence[Labelled], start: BeliefConfig) -> Values:
+    """The settings that each have labels of their own: ``ALONE``."""
+    reached = [found for one in many for found in one.reached]
+    going = [share for one in many for share in one.going]
+    gone = sum(share < start.breaks for share in going)
+    return {
+        "nearby_per_m": nearby([slip for one in many for slip in one.slips], start.nearby_per_m),
+        "searched": log_odds(sum(reached), len(reached)),
+        "broken": -math.log((gone + 0.5) / (len(going) + 1.0)),
+    }
+
+
+def quantiles(shares: Sequence[float], at: Sequence[float]) -> list[float]:
+    """Of what goes on; NaN of nothing."""
+    return np.quantile(shares, at).tolist() if len(shares) else [math.nan] * len(at)
+
+
+def intervals(
+    make: Callable[[NDArray[np.int64]], Values], streams: int, resampled: int = RESAMPLED
+) -> dict[str, tuple[float, float]]:
+    """Of what ``make`` makes of streams (n,) drawn with replacement."""
+    rng, drawn = np.random.default_rng(0), []
+    for _ in range(resampled):
+        drawn.append(make(rng.integers(streams, size=streams)))
+    out = {}
+    for name in drawn[0] if drawn else ():
+        values = [values[name] for values in drawn]
+        low, high = np.quantile(values, [0.5 - SURE / 2.0, 0.5 + SURE / 2.0]).tolist()
+        out[name] = (low, high)
+    return out
+
+
+def fitted(
+    many: Sequence[Labelled], start: BeliefConfig, free: Sequence[str] = JOINT,
+    resampled: int = RESAMPLED,
+) -> dict[str, tuple[float, float, float]]:  # fmt: skip
+    """Value and interval of every setting that is fitted, by its name."""
+    scans, first = Scans.of(many), {name: float(getattr(start, name)) for name in JOINT + FREE}
+    best = fit(scans, first, free)
+
+    def again(streams: NDArray[np.int64]) -> Values:
+        counts = np.bincount(streams, minlength=len(many)).astype(np.float64)
+        joint = fit(scans, best, free, counts, tries=(1.0,))
+        return {n: joint[n] for n in free} | alone([many[k] for k in streams], start)
+
+    values = {name: best[name] for name in free} | alone(many, start)
+    ends = intervals(again, len(many), resampled)
+    return {name: (value, *ends.get(name, (math.nan, math.nan))) for name, value in values.items()}
