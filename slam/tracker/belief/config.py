@@ -60,7 +60,6 @@ class BeliefConfig(Settings):
     )
     unsearched: float = number(
         8.0, "nats", "that a place explains which a search not done may still find, after a break",
-        READ_OFF,
     )  # fmt: skip
     searches: int = number(2, "searches", "most that are such evidence", low=0, high=100)
     slips_per_m: float = number(
