@@ -63,6 +63,7 @@ class Observations:
     T_robot_laser (3,) origin of ``view``
     sensor_sigma_m  standard deviation of a range: the scanner's own, or that of the config
     votes         (n,) in [0, 1] on what is young in the map, see ``tracker.standing``; None: all 1
+    in_view       share of the returns whose places scans of the last seconds had in view
     """
 
     points_robot: Float
@@ -75,6 +76,7 @@ class Observations:
     T_robot_laser: Float
     sensor_sigma_m: float = FRONTEND.sensor_sigma_m
     votes: Float | None = None
+    in_view: float = 1.0
 
     @cached_property
     def weight(self) -> float:
@@ -86,10 +88,10 @@ class Observations:
         """Mean of the votes, 1 where nothing is known of them."""
         return float(self.votes.mean()) if self.votes is not None and len(self.votes) else 1.0
 
-    def with_votes(self, votes: Float | None) -> Observations:
+    def with_votes(self, votes: Float | None, in_view: float = 1.0) -> Observations:
         """The same with other votes: ``replace``, at a quarter of its time."""
         other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__, votes=votes)
+        other.__dict__.update(self.__dict__, votes=votes, in_view=in_view)
         other.__dict__.pop("mean_vote", None)
         return other
 

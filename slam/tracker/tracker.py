@@ -108,10 +108,9 @@ class Tracker(abc.ABC):
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         seen = frame if self._ranges is None else self._ranges.seen(frame)
         observations = observe(seen, prediction.twist, self.config)  # 2 de-skewed points, view
-        votes = self._standing.votes(
+        observations = self._standing.votes(
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
         )
-        observations = observations.with_votes(votes)
         self._vote = observations.mean_vote
         judged = self._judge(observations, prediction)  # 3 Eq. (13), and whether it is believed
         evidence = self._compare(observations, judged)  # 4 residuals
@@ -124,7 +123,7 @@ class Tracker(abc.ABC):
         if self._ranges is not None:
             tracked = state is State.TRACKING and not match.slipped
             self._ranges.learn(frame, prediction.twist, match.T_map_robot, tracked=tracked)
-        return self._report(frame, match, state)
+        return self._report(frame, match, state, judged.likeliest)
 
     def _first(self, frame: Frame) -> Estimate:
         twist = frame.odometry.twist
@@ -262,14 +261,17 @@ class Tracker(abc.ABC):
             elapsed=prediction.elapsed, written=state is State.TRACKING, found=found,
         )  # fmt: skip
 
-    def _report(self, frame: Frame, match: Match, state: State) -> Estimate:
+    def _report(
+        self, frame: Frame, match: Match, state: State, elsewhere: Float | None = None
+    ) -> Estimate:
         self._before = frame.odometry
         self._T_map_robot = match.T_map_robot
-        self._path.add(frame.stamp_ns, match.T_map_robot)
+        T_map_robot = match.T_map_robot if elsewhere is None else elsewhere
+        self._path.add(frame.stamp_ns, T_map_robot)
         return Estimate(
             stamp_ns=frame.stamp_ns,
-            T_map_robot=match.T_map_robot,
-            covariance=self._covariance(match.T_map_robot),
+            T_map_robot=T_map_robot,
+            covariance=self._covariance(T_map_robot),
             converged=state in (State.TRACKING, State.RELOCATED) and not self._doubtful(),
             diagnostics={
                 "state": state.value,

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -39,8 +38,14 @@ def said_after(number: signal.Signals, words: list[str]) -> str:
     with subprocess.Popen(
         words, cwd=REPO, env={**os.environ, "PYTHONPATH": str(REPO)},
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),  # ignored after "&"
+        preexec_fn=_heeding,
     ) as process:  # fmt: skip
         assert process.stdout.readline() == "ready\n"
         process.send_signal(number)
         return process.stdout.read().strip()
+
+
+def _heeding() -> None:
+    """As in a terminal: SIGINT is ignored after "&", SIGHUP under nohup."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)

@@ -32,6 +32,8 @@ from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.matching.usual import Usual
 from slam.tracker.standing.agreement import Agreement
 
+LIKELY = 0.5  # probability from which on a place is likelier than all others together
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judged:
@@ -41,6 +43,7 @@ class Judged:
     prediction  as given, or wider after a slip
     cell_map    the map to go on in; ``writes``: it takes the scan in
     followed    whether the pose is a match to a map, be it the local copy
+    likeliest   (3,) pose of the likeliest place, if that is not where motion led
     """
 
     match: Match
@@ -49,6 +52,7 @@ class Judged:
     cell_map: CellMap
     writes: bool = False
     followed: bool = True
+    likeliest: Float | None = None
 
 
 class Belief:
@@ -76,6 +80,8 @@ class Belief:
         self._give_up_s = config.tracking.give_up_s
         self._episode: Episode | None = None
         self.p_lost, self.status = 0.0, Status.TRACKING
+        self._p_off = 0.0  # that the robot is not where its motion led
+        self._likeliest: int | None = None  # of the places that are followed, if one is
         self._since_near_s = np.inf
         self._suspect = False
 
@@ -108,10 +114,10 @@ class Belief:
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
         episode = self._begun(cell_map, observations, prediction, match)
-        if self.p_lost <= self._config.frozen_above:
+        if self._p_off <= self._config.frozen_above:
             return self._settled(cell_map, match, prediction)
         self._episode, episode.matched = episode, True
-        self._usual.follow(match, prediction.elapsed)
+        self._usual.follow(match, observations, prediction.elapsed)
         episode.places.remember(observations.with_votes(None))
         episode.write(observations, match.T_map_robot, prediction.elapsed)
         return self._decided(episode, cell_map, observations, match, prediction)
@@ -127,6 +133,7 @@ class Belief:
         return Judged(
             match=match, prediction=prediction, state=State.BLIND, cell_map=cell_map,
             writes=episode is None, followed=False,
+            likeliest=None if self._elsewhere is None else self._elsewhere.match.T_map_robot,
         )  # fmt: skip
 
     def _note_break(
@@ -141,7 +148,7 @@ class Belief:
         match, elapsed = judged.match, judged.prediction.elapsed
         here = self._odds.evidence(look) - max(self._broken(observations, judged.prediction, match))
         self._usual.learn(match, elapsed)
-        self._usual.follow(match, elapsed)
+        self._usual.follow(match, observations, elapsed)
         self.p_lost = probabilities([here, self._odds.carried(elapsed)])[1]
         self._suspect = self._odds.asked and self.p_lost > self._config.frozen_above
         self._tell(look.through)
@@ -153,7 +160,7 @@ class Belief:
         if match.slipped or observations.weight < self._numbers.least_weight:
             return 0.0, 0.0  # paid for, or too little in view
         corrected = self._odds.corrected(prediction, match.T_map_robot)
-        return corrected, self._odds.broken(self._usual.share(match))
+        return corrected, self._odds.broken(self._usual.share(match, observations))
 
     @staticmethod
     def _settled(cell_map: CellMap, match: Match, prediction: Prediction) -> Judged:
@@ -237,7 +244,7 @@ class Belief:
         new = episode.places.step(everyone, moved, self._share(), episode.evidence)
         new = [self._told_nearby(episode, place, match) for place in new]
         episode.places.keep(new, episode.weight, self._config.hopeless)
-        if self.p_lost > self._config.frozen_above:
+        if self._p_off > self._config.frozen_above:
             self._search_near(episode, cell_map, observations, prediction, match)
         episode.places.remember(everyone)
         self._weigh(episode)
@@ -245,7 +252,7 @@ class Belief:
 
     def _share(self) -> float:
         prices = self._matcher.config.matching.budget
-        return prices.lost_share if self.p_lost > 0.5 else prices.frozen_share
+        return prices.lost_share if self._p_off > LIKELY else prices.frozen_share
 
     def _followed(
         self,
@@ -259,9 +266,9 @@ class Belief:
         match = unmatched(prediction.T_map_robot, matched=0.0, score=0.0)
         if observations.weight >= self._numbers.least_weight:
             found = near(self._match(observations, prediction, episode.local), prediction)
-            goes_on = self._usual.share(found) >= self._config.breaks
+            goes_on = self._usual.share(found, observations) >= self._config.breaks
             self._note_break(episode, observations, prediction, found)
-            self._usual.follow(found, prediction.elapsed)
+            self._usual.follow(found, observations, prediction.elapsed)
             pose = self._undragged(observations, prediction, found, episode.evidence.latest_m)
             episode.matched = goes_on and pose is None
             match = found if episode.matched else replace(match, matched=found.matched)
@@ -294,12 +301,24 @@ class Belief:
             for place, p in zip(episode.places.followed, self._weighed.places, strict=True)
             if _same(place.match, episode.match)
         )
-        self.p_lost = max(0.0, 1.0 - self._weighed.followed - sum(at_same))
-        self._tell(episode.evidence.through_m)
+        self.p_lost = self._p_off = max(0.0, 1.0 - self._weighed.followed - sum(at_same))
+        self._likeliest = None
+        for k, p in enumerate(self._weighed.places):
+            if 1.0 - p < self.p_lost:
+                self._likeliest, self.p_lost = k, 1.0 - p
+        place = self._elsewhere
+        self._tell((place or episode).evidence.through_m)
+
+    @property
+    def _elsewhere(self) -> Place | None:
+        """The likeliest place, if that is not where motion led."""
+        if self._episode is None or self._likeliest is None:
+            return None
+        return self._episode.places.followed[self._likeliest]
 
     def _tell(self, through_m: float) -> None:
         """In a word."""
-        if self.p_lost >= 0.5:
+        if self.p_lost >= LIKELY:
             self.status = Status.LOST
         else:
             outdated = self._odds.denied(through_m) >= self._config.outdated
@@ -315,19 +334,23 @@ class Belief:
     ) -> Judged:
         """Whether one place is certain: where motion led, or another; else wait."""
         sure, weighed = 1.0 - self._config.frozen_above, self._weighed
+        tired = episode.elapsed_s > self._give_up_s
         for place, p in zip(episode.places.followed, weighed.places, strict=True):
             same = _same(place.match, match) and p > weighed.followed
-            if place.waited == 0 and (p >= sure or (same and 1.0 - self.p_lost >= sure)):
+            taken = p >= (LIKELY if tired else sure)
+            if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
                 return self._found(place, episode, cell_map, observations, prediction)
-        if 1.0 - self.p_lost >= sure or episode.elapsed_s > self._give_up_s:
+        if 1.0 - self._p_off >= sure or (tired and self.p_lost >= min(self._p_off, LIKELY)):
             self._episode = None
             return self._settled(episode.local, match, prediction)
         if episode.elapsed_s > prediction.elapsed:
             episode.write(observations, match.T_map_robot, prediction.elapsed)
-        state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
+        state = State.LOST if self.p_lost >= LIKELY else State.FROZEN
+        place = self._elsewhere
         return Judged(
             match=match, prediction=prediction, state=state, cell_map=cell_map,
             followed=episode.matched,
+            likeliest=None if place is None else place.match.T_map_robot,
         )  # fmt: skip
 
     def _found(
@@ -357,7 +380,9 @@ class Belief:
         if self._episode is None:
             return np.zeros((3, 3))
         poses = [place.match.T_map_robot for place in self._episode.places.followed]
-        spreads = second_moment(poses, self._weighed.places, T_map_robot)
+        poses.append(self._episode.match.T_map_robot)
+        shares = [*self._weighed.places, self._weighed.followed]
+        spreads = second_moment(poses, shares, T_map_robot)
         # the places that are followed need not be all: who is lost may be anywhere
         return spreads + self.p_lost * anywhere(T_map_robot)
 

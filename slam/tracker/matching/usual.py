@@ -36,9 +36,10 @@ class Usual:
         self.matches.append(match.matched)
         self._rewarded += self._forgotten(elapsed) * (match.rewarded - self._rewarded)
 
-    def follow(self, match: Match, elapsed: float) -> None:
+    def follow(self, match: Match, observations: Observations, elapsed: float) -> None:
         """A scan was matched, to the map or to a local copy."""
-        self._overlapped += self._forgotten(elapsed) * (match.overlapped - self._overlapped)
+        known = _of_known(match, observations)
+        self._overlapped += self._forgotten(elapsed) * (known - self._overlapped)
 
     def _forgotten(self, elapsed: float) -> float:
         """Share of what is remembered of a second ago that a scan replaces."""
@@ -56,6 +57,11 @@ class Usual:
         fell = match.rewarded < config.fallen * self._rewarded
         return fell and observations.mean_vote < config.outvoted
 
-    def share(self, match: Match) -> float:
+    def share(self, match: Match, observations: Observations) -> float:
         """Of what all returns, voting or not, matched in the second before: what matches now."""
-        return match.overlapped / max(self._overlapped, LEAST)
+        return _of_known(match, observations) / max(self._overlapped, LEAST)
+
+
+def _of_known(match: Match, observations: Observations) -> float:
+    """Matched share of what the scans before had in view: nothing else can go on from them."""
+    return match.overlapped / max(observations.in_view, match.overlapped, LEAST)

@@ -51,6 +51,15 @@ def _passed(limit: NDArray[np.float64], of: Asking, x: float, y: float) -> bool:
 
 
 @inner
+def _in_view(limit: NDArray[np.float64], of: Asking, x: float, y: float) -> bool:
+    """Whether nothing hid (x, y) (laser axes), and a beam came that way."""
+    bins, r = len(limit), math.sqrt(x * x + y * y)
+    k = math.floor(bearing(x, y) / of.step + 0.5)
+    free = limit[k + bins if k < 0 else (k - bins if k >= bins else k)]
+    return r < free + of.margin and free > 0.0
+
+
+@inner
 def _emptied(  # noqa: PLR0913 (kernel)
     points: NDArray[np.float64],
     pose: NDArray[np.float64],
@@ -60,8 +69,10 @@ def _emptied(  # noqa: PLR0913 (kernel)
     of: Asking,
     recent: int,
     out: NDArray[np.float64],
-) -> None:
+) -> int:
     """Age of the newest scan that saw the place of each point (robot frame) empty, else inf.
+
+    Returns the number of points whose places any of them had in view.
 
     lasers  (J, 3) in the map, ``limits`` (J, bins) free ranges as in ``View``, newest first, of
     which the first few, ``recent``, are asked
@@ -70,16 +81,20 @@ def _emptied(  # noqa: PLR0913 (kernel)
     cosines, sines = np.empty(recent), np.empty(recent)
     for j in range(recent):
         cosines[j], sines[j] = math.cos(lasers[j, 2]), math.sin(lasers[j, 2])
+    in_view = 0
     for k in range(len(points)):
         x = c * points[k, 0] - s * points[k, 1] + pose[0]
         y = s * points[k, 0] + c * points[k, 1] + pose[1]
-        out[k] = math.inf
+        out[k], seen = math.inf, False
         for j in range(recent):
             dx, dy = x - lasers[j, 0], y - lasers[j, 1]
             u, v = cosines[j] * dx + sines[j] * dy, cosines[j] * dy - sines[j] * dx
+            seen = seen or _in_view(limits[j], of, u, v)
             if _passed(limits[j], of, u, v):
                 out[k] = ages[j]
                 break
+        in_view += seen
+    return in_view
 
 
 @inner
@@ -201,15 +216,17 @@ def votes(  # noqa: PLR0913 (kernel)
     ends: NDArray[np.int64],
     of: Asking,
     out: NDArray[np.float64],
-) -> None:
+) -> float:
     """Fill ``out`` (n,) with the vote of each of the points (robot frame), see ``Standing``.
+
+    Returns the share of the points whose places any of the scans asked had in view.
 
     limit   (bins,) free ranges of the present scan, seen from ``T_map_laser``
     lasers, limits, ages, recent  of the scans asked, see ``_emptied``
     before  (m, 2) points in the map of those whose things may have left; ends (L,) of each scan's
     """
     stood = np.empty(len(points))
-    _emptied(points, pose, lasers, limits, ages, of, recent, stood)
+    in_view = _emptied(points, pose, lasers, limits, ages, of, recent, stood)
     first, last = np.empty(len(limit), np.int64), np.empty(len(limit), np.int64)
     _indexed(points, T_robot_laser, of.step, first, last)
     start = 0
@@ -224,3 +241,4 @@ def votes(  # noqa: PLR0913 (kernel)
         ratio = of.settled_s / max(stood[k], 1e-300)
         own[k] = 1.0 - of.sure * (1.0 - 1.0 / (1.0 + ratio * ratio))
     _along(points, joined, own, of.along_m, of.thin_m, out)
+    return in_view / len(points)

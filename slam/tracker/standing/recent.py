@@ -88,12 +88,17 @@ class Standing:
                 least = older[0]
         return chosen
 
-    def votes(self, stamp_ns: int, T_map_robot: Float, prior: Float, seen: Observations) -> Float:
-        """(n,) vote of each return in [0, 1], seen from a pose predicted with a (3, 3) prior."""
+    def votes(
+        self, stamp_ns: int, T_map_robot: Float, prior: Float, seen: Observations
+    ) -> Observations:
+        """With the vote of each return in [0, 1], and what share of them may have been seen before.
+
+        ``T_map_robot``: a pose predicted with a (3, 3) prior.
+        """
         config, points = self._config, seen.points_robot
         asked = self._asked(stamp_ns, seen.view.step) if config.settled_s > 0.0 else []
         if not asked or not len(points):
-            return np.ones(len(points))
+            return seen.with_votes(np.ones(len(points)))
         ages = [(stamp_ns - look.stamp_ns) / NS_PER_S for look in asked]
         place, heading = max(float(prior[0, 0]), float(prior[1, 1])), float(prior[2, 2])
         margin = config.margin_m + config.sigmas * math.sqrt(place)
@@ -112,7 +117,7 @@ class Standing:
         newest = sum(age <= config.left_s for age in ages)
         lately = [look.points_map for look in asked[:newest]]
         out = np.empty(len(points))
-        votes(
+        in_view = votes(
             points, seen.joined, seen.view.limit, T_map_robot,
             se2.compose(T_map_robot, seen.T_robot_laser), seen.T_robot_laser,
             np.array([look.T_map_laser for look in asked]),
@@ -121,4 +126,4 @@ class Standing:
             np.concatenate(lately) if lately else NO_POINTS,
             np.array(list(accumulate(map(len, lately))), np.int64), asking, out,
         )  # fmt: skip
-        return out
+        return seen.with_votes(out, in_view)
