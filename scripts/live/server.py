@@ -7,7 +7,6 @@ touch neither the world nor the playback.
 
 from __future__ import annotations
 
-import ipaddress
 import json
 import logging
 import math
@@ -15,6 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from scripts.live import published
+from scripts.live.gate import hidden_host
 from scripts.live.inbox import Inbox
 from scripts.live.playback import Playback
 from scripts.live.publisher import Publisher
@@ -23,6 +23,7 @@ from scripts.live.sdk import Sdk
 from slam.errors import InvalidValueError, MobiliaError
 from slam.frames import NS_PER_S
 
+BACKLOG = 64  # messages that wait for a slow client; the oldest are dropped
 MOST_CHANNELS = 256  # that clients advertise to us and that are kept in mind
 
 
@@ -178,19 +179,19 @@ def _service(sdk: Sdk, inbox: Inbox, name: str, service: Service, answer: bytes)
 
 def start(
     sdk: Sdk, publisher: Publisher, listener: Listener, inbox: Inbox,
-    address: tuple[str, int], shown_ns: tuple[int, int],
-) -> Any:  # fmt: skip
-    """The running server; ``InvalidValueError`` where it cannot listen at ``address``.
+    shown_ns: tuple[int, int],
+) -> tuple[Any, tuple[str, int]]:
+    """The running server and where it listens: behind a gate (``gate``), at a hidden address.
 
     shown_ns  first and last stamp of the time line
     """
-    host, port = address
+    host = hidden_host()
     capabilities = sdk.websocket.Capability
     sdk.foxglove.set_log_level(logging.ERROR)
     listener.publisher = publisher
     try:
-        return sdk.foxglove.start_server(
-            name="mobilia", host=host, port=port, context=publisher.context,
+        running = sdk.foxglove.start_server(
+            name="mobilia", host=host, port=0, message_backlog_size=BACKLOG, context=publisher.context,
             server_listener=listener, services=services(sdk, inbox),
             supported_encodings=["json"], playback_time_range=shown_ns,
             capabilities=[
@@ -199,15 +200,8 @@ def start(
             ],
         )  # fmt: skip
     except (RuntimeError, OSError, ValueError, OverflowError) as error:
-        raise InvalidValueError(f"cannot listen at {host}:{port}: {error}") from error
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach it."""
-    try:
-        return host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+        raise InvalidValueError(f"cannot listen at {host}: {error}") from error
+    return running, (host, int(running.port))
 
 
 def playback_state(

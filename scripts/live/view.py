@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from scripts import interrupt
 from scripts.live import server
+from scripts.live.gate import Gate, new_token
 from scripts.live.inbox import MOST_WAITING, Inbox
 from scripts.live.pace import Pace
 from scripts.live.playback import Playback
@@ -29,7 +31,7 @@ class View:
 
     def __init__(
         self, sdk: Sdk, session: Session, playback: Playback,
-        address: tuple[str, int], shown_ns: tuple[int, int],
+        address: tuple[str, int], shown_ns: tuple[int, int], origins: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self._sdk, self.session, self._playback = sdk, session, playback
         self._inbox, self._pace = Inbox(), Pace()
@@ -38,7 +40,15 @@ class View:
         listener.parameters = self._parameters
         listener.state = self._state
         self._first_ns = shown_ns[0]
-        self._server = server.start(sdk, self._publisher, listener, self._inbox, address, shown_ns)
+        self._server, behind = server.start(
+            sdk, self._publisher, listener, self._inbox, shown_ns
+        )
+        token = new_token(address[0])
+        try:
+            self._gate = Gate(address, behind, origins=origins, token=token)
+        except InvalidValueError:
+            self._server.stop()
+            raise
         session.speed = playback.speed
         self._due: Shown | None = None
         self._told_end = False
@@ -46,10 +56,16 @@ class View:
     @property
     def port(self) -> int:
         """As above."""
-        return int(self._server.port)
+        return self._gate.port
+
+    @property
+    def token(self) -> str:
+        """What the address must hold, where others can reach it; else empty."""
+        return self._gate.rules.token
 
     def close(self) -> None:
         """Stop listening."""
+        self._gate.close()
         self._server.stop()
 
     def turn(self) -> None:

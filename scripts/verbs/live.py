@@ -49,6 +49,10 @@ def live(
         str, typer.Option(help="Address to listen at; any but loopback lets others in.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port to listen at, 0 for any that is free.")] = PORT,
+    allow_origin: Annotated[
+        list[str] | None,
+        typer.Option(help="A web page that may connect: https://host[:port]; repeatable."),
+    ] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
@@ -70,7 +74,9 @@ def live(
         raise InvalidValueError(f"--speed must lie in [{SLOWEST:g}, {FASTEST:g}], got {speed:g}")
     slams = list(with_set(slam or ["shunting"], set_ or []))
     check(slams, scene)
-    from scripts.live import opened, sdk
+    from scripts.live import gate, opened, sdk
+
+    origins = [gate.origin_of(text) for text in allow_origin or []]
 
     found = sdk.require()
     if path is not None:
@@ -79,7 +85,7 @@ def live(
         held = Held(motion=motion, change=change, crowd=crowd)
         world = {"scene": scene, "dynamism": dynamism, **held.given(), "seed": seed}
         served = opened.of_scene(slams, {**world, "laser": scanner}, seconds)
-    _serve(found, served, (host, port), playing=not paused, speed=speed)
+    _serve(found, served, (host, port), origins, playing=not paused, speed=speed)
 
 
 def _file(scene: str | None, log: Path | None, bag: Path | None) -> Path | None:
@@ -91,26 +97,27 @@ def _file(scene: str | None, log: Path | None, bag: Path | None) -> Path | None:
 
 
 def _serve(
-    found: object, served: Opened, address: tuple[str, int], *, playing: bool, speed: float
-) -> None:
+    found: object, served: Opened, address: tuple[str, int], origins: list[str], *,
+    playing: bool, speed: float,
+) -> None:  # fmt: skip
     from scripts.live.playback import Playback
     from scripts.live.sdk import Sdk
-    from scripts.live.server import is_loopback
     from scripts.live.view import View
 
     assert isinstance(found, Sdk)
     session, shown_ns = served
     playback = Playback(session.run(), playing=playing, speed=speed)
-    view = View(found, session, playback, address, shown_ns)
+    view = View(found, session, playback, address, shown_ns, origins)
     try:
         host = address[0]
-        if not is_loopback(host):
+        if view.token:
             note(
-                f"--host {host}: whoever can reach this machine can watch, drive the robot and "
-                "move things. There is no password and no encryption."
+                f"--host {host}: whoever has the address below can watch, drive the robot and "
+                "move things. There is no encryption."
             )
+        path = f"/{view.token}" if view.token else ""
         console.print(
-            f"Serving at [bold]ws://{escape(host)}:{view.port}[/bold]; layout: "
+            f"Serving at [bold]ws://{escape(host)}:{view.port}{path}[/bold]; layout: "
             f"{escape(str(LAYOUT))}. Ctrl-C ends it.",
             soft_wrap=True,
         )

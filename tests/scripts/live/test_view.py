@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from scripts.experiments import live_client
-from scripts.live import opened, sdk, server
+from scripts.live import gate, opened, sdk
 from scripts.live.client import Client, fields
 from scripts.live.playback import Playback
 from scripts.live.session import EPOCH_NS
@@ -158,8 +158,8 @@ def test_without_the_sdk_one_line_says_what_to_install(monkeypatch):
 
 
 def test_only_loopback_is_private():
-    assert all(server.is_loopback(host) for host in ("127.0.0.1", "localhost", "::1", "127.9.9.9"))
-    assert not any(server.is_loopback(host) for host in ("0.0.0.0", "192.168.1.2", "a.example", ""))
+    assert all(gate.is_loopback(host) for host in ("127.0.0.1", "localhost", "::1", "127.9.9.9"))
+    assert not any(gate.is_loopback(host) for host in ("0.0.0.0", "192.168.1.2", "a.example", ""))
 
 
 def test_a_port_that_is_taken_is_named(view: View):

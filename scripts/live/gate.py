@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who may connect: the Foxglove SDK lets every page of every site in, so a gate stands before it.
+
+A browser sends the ``Origin`` of the page that connects, and no page can forge it. The gate reads
+the handshake, refuses what is not allowed, and from there on carries bytes. The SDK listens behind
+it at a loopback address and a port that nobody is told.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import ipaddress
+import logging
+import random
+import secrets
+import sys
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from slam.errors import InvalidValueError
+
+log = logging.getLogger(__name__)
+
+VIEWERS = ("https://app.foxglove.dev",)  # pages of others that may connect
+MOST_CLIENTS = 8  # at once; each may keep a backlog of the SDK's messages waiting
+MOST_HEAD = 8192  # bytes of a handshake
+HEAD_S = 5.0  # s until it is there
+CARRIED = 1 << 16  # bytes that are read at a time, and wait in the gate for a client that is slow
+_HEAD_END = b"\r\n\r\n"
+
+
+class Refused(Exception):
+    """A handshake that is not let through: status line and reason."""
+
+    def __init__(self, status: str, why: str) -> None:
+        super().__init__(why)
+        self.status = status
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rules:
+    """Who is let in.
+
+    host     that the gate listens at, ``port`` too
+    origins  of pages beside ``VIEWERS`` and those that the gate's own address would serve
+    token    that the address must hold; empty: none
+    """
+
+    host: str
+    port: int
+    origins: tuple[str, ...] = ()
+    token: str = ""
+
+    def names(self) -> frozenset[str]:
+        """Hosts that a client may have asked for: a name that leads here by force is none."""
+        own = f"[{self.host}]" if ":" in self.host else self.host
+        return frozenset(f"{name}:{self.port}" for name in ("localhost", "127.0.0.1", "[::1]", own))
+
+    def check(self, head: bytes) -> bytes:
+        """The handshake as it goes on to the SDK; raises ``Refused``."""
+        target, headers = _parsed(head)
+        hosts, origins = headers.get("host", []), headers.get("origin", [])
+        if headers.get("upgrade", [""])[0].lower() != "websocket":
+            raise Refused("426 Upgrade Required", "this is a WebSocket")
+        if len(hosts) != 1 or (not self.token and hosts[0].lower() not in self.names()):
+            raise Refused("403 Forbidden", f"the address is not {self.host}:{self.port}")
+        if self.token and not self._holds_token(target):
+            raise Refused("403 Forbidden", "the token in the address is missing or wrong")
+        if origins and (len(origins) > 1 or not self._knows(origins[0], hosts[0])):
+            raise Refused(
+                "403 Forbidden",
+                f"a page of {origins[0]!r:.80} wants in; --allow-origin lets it",
+            )
+        lines = head.split(b"\r\n")
+        return b"\r\n".join([b"GET / HTTP/1.1", *lines[1:]])
+
+    def _knows(self, origin: str, host: str) -> bool:
+        own = (f"http://{host.lower()}", f"https://{host.lower()}")
+        return origin in (*VIEWERS, *self.origins) or origin in own
+
+    def _holds_token(self, target: str) -> bool:
+        parts = urlsplit(target)
+        given = [parts.path.strip("/"), *parse_qs(parts.query).get("token", [])]
+        return any(hmac.compare_digest(one.encode(), self.token.encode()) for one in given)
+
+
+def _parsed(head: bytes) -> tuple[str, dict[str, list[str]]]:
+    """Target and headers, names in lower case, each with all its values."""
+    try:
+        first, *lines = head.removesuffix(_HEAD_END).decode("ascii").split("\r\n")
+        method, target, version = first.split(" ")
+        pairs = [line.split(":", 1) for line in lines]
+        headers: dict[str, list[str]] = {}
+        for name, value in pairs:
+            if name != name.strip() or not name:
+                raise ValueError(name)
+            headers.setdefault(name.lower(), []).append(value.strip(" \t"))
+    except ValueError as error:  # UnicodeDecodeError is one
+        raise Refused("400 Bad Request", "no handshake of a WebSocket") from error
+    if method != "GET" or version != "HTTP/1.1" or any(c in head for c in (b"\0", b"\n\n")):
+        raise Refused("400 Bad Request", "no handshake of a WebSocket")
+    return target, headers
+
+
+def origin_of(text: str) -> str:
+    """``--allow-origin``, checked: scheme://host or scheme://host:port."""
+    parts = urlsplit(text)
+    whole = f"{parts.scheme}://{parts.netloc}"
+    if text == "null" or (parts.scheme and parts.netloc and text == whole):
+        return text
+    raise InvalidValueError(
+        f"--allow-origin must be like https://example.org:8080, got {text!r:.80}"
+    )
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach it."""
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def new_token(host: str) -> str:
+    """What the address must hold where others can reach it, else nothing."""
+    return "" if is_loopback(host) else secrets.token_urlsafe(16)
+
+
+def hidden_host() -> str:
+    """A loopback address that no page can guess, where the system has more than one."""
+    if not sys.platform.startswith("linux"):
+        return "127.0.0.1"
+    draw = random.SystemRandom()
+    return f"127.{draw.randrange(1, 255)}.{draw.randrange(256)}.{draw.randrange(1, 255)}"
+
+
+class Gate:
+    """Listens at an address in a thread of its own, before a server at ``behind``.
+
+    port  where it listens, also where 0 was asked for
+    """
+
+    def __init__(
+        self, address: tuple[str, int], behind: tuple[str, int], *,
+        origins: Sequence[str] = (), token: str = "",
+    ) -> None:  # fmt: skip
+        self._behind, self._clients = behind, 0
+        self._loop = asyncio.new_event_loop()
+        host, port = address
+        opened = asyncio.start_server(self._let_in, host, port, limit=MOST_HEAD)
+        try:
+            self._server: Any = self._loop.run_until_complete(opened)
+        except (OSError, OverflowError, UnicodeError) as error:
+            self._loop.close()
+            raise InvalidValueError(f"cannot listen at {host}:{port}: {error}") from error
+        self.port = int(self._server.sockets[0].getsockname()[1])
+        self.rules = Rules(host=host, port=self.port, origins=tuple(origins), token=token)
+        self._thread = threading.Thread(target=self._run, name="gate", daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        self._loop.run_forever()
+        self._loop.run_until_complete(self._end())
+        self._loop.close()
+
+    async def _end(self) -> None:
+        self._server.close()
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def close(self) -> None:
+        """Stop listening, and let go of all clients."""
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(HEAD_S)
+
+    async def _let_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._clients += 1
+        try:
+            if self._clients > MOST_CLIENTS:
+                raise Refused("503 Service Unavailable", f"{MOST_CLIENTS} clients are here already")
+            head = await asyncio.wait_for(reader.readuntil(_HEAD_END), HEAD_S)
+            await self._carry(reader, writer, self.rules.check(head))
+        except Refused as error:
+            log.warning("live view: refused: %s", error)
+            text = f"HTTP/1.1 {error.status}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
+            with suppress(OSError):
+                writer.write(text.encode())
+                await asyncio.wait_for(writer.drain(), HEAD_S)
+        except (OSError, EOFError, TimeoutError, asyncio.LimitOverrunError):
+            pass  # it left, or never spoke
+        finally:
+            self._clients -= 1
+            writer.close()
+
+    async def _carry(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, head: bytes
+    ) -> None:
+        """Bytes both ways until one side ends; a slow side stops the other, not the world."""
+        inner_reader, inner_writer = await asyncio.open_connection(*self._behind, limit=CARRIED)
+        try:
+            inner_writer.write(head)
+            ways = [
+                asyncio.ensure_future(_pour(reader, inner_writer)),
+                asyncio.ensure_future(_pour(inner_reader, writer)),
+            ]
+            try:
+                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                for way in ways:
+                    way.cancel()
+                await asyncio.gather(*ways, return_exceptions=True)
+        finally:
+            inner_writer.close()
+
+
+async def _pour(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    writer.transport.set_write_buffer_limits(high=CARRIED)
+    with suppress(OSError):
+        while data := await reader.read(CARRIED):
+            writer.write(data)
+            await writer.drain()
