@@ -108,7 +108,7 @@ class Tracker(abc.ABC):
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         seen = frame if self._ranges is None else self._ranges.seen(frame)
         observations = observe(seen, prediction.twist, self.config)  # 2 de-skewed points, view
-        observations = self._standing.votes(
+        observations = self._standing.with_votes(
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
         )
         self._vote = observations.mean_vote

@@ -69,7 +69,7 @@ def _run_all(config: TrackerConfig, new_map: Callable[[Any], CellMap]) -> None:
         cell_map.integrate(seen.view, origin, 1.0, write=write)
     standing = Standing(StandingConfig(thin_m=0.0))
     standing.add(0, origin, seen)
-    standing.votes(NS_PER_S // 2, origin, covariance, seen)
+    standing.with_votes(NS_PER_S // 2, origin, covariance, seen)
     start = matcher.approach(cell_map, seen, origin, covariance)
     matcher.climb(cell_map, seen, start, origin, np.linalg.inv(covariance))
     _search(cell_map, matcher, seen)

@@ -337,7 +337,8 @@ class Belief:
         tired = episode.elapsed_s > self._give_up_s
         for place, p in zip(episode.places.followed, weighed.places, strict=True):
             same = _same(place.match, match) and p > weighed.followed
-            taken = p >= (LIKELY if tired else sure)
+            goes_on = self._usual.share(place.match, observations) >= self._config.breaks
+            taken = p >= LIKELY if tired else p >= sure and goes_on
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
                 return self._found(place, episode, cell_map, observations, prediction)
         if 1.0 - self._p_off >= sure or (tired and self.p_lost >= min(self._p_off, LIKELY)):

@@ -37,9 +37,8 @@ class BeliefConfig(Settings):
         0.49, "nats/m", "of long-known surface that is seen through in such a room", FITTED
     )
     broken: float = number(
-        8.0, "nats", "that it costs if hardly a return goes on from the scans before", FITTED,
-        low=1e-3,
-    )  # fmt: skip
+        7.0, "nats", "that it costs if hardly a return goes on from the scans before", low=1e-3
+    )
     goes_on: float = number(
         0.5, "share", "of what all returns matched in the second before: a scan goes on", READ_OFF
     )

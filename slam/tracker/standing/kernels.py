@@ -52,11 +52,17 @@ def _passed(limit: NDArray[np.float64], of: Asking, x: float, y: float) -> bool:
 
 @inner
 def _in_view(limit: NDArray[np.float64], of: Asking, x: float, y: float) -> bool:
-    """Whether nothing hid (x, y) (laser axes), and a beam came that way."""
-    bins, r = len(limit), math.sqrt(x * x + y * y)
+    """Whether nothing hid (x, y) (laser axes), and a beam came that way.
+
+    The widest of three bins: at a wall that is seen at a grazing angle each falls short of it.
+    """
+    bins, end = len(limit), math.sqrt(x * x + y * y) - of.margin
     k = math.floor(bearing(x, y) / of.step + 0.5)
-    free = limit[k + bins if k < 0 else (k - bins if k >= bins else k)]
-    return r < free + of.margin and free > 0.0
+    for b in (k - 1, k, k + 1):
+        free = limit[b % bins]
+        if free > 0.0 and end < free:
+            return True
+    return False
 
 
 @inner

@@ -88,7 +88,7 @@ class Standing:
                 least = older[0]
         return chosen
 
-    def votes(
+    def with_votes(
         self, stamp_ns: int, T_map_robot: Float, prior: Float, seen: Observations
     ) -> Observations:
         """With the vote of each return in [0, 1], and what share of them may have been seen before.

@@ -26,16 +26,19 @@ def match(matched: float = 0.8, *, overlapped: float = 0.8, rewarded: float = 0.
     )  # fmt: skip
 
 
-def voting(vote: float) -> Any:
+def voting(vote: float, in_view: float = 1.0) -> Any:
     """Observations, as far as they are asked."""
-    return SimpleNamespace(mean_vote=vote)
+    return SimpleNamespace(mean_vote=vote, in_view=in_view)
+
+
+ALL = voting(1.0)
 
 
 def settled(of: Match, step_s: float = STEP_S, scans: int = LONG) -> Usual:
     usual = Usual(CONFIG)
     for _ in range(scans):
         usual.learn(of, step_s)
-        usual.follow(of, step_s)
+        usual.follow(of, ALL, step_s)
     return usual
 
 
@@ -72,13 +75,13 @@ def test_a_reward_that_fell_is_odd_where_returns_lost_their_votes() -> None:
 
 def test_a_share_is_of_what_the_second_before_matched() -> None:
     usual = settled(match(overlapped=0.8))
-    assert usual.share(match(overlapped=0.8)) == pytest.approx(1.0, abs=1e-3)
-    assert usual.share(match(overlapped=0.2)) == pytest.approx(0.25, abs=1e-3)
+    assert usual.share(match(overlapped=0.8), ALL) == pytest.approx(1.0, abs=1e-3)
+    assert usual.share(match(overlapped=0.2), ALL) == pytest.approx(0.25, abs=1e-3)
     usual.learn(match(overlapped=0.1), STEP_S)  # the map took it in: that alone says nothing
-    assert usual.share(match(overlapped=0.8)) == pytest.approx(1.0, abs=1e-3)
+    assert usual.share(match(overlapped=0.8), ALL) == pytest.approx(1.0, abs=1e-3)
     for _ in range(LONG):  # the scans that follow are what goes on
-        usual.follow(match(overlapped=0.2), STEP_S)
-    assert usual.share(match(overlapped=0.2)) == pytest.approx(1.0, abs=1e-3)
+        usual.follow(match(overlapped=0.2), ALL, STEP_S)
+    assert usual.share(match(overlapped=0.2), ALL) == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("fast_s", [0.027, 0.1])
@@ -88,8 +91,8 @@ def test_a_second_is_forgotten_alike_at_any_rate(fast_s: float) -> None:
     for step_s in (fast_s, 2.0 * fast_s):
         usual = settled(match(overlapped=0.8), step_s, round(10.0 * CONFIG.fallen_s / step_s))
         for _ in range(round(CONFIG.fallen_s / fast_s / 2.0) * (2 if step_s == fast_s else 1)):
-            usual.follow(match(overlapped=0.4), step_s)
-        shares.append(usual.share(match(overlapped=0.4)))
+            usual.follow(match(overlapped=0.4), ALL, step_s)
+        shares.append(usual.share(match(overlapped=0.4), ALL))
     assert shares[0] == pytest.approx(shares[1], rel=1e-6)
     assert 0.5 < shares[0] < 1.0
 
@@ -97,11 +100,20 @@ def test_a_second_is_forgotten_alike_at_any_rate(fast_s: float) -> None:
 def test_one_scan_alone_never_makes_the_usual() -> None:
     """After a gap of a minute too: a board in that scan must not be what goes on."""
     usual = settled(match(overlapped=0.8))
-    usual.follow(match(overlapped=0.1), 60.0)
-    assert usual.share(match(overlapped=0.8)) < 1.5
-    assert usual.share(match(overlapped=0.1)) < 0.3
+    usual.follow(match(overlapped=0.1), ALL, 60.0)
+    assert usual.share(match(overlapped=0.8), ALL) < 1.5
+    assert usual.share(match(overlapped=0.1), ALL) < 0.3
+
+
+def test_what_was_not_in_view_before_need_not_go_on() -> None:
+    """A robot that turns into a part of a room that no scan has seen has not been carried off."""
+    usual = settled(match(overlapped=0.8))
+    turned = match(overlapped=0.2)
+    assert usual.share(turned, ALL) < 0.3
+    assert usual.share(turned, voting(1.0, in_view=0.25)) == pytest.approx(1.0, abs=1e-3)
+    assert usual.share(match(overlapped=0.9), voting(1.0, in_view=0.5)) < 1.3
 
 
 def test_nothing_before_is_no_division_by_nothing() -> None:
-    assert np.isfinite(Usual(CONFIG).share(match()))
-    assert Usual(CONFIG).share(match(overlapped=0.0)) == 0.0
+    assert np.isfinite(Usual(CONFIG).share(match(), ALL))
+    assert Usual(CONFIG).share(match(overlapped=0.0), ALL) == 0.0

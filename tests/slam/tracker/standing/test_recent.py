@@ -44,7 +44,7 @@ def votes(
     """Of what is nearer than the walls, and of the walls, ``age_s`` after the only earlier scan."""
     standing = Standing(NUMBERS)
     standing.add(0, HERE, before)
-    found = standing.votes(round(age_s * NS_PER_S), HERE, prior, now)
+    found = votes_of(standing.with_votes(round(age_s * NS_PER_S), HERE, prior, now))
     x, y = now.points_robot.T
     inside = (np.abs(x - 1.0) < 3.8) & (np.abs(y) < 2.8)
     return found[inside], found[~inside]
@@ -90,12 +90,27 @@ def test_where_the_prediction_is_vague_nobody_loses_the_vote() -> None:
     assert came.min() > 0.9
 
 
+def test_what_no_scan_had_in_view_is_told_apart() -> None:
+    """Where the robot has turned to, and what a box hid: no scan can have seen what is there."""
+    standing, now = Standing(NUMBERS), seen()
+    standing.add(0, HERE, now)
+    again = standing.with_votes(NS_PER_S // 5, HERE, SURE, now)
+    turned = standing.with_votes(NS_PER_S // 5, np.array([0.0, 0.0, 0.5 * np.pi]), SURE, now)
+    hidden = Standing(NUMBERS)
+    hidden.add(0, HERE, seen(box(1.0, 0.0)))
+    behind = hidden.with_votes(NS_PER_S // 5, HERE, SURE, now)
+    assert again.in_view > 0.98
+    assert turned.in_view < 0.5
+    assert 0.6 < behind.in_view < 0.95
+    assert Standing(NUMBERS).with_votes(0, HERE, SURE, now).in_view == 1.0
+
+
 def test_all_vote_without_earlier_scans_and_when_it_is_off() -> None:
     now = seen(box(2.0, 0.0))
-    assert Standing(NUMBERS).votes(0, HERE, SURE, now).min() == 1.0
+    assert votes_of(Standing(NUMBERS).with_votes(0, HERE, SURE, now)).min() == 1.0
     off = Standing(ALL_VOTE)
     off.add(0, HERE, seen())
-    assert off.votes(NS_PER_S // 5, HERE, SURE, now).min() == 1.0
+    assert votes_of(off.with_votes(NS_PER_S // 5, HERE, SURE, now)).min() == 1.0
 
 
 def test_scans_are_kept_for_seconds_at_any_rate_and_few_are_asked() -> None:
