@@ -178,7 +178,10 @@ def _service(sdk: Sdk, inbox: Inbox, name: str, service: Service, answer: bytes)
 
 
 def start(
-    sdk: Sdk, publisher: Publisher, listener: Listener, inbox: Inbox,
+    sdk: Sdk,
+    publisher: Publisher,
+    listener: Listener,
+    inbox: Inbox,
     shown_ns: tuple[int, int],
 ) -> tuple[Any, tuple[str, int]]:
     """The running server and where it listens: behind a gate (``gate``), at a hidden address.
@@ -191,7 +194,8 @@ def start(
     listener.publisher = publisher
     try:
         running = sdk.foxglove.start_server(
-            name="mobilia", host=host, port=0, message_backlog_size=BACKLOG, context=publisher.context,
+            name="mobilia", host=host, port=0, message_backlog_size=BACKLOG,
+            context=publisher.context,
             server_listener=listener, services=services(sdk, inbox),
             supported_encodings=["json"], playback_time_range=shown_ns,
             capabilities=[

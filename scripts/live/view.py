@@ -40,9 +40,7 @@ class View:
         listener.parameters = self._parameters
         listener.state = self._state
         self._first_ns = shown_ns[0]
-        self._server, behind = server.start(
-            sdk, self._publisher, listener, self._inbox, shown_ns
-        )
+        self._server, behind = server.start(sdk, self._publisher, listener, self._inbox, shown_ns)
         token = new_token(address[0])
         try:
             self._gate = Gate(address, behind, origins=origins, token=token)

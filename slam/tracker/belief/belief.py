@@ -347,11 +347,11 @@ class Belief:
         if episode.elapsed_s > prediction.elapsed:
             episode.write(observations, match.T_map_robot, prediction.elapsed)
         state = State.LOST if self.p_lost >= LIKELY else State.FROZEN
-        place = self._elsewhere
+        elsewhere = self._elsewhere
         return Judged(
             match=match, prediction=prediction, state=state, cell_map=cell_map,
             followed=episode.matched,
-            likeliest=None if place is None else place.match.T_map_robot,
+            likeliest=None if elsewhere is None else elsewhere.match.T_map_robot,
         )  # fmt: skip
 
     def _found(

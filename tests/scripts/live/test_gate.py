@@ -66,7 +66,7 @@ def test_two_origins_a_foreign_name_and_half_a_handshake_are_refused():
 def test_500_foreign_origins_are_refused():
     rng = random.Random(0)
     good = ["https://app.foxglove.dev", f"http://127.0.0.1:{PORT}", "https://mine.example:8443"]
-    marks = ["evil.example", ".", ":", "@", "/", "#", "?", "%00", "\u00e9", " ", "\t", ",", "x", "0"]
+    marks = ["evil.example", *".:@/#?,x0 \t", "%00", "\u00e9"]
     tried = 0
     while tried < 500:
         origin = rng.choice([*good, "http://evil.example", "null"])
@@ -86,7 +86,8 @@ def test_others_need_the_token_of_the_address():
     token = gate.new_token("0.0.0.0")
     rules = Rules(host="0.0.0.0", port=PORT, token=token)
     host = f"192.168.1.2:{PORT}"
-    assert len(token) >= 20 and gate.new_token("127.0.0.1") == ""
+    assert len(token) >= 20
+    assert gate.new_token("127.0.0.1") == ""
     assert is_let_in(rules, head(host=host, path=f"/{token}"))
     assert is_let_in(rules, head(host=host, path=f"/?token={token}"))
     for path in ("/", f"/{token[:-1]}", f"/{token}x", "/?token=", f"/?other={token}"):
