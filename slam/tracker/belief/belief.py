@@ -32,8 +32,6 @@ from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.matching.usual import Usual
 from slam.tracker.standing.agreement import Agreement
 
-LIKELY = 0.5  # probability from which on a place is likelier than all others together
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judged:
@@ -252,7 +250,7 @@ class Belief:
 
     def _share(self) -> float:
         prices = self._matcher.config.matching.budget
-        return prices.lost_share if self._p_off > LIKELY else prices.frozen_share
+        return prices.lost_share if self._p_off > 0.5 else prices.frozen_share
 
     def _followed(
         self,
@@ -318,7 +316,7 @@ class Belief:
 
     def _tell(self, through_m: float) -> None:
         """In a word."""
-        if self.p_lost >= LIKELY:
+        if self.p_lost >= 0.5:
             self.status = Status.LOST
         else:
             outdated = self._odds.denied(through_m) >= self._config.outdated
@@ -338,15 +336,15 @@ class Belief:
         for place, p in zip(episode.places.followed, weighed.places, strict=True):
             same = _same(place.match, match) and p > weighed.followed
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks
-            taken = p >= LIKELY if tired else p >= sure and goes_on
+            taken = p >= 0.5 if tired else p >= sure and goes_on
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
                 return self._found(place, episode, cell_map, observations, prediction)
-        if 1.0 - self._p_off >= sure or (tired and self.p_lost >= min(self._p_off, LIKELY)):
+        if 1.0 - self._p_off >= sure or (tired and self.p_lost >= min(self._p_off, 0.5)):
             self._episode = None
             return self._settled(episode.local, match, prediction)
         if episode.elapsed_s > prediction.elapsed:
             episode.write(observations, match.T_map_robot, prediction.elapsed)
-        state = State.LOST if self.p_lost >= LIKELY else State.FROZEN
+        state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
         elsewhere = self._elsewhere
         return Judged(
             match=match, prediction=prediction, state=state, cell_map=cell_map,

@@ -189,7 +189,7 @@ def test_places_that_look_alike_are_not_told_apart_by_one_of_them() -> None:
         system.update(frame)
     after = kidnapped_to((3.0, 0.0, 1.5), hall, before[-1])
     states = [system.update(frame).diagnostics["state"] for frame in after]
-    assert states[-1] == "lost"
+    assert states[-1] in ("frozen", "lost")
     assert "relocated" not in states
 
 

@@ -21,8 +21,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("7f3179651099", "7a795330754a")),
-        (OccupancyConfig, ["grid"], ("45e0a6e53496", "dd0119d8edab")),
+        (ShuntingConfig, [], ("f7d9e1f0179d", "fee739d1b819")),
+        (OccupancyConfig, ["grid"], ("15c4b126e7e0", "52594c6f1c38")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

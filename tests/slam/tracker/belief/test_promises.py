@@ -211,7 +211,7 @@ def carried(budget_ms: float) -> tuple[Counter[str], list[float], float]:
         said.update(states([estimate]))
         episode = system._belief._episode
         spent.append(0.0 if episode is None else episode.places.spent_ns)
-    assert estimate.diagnostics["state"] in ("tracking", "lost")
+    assert estimate.diagnostics["state"] in ("tracking", "frozen", "lost")
     return said, spent, off_m(estimate, frame.truth)
 
 
