@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError, NeedsLabelsError, NotFiniteError, SlamFailedError
 from slam.estimate import Changes, Estimate, Landmarks, Raster
-from slam.frames import Frame
+from slam.frames import Float, Frame
 from slam.system import HasChanges, HasLandmarks, RunsAtTheEnd, SlamSystem, told
 from slam.trajectory import Trajectory
+
+MOST_M = 1e9  # m and rad, of a pose or a map's origin: the squares of errors must not overflow
+LEAST_CELL_M, MOST_CELL_M = 1e-3, 1e3  # edge of a map's cell
 
 
 def asked(system: SlamSystem, frame: Frame) -> Estimate:
@@ -26,7 +29,14 @@ def asked(system: SlamSystem, frame: Frame) -> Estimate:
         raise SlamFailedError(
             f"returned an estimate for {estimate.stamp_ns} ns instead of {frame.stamp_ns} ns", "bad"
         )
+    _check_near("a pose", estimate.T_map_robot)
     return estimate
+
+
+def _check_near(what: str, poses: Float) -> None:
+    """``SlamFailedError`` for a place past ``MOST_M``: no picture holds it."""
+    if poses.size and (far := float(np.abs(poses).max())) > MOST_M:
+        raise SlamFailedError(f"returned {what} at {far:g} m or rad, past {MOST_M:g}", "bad")
 
 
 def asked_map(system: SlamSystem) -> Raster | None:
@@ -46,6 +56,13 @@ def as_map(raster: object) -> Raster | None:
         raise SlamFailedError(
             "returned a map that does not lie along the map's axes, its origin is turned by "
             f"{raster.T_map_origin[2]} rad",
+            "bad",
+        )
+    _check_near("a map", raster.T_map_origin)
+    if not LEAST_CELL_M <= raster.resolution_m <= MOST_CELL_M:
+        raise SlamFailedError(
+            f"returned a map of cells of {raster.resolution_m:g} m, they may have {LEAST_CELL_M:g} "
+            f"to {MOST_CELL_M:g}",
             "bad",
         )
     return raster if raster.values.size else None
@@ -81,6 +98,7 @@ def asked_trajectory(system: SlamSystem, stamps_ns: NDArray[np.int64]) -> Trajec
             f"{len(stamps_ns)} updates",
             "bad",
         )
+    _check_near("a final pose", final.poses)
     return final
 
 
@@ -99,6 +117,8 @@ def asked_at_end(
             f"{len(stamps_ns)} updates, in order",
             "bad",
         )
+    for estimate in estimates:
+        _check_near("a pose", estimate.T_map_robot)
     return estimates, spent_s
 
 

@@ -16,7 +16,7 @@ from typing import IO
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.guests.guarding import Guard
 
-MAX_LINE_BYTES = 1 << 28  # a map of 5000 x 5000 cells
+MAX_LINE_BYTES = 1 << 28  # a map of 5000 x 5000 cells with all digits of a float32
 KEPT_WORDS = 4000  # bytes of its standard error
 _CHUNK = 1 << 16
 _LEAVE_S = 1.0  # from the end of its input to the end of its life
@@ -78,11 +78,13 @@ class Wire:
 
     def _exchange(self, request: bytes, deadline: float, limit_s: float) -> bytes:
         unsent = memoryview(request)
+        searched = 0  # each byte once: a map comes in thousands of pieces
         with selectors.DefaultSelector() as selector:
             selector.register(self._stdin, selectors.EVENT_WRITE)
             selector.register(self._stdout, selectors.EVENT_READ)
             selector.register(self._stderr, selectors.EVENT_READ)
-            while (end := self._heard.find(b"\n")) < 0:
+            while (end := self._heard.find(b"\n", searched)) < 0:
+                searched = len(self._heard)
                 left_s = deadline - time.monotonic()
                 if left_s <= 0.0:
                     raise SlamFailedError(

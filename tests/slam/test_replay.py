@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import pickle
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -180,3 +181,40 @@ def test_optional_methods_of_somebody_else_fail_by_name(tmp_path):
     track.system.landmarks = list
     with pytest.raises(SlamFailedError, match=r"landmarks\(\) returned no Landmarks but \[\]"):
         track.landmarks()
+
+
+class Far(Peeping):
+    """Answers what ``pose`` and ``raster`` say."""
+
+    def __init__(self, pose: tuple[float, ...] = (0.0, 0.0, 0.0), **raster: object) -> None:
+        super().__init__()
+        self.pose, self.raster = pose, raster
+
+    def update(self, frame: Frame) -> Estimate:
+        return replace(super().update(frame), T_map_robot=np.array(self.pose))
+
+    def map(self) -> Raster | None:
+        whole = {"values": np.zeros((2, 2)), "resolution_m": 0.1, "T_map_origin": np.zeros(3)}
+        return Raster(**{**whole, **self.raster})
+
+
+@pytest.mark.parametrize("pose", [(1e300, 0.0, 0.0), (0.0, -2e9, 0.0), (0.0, 0.0, 1e10)])
+def test_a_place_that_no_picture_holds_is_no_answer(pose):
+    failure = Track("far", Far(pose)).survive(frames())
+    assert failure is not None
+    assert (failure.outcome, "m or rad, past 1e+09" in str(failure)) == ("bad", True)
+
+
+@pytest.mark.parametrize(
+    ("raster", "says"),
+    [
+        ({"resolution_m": 1e-300}, "cells of 1e-300 m, they may have 0.001 to 1000"),
+        ({"resolution_m": 1e300}, "cells of 1e+300 m"),
+        ({"T_map_origin": np.array([0.0, 1e300, 0.0])}, "a map at 1e+300 m or rad"),
+    ],
+)
+def test_a_map_that_no_picture_holds_is_no_answer(raster, says):
+    assert Track("near", Far()).map() is not None
+    with pytest.raises(SlamFailedError, match=re.escape(says)) as got:
+        Track("far", Far(**raster)).map()
+    assert got.value.outcome == "bad"

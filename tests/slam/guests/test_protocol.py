@@ -158,6 +158,13 @@ def test_numbers_as_c_prints_them_are_understood_to_be_none(word):
     assert got.value.outcome == "nan"
 
 
+def test_no_number_is_looked_for_through_the_whole_line():
+    """An open bracket after each of many nan would make the line read as often as it has some."""
+    line = b'{"type":"estimate","stamp_ns":7,"T_map_robot":[nan(' + b"x" * 41 + b"),0,0]}"
+    with pytest.raises(SlamFailedError, match="no JSON object"):
+        protocol.message_of(line)
+
+
 @pytest.mark.parametrize("line", [b"\n", b"ready.\n", b"[1]\n", b"\xff{}\n", b"{" * 100000, b"5\n"])
 def test_garbage_is_no_message(line):
     with pytest.raises(SlamFailedError, match="no JSON object") as got:
@@ -177,6 +184,8 @@ def test_garbage_is_no_message(line):
         {"values": [0.0, 2.0]},
         {"T_map_origin": [0.0, 0.0]},
         {"values": 5},
+        {"values": [True, 0.0]},
+        {"width": protocol.MAX_CELLS + 1},
     ],
 )
 def test_what_is_no_map_is_bad(change):
