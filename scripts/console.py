@@ -24,22 +24,29 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
+from slam.errors import printable
+
 LINE_EVERY_S = 10.0  # between lines of progress where the output is no terminal
 FEW_STEPS = 50  # up to these a pace over the last half minute says nothing
 console = Console()
 _errors = Console(stderr=True)
 
 
+def plain(words: str) -> str:
+    """Somebody's words, a file's name among them, as they are: no markup, nothing to be obeyed."""
+    return escape(printable(words))
+
+
 def fail(message: str) -> None:
     """One line on stderr."""
     _errors.print(
-        f"[bold red]mobilia:[/bold red] {escape(message)}", highlight=False, soft_wrap=True
+        f"[bold red]mobilia:[/bold red] {plain(message)}", highlight=False, soft_wrap=True
     )
 
 
 def note(message: str) -> None:
     """One line that the user should see but that is no error."""
-    console.print(f"[yellow]note:[/yellow] {escape(message)}", highlight=False, soft_wrap=True)
+    console.print(f"[yellow]note:[/yellow] {plain(message)}", highlight=False, soft_wrap=True)
 
 
 class LogLines(RichHandler):
@@ -50,14 +57,14 @@ class LogLines(RichHandler):
         if record.levelno < logging.WARNING or record.exc_info:
             super().emit(record)
             return
-        words = escape(record.getMessage())
+        words = plain(record.getMessage())
         self.console.print(f"[yellow]warning:[/yellow] {words}", highlight=False, soft_wrap=True)
 
 
 def fact(sentence: str, *, bad: bool = False) -> None:
     """A sentence that is a result."""
     style = "bold red" if bad else "bold"
-    console.print(escape(sentence), style=style, highlight=False, soft_wrap=True)
+    console.print(plain(sentence), style=style, highlight=False, soft_wrap=True)
 
 
 def progress() -> Progress:

@@ -27,9 +27,8 @@ def commit(*code: str) -> str:
     paths = code or CODE
     changed = _git("status", "--porcelain", "--untracked-files=no", "--", *paths)
     if changed:
-        raise InvalidValueError(
-            f"commit these first, so that results can name the code:\n{changed}"
-        )
+        files = ", ".join(line[3:] for line in changed.splitlines())
+        raise InvalidValueError(f"commit these first, so that results can name the code: {files}")
     return _git("log", "-1", "--format=%H", "--", *paths)
 
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can go wrong, by cause.
 
-Every message names the file or field, the value, and what was expected.
+Every message names the file or field, the value, and what was expected. It is one line of printable
+characters, whatever a guest or a file says in it.
 """
 
 from __future__ import annotations
@@ -9,8 +10,22 @@ from __future__ import annotations
 from pathlib import Path
 
 
+def printable(words: str) -> str:
+    """Somebody's words in one line that nothing obeys: whatever does not print is its escape.
+
+    That is every control character, ESC and the ends of lines among them, and every mark that turns
+    the direction of reading.
+    """
+    if words.isprintable():
+        return words
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in words)
+
+
 class MobiliaError(Exception):
     """Base of every error raised on purpose; the command line prints it as one line."""
+
+    def __init__(self, *words: object) -> None:
+        super().__init__(*(printable(w) if isinstance(w, str) else w for w in words))
 
 
 class InvalidValueError(MobiliaError, ValueError):
@@ -41,7 +56,7 @@ class LogFormatError(MobiliaError):
 
     def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
         self.path = Path(path)
-        self.message = message
+        self.message = printable(message)
         self.line = line
         where = f"{path}:{line}" if line is not None else f"{path}"
         super().__init__(f"{where}: {message}")
@@ -71,9 +86,9 @@ class SlamFailedError(MobiliaError):
             raise InvalidValueError(
                 f"outcome must be one of {', '.join(FAILURES)}, got {outcome!r}"
             )
-        self.message = message
+        self.message = printable(message)
         self.outcome = outcome
-        super().__init__(message)
+        super().__init__(self.message)
 
     def __reduce__(self) -> tuple[type, tuple[str, str]]:
         """So that it comes back whole from another process."""

@@ -29,6 +29,7 @@ from scripts.output import check_whole
 from sim.recording.sums import check_vouched
 from slam.archives import read_arrays
 from slam.bounded import check_file
+from slam.csv_cells import cell_of, word_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing, write_text
 from slam.frames import Float
@@ -59,7 +60,7 @@ def write_csv(
 def _cell(value: Any) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
-    return repr(value) if isinstance(value, float) else str(value)
+    return repr(value) if isinstance(value, float) else cell_of(str(value))
 
 
 def write_json(path: Path, rows: Sequence[Mapping[str, Any]], axis: str = "dynamism") -> None:
@@ -285,7 +286,7 @@ def read_csv(path: Path, axis: str = "dynamism") -> list[Row]:
 def _value(column: str, cell: str) -> Any:
     if cell == "":
         return None
-    return cell if column in _WORDS else float(cell)
+    return word_of(cell) if column in _WORDS else float(cell)
 
 
 def read_json(path: Path) -> Row:

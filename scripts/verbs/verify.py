@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
 from scripts import interrupt
-from scripts.console import console, fail, progress, working
+from scripts.console import console, fail, plain, progress, working
 from scripts.trust import Trust, admitted
 from slam.errors import InvalidValueError
 
@@ -125,7 +124,7 @@ def _words(finding: Finding) -> str:
 
 def _tell(finding: Finding) -> None:
     color = _COLORS.get(finding.verdict, "yellow")
-    why = f": {escape(finding.why)}" if finding.why else ""
+    why = f": {plain(finding.why)}" if finding.why else ""
     console.print(
-        f"[{color}]{finding.verdict}[/{color}] {escape(finding.episode)}{why}", soft_wrap=True
+        f"[{color}]{finding.verdict}[/{color}] {plain(finding.episode)}{why}", soft_wrap=True
     )

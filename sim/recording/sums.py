@@ -19,7 +19,7 @@ from pathlib import Path, PurePosixPath
 from typing import Literal, NoReturn
 
 from slam import bounded, locks
-from slam.errors import LogFormatError
+from slam.errors import LogFormatError, printable
 from slam.files import write_text
 
 SUMS = "SHA256SUMS"
@@ -207,7 +207,7 @@ def _top(name: str, ours: set[str]) -> str:
 
 
 def _stranger(folder: Path, name: str) -> str:
-    shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in name)
+    shown = printable(name)
     last = PurePosixPath(name).name
     if last in locks.NAMES or last.startswith(".tables.") or (last[0] == "." and PART in last):
         return f"{folder}/{shown} is left of a run that was killed, or is being written"

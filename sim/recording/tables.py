@@ -15,6 +15,7 @@ from pathlib import Path
 
 from scenes.scene import Pose
 from slam.bounded import text_of
+from slam.csv_cells import cell_of, word_of
 from slam.errors import LogFormatError
 
 MAX_BYTES = 1 << 26  # of a table
@@ -35,7 +36,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(rows)
+    writer.writerows([cell_of(c) if isinstance(c, str) else c for c in row] for row in rows)
     return text.getvalue()
 
 
@@ -98,7 +99,7 @@ def read_table(file: Path, columns: Sequence[str]) -> Iterator[Row]:
         if next(reader, None) != list(columns):
             raise LogFormatError(file, f"expected the columns {', '.join(columns)}", 1)
         for words in reader:
-            row = Row(file, reader.line_num, columns, words)
+            row = Row(file, reader.line_num, columns, [word_of(cell) for cell in words])
             if len(words) != len(columns):
                 raise row.error(f"expected {len(columns)} fields, got {len(words)}")
             yield row

@@ -70,3 +70,9 @@ def test_the_time_left_of_few_long_steps_is_that_of_all_so_far():
     bar.advance(task, 2)  # two that ended together
     now = 150.0
     assert console._words(bar.tasks[0]) == "simulating: 150 s so far, about 300 s left"
+
+
+@pytest.mark.parametrize("say", [console.note, console.fact])
+def test_a_file_s_name_is_no_order_to_the_terminal(printed: io.StringIO, say):
+    say("a\x1b[2J\u202e[bold]b")
+    assert "a\\x1b[2J\\u202e[bold]b\n" in printed.getvalue()

@@ -300,3 +300,14 @@ def test_the_dynamism_curve(tmp_path, capsys):
     assert "ekf" in capsys.readouterr().out
     assert (tmp_path / "curve.png").stat().st_size > 10_000
     assert dynamism_curve.main([str(tmp_path / "nowhere")]) == 1
+
+
+def test_a_failure_in_a_table_is_no_formula(tmp_path):
+    rows = [
+        {"slam": "=cmd|' /C calc'!A0", "failure": "-2+3", "dynamism": -0.5, "outcome": "@SUM(A1)"}
+    ]
+    columns = ["slam", "failure", "dynamism", "outcome"]
+    folder.write_csv(tmp_path / "t.csv", rows, columns)
+    written = (tmp_path / "t.csv").read_text().splitlines()[1]
+    assert written == "'=cmd|' /C calc'!A0,'-2+3,-0.5,'@SUM(A1)"
+    assert folder.read_csv(tmp_path / "t.csv") == rows

@@ -59,6 +59,8 @@ def answered(fault: str, stamp_ns: int) -> bool:
         print("Segmentation fault (just kidding)", flush=True)
     elif fault == "error":
         say(type="error", message="no idea\nat all")
+    elif fault == "terminal":
+        say(type="error", message="\x1b]0;owned\x07\x9b2J\u202e=1+1")
     elif fault == "other":
         say(type="map")
     elif fault == "nan":
@@ -68,6 +70,9 @@ def answered(fault: str, stamp_ns: int) -> bool:
         estimate(stamp_ns, [1])
     elif fault == "stamp":
         estimate(1, [0, 0, 0])
+    elif fault == "long":
+        words = {"words": "x" * (1 << 22)}
+        say(type="estimate", stamp_ns=stamp_ns, T_map_robot=[3, 0, 0], diagnostics=words)
     else:
         return False
     return True
