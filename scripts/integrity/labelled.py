@@ -253,8 +253,8 @@ def _noted() -> Iterator[list[float]]:
     said: list[float] = []
     plain = Usual.share
 
-    def share(self: Usual, match: Match) -> float:
-        said.append(plain(self, match))
+    def share(self: Usual, match: Match, observations: Observations) -> float:
+        said.append(plain(self, match, observations))
         return said[-1]
 
     Usual.share = share  # type: ignore[method-assign]
