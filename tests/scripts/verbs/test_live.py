@@ -43,6 +43,7 @@ def test_an_address_that_others_reach_is_warned_of(host, warned, monkeypatch, ca
 
     class Once:
         port = 8765
+        token = "a-token" if warned else ""
 
         def __init__(self, *_: object) -> None:
             pass
@@ -57,8 +58,9 @@ def test_an_address_that_others_reach_is_warned_of(host, warned, monkeypatch, ca
     session = SimpleNamespace(run=lambda: iter(()))
     found = sdk.Sdk(None, None, None, None)
     with pytest.raises(InvalidValueError, match="enough"):
-        _serve(found, (session, (0, 1)), (host, 8765), playing=True, speed=1.0)
+        _serve(found, (session, (0, 1)), (host, 8765), [], playing=True, speed=1.0)
     printed = " ".join(capsys.readouterr().out.split())
     assert f"ws://{host}:8765" in printed
-    assert ("There is no password" in printed) is warned
+    assert ("There is no encryption" in printed) is warned
+    assert ("/a-token" in printed) is warned
     assert closed == [True]
