@@ -12,7 +12,6 @@ import asyncio
 import hmac
 import ipaddress
 import logging
-import random
 import secrets
 import sys
 import threading
@@ -20,7 +19,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from slam.errors import InvalidValueError
 
@@ -84,9 +83,7 @@ class Rules:
         return origin in (*VIEWERS, *self.origins) or origin in own
 
     def _holds_token(self, target: str) -> bool:
-        parts = urlsplit(target)
-        given = [parts.path.strip("/"), *parse_qs(parts.query).get("token", [])]
-        return any(hmac.compare_digest(one.encode(), self.token.encode()) for one in given)
+        return hmac.compare_digest(target.strip("/").encode(), self.token.encode())
 
 
 def _parsed(head: bytes) -> tuple[str, dict[str, list[str]]]:
@@ -94,24 +91,24 @@ def _parsed(head: bytes) -> tuple[str, dict[str, list[str]]]:
     try:
         first, *lines = head.removesuffix(_HEAD_END).decode("ascii").split("\r\n")
         method, target, version = first.split(" ")
-        pairs = [line.split(":", 1) for line in lines]
         headers: dict[str, list[str]] = {}
-        for name, value in pairs:
-            if name != name.strip() or not name:
-                raise ValueError(name)
+        for line in lines:
+            name, value = line.split(":", 1)
+            if name != name.strip() or not name or any(c in line for c in "\r\n\0"):
+                raise ValueError(line)
             headers.setdefault(name.lower(), []).append(value.strip(" \t"))
     except ValueError as error:  # UnicodeDecodeError is one
         raise Refused("400 Bad Request", "no handshake of a WebSocket") from error
-    if method != "GET" or version != "HTTP/1.1" or any(c in head for c in (b"\0", b"\n\n")):
+    if method != "GET" or version != "HTTP/1.1":
         raise Refused("400 Bad Request", "no handshake of a WebSocket")
     return target, headers
 
 
 def origin_of(text: str) -> str:
-    """``--allow-origin``, checked: scheme://host or scheme://host:port."""
+    """``--allow-origin``, checked: scheme://host[:port], or what pages and apps on disk send."""
     parts = urlsplit(text)
     whole = f"{parts.scheme}://{parts.netloc}"
-    if text == "null" or (parts.scheme and parts.netloc and text == whole):
+    if text in ("null", "file://") or (parts.scheme and parts.netloc and text == whole):
         return text
     raise InvalidValueError(
         f"--allow-origin must be like https://example.org:8080, got {text!r:.80}"
@@ -135,8 +132,7 @@ def hidden_host() -> str:
     """A loopback address that no page can guess, where the system has more than one."""
     if not sys.platform.startswith("linux"):
         return "127.0.0.1"
-    draw = random.SystemRandom()
-    return f"127.{draw.randrange(1, 255)}.{draw.randrange(256)}.{draw.randrange(1, 255)}"
+    return f"127.{1 + secrets.randbelow(254)}.{secrets.randbelow(256)}.{1 + secrets.randbelow(254)}"
 
 
 class Gate:

@@ -88,10 +88,13 @@ class Observations:
         """Mean of the votes, 1 where nothing is known of them."""
         return float(self.votes.mean()) if self.votes is not None and len(self.votes) else 1.0
 
-    def with_votes(self, votes: Float | None, in_view: float = 1.0) -> Observations:
-        """The same with other votes: ``replace``, at a quarter of its time."""
+    def with_votes(self, votes: Float | None, in_view: float | None = None) -> Observations:
+        """The same with other votes, and ``in_view`` unless None: ``replace`` at a quarter of its
+        time.
+        """
         other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__, votes=votes, in_view=in_view)
+        stays = self.in_view if in_view is None else in_view
+        other.__dict__.update(self.__dict__, votes=votes, in_view=stays)
         other.__dict__.pop("mean_vote", None)
         return other
 

@@ -131,7 +131,7 @@ class Belief:
         return Judged(
             match=match, prediction=prediction, state=State.BLIND, cell_map=cell_map,
             writes=episode is None, followed=False,
-            likeliest=None if self._elsewhere is None else self._elsewhere.match.T_map_robot,
+            likeliest=self._elsewhere(episode),
         )  # fmt: skip
 
     def _note_break(
@@ -304,15 +304,14 @@ class Belief:
         for k, p in enumerate(self._weighed.places):
             if 1.0 - p < self.p_lost:
                 self._likeliest, self.p_lost = k, 1.0 - p
-        place = self._elsewhere
+        place = None if self._likeliest is None else episode.places.followed[self._likeliest]
         self._tell((place or episode).evidence.through_m)
 
-    @property
-    def _elsewhere(self) -> Place | None:
-        """The likeliest place, if that is not where motion led."""
-        if self._episode is None or self._likeliest is None:
+    def _elsewhere(self, episode: Episode | None) -> Float | None:
+        """(3,) where the likeliest place is, if that is not where motion led."""
+        if episode is None or self._likeliest is None:
             return None
-        return self._episode.places.followed[self._likeliest]
+        return episode.places.followed[self._likeliest].match.T_map_robot
 
     def _tell(self, through_m: float) -> None:
         """In a word."""
@@ -332,24 +331,24 @@ class Belief:
     ) -> Judged:
         """Whether one place is certain: where motion led, or another; else wait."""
         sure, weighed = 1.0 - self._config.frozen_above, self._weighed
-        tired = episode.elapsed_s > self._give_up_s
+        waited_enough = episode.elapsed_s > self._give_up_s
         for place, p in zip(episode.places.followed, weighed.places, strict=True):
             same = _same(place.match, match) and p > weighed.followed
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks
-            taken = p >= 0.5 if tired else p >= sure and goes_on
+            taken = p >= 0.5 if waited_enough else p >= sure and goes_on
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
                 return self._found(place, episode, cell_map, observations, prediction)
-        if 1.0 - self._p_off >= sure or (tired and self.p_lost >= min(self._p_off, 0.5)):
+        elsewhere = self._likeliest is not None and self.p_lost < 0.5
+        if 1.0 - self._p_off >= sure or (waited_enough and not elsewhere):
             self._episode = None
             return self._settled(episode.local, match, prediction)
         if episode.elapsed_s > prediction.elapsed:
             episode.write(observations, match.T_map_robot, prediction.elapsed)
         state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
-        elsewhere = self._elsewhere
         return Judged(
             match=match, prediction=prediction, state=state, cell_map=cell_map,
             followed=episode.matched,
-            likeliest=None if elsewhere is None else elsewhere.match.T_map_robot,
+            likeliest=self._elsewhere(episode),
         )  # fmt: skip
 
     def _found(

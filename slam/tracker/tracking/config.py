@@ -15,7 +15,9 @@ MANY = 100_000
 class TrackingConfig(Settings):
     """Following the robot, and finding it again."""
 
-    give_up_s: float = number(60.0, "s", "of being lost; then go on from odometry")
+    give_up_s: float = number(
+        60.0, "s", "of doubt; then the likeliest place is gone on at, or else where motion led"
+    )
     relocalise: RelocaliseConfig = field(default=RelocaliseConfig())
 
 
