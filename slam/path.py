@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The path a SLAM has reported so far: stamps and poses of its frames, which come in order."""
+"""The path of a SLAM so far: stamps and poses of its frames, which come in order."""
 
 from __future__ import annotations
 
@@ -11,11 +11,16 @@ from slam.trajectory import Trajectory
 
 
 class PosePath:
-    """Stamps (ns) and poses ``T_map_robot`` (m, m, rad) of the frames so far."""
+    """Stamps (ns) and poses ``T_map_robot`` (m, m, rad) of the frames so far.
+
+    A lost robot is reported at its likeliest place, which need not be where its motion led. Loops
+    correct the motion, and decide where it was.
+    """
 
     def __init__(self) -> None:
         self._stamps: list[int] = []
         self._poses: list[Float] = []
+        self._reported: dict[int, Float] = {}  # by frame, where it is not the motion's
 
     def __len__(self) -> int:
         return len(self._stamps)
@@ -24,18 +29,28 @@ class PosePath:
         """Raise ``InvalidValueError`` unless a frame at ``stamp_ns`` comes after the last one."""
         odometry_steps.check_order(self._stamps[-1] if self._stamps else None, stamp_ns)
 
-    def add(self, stamp_ns: int, T_map_robot: Float) -> None:
-        """The pose of one more frame."""
+    def add(self, stamp_ns: int, T_map_robot: Float, reported: Float | None = None) -> None:
+        """The pose of one more frame, as its motion led there; ``reported``: if at another."""
+        if reported is not None:
+            self._reported[len(self._poses)] = reported.copy()
         self._stamps.append(stamp_ns)
         self._poses.append(T_map_robot.copy())
 
     def replace(self, poses: Float) -> None:
         """The frames so far were at these (n, 3)."""
         self._poses = list(poses)
+        self._reported.clear()
 
     def poses(self) -> Float:
-        """(n, 3) m, m, rad."""
+        """(n, 3) m, m, rad, as motion led."""
         return np.array(self._poses, dtype=np.float64).reshape(-1, 3)
+
+    def reported(self) -> Float:
+        """(n, 3) m, m, rad, as reported, or as corrected since."""
+        poses = self.poses()
+        for k, T_map_robot in self._reported.items():
+            poses[k] = T_map_robot
+        return poses
 
     def trajectory(self, poses: Float | None = None) -> Trajectory:
         """The poses as they were reported, or others (n, 3) for the same stamps."""

@@ -267,7 +267,7 @@ class Tracker(abc.ABC):
         self._before = frame.odometry
         self._T_map_robot = match.T_map_robot
         T_map_robot = match.T_map_robot if elsewhere is None else elsewhere
-        self._path.add(frame.stamp_ns, T_map_robot)
+        self._path.add(frame.stamp_ns, match.T_map_robot, elsewhere)
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=T_map_robot,
@@ -383,8 +383,10 @@ class Tracker(abc.ABC):
 
     def poses_in_map(self) -> Float:
         """(n, 3) of all frames so far in the map as it is now: moved with it by each correction."""
-        return self._path.poses()
+        return self._path.reported()
 
     def trajectory(self) -> Trajectory:
         """The poses moved with the loops found so far where they tear the map, else as online."""
-        return self._path.trajectory(self._loops.corrected(self._path.poses()))
+        led = self._path.poses()
+        corrected = self._loops.corrected(led)
+        return self._path.trajectory(self._path.reported() if corrected is led else corrected)
