@@ -15,6 +15,6 @@ def test_a_lost_robot_is_reported_elsewhere_and_its_motion_is_what_loops_correct
     there[:] = np.nan  # its poses are its own
     assert path.poses().tolist() == [[1, 0, 0], [2, 0, 0]]
     assert path.reported().tolist() == [[1, 0, 0], [5, 5, 1]]
-    corrected = path.poses() + [0.0, 1.0, 0.0]
+    corrected = path.poses() + np.array([0.0, 1.0, 0.0])
     path.replace(corrected)
     assert path.reported().tolist() == path.poses().tolist() == corrected.tolist()
