@@ -135,7 +135,7 @@ def carry_out(
 ) -> list[dict[str, Any]]:
     """The section alone, into a folder of its own; its rows."""
     for name in of.slams:
-        limited(name, Limits())  # wrong names are told before anything starts
+        limited(name, Limits(hidden=(out,)))  # wrong names are told before anything starts
     out = out.absolute()
     with locked_folder(out):
         settings = head(of)

@@ -33,7 +33,7 @@ def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
             known = ", ".join(sorted(built.goals))
             raise UnknownNameError(f"scene '{plan.scene}' has no goal '{name}'. Known: {known}.")
     for name in plan.slams:
-        limited(name, Limits())
+        limited(name, Limits(hidden=(out,)))
     out = out.absolute()
     with locked_folder(out):
         settings = {"drive_schema": SCHEMA, **asdict(plan)}

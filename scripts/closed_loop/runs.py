@@ -37,7 +37,7 @@ def run_one(  # noqa: PLR0913 (the arguments of a job)
     """
     simulation = Simulation(scene, seed=seed, laser=laser, **room)
     try:
-        system = limited(slam, Limits())
+        system = limited(slam, Limits(hidden=(path.parent.parent,)))
     except SlamFailedError as error:
         save(path, _failed(goal_order(simulation.world, goals), error))
         return

@@ -42,8 +42,9 @@ def enter(
     A SLAM that fails, even at its start, is scored as such. Whatever is not ours runs in a process
     of its own, which it may crash or hang for ``scan_limit_s`` at a scan.
     """
-    drive = load(path.parent.parent / recording)
-    limits = Limits(scan_s=scan_limit_s)
+    out = path.parent.parent
+    drive = load(out / recording)
+    limits = Limits(scan_s=scan_limit_s, hidden=(out,))
     _warm_up(slam, drive.frames, limits)
     run = Entry(slam, drive, limits, judge_maps=judge_maps)
     run.over(drive.frames)

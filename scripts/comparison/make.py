@@ -47,7 +47,7 @@ def carry_out(
     for name in plan.scenes:
         registry.build(name)  # wrong names are told before anything starts
     for name in plan.slams:
-        limited(name, Limits())
+        limited(name, Limits(hidden=(out,)))
     if plan.sessions is not None and more is None:
         raise InvalidValueError("Plan.sessions needs more=scripts.days.make.beside(plan)")
     out = out.absolute()

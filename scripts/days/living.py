@@ -28,10 +28,12 @@ def live(
     Its maps are not kept. A SLAM from outside runs in a process of its own for each session; one
     that fails, even at its start, is a row.
     """
+    out = path.parent.parent
+    limits = Limits(scan_s=scan_limit_s, hidden=(out,))
     with tempfile.TemporaryDirectory() as folder:
-        (building,) = lifelong.started([slam], Path(folder), Limits(scan_s=scan_limit_s))
+        (building,) = lifelong.started([slam], Path(folder), limits)
         last: list[Drive] = []
-        files = [path.parent.parent / name for name in sessions]
+        files = [out / name for name in sessions]
         rows = list(lifelong.rows([building], _last_kept(loaded(files), last)))
         aged = [] if building.anew else list(lifelong.age_rows(building, last[0]))
     failure = building.failures[0] if building.failures else None

@@ -19,6 +19,7 @@ from packaging.requirements import Requirement
 import mobilia
 from sim.core.versions import WORLD
 from slam.errors import MissingDependencyError
+from slam.guests.confined import kernel_version
 
 State = Literal["ok", "can do without", "missing"]
 PACKAGE = "mobilia"
@@ -164,6 +165,12 @@ def _machine() -> Iterator[Finding]:
         found=str(folder) if writable else "cannot be written: each start compiles for a minute",
         how="" if writable else "set NUMBA_CACHE_DIR to a folder that you may write",
     )
+    landlock = kernel_version()
+    yield Finding(
+        what="guests see no truth (Landlock)", state="ok" if landlock else "can do without",
+        found=f"version {landlock}" if landlock else "a program behind pipe: sees all your files",
+        how="" if landlock else "Linux 5.13 or newer, with landlock in /sys/kernel/security/lsm",
+    )  # fmt: skip
     free_gb = shutil.disk_usage(Path.cwd()).free / 1e9
     enough = free_gb >= LEAST_FREE_GB
     yield Finding(

@@ -11,6 +11,9 @@ processes in sessions of their own, daemons too, stay its descendants and are fo
 itself dies with the guard, should that be killed. Elsewhere only the guest's process group is
 killed.
 
+Where the kernel can (Landlock), the guest sees only the files that the command comes with, and has
+a temporary folder of its own, which goes with it.
+
 Told none, it kills the processes whose environment has its mark (Linux). Worker processes get that:
 one that is still being loaded has had no time to tie itself to its parent.
 """
@@ -32,6 +35,13 @@ _QUIET_S = 0.3
 _PDEATHSIG, _CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 _LINUX = sys.platform == "linux"
 
+# linux/landlock.h
+_CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
+_BENEATH, _NO_NEW_PRIVILEGES = 1, 38  # the latter: linux/prctl.h
+_RIGHTS = (0, 0x1FFF, 0x3FFF, 0x7FFF)  # all of an interface's version on files; later ones: devices
+_OF_FILES = 0x4007  # of them, those that a file can have: execute, write, read, truncate
+_MAY = (0x8, 0xD, 0x7FFF)  # list; list, read and execute; everything
+
 
 def main(words: list[str]) -> None:
     """Start the guest, wait for the order, kill."""
@@ -40,7 +50,7 @@ def main(words: list[str]) -> None:
     told = _told(control)
     if told is None:
         return
-    command, environment, mark = told
+    command, environment, mark, rules = told
     if not command:
         woken = _wake_up()
         _say(control, b"pid 0\n")
@@ -48,7 +58,26 @@ def main(words: list[str]) -> None:
         _kill_marked(mark)
         return
     _prctl(_CHILD_SUBREAPER, 1)
-    guest, error = _start(command, environment)
+    own = b""
+    if rules is not None:
+        own = os.path.join(environment.get(b"TMPDIR", b"/tmp"), b"mobilia-guest-%d" % os.getpid())
+        os.mkdir(own, 0o700)
+        environment[b"TMPDIR"] = own
+        rules.append((own, 2))
+    try:
+        _guard(control, parent, command, environment, rules)
+    finally:
+        _remove(own)
+
+
+def _guard(
+    control: int,
+    parent: int,
+    command: list[bytes],
+    environment: dict[bytes, bytes],
+    rules: list[tuple[bytes, int]] | None,
+) -> None:
+    guest, error = _start(command, environment, rules)
     if error:
         _say(control, b"errno %d\n" % error)
         return
@@ -61,21 +90,60 @@ def main(words: list[str]) -> None:
     _kill(guest)
 
 
+def _remove(folder: bytes) -> None:
+    """The guest's own: it has gone."""
+    for root, folders, files in os.walk(folder, topdown=False) if folder else ():
+        for name in (*files, *folders):
+            path = os.path.join(root, name)
+            with suppress(OSError):
+                (os.unlink if name in files or os.path.islink(path) else os.rmdir)(path)
+    with suppress(OSError):
+        os.rmdir(folder)
+
+
+def _confine(rules: list[tuple[bytes, int]]) -> None:
+    """This process, and what it starts, may touch no file but those; raises ``OSError``."""
+    call = ctypes.CDLL(None, use_errno=True).syscall
+
+    def asked(*arguments: object) -> int:
+        done = int(call(*arguments))
+        if done < 0:
+            raise OSError(ctypes.get_errno(), "Landlock")
+        return done
+
+    handled = _RIGHTS[min(asked(_CREATE_RULESET, None, 0, 1), len(_RIGHTS) - 1)]
+    wanted = handled.to_bytes(8, sys.byteorder)
+    ruleset = asked(_CREATE_RULESET, wanted, len(wanted), 0)
+    for path, may in rules:
+        with suppress(FileNotFoundError, PermissionError):  # gone, or not ours: not the guest's
+            place = os.open(path, os.O_PATH)
+            rights = handled & _MAY[may] & (-1 if os.path.isdir(path) else _OF_FILES)
+            rule = rights.to_bytes(8, sys.byteorder) + place.to_bytes(4, sys.byteorder)
+            if rights:
+                asked(_ADD_RULE, ruleset, _BENEATH, rule, 0)
+            os.close(place)
+    _prctl(_NO_NEW_PRIVILEGES, 1)
+    asked(_RESTRICT_SELF, ruleset, 0)
+    os.close(ruleset)
+
+
 def _prctl(option: int, value: int) -> None:
     if _LINUX:
         ctypes.CDLL(None).prctl(option, ctypes.c_ulong(value), 0, 0, 0)
 
 
-def _told(control: int) -> tuple[list[bytes], dict[bytes, bytes], bytes] | None:
-    """Command, environment and mark, None when mobilia has gone before it said them."""
+def _told(
+    control: int,
+) -> tuple[list[bytes], dict[bytes, bytes], bytes, list[tuple[bytes, int]] | None] | None:
+    """Command, environment, mark and rules, None when mobilia has gone before it said them."""
     heard = b""
     while len(heard) < 8 or len(heard) < 8 + int.from_bytes(heard[:8], "little"):
         data = os.read(control, 1 << 16)
         if not data:
             return None
         heard += data
-    command, environment, mark = marshal.loads(heard[8:])  # from mobilia itself
-    return command, environment, mark
+    command, environment, mark, rules = marshal.loads(heard[8:])  # from mobilia itself
+    return command, environment, mark, rules
 
 
 def _say(control: int, words: bytes) -> None:
@@ -83,7 +151,9 @@ def _say(control: int, words: bytes) -> None:
         os.write(control, words)
 
 
-def _start(command: list[bytes], environment: dict[bytes, bytes]) -> tuple[int, int]:
+def _start(
+    command: list[bytes], environment: dict[bytes, bytes], rules: list[tuple[bytes, int]] | None
+) -> tuple[int, int]:
     """The guest in a session of its own: its number, and why it could not be started, or 0."""
     guard = os.getpid()
     read, write = os.pipe()
@@ -96,6 +166,8 @@ def _start(command: list[bytes], environment: dict[bytes, bytes]) -> tuple[int, 
                 os._exit(1)
             for number in (signal.SIGPIPE, signal.SIGXFSZ):  # which Python ignores
                 signal.signal(number, signal.SIG_DFL)
+            if rules is not None:
+                _confine(rules)
             os.execvpe(command[0], command, environment)
         except OSError as error:
             os.write(write, b"%d" % (error.errno or 1))

@@ -25,12 +25,18 @@ MARK = "MOBILIA_COMMAND"  # variable that worker processes of one command have i
 class Guard:
     """``command`` below a guard, to which its three streams belong.
 
+    rules  what it may see (``confined.rules``), None: all that we see
+
     Without a command it guards the processes with ``mark``, "name=value", in their environment.
     Raises ``OSError`` and ``ValueError`` as ``subprocess.Popen`` does.
     """
 
     def __init__(
-        self, command: Sequence[str], environment: Mapping[str, str], mark: str = ""
+        self,
+        command: Sequence[str],
+        environment: Mapping[str, str],
+        mark: str = "",
+        rules: Sequence[tuple[str, int]] | None = None,
     ) -> None:
         encoded = [os.fsencode(word) for word in command]
         variables = {os.fsencode(name): os.fsencode(value) for name, value in environment.items()}
@@ -53,7 +59,9 @@ class Guard:
             if_it_fails.pop_all()
         self._status = ""
         try:
-            self.pid = self._begin(marshal.dumps((encoded, variables, os.fsencode(mark))))
+            seen = None if rules is None else [(os.fsencode(path), may) for path, may in rules]
+            told = (encoded, variables, os.fsencode(mark), seen)
+            self.pid = self._begin(marshal.dumps(told))
         except BaseException:
             self.dismiss()
             raise

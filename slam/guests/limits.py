@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long a SLAM in a process of its own may take."""
+"""How long a SLAM in a process of its own may take, and what it may not see."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 from slam.checked import is_number
 from slam.errors import InvalidValueError
@@ -17,10 +18,12 @@ class Limits:
     scan_s   one scan
     first_s  its start, the first scan after it, a reset, the map and the final poses: compilers and
              great maps are no hang
+    hidden   folders of results, which hold the truth: a command sees nothing in them
     """
 
     scan_s: float = 10.0
     first_s: float = 120.0
+    hidden: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("scan_s", "first_s"):

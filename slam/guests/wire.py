@@ -38,9 +38,13 @@ class Wire:
         command: Sequence[str],
         environment: Mapping[str, str] | None = None,
         farewell: bytes = b"",
+        rules: Sequence[tuple[str, int]] | None = None,
     ) -> None:
+        """``rules``: what it may see (``confined.rules``), None: all that we see."""
         try:
-            self._guard = Guard(command, os.environ if environment is None else environment)
+            environment = os.environ if environment is None else environment
+            self._guard = Guard(command, environment, rules=rules)
+            self._confined = rules is not None
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             raise InvalidValueError(f"cannot start {command[0]!r}: {why}") from error
@@ -143,7 +147,9 @@ class Wire:
                 self._words += data
         lines = self._words[-KEPT_WORDS:].decode(errors="replace").split("\n")
         said = [text for text in (" ".join(part.split()) for part in lines) if text]
-        return f"; its last words: {' | '.join(said[-3:])[-400:]!r}" if said else ""
+        refused = self._confined and "Permission denied" in " ".join(said)
+        hint = "; it sees only its own folder: docs/bring_your_own.md" if refused else ""
+        return f"; its last words: {' | '.join(said[-3:])[-400:]!r}{hint}" if said else ""
 
     def processor_s(self) -> float | None:
         """Processor time it has used, all its threads, s; None where that cannot be known."""

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a program behind ``pipe:`` may see: its own folder and the system, but no results.
+
+Linux's Landlock (5.13) does it, without any rights of the user's: the guard (``guard``) gives up
+for the guest all files but those listed here. With them go the memory, the descriptors and the
+environment of all other processes, for which the kernel asks the same question.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import mobilia
+
+MORE = "MOBILIA_GUEST_FOLDERS"  # of the user's environment: folders that guests read and write too
+RESULTS = "out"  # folder in the working folder, where results lie unless --out says otherwise
+LISTED, READ, WRITTEN = 0, 1, 2  # what may be done in a folder and in all that it holds
+_SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc", "/opt", "/nix", "/snap",
+           "/proc", "/sys")  # fmt: skip
+_DEVICES = ("null", "zero", "full", "random", "urandom", "tty", "ptmx", "pts", "shm", "dri")
+_BINARIES = ("bin", "sbin", "shims", "Scripts")  # folders of programs, whose libraries lie beside
+_CREATE_RULESET, _VERSION = 444, 1  # linux/landlock.h; the number is the same on all processors
+
+
+def kernel_version() -> int:
+    """Version of Landlock's interface, 0 where the kernel has none, or has it switched off."""
+    if sys.platform != "linux":
+        return 0
+    return max(0, int(ctypes.CDLL(None).syscall(_CREATE_RULESET, None, 0, _VERSION)))
+
+
+def rules(
+    command: Sequence[str], environment: Mapping[str, str], hidden: Iterable[Path] = ()
+) -> list[tuple[str, int]] | None:
+    """Paths that ``command`` may see, and what it may do in each; None: the kernel has no rules.
+
+    hidden  folders of results, beside ``RESULTS``: nothing in them, wherever they lie
+    """
+    if not kernel_version():
+        return None
+    never = {path.resolve() for path in (Path.cwd() / RESULTS, *hidden)}
+    found: dict[Path, int] = {}
+    written = environment.get(MORE, "").split(os.pathsep)
+    for root in _there(written):
+        _add(found, root, never, WRITTEN)
+    for root in _there(_devices()):
+        found[root] = WRITTEN
+    for root in _there((*_SYSTEM, *_own(command), *_on_paths(command, environment))):
+        _add(found, root, never, READ)
+    home = Path(mobilia.HOME)
+    found.setdefault(home, LISTED)  # to find the two
+    for package in ("slam", "mobilia"):
+        _add(found, home / package, never, READ)
+    return [(str(path), may) for path, may in found.items()]
+
+
+def _add(found: dict[Path, int], root: Path, never: set[Path], may: int) -> None:
+    """``root`` without what it holds of ``never``: its folders one by one, where it holds some."""
+    if any(root.is_relative_to(path) for path in never):
+        return
+    if not any(path.is_relative_to(root) for path in never):
+        found[root] = max(may, found.get(root, may))
+        return
+    found.setdefault(root, LISTED)
+    for entry in os.scandir(root):
+        if not entry.is_symlink():  # it leads to what has a rule of its own, or none
+            _add(found, root / entry.name, never, may)
+
+
+def _there(paths: Iterable[str]) -> Iterator[Path]:
+    """Those that exist, resolved."""
+    for path in paths:
+        if path and os.path.exists(path):
+            yield Path(path).resolve()
+
+
+def _devices() -> Iterator[str]:
+    yield from (f"/dev/{name}" for name in _DEVICES)
+    yield from (str(path) for path in Path("/dev").glob("nvidia*"))
+
+
+def _own(command: Sequence[str]) -> set[str]:
+    """The folders of the files that the command names; the working folder if it names none."""
+    named = [word for word in command[1:] if os.path.exists(word)]
+    if os.sep in command[0]:
+        named.append(command[0])
+    folders = {word if os.path.isdir(word) else os.path.dirname(word) or "." for word in named}
+    real = {os.path.dirname(os.path.realpath(word)) for word in named}
+    return folders | real if named else {"."}
+
+
+def _on_paths(command: Sequence[str], environment: Mapping[str, str]) -> Iterator[str]:
+    """What a PATH, a PYTHONPATH, an LD_LIBRARY_PATH … names, and where installed programs lie."""
+    for name, value in environment.items():
+        if name.endswith("PATH"):
+            for folder in value.split(os.pathsep):
+                if os.path.isabs(folder):
+                    yield from _installed(folder)
+    program = shutil.which(command[0], path=environment.get("PATH")) or command[0]
+    for path in (program, os.path.realpath(program)):
+        yield from _installed(os.path.dirname(path))
+
+
+def _installed(folder: str) -> Iterator[str]:
+    """A folder of programs, and that of the installation: ~/.local of ~/.local/bin."""
+    yield folder
+    above = os.path.dirname(folder.rstrip(os.sep))
+    of_home = Path.home().is_relative_to(os.path.realpath(above))  # not ~ of ~/bin
+    if os.path.basename(folder.rstrip(os.sep)) in _BINARIES and not of_home:
+        yield above
