@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Some runs of a submission simulated again: are its recordings those of its tracks?"""
+"""Some runs of a submission made again: its recordings, and the poses of its SLAM."""
 
 from __future__ import annotations
 
+import json
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,43 +13,78 @@ from typing import Any
 import numpy as np
 
 from scripts.benchmark import submission
+from scripts.benchmark.submission import Submission
 from scripts.benchmark.tracks import TRACKS
-from scripts.comparison.recording import digest, record
+from scripts.comparison.entry import Entry
+from scripts.comparison.recording import digest, load, record
 from scripts.machine import machine, versions
 from scripts.report.answer import ODOMETRY
 from sim.recording.verify import Finding
+from slam.guests import Limits, limited
+
+_TOLD = ("outcome", "ate_unaligned_m", "error_tracking_m")  # of a run with other poses
 
 
-def made_again(path: Path, count: int, seed: int = 0) -> Iterator[Finding]:
+def made_again(path: Path, count: int, seed: int = 0, slam: str | None = None) -> Iterator[Finding]:
     """One finding for each of ``count`` runs, drawn by ``seed``; raises as ``submission.read``.
 
+    slam  runs on them too, by this name; None: only recordings are checked, no SLAM runs
+
     A difference is no proof of anything with other versions or on another processor: then the
-    verdict is "cannot be checked here". Only recordings are checked: no SLAM runs.
+    verdict is "cannot be checked here".
     """
     given = submission.read(path)
+    if slam is not None:
+        _must_start(slam)
     runs = [(track, run) for track, own in given.runs.items() for run in own]
-    drawn = np.random.default_rng(seed).choice(len(runs), min(count, len(runs)), replace=False)
-    for track, run in (runs[k] for k in sorted(drawn.tolist())):
-        level = float(run["level"])
-        plan = TRACKS[track].plan(
-            (ODOMETRY,), (run["seed"],), levels=(level,), seconds=given.seconds
-        )
-        (one,) = plan.runs()
+    chosen = np.random.default_rng(seed).choice(len(runs), min(count, len(runs)), replace=False)
+    for track, run in (runs[k] for k in sorted(chosen.tolist())):
+        name = f"{path.name}: {track}, level {run['level']:g}, seed {run['seed']}"
         with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "again.npz"
-            record(file, every=plan.every, **asdict(plan.recipe(one)))
-            same = digest(file) == run["recording"]
-        name = f"{path.name}: {track}, level {level:g}, seed {run['seed']}"
-        if same:
-            yield Finding(episode=name, verdict="same bytes")
-            continue
+            wrong = _wrong(given, track, run, slam, Path(folder))
         there = _elsewhere(given.made_with)
-        if there:
-            why = f"its scans are others here, and it was made with {there}"
+        if not wrong:
+            yield Finding(episode=name, verdict="same bytes")
+        elif there:
+            why = f"{wrong}, and it was made with {there}"
             yield Finding(episode=name, verdict="cannot be checked here", why=why)
-            continue
-        why = "its scans are others here, on the same processor and versions"
-        yield Finding(episode=name, verdict="differs", why=why)
+        else:
+            why = f"{wrong}, on the same processor and versions"
+            yield Finding(episode=name, verdict="differs", why=why)
+
+
+def _must_start(slam: str) -> None:
+    """Raise what says why it cannot run here."""
+    limited(slam, Limits())
+
+
+def _wrong(
+    given: Submission, track: str, run: Mapping[str, Any], slam: str | None, folder: Path
+) -> str:
+    """What is others here, "" where nothing is."""
+    file = folder / "again.npz"
+    plan = TRACKS[track].plan(
+        (ODOMETRY,), (run["seed"],), levels=(float(run["level"]),), seconds=given.seconds
+    )
+    (one,) = plan.runs()
+    record(file, every=plan.every, **asdict(plan.recipe(one)))
+    if digest(file) != run["recording"]:
+        return "its scans are others here"
+    if slam is None:
+        return ""
+    drive = load(file)
+    entry = Entry(slam, drive, Limits(hidden=(folder,)), judge_maps=False)
+    entry.over(drive.frames)
+    arrays = entry.arrays()
+    row = json.loads(arrays["row"])
+    if submission.digest_of(arrays["stamps_ns"], arrays["poses"]) == run["poses"]:
+        wrong = [key for key in submission.OF_POSES if key in row and row[key] != run[key]]
+        return f"its {', '.join(wrong)} are not those of its poses" if wrong else ""
+    return f"its poses are others here ({_told(_TOLD, run)}; here {_told(_TOLD, row)})"
+
+
+def _told(keys: Sequence[str], row: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} {row.get(key)!s:.12}" for key in keys)
 
 
 def _elsewhere(made_with: Mapping[str, Any]) -> str:

@@ -10,9 +10,11 @@ from typing import Any
 
 from scripts.benchmark import days, submission
 from scripts.benchmark.board import Board
+from scripts.benchmark.sealed import SealedSeeds
 from scripts.benchmark.submission import Submission
 from scripts.benchmark.systems import installed
 from scripts.benchmark.tracks import LEVELS, TEST, TRACKS, TRAIN, Track
+from scripts.comparison.folder import Compared
 from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
 from scripts.comparison.recording import digest
@@ -40,6 +42,7 @@ class Wanted:
 
     slams    beside the controls of each track; the subject is one of them
     train    on the seeds that are for tuning, not on those that count
+    sealed   on these seeds instead
     seeds    how many
     quick    three levels only: runs of the full benchmark, which goes on from there
     seconds  of each run, instead of the track's own; such a board is for trying out
@@ -52,6 +55,7 @@ class Wanted:
     slams: tuple[str, ...]
     subject: str
     train: bool = False
+    sealed: SealedSeeds | None = None
     seeds: int = SEEDS
     quick: bool = False
     seconds: float | None = None
@@ -77,6 +81,8 @@ class Wanted:
 
     def seeds_of(self, track: Track) -> tuple[int, ...]:
         """All that there are of that kind."""
+        if self.sealed is not None:
+            return self.sealed.seeds
         return track.train if self.train else track.test
 
     def plan(self, track: Track) -> Plan:
@@ -86,7 +92,7 @@ class Wanted:
 
     def buildings(self) -> Buildings:
         """Of the section over days."""
-        known = TRAIN if self.train else TEST
+        known = self.sealed.seeds if self.sealed else TRAIN if self.train else TEST
         return days.buildings(
             self.slams, known[: self.seeds], quick=self.quick, seconds=self.seconds
         )
@@ -96,7 +102,7 @@ class Wanted:
         seeds = self.seeds_of(self.tracks[0])[: self.seeds]
         return {
             "tracks_run": [track.name for track in self.tracks],
-            "seeds_of": submission.SETS[self.train],
+            "seeds_of": submission.SEALED if self.sealed else submission.SETS[self.train],
             "seeds": list(seeds),
             "levels_run": list(self.levels),
             "quick": self.quick,
@@ -150,7 +156,7 @@ def carry_out(
         digests = {name: _digests(plan, out / name) for name, plan in plans.items()}
         lives = wanted.buildings() if wanted.days else None
         aged = [] if lives is None else live(lives, out / DAYS, jobs=jobs, cluster=cluster)
-        own = None if wanted.submit is None else _submission(wanted, runs, digests, wanted.submit)
+        own = None if wanted.submit is None else _submission(wanted, runs, digests, out)
         for one in merge:
             for name in plans:
                 runs[name] = runs[name] + _on_the_same_scans(one, name, digests[name])
@@ -181,21 +187,30 @@ def _digests(plan: Plan, folder: Path) -> dict[tuple[float, int], str]:
     return {(run.dynamism, run.seed): digest(file) for run, file in files.items()}
 
 
-def _submission(wanted: Wanted, runs: Runs, digests: Digests, name: str) -> Submission:
-    kept = {
-        track: [
-            submission.run_of(row, digests[track][row["dynamism"], row["seed"]])
-            for row in rows
-            if row["slam"] == wanted.subject
-        ]
-        for track, rows in runs.items()
-    }
-    head = wanted.head()
+def _submission(wanted: Wanted, runs: Runs, digests: Digests, out: Path) -> Submission:
+    kept: Runs = {}
+    for track, rows in runs.items():
+        compared, own = Compared(out / track), [r for r in rows if r["slam"] == wanted.subject]
+        kept[track] = [
+            submission.run_of(
+                row, digests[track][row["dynamism"], row["seed"]],
+                _poses(compared, row, wanted.subject),
+            )
+            for row in own
+        ]  # fmt: skip
+    head, name = wanted.head(), wanted.submit
+    assert name is not None
     return Submission(
         name=name, slam=wanted.subject, seeds_of=head["seeds_of"], seeds=tuple(head["seeds"]),
         levels=wanted.levels, seconds=wanted.seconds, runs=kept,
         made_with=submission.made_with(wanted.subject),
     )  # fmt: skip
+
+
+def _poses(compared: Compared, row: Mapping[str, Any], slam: str) -> str:
+    """Digest of what it said in that run."""
+    said = compared.run(row["scene"], row["dynamism"], row["seed"]).believed(slam)
+    return submission.digest_of(said.stamps_ns, said.poses)
 
 
 def _check_alike(merge: Sequence[Submission], wanted: Wanted, taken: set[str]) -> None:

@@ -16,6 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from scripts.benchmark.tracks import LEVELS, TRACKS
 from scripts.machine import machine, versions
 from scripts.metrics.table import METRICS
@@ -25,16 +28,18 @@ from sim.recording.sums import check_vouched
 from slam.bounded import text_of
 from slam.errors import FAILURES, InvalidValueError, LogFormatError
 from slam.files import write_text
+from slam.frames import Float
 from slam.system import names as registered
 from slam.variants import ORACLE
 
-SCHEMA, WHAT = 1, "submission to the benchmark of mobilia"
+SCHEMA, WHAT = 2, "submission to the benchmark of mobilia"
 MAX_BYTES = 1 << 25
 MAX_SEEDS, MAX_WORDS = 1000, 2000  # of a file; characters of a name or failure
 MAX_SEED, MAX_SECONDS = 2**32 - 1, 86_400.0  # s of a run
 MAX_DEPTH = 16  # objects and lists within each other, in what it was made with
 MAX_NUMBER = 1e300  # of any metric; JSON has whole numbers that no double holds
-SETS = ("test", "train")
+SEALED = "sealed"  # seeds that were published as a hash first (``scripts.benchmark.sealed``)
+SETS = ("test", "train", SEALED)
 OUTCOMES = ("finished", "lost", *FAILURES)
 _SECTIONS = ("errors", "honesty", "costs")
 # Metrics of which less is better, but for "lost", which is a word of every run.
@@ -47,8 +52,9 @@ _COSTS = tuple(key for key in _METRICS if METRICS[key].section == "costs")
 _FINISHED = ("ate_unaligned_m", "error_tracking_m")  # what every run that finished has
 _ALSO = ("scans", "lost_at_s", "not_trusted_share", "moving_share_of_returns")
 NUMBERS = (*_METRICS, *_ALSO)  # none of them is below 0
+OF_POSES = ("outcome", "lost", *(key for key in NUMBERS if key not in _COSTS))  # not of a machine
 _SHARES = ("_share", "_share_of_returns")  # at most 1
-_WORDS = {"level", "seed", "recording", "outcome", "failure", "lost", *NUMBERS}
+_WORDS = {"level", "seed", "recording", "poses", "outcome", "failure", "lost", *NUMBERS}
 _NAME, _DIGEST = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}"), re.compile(r"[0-9a-f]{64}")
 Row = dict[str, Any]
 
@@ -60,7 +66,8 @@ class Submission:
     name       what tables call it: letters, digits, "_", "-", "."
     slam       the name that it ran by, with the numbers that were set: a word, never run
     seeds_of, seeds, levels, seconds  what was run; seconds None: as long as the track says
-    runs       by track: rows as of ``runs.csv``, and "recording", the digest of the scans
+    runs       by track: rows as of ``runs.csv``, "recording", the digest of the scans, and "poses",
+               that of the poses at them
     made_with  versions, machine, numbers of the SLAM
     """
 
@@ -114,11 +121,19 @@ def file_of(name: str) -> str:
     return f"submission_{name}.json"
 
 
-def run_of(row: Mapping[str, Any], recording: str) -> Row:
+def digest_of(stamps_ns: NDArray[np.int64], poses: Float) -> str:
+    """SHA-256 of (k,) stamps and (k, 3) poses of a SLAM: all bits, so it is of one machine."""
+    whole = hashlib.sha256(np.ascontiguousarray(stamps_ns, dtype="<i8").tobytes())
+    whole.update(np.ascontiguousarray(poses, dtype="<f8").tobytes())
+    return whole.hexdigest()
+
+
+def run_of(row: Mapping[str, Any], recording: str, poses: str) -> Row:
     """What a submission keeps of a row of ``runs.csv``."""
     numbers = {key: _plain(row.get(key)) for key in NUMBERS}
     return {
         "level": float(row["dynamism"]), "seed": int(row["seed"]), "recording": recording,
+        "poses": poses,
         "outcome": row["outcome"], "failure": _line(row.get("failure")), "lost": int(row["lost"]),
         **numbers,
     }  # fmt: skip
@@ -236,10 +251,12 @@ def _check_run(path: Path, track: str, run: Any) -> None:
     where = f"{track}, level {run['level']!r:.20}, seed {run['seed']!r:.20}: "
     _expect(path, f"{where}level", run["level"], _in(run["level"], LEVELS), f"of {LEVELS}")
     _expect(path, f"{where}seed", run["seed"], _is_seed(run["seed"]), "a whole number")
-    digest = isinstance(run["recording"], str) and _DIGEST.fullmatch(run["recording"]) is not None
     told = run["failure"] is None or _is_words(run["failure"])
     lost, outcome = run["lost"], run["outcome"]
-    _expect(path, f"{where}recording", run["recording"], digest, "a SHA-256")
+    for key in ("recording", "poses"):
+        value = run[key]
+        digest = isinstance(value, str) and _DIGEST.fullmatch(value) is not None
+        _expect(path, where + key, value, digest, "a SHA-256")
     _expect(path, f"{where}outcome", outcome, _in(outcome, OUTCOMES), ", ".join(OUTCOMES))
     _expect(path, f"{where}failure", run["failure"], told, "null or words")
     fits = type(lost) is int and lost == int(outcome != "finished")

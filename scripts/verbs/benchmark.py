@@ -16,10 +16,12 @@ from scripts.many import named
 from scripts.names import check
 from scripts.process_options import Cluster, Jobs
 from scripts.set_option import Set
+from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
     from scripts.benchmark.board import Board
+    from scripts.benchmark.sealed import SealedSeeds
 
 
 MOST_COLUMNS = 5  # SLAMs in the table of the terminal; the page has all
@@ -50,6 +52,14 @@ def benchmark(
     train: Annotated[
         bool, typer.Option("--train", help="On the seeds for tuning, not on those that count.")
     ] = False,
+    sealed: Annotated[
+        Path | None,
+        typer.Option(help="On the seeds of this file, which were published as a hash first."),
+    ] = None,
+    seal: Annotated[
+        Path | None,
+        typer.Option(help="Only draw secret seeds, write them here, and print their hash."),
+    ] = None,
     seeds: Annotated[
         int | None, typer.Option(help="Seeds at every level; default 6, with --quick 2.")
     ] = None,
@@ -79,6 +89,9 @@ def benchmark(
 
     [bold]mobilia benchmark --quick --slam my_package:MySlam --jobs 2[/bold]
     """
+    if seal is not None:
+        _seal(seal, seeds)
+        return
     slams = named(slam or [])
     check((*slams, *([subject] if subject else [])))
     from scripts import workers
@@ -88,18 +101,40 @@ def benchmark(
 
     workers.check_jobs(jobs)
     others = [submission.read(path) for path in merge or ()]
-    count = seeds if seeds is not None else QUICK_SEEDS if quick else SEEDS
+    drawn = None if sealed is None else _opened(sealed, train)
+    most = SEEDS if drawn is None else len(drawn.seeds)
+    count = seeds if seeds is not None else min(QUICK_SEEDS if quick else most, most)
     runs = tuple(dict.fromkeys((*slams, *([subject] if subject else []))))
     numbered = dict(zip(runs, with_set(runs, set_ or []), strict=True))
     wanted = wanted_of(
         chosen(named(tracks or [])), [numbered[name] for name in slams],
         None if subject is None else numbered[subject],
-        train=train, seeds=count, quick=quick, seconds=seconds, submit=submit,
+        train=train, sealed=drawn, seeds=count, quick=quick, seconds=seconds, submit=submit,
         days=days,
     )  # fmt: skip
     started = time.perf_counter()
     board = carry_out(wanted, out, jobs=jobs, cluster=cluster, merge=others)
     _tell(board, out, time.perf_counter() - started)
+
+
+def _seal(path: Path, seeds: int | None) -> None:
+    from scripts.benchmark import sealed
+    from scripts.benchmark.make import SEEDS
+
+    drawn = sealed.drawn(SEEDS if seeds is None else seeds)
+    sealed.write(path, drawn)
+    console.print(f"{escape(str(path))}: {len(drawn.seeds)} seeds. Keep it; publish this hash:")
+    console.print(drawn.sha256, soft_wrap=True)
+
+
+def _opened(path: Path, train: bool) -> SealedSeeds:
+    from scripts.benchmark import sealed
+
+    if train:
+        raise InvalidValueError("--sealed and --train are seeds of two kinds: give one of them")
+    opened = sealed.read(path)
+    note(f"sealed seeds: their hash is {opened.sha256}")
+    return opened
 
 
 def _tell(board: Board, out: Path, spent_s: float) -> None:

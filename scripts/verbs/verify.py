@@ -14,6 +14,7 @@ from scripts.trust import Trust, admitted
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    from scripts.benchmark.submission import Submission
     from sim.recording.verify import Finding
 
 _COLORS = {
@@ -32,6 +33,16 @@ def verify(
     regenerate_: Annotated[
         int, typer.Option("--regenerate", help="Simulate this many episodes anew and compare.")
     ] = 0,
+    rerun: Annotated[
+        int,
+        typer.Option(help="Of a submission: also run its SLAM on this many, compare its poses."),
+    ] = 0,
+    slam: Annotated[
+        str | None, typer.Option(help="The SLAM to --rerun; default the one that the file names.")
+    ] = None,
+    sealed: Annotated[
+        Path | None, typer.Option(help="Of a submission: its seeds are those of this file.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Which ones: seed of that choice.")] = 0,
     trust: Trust = False,
 ) -> None:
@@ -44,32 +55,69 @@ def verify(
     anew. 6 the recordings of a submission cannot be checked here: they were made on another kind of
     processor or with other versions. The first that holds counts.
 
-    Of a submission to the benchmark only the recordings can be made again. Its results are the
-    submitter's word.
+    Of a submission to the benchmark --regenerate makes recordings again: its results are the
+    submitter's word. --rerun also runs its SLAM, which must be installed here, on recordings drawn
+    by --seed.
     """
-    if regenerate_ < 0 or seed < 0:
-        raise InvalidValueError("--regenerate and --seed must be >= 0")
+    if min(regenerate_, rerun, seed) < 0:
+        raise InvalidValueError("--regenerate, --rerun and --seed must be >= 0")
     from scripts.results import check
 
     with working("checking every file"):
         findings = check(folder)
     checked = len(findings)
     submitted = folder.suffix == ".json" and folder.is_file()
-    if regenerate_ and submitted and findings[0].ok:
-        from scripts.benchmark.again import made_again
-
-        findings += made_again(folder, regenerate_, seed)
-    elif regenerate_ and not submitted:
+    if not submitted and (rerun or slam or sealed):
+        raise InvalidValueError("--rerun, --slam and --sealed are for a submission")
+    if submitted and findings[0].ok:
+        findings += _of_submission(folder, regenerate_, rerun, seed, slam, sealed, trust)
+    elif regenerate_:
         findings += _made_again(_drawn(_sound(folder, findings), regenerate_, seed), trust)
     for finding in findings:
         _tell(finding)
     _exit_if_bad(findings)
     if submitted:
-        again = len(findings) - checked
-        made = f", the recordings of {again} of its runs are right" if again else ""
-        console.print(f"the file is whole{made}; the results are the submitter's word")
+        console.print(_judgement(len(findings) - checked, rerun))
         return
     console.print(f"{checked} checked, {len(findings) - checked} of them made again: all well")
+
+
+def _of_submission(
+    path: Path, regenerate_: int, rerun: int, seed: int, slam: str | None, sealed: Path | None,
+    trust: bool,
+) -> list[Finding]:  # fmt: skip
+    """A finding for each of its runs that was made again."""
+    from scripts.benchmark import submission
+    from scripts.benchmark.again import made_again
+    from slam.names import NameFromFile
+
+    given = submission.read(path)
+    if sealed is not None:
+        _check_sealed(given, sealed)
+    runs = None
+    if rerun:
+        named = NameFromFile(given.slam, path)
+        runs = admitted(named, "SLAM", trust) if slam is None else slam
+    return list(made_again(path, rerun or regenerate_, seed, runs))
+
+
+def _check_sealed(given: Submission, path: Path) -> None:
+    from scripts.benchmark import sealed, submission
+
+    opened = sealed.read(path)
+    wanted = opened.seeds[: len(given.seeds)]
+    if given.seeds_of != submission.SEALED or given.seeds != wanted:
+        raise InvalidValueError(f"the seeds of {given.name!r} are not those of {path}")
+    console.print(f"its seeds were sealed as {opened.sha256}", soft_wrap=True)
+
+
+def _judgement(again: int, rerun: int) -> str:
+    if not again:
+        return "the file is whole; the results are the submitter's word"
+    if rerun:
+        return f"the file is whole, and {again} of its runs came out again: scans and poses"
+    made = f"the recordings of {again} of its runs are right"
+    return f"the file is whole, {made}; the results are the submitter's word"
 
 
 def _made_again(episodes: list[Path], trust: bool) -> list[Finding]:

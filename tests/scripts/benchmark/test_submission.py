@@ -27,7 +27,7 @@ ROW = {
 
 def made() -> Submission:
     runs = [
-        submission.run_of({**ROW, "dynamism": level, "seed": seed}, f"{seed:064x}")
+        submission.run_of({**ROW, "dynamism": level, "seed": seed}, f"{seed:064x}", "a" * 64)
         for level in LEVELS
         for seed in (720, 721)
     ]
@@ -63,11 +63,11 @@ def first_run(data: dict[str, Any], **values: Any) -> None:
 
 HUGE = 10**400  # JSON has it, no double holds it
 WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
-    "schema": (lambda d: d.update(schema=2), "of schema 1"),
+    "schema": (lambda d: d.update(schema=1), "of schema 2"),
     "what": (lambda d: d.update(what="a recipe"), "no submission"),
     "name": (lambda d: d.update(name="../x"), "name must be up to 40"),
     "slam": (lambda d: d.update(slam="a\nb"), "slam must be"),
-    "seeds_of": (lambda d: d.update(seeds_of="best"), "test or train"),
+    "seeds_of": (lambda d: d.update(seeds_of="best"), "test or train or sealed"),
     "seeds": (lambda d: d.update(seeds=[720, 720]), "seeds must be whole"),
     "one seed": (lambda d: d.update(seeds=[720]), "expected 5 runs"),
     "levels": (lambda d: d.update(levels=[0.0, 0.3]), "levels must be of"),
@@ -79,6 +79,7 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "run of words": (lambda d: d["tracks"][TRACK]["runs"].__setitem__(0, "x"), "a run must have"),
     "more in a run": (lambda d: first_run(d, more=1), "a run must have"),
     "recording": (lambda d: first_run(d, recording="0"), "recording must be a SHA-256"),
+    "poses": (lambda d: first_run(d, poses=None), "poses must be a SHA-256"),
     "outcome": (lambda d: first_run(d, outcome="won"), "outcome must be"),
     "lost": (lambda d: first_run(d, lost=1), "lost must be"),
     "error": (lambda d: first_run(d, ate_unaligned_m=-0.1), "ate_unaligned_m must be"),

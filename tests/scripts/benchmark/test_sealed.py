@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Seeds that are promised by their hash, and runs of a submission that come out again."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from scripts.benchmark import sealed, submission
+from scripts.benchmark.again import made_again
+from scripts.benchmark.make import Wanted, carry_out
+from scripts.benchmark.tracks import TEST, TRACKS, TRAIN
+from slam.errors import InvalidValueError, LogFormatError
+
+TRACK = TRACKS["no-walls-v1"]
+
+
+def test_they_come_back_and_are_none_that_is_published(tmp_path: Path):
+    drawn, path = sealed.drawn(50), tmp_path / "seeds.json"
+    assert len(set(drawn.seeds)) == 50
+    assert not {*TRAIN, *TEST} & set(drawn.seeds)
+    sealed.write(path, drawn)
+    assert sealed.read(path) == drawn
+    with pytest.raises(InvalidValueError, match="exists"):
+        sealed.write(path, drawn)
+
+
+def test_the_seal_is_of_each_seed_its_order_and_the_salt():
+    """The salt hides them: without it, a hundred million guesses would find two seeds."""
+    drawn = sealed.drawn(3)
+    others = [
+        replace(drawn, seeds=drawn.seeds[::-1]),
+        replace(drawn, seeds=drawn.seeds[:2]),
+        replace(drawn, salt=sealed.drawn(1).salt),
+    ]
+    assert len({one.sha256 for one in (drawn, *others)}) == 4
+    assert replace(drawn).sha256 == drawn.sha256
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("sealed", [720], "none that is published"),
+        ("sealed", [21, 21], "each once"),
+        ("sealed", [2**40], "whole numbers"),
+        ("sealed", "21", "whole numbers"),
+        ("salt", "", "64 hexadecimal"),
+        ("what", "a recipe", "no sealed seeds"),
+        ("tracks", {}, "its tracks are others"),
+        ("more", 1, "no sealed seeds"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, key: str, value: object, says: str):
+    path = tmp_path / "seeds.json"
+    sealed.write(path, sealed.drawn(2))
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    with pytest.raises(LogFormatError, match=says) as told:
+        sealed.read(path)
+    assert str(path) in str(told.value)
+
+
+@pytest.fixture(scope="module")
+def submitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two runs of a second on sealed seeds."""
+    out = tmp_path_factory.mktemp("board")
+    drawn = sealed.SealedSeeds(seeds=(21, 5), salt="0" * 64)
+    wanted = Wanted(
+        tracks=(TRACK,), slams=("ekf",), subject="ekf", sealed=drawn, seeds=2, quick=True,
+        seconds=1.0, submit="mine",
+    )  # fmt: skip
+    carry_out(wanted, out)
+    return out / submission.file_of("mine")
+
+
+def test_the_poses_of_a_submission_come_out_again(submitted: Path):
+    given = submission.read(submitted)
+    assert (given.seeds_of, given.seeds) == ("sealed", (21, 5))
+    assert [one.verdict for one in made_again(submitted, 2, slam="ekf")] == ["same bytes"] * 2
+
+
+def test_another_slam_or_other_numbers_do_not(submitted: Path, tmp_path: Path):
+    (other,) = made_again(submitted, 1, slam="odometry")
+    assert other.verdict == "differs"
+    assert "its poses are others here (outcome finished, ate_unaligned_m" in other.why
+    given = submission.read(submitted)
+    better = [run | {"error_tracking_m": 0.0} for run in given.runs[TRACK.name]]
+    faked = tmp_path / "faked.json"
+    submission.write(faked, replace(given, runs={TRACK.name: better}))
+    assert [one.verdict for one in made_again(faked, 1)] == ["same bytes"]
+    (wrong,) = made_again(faked, 1, slam="ekf")
+    assert (wrong.verdict, wrong.why.partition(" are not")[0]) == (
+        "differs", "its error_tracking_m",
+    )  # fmt: skip
