@@ -17,6 +17,7 @@ from slam.constant_velocity import standing
 from slam.errors import LogFormatError
 from slam.frames import Float, Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata
 from slam.logs import carmen_messages as messages
+from slam.logs.border import about
 from slam.logs.carmen_clock import Clock, rough_steps
 from slam.logs.carmen_messages import LaserMessage, PoseMessage
 from slam.logs.carmen_poses import ScanPoses, at_rest, scan_poses
@@ -110,8 +111,9 @@ def stream_of(log: Log, name: str, repairs: Repairs, source: str) -> Stream:
         digits=log.digits,
     )
     ranges, range_max, range_max_source = _ranges(log, scans)
-    spec = _spec(scans[0], range_max, poses.T_robot_laser)
-    frames = _frames(scans, ordered, ranges, spec, poses)
+    with about(log.path, line=scans[0].line):
+        spec = _spec(scans[0], range_max, poses.T_robot_laser)
+    frames = _frames(log.path, scans, ordered, ranges, spec, poses)
     if not wheels:
         frames = [_without_wheels(frame, before) for before, frame in pairwise([None, *frames])]
     if not frames:
@@ -251,22 +253,31 @@ def _flaser_angles(n: int) -> tuple[float, float]:
 
 
 def _frames(
-    scans: list[LaserMessage], ordered: Ordered, ranges: Float, spec: LaserSpec, poses: ScanPoses
+    path: Path,
+    scans: list[LaserMessage],
+    ordered: Ordered,
+    ranges: Float,
+    spec: LaserSpec,
+    poses: ScanPoses,
 ) -> list[Frame]:
     frames = []
     for k, stamp_ns in zip(ordered.order, ordered.stamps_ns, strict=True):
         T_odom_robot = poses.odometry[k]
         if T_odom_robot is None:
             continue
-        intensities: NDArray[np.float32] | None = None
-        if scans[k].intensities:
-            intensities = np.array(scans[k].intensities, dtype=np.float32)
-        scan = Scan(
-            stamp_ns=stamp_ns,
-            ranges=ranges[k].astype(np.float32),
-            spec=spec,
-            intensities=intensities,
-        )
-        odometry = Odometry(stamp_ns=stamp_ns, T_odom_robot=T_odom_robot)
-        frames.append(Frame(stamp_ns=stamp_ns, odometry=odometry, scan=scan, truth=poses.truth[k]))
+        with about(path, line=scans[k].line):
+            scan = _scan(scans[k], stamp_ns, ranges[k], spec)
+            odometry = Odometry(stamp_ns=stamp_ns, T_odom_robot=T_odom_robot)
+            frames.append(
+                Frame(stamp_ns=stamp_ns, odometry=odometry, scan=scan, truth=poses.truth[k])
+            )
     return frames
+
+
+def _scan(message: LaserMessage, stamp_ns: int, ranges: Float, spec: LaserSpec) -> Scan:
+    intensities: NDArray[np.float32] | None = None
+    if message.intensities:
+        intensities = np.array(message.intensities, dtype=np.float32)
+    return Scan(
+        stamp_ns=stamp_ns, ranges=ranges.astype(np.float32), spec=spec, intensities=intensities
+    )
