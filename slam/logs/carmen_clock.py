@@ -47,9 +47,7 @@ class Clock:
         equal = sum(a.stamp_ns == b.stamp_ns for a, b in pairwise(scans))
         if equal and scans[0].robot_pose is None:  # odometry is interpolated to the scans' times
             steps = [MESSAGE_S] * (len(kept) - 1)
-            ordered = put_in_order(
-                repairs.path, stamps, lines, steps_s=steps, digits=digits
-            )
+            ordered = put_in_order(repairs.path, stamps, lines, steps_s=steps, digits=digits)
             repairs.note(STAMPS_SPREAD, f"{equal} scans have the time of another", None, equal)
             kept = [kept[k] for k in ordered.order]
             stamps = ordered.stamps_ns
