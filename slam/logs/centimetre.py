@@ -34,8 +34,9 @@ def is_centimetre(path: Path) -> bool:
     """Whether one of the first lines is an ``L`` or ``O`` followed by numbers."""
     for _, line in islice(numbered_lines(path, Repairs(path)), _LINES_TO_LOOK_AT):
         words = line.split()
-        if words[:1] in ([SCAN], [ODOM]) and len(words) >= 5:
-            return all(_is_number(word) for word in words[1:5])
+        known = words[:1] in ([SCAN], [ODOM]) and len(words) >= 5
+        if known and all(map(_is_number, words[1:5])):
+            return True
     return False
 
 
