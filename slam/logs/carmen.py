@@ -67,11 +67,12 @@ def read_carmen(path: str | Path, *, strict: bool = False) -> Stream:
     What is usual in public logs is repaired: a last line without an end is left out; stamps that
     step back by less than 1 s are sorted, equal ones spread by the odometry between them
     (``put_in_order``); a clock that is set back goes on from where it was (``continued``); times
-    below 0 that lost their sign in 32 bits get it back (``unwrapped``). One warning says so, ``metadata.extra`` counts each, and ``strict`` refuses all.
+    below 0 that lost their sign in 32 bits get it back (``unwrapped``). One warning says so,
+    ``metadata.extra`` counts each, and ``strict`` refuses all.
 
     Beams of one scan have no times of their own (offsets zero). Ranges at or above the scanner's
     maximum are inf, ranges of 0 are NaN (REP 117). The log is read whole: a damaged line anywhere
-    raises ``LogFormatError`` with file and line.
+    raises ``LogFormatError`` with file, line, field and value.
     """
     repairs = Repairs(Path(path), strict)
     log = _read(Path(path), repairs)
