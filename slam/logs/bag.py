@@ -12,9 +12,10 @@ import numpy as np
 
 from slam.errors import LogFormatError
 from slam.frames import EPOCH, NS_PER_S, Stream, StreamMetadata
-from slam.logs.bag_frames import about, frames_of, stamp_of
+from slam.logs.bag_frames import frames_of, stamp_of
 from slam.logs.bag_laser import Laser, mounting
 from slam.logs.bag_topics import SCAN, Bag, Topics, choose
+from slam.logs.border import about
 from slam.logs.repairs import NO_ODOMETRY, Repairs
 
 PROBE_NS = 20 * NS_PER_S  # how far the transform to the laser is looked for
@@ -83,7 +84,7 @@ def _epoch_ns(bag: Bag, topics: Topics) -> int:
     if topics.began is None:
         return 0
     for _, _, message in bag.messages({topics.began}):
-        with about(bag.path, f"topic {topics.began}"):
+        with about(bag.path, bag.at):
             simulated = message.time_ref
             return stamp_of(message, 0) - int(simulated.sec) * NS_PER_S - int(simulated.nanosec)
     return 0
@@ -101,7 +102,7 @@ def _probe(bag: Bag, topics: Topics) -> Laser:  # noqa: C901 (one branch a kind 
     mount, start_ns = None, None
     for topic, log_ns, message in bag.messages(wanted):
         start_ns = log_ns if start_ns is None else start_ns
-        with about(bag.path, f"topic {topic}"):
+        with about(bag.path, bag.at):
             if topic == topics.scan:
                 scans = [*scans, message][:2]
             elif topic == topics.turns:
@@ -122,7 +123,7 @@ def _probe(bag: Bag, topics: Topics) -> Laser:  # noqa: C901 (one branch a kind 
         raise LogFormatError(bag.path, f"no scan on {topics.scan}")
     if mount is None:
         _log.info("%s: no transform to the laser, taken to be at the robot's origin", bag.path)
-    with about(bag.path, f"topic {topics.scan}"):
+    with about(bag.path, f"topic {topics.scan}, message 1"):
         times = [stamp_of(scan, 0) for scan in scans]
         end = times[1] if len(times) > 1 else math.inf
         turns = [turn for turn in turns if times[0] <= stamp_of(turn, 0) < end]

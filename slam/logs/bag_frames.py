@@ -7,7 +7,6 @@ import logging
 import math
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +14,16 @@ import numpy as np
 
 from slam.constant_velocity import standing
 from slam.errors import InvalidValueError, LogFormatError
-from slam.frames import NS_PER_S, BeamLabels, Float, Frame, Odometry, Scan
+from slam.frames import MOST_TWIST, NS_PER_S, BeamLabels, Float, Frame, Odometry, Scan
 from slam.logs.bag_laser import Laser
 from slam.logs.bag_odometry import PoseTrack, Stamped, increment_covariance
 from slam.logs.bag_topics import Bag, Topics
+from slam.logs.border import about
 from slam.logs.ros_numbers import yaw_of
 
 PATIENCE_NS = 2 * NS_PER_S  # how long a scan waits for its odometry
 _PLANAR = np.array([[6 * i + j for j in (0, 1, 5)] for i in (0, 1, 5)])
-IMPOSSIBLE = (InvalidValueError, ValueError, AttributeError, TypeError, OverflowError, KeyError)
+MOST_POSE_M = 1e9  # from the origin of its frame, which may be that of a map of the earth
 _log = logging.getLogger(__name__)
 
 
@@ -36,25 +36,14 @@ def frames_of(path: Path, topics: Topics, laser: Laser, epoch_ns: int) -> Iterat
     with Bag(path) as bag:
         assembly = _Assembly(topics, laser, epoch_ns)
         for topic, log_ns, message in bag.messages({name for name in names if name}):
-            try:
+            with about(path, bag.at):
                 assembly.take(topic, log_ns, message)
-                ready = assembly.ready(log_ns) if assembly.waiting else ()
-            except IMPOSSIBLE as error:
-                raise LogFormatError(path, f"topic {topic}: {error}") from error
+                ready = assembly.ready(log_ns) if assembly.waiting else []
             yield from ready
         with about(path, "at the end"):
             ready = assembly.ready(None)
         yield from ready
     assembly.report(path)
-
-
-@contextmanager
-def about(path: Path, what: str) -> Iterator[None]:
-    """Values that cannot be are the file's fault here."""
-    try:
-        yield
-    except IMPOSSIBLE as error:
-        raise LogFormatError(path, f"{what}: {error}") from error
 
 
 def stamp_of(message: Any, log_ns: int) -> int:
@@ -171,8 +160,13 @@ class _Assembly:
 
 def _planar(pose: Any) -> Float:
     p, q = pose.position, pose.orientation
-    if not math.isfinite(p.x + p.y + q.x + q.y + q.z + q.w):
-        raise InvalidValueError("a pose that is not finite")
+    if not max(abs(p.x), abs(p.y)) <= MOST_POSE_M or not math.isfinite(p.x + p.y):
+        raise InvalidValueError(
+            f"pose.position: expected a place within {MOST_POSE_M:g} m, got {p.x:g}, {p.y:g}"
+        )
+    if not math.isfinite(q.x + q.y + q.z + q.w):
+        got = f"{q.x:g}, {q.y:g}, {q.z:g}, {q.w:g}"
+        raise InvalidValueError(f"pose.orientation: expected finite numbers, got {got}")
     return np.array([p.x, p.y, yaw_of(q.x, q.y, q.z, q.w)])
 
 
@@ -185,10 +179,15 @@ def _odometry(message: Any, stamp_ns: int, with_covariance: bool) -> Stamped:
     twist = message.twist.twist
     known = message.twist.covariance[0] != -1.0  # the convention of sensor_msgs/Imu
     rates = np.array([twist.linear.x, twist.linear.y, twist.angular.z])
+    known = known and bool(np.isfinite(rates).all())
+    if known and np.abs(rates).max() > MOST_TWIST:
+        raise InvalidValueError(
+            f"twist: expected speeds within {MOST_TWIST:g} m/s and rad/s, got {rates.tolist()}"
+        )
     return Stamped(
         stamp_ns=stamp_ns,
         pose=_planar(message.pose.pose),
-        twist=rates if known and np.isfinite(rates).all() else None,
+        twist=rates if known else None,
         covariance=message.pose.covariance[_PLANAR] if with_covariance else None,
     )
 

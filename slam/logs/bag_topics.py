@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -52,9 +53,9 @@ def failing_as_ours(path: Path) -> Iterator[None]:
         raise _damaged(path, error) from error
 
 
-def _damaged(path: Path, error: Exception) -> LogFormatError:
+def _damaged(path: Path, error: Exception, where: str = "") -> LogFormatError:
     text = " ".join(str(error).split())[:200] or type(error).__name__
-    return LogFormatError(path, f"corrupt or truncated bag: {text}")
+    return LogFormatError(path, f"{where}corrupt or truncated bag: {text}")
 
 
 class Bag:
@@ -75,6 +76,7 @@ class Bag:
                 check_file(file)
         with failing_as_ours(path):
             self._reader: Any = ReaderOfRos1(path) if self.is_ros1 else Reader(_storage(path))
+        self.at = ""  # which message was read last, in the words of an error
         self._decode = ROS1.deserialize_ros1 if self.is_ros1 else ROS2.deserialize_cdr
 
     def __enter__(self) -> Bag:
@@ -97,11 +99,14 @@ class Bag:
 
     def messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
         """(topic, log time ns, message) of these topics."""
+        count: Counter[str] = Counter()
         for connection, log_ns, data in self._messages(topics):
+            count[connection.topic] += 1
+            self.at = f"topic {connection.topic}, message {count[connection.topic]}"
             try:
                 decoded = self._decode(data, connection.msgtype)
             except Exception as error:  # see failing_as_ours
-                raise _damaged(self.path, error) from error
+                raise _damaged(self.path, error, f"{self.at}: ") from error
             yield connection.topic, log_ns, decoded
 
     def _messages(self, topics: Collection[str] | None) -> Iterator[tuple[Any, int, bytes]]:

@@ -17,6 +17,7 @@ from slam.constant_velocity import standing
 from slam.errors import LogFormatError
 from slam.frames import Float, Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata
 from slam.logs import carmen_messages as messages
+from slam.logs.border import about
 from slam.logs.carmen_clock import Clock, rough_steps
 from slam.logs.carmen_messages import LaserMessage, PoseMessage
 from slam.logs.carmen_poses import ScanPoses, at_rest, scan_poses
@@ -65,12 +66,13 @@ def read_carmen(path: str | Path, *, strict: bool = False) -> Stream:
 
     What is usual in public logs is repaired: a last line without an end is left out; stamps that
     step back by less than 1 s are sorted, equal ones spread by the odometry between them
-    (``put_in_order``); a clock that is set back goes on from where it was (``continued``). One
-    warning says so, ``metadata.extra`` counts each, and ``strict`` refuses all.
+    (``put_in_order``); a clock that is set back goes on from where it was (``continued``); times
+    below 0 that lost their sign in 32 bits get it back (``unwrapped``). One warning says so,
+    ``metadata.extra`` counts each, and ``strict`` refuses all.
 
     Beams of one scan have no times of their own (offsets zero). Ranges at or above the scanner's
     maximum are inf, ranges of 0 are NaN (REP 117). The log is read whole: a damaged line anywhere
-    raises ``LogFormatError`` with file and line.
+    raises ``LogFormatError`` with file, line, field and value.
     """
     repairs = Repairs(Path(path), strict)
     log = _read(Path(path), repairs)
@@ -110,8 +112,9 @@ def stream_of(log: Log, name: str, repairs: Repairs, source: str) -> Stream:
         digits=log.digits,
     )
     ranges, range_max, range_max_source = _ranges(log, scans)
-    spec = _spec(scans[0], range_max, poses.T_robot_laser)
-    frames = _frames(scans, ordered, ranges, spec, poses)
+    with about(log.path, line=scans[0].line):
+        spec = _spec(scans[0], range_max, poses.T_robot_laser)
+    frames = _frames(log.path, scans, ordered, ranges, spec, poses)
     if not wheels:
         frames = [_without_wheels(frame, before) for before, frame in pairwise([None, *frames])]
     if not frames:
@@ -251,22 +254,31 @@ def _flaser_angles(n: int) -> tuple[float, float]:
 
 
 def _frames(
-    scans: list[LaserMessage], ordered: Ordered, ranges: Float, spec: LaserSpec, poses: ScanPoses
+    path: Path,
+    scans: list[LaserMessage],
+    ordered: Ordered,
+    ranges: Float,
+    spec: LaserSpec,
+    poses: ScanPoses,
 ) -> list[Frame]:
     frames = []
     for k, stamp_ns in zip(ordered.order, ordered.stamps_ns, strict=True):
         T_odom_robot = poses.odometry[k]
         if T_odom_robot is None:
             continue
-        intensities: NDArray[np.float32] | None = None
-        if scans[k].intensities:
-            intensities = np.array(scans[k].intensities, dtype=np.float32)
-        scan = Scan(
-            stamp_ns=stamp_ns,
-            ranges=ranges[k].astype(np.float32),
-            spec=spec,
-            intensities=intensities,
-        )
-        odometry = Odometry(stamp_ns=stamp_ns, T_odom_robot=T_odom_robot)
-        frames.append(Frame(stamp_ns=stamp_ns, odometry=odometry, scan=scan, truth=poses.truth[k]))
+        with about(path, line=scans[k].line):
+            scan = _scan(scans[k], stamp_ns, ranges[k], spec)
+            odometry = Odometry(stamp_ns=stamp_ns, T_odom_robot=T_odom_robot)
+            frames.append(
+                Frame(stamp_ns=stamp_ns, odometry=odometry, scan=scan, truth=poses.truth[k])
+            )
     return frames
+
+
+def _scan(message: LaserMessage, stamp_ns: int, ranges: Float, spec: LaserSpec) -> Scan:
+    intensities: NDArray[np.float32] | None = None
+    if message.intensities:
+        intensities = np.array(message.intensities, dtype=np.float32)
+    return Scan(
+        stamp_ns=stamp_ns, ranges=ranges.astype(np.float32), spec=spec, intensities=intensities
+    )

@@ -13,7 +13,7 @@ from typing import TypeVar
 from slam import se2
 from slam.logs.carmen_messages import LaserMessage, Pose, PoseMessage
 from slam.logs.repairs import STAMPS_SPREAD, Repairs
-from slam.logs.stamps import continued, put_in_order
+from slam.logs.stamps import continued, put_in_order, unwrapped
 
 ODOM_S = 0.16  # between two ODOM lines, as in the public logs of a B21 (Intel, FHW, CSAIL)
 SPEED, TURN = 0.5, 0.5  # m/s, rad/s: of an indoor robot that moves, where nothing else is known
@@ -41,13 +41,13 @@ class Clock:
         both: list[Message] = [*scans, *(m for track in tracks for m in track)]
         both.sort(key=lambda m: m.line)
         kept = both[:1] + [m for before, m in pairwise(both) if not _echo(before, m)]
-        stamps = continued([m.stamp_ns for m in kept], [m.line for m in kept], repairs, digits)
+        lines = [m.line for m in kept]
+        stamps = unwrapped([m.stamp_ns for m in kept], lines, repairs)
+        stamps = continued(stamps, lines, repairs, digits)
         equal = sum(a.stamp_ns == b.stamp_ns for a, b in pairwise(scans))
         if equal and scans[0].robot_pose is None:  # odometry is interpolated to the scans' times
             steps = [MESSAGE_S] * (len(kept) - 1)
-            ordered = put_in_order(
-                repairs.path, stamps, [m.line for m in kept], steps_s=steps, digits=digits
-            )
+            ordered = put_in_order(repairs.path, stamps, lines, steps_s=steps, digits=digits)
             repairs.note(STAMPS_SPREAD, f"{equal} scans have the time of another", None, equal)
             kept = [kept[k] for k in ordered.order]
             stamps = ordered.stamps_ns

@@ -30,11 +30,12 @@ import re
 from dataclasses import dataclass
 from decimal import Decimal
 
-from slam.frames import NS_PER_S
+from slam.frames import MOST_MOUNT_M, NS_PER_S
 
 MAX_BEAMS = 20_000
 MAX_RANGE_M = 1e4
 MAX_COORDINATE = 1e6
+MAX_REMISSION = 1e30  # single precision holds it
 MAX_STAMP_S = 9e9  # what 64-bit nanoseconds hold: year 2255
 NAME = re.compile(r"[A-Za-z][\w-]*")
 KNOWN_NAMES = tuple(
@@ -45,6 +46,7 @@ KNOWN_NAMES = tuple(
     )
 )
 ODOM_WORDS, SHORT_ODOM_WORDS = 10, 5
+_GEOMETRY = ("start angle", "field of view", "angular step", "maximum range")
 
 Pose = tuple[float, float, float]
 
@@ -91,8 +93,8 @@ def parse_flaser(line: int, words: list[str]) -> LaserMessage:
         ranges=_ranges(words[2 : 2 + n]),
         intensities=[],
         beams=None,
-        laser_pose=_pose(words[2 + n : 5 + n]),
-        robot_pose=_pose(words[5 + n : 8 + n]),
+        laser_pose=pose_of(words[2 + n : 5 + n], "laser"),
+        robot_pose=pose_of(words[5 + n : 8 + n], "robot"),
     )
 
 
@@ -113,7 +115,7 @@ def parse_laser_reading(line: int, words: list[str]) -> LaserMessage:
     _expect(
         len(words) == expected, f"LASER_READING of {n} beams has {expected} words, got {len(words)}"
     )
-    pose = _pose(words[2 + n : 5 + n])
+    pose = pose_of(words[2 + n : 5 + n], "robot")
     return LaserMessage(
         line=line,
         stamp_ns=stamp_ns(words[-1]),
@@ -130,25 +132,30 @@ def parse_odom(line: int, words: list[str], *, short: bool = False) -> PoseMessa
     expected = SHORT_ODOM_WORDS if short else ODOM_WORDS
     _expect(len(words) == expected, f"ODOM has {expected} words, got {len(words)}")
     stamp = words[-1] if short else words[-3]
-    return PoseMessage(line=line, stamp_ns=stamp_ns(stamp), pose=_pose(words[1:4]))
+    return PoseMessage(line=line, stamp_ns=stamp_ns(stamp), pose=pose_of(words[1:4], "robot"))
 
 
 def parse_truepos(line: int, words: list[str]) -> PoseMessage:
     """``TRUEPOS``: pose of the robot by the simulator."""
     _expect(len(words) == 10, f"TRUEPOS has 10 words, got {len(words)}")
-    return PoseMessage(line=line, stamp_ns=stamp_ns(words[-3]), pose=_pose(words[1:4]))
+    return PoseMessage(line=line, stamp_ns=stamp_ns(words[-3]), pose=pose_of(words[1:4], "robot"))
 
 
 def parse_param(words: list[str]) -> float:
     """Value of a numeric ``PARAM``."""
     _expect(len(words) >= 3, "PARAM has a name and a value")
-    return number(words[2])
+    limit = MOST_MOUNT_M if words[1].endswith("_offset") else MAX_COORDINATE
+    return number(words[2], f"PARAM {words[1]}", limit)
 
 
-def number(word: str, limit: float = MAX_COORDINATE) -> float:
-    """A finite number within +-limit."""
-    value = float(word)
-    _expect(abs(value) <= limit, f"expected a number within +-{limit:g}, got {word[:40]!r}")
+def number(word: str, field: str, limit: float = MAX_COORDINATE) -> float:
+    """A finite number within +-limit; ``field`` is what it is for whoever reads the error."""
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= limit:  # false for NaN too
+        raise ValueError(f"{field}: expected a number within +-{limit:g}, got {word[:40]!r}")
     return value
 
 
@@ -167,10 +174,10 @@ def _parse_laser(line: int, words: list[str], after: tuple[int, ...]) -> LaserMe
         line=line,
         stamp_ns=stamp_ns(words[-3]),
         ranges=_ranges(words[at + 1 : at + 1 + n]),
-        intensities=[number(w, math.inf) for w in words[at + 2 + n : at + 2 + n + n_remissions]],
+        intensities=_remissions(words[at + 2 + n : at + 2 + n + n_remissions]),
         beams=_beams(words, n),
-        laser_pose=_pose(tail[:3]) if poses else None,
-        robot_pose=_pose(tail[3:6]) if poses else None,
+        laser_pose=pose_of(tail[:3], "laser") if poses else None,
+        robot_pose=pose_of(tail[3:6], "robot") if poses else None,
     )
 
 
@@ -186,7 +193,7 @@ def _layout(words: list[str], at: int, after: tuple[int, ...]) -> tuple[int, int
 
 
 def _beams(words: list[str], n: int) -> Beams:
-    start, fov, step, range_max = (number(word) for word in words[2:6])
+    start, fov, step, range_max = map(number, words[2:6], _GEOMETRY)
     _expect(range_max > 0.0, f"expected a maximum range > 0 m, got {words[5]}")
     _expect(fov > 0.0 or step > 0.0, f"expected a field of view > 0 rad, got {words[3]}")
     increment = step if step > 0.0 else fov / max(n - 1, 1)
@@ -196,28 +203,51 @@ def _beams(words: list[str], n: int) -> Beams:
 
 def _count(words: list[str], at: int) -> int:
     _expect(len(words) > at, f"{words[0]} ends before its number of beams")
-    n = int(words[at])
-    _expect(1 <= n <= MAX_BEAMS, f"expected 1 to {MAX_BEAMS} beams, got {n}")
+    try:
+        n = int(words[at])
+    except ValueError:
+        n = 0
+    if not 1 <= n <= MAX_BEAMS:
+        raise ValueError(
+            f"number of beams: expected 1 to {MAX_BEAMS} beams, got {words[at][:40]!r}"
+        )
     return n
 
 
 def _ranges(words: list[str]) -> list[float]:
-    values = list(map(float, words))
-    for k, value in enumerate(values):
-        if not 0.0 <= value <= MAX_RANGE_M:  # false for NaN too
-            raise ValueError(f"range {k} must be 0 to {MAX_RANGE_M:g} m, got {words[k][:40]!r}")
-    return values
+    return [_range(k, word) for k, word in enumerate(words)]
 
 
-def _pose(words: list[str]) -> Pose:
-    x, y, theta = (number(word) for word in words)
+def _range(k: int, word: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= MAX_RANGE_M:  # false for NaN too
+        raise ValueError(f"range {k} must be 0 to {MAX_RANGE_M:g} m, got {word[:40]!r}")
+    return value
+
+
+def _remissions(words: list[str]) -> list[float]:
+    return [number(word, f"remission {k}", MAX_REMISSION) for k, word in enumerate(words)]
+
+
+def pose_of(words: list[str], whose: str) -> Pose:
+    """x, y, theta of the robot or of its laser."""
+    x, y, theta = (
+        number(word, f"{name} of the {whose}")
+        for word, name in zip(words, ("x", "y", "theta"), strict=True)
+    )
     return x, y, theta
 
 
 def stamp_ns(word: str) -> int:
     """Exact nanoseconds (``float`` would lose the last digits of Unix times); may be negative."""
-    number(word, MAX_STAMP_S)
-    return round(Decimal(word) * NS_PER_S)
+    number(word, "time", MAX_STAMP_S)
+    try:
+        return round(Decimal(word) * NS_PER_S)
+    except ArithmeticError as error:  # an exponent of twenty digits
+        raise ValueError(f"time: expected a number, got {word[:40]!r}") from error
 
 
 def _expect(condition: bool, message: str) -> None:

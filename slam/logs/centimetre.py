@@ -34,8 +34,9 @@ def is_centimetre(path: Path) -> bool:
     """Whether one of the first lines is an ``L`` or ``O`` followed by numbers."""
     for _, line in islice(numbered_lines(path, Repairs(path)), _LINES_TO_LOOK_AT):
         words = line.split()
-        if words[:1] in ([SCAN], [ODOM]) and len(words) >= 5:
-            return all(_is_number(word) for word in words[1:5])
+        known = words[:1] in ([SCAN], [ODOM]) and len(words) >= 5
+        if known and all(map(_is_number, words[1:5])):
+            return True
     return False
 
 
@@ -73,17 +74,21 @@ def _scan(line: int, words: list[str]) -> LaserMessage:
             f"L of {len(words)} words; expected L, six words of poses, 1 to {messages.MAX_BEAMS} "
             "ranges and a time"
         )
-    ranges = [messages.number(word) * _CM for word in words[7:-1]]
-    if not all(0.0 <= value <= messages.MAX_RANGE_M for value in ranges):
-        raise ValueError(f"ranges must be 0 to {messages.MAX_RANGE_M / _CM:g} cm")
+    ranges = [messages.number(word, f"range {k}") * _CM for k, word in enumerate(words[7:-1])]
+    for k, value in enumerate(ranges):
+        if not 0.0 <= value <= messages.MAX_RANGE_M:
+            raise ValueError(
+                f"range {k}: ranges must be 0 to {messages.MAX_RANGE_M / _CM:g} cm, "
+                f"got {words[7 + k]}"
+            )
     return LaserMessage(
         line=line,
         stamp_ns=messages.stamp_ns(words[-1]),
         ranges=ranges,
         intensities=[],
         beams=None,
-        laser_pose=_pose(words[4:7]),
-        robot_pose=_pose(words[1:4]),
+        laser_pose=_pose(words[4:7], "laser"),
+        robot_pose=_pose(words[1:4], "robot"),
     )
 
 
@@ -91,17 +96,17 @@ def _odom(line: int, words: list[str]) -> PoseMessage:
     if len(words) != 5:
         raise ValueError(f"O has 5 words, got {len(words)}")
     stamp_ns = messages.stamp_ns(words[-1])
-    return PoseMessage(line=line, stamp_ns=stamp_ns, pose=_pose(words[1:4]))
+    return PoseMessage(line=line, stamp_ns=stamp_ns, pose=_pose(words[1:4], "robot"))
 
 
-def _pose(words: list[str]) -> Pose:
-    x, y, theta = (messages.number(word) for word in words)
+def _pose(words: list[str], whose: str) -> Pose:
+    x, y, theta = messages.pose_of(words, whose)
     return x * _CM, y * _CM, theta
 
 
 def _is_number(word: str) -> bool:
     try:
-        messages.number(word)
+        messages.number(word, "")
     except ValueError:
         return False
     return True

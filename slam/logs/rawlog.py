@@ -170,7 +170,7 @@ class _Builder:
         return middle
 
     def _checked(self, number: int, pose: tuple[float, float, float]) -> tuple[float, float, float]:
-        if max(map(abs, pose)) > MAX_COORDINATE:
+        if not all(abs(value) <= MAX_COORDINATE for value in pose):  # false for NaN too
             raise LogFormatError(
                 self._path, f"a pose must lie within {MAX_COORDINATE:g} m, got {pose}", number
             )

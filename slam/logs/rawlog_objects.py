@@ -162,7 +162,7 @@ class Objects:
 
     def _finite(self, values: tuple[float, ...]) -> tuple[float, ...]:
         if not all(map(math.isfinite, values)):
-            raise ValueError(f"object {self.number} has a pose that is not finite")
+            raise ValueError(f"object {self.number}: a pose must be finite, got {list(values)}")
         return values
 
     # -- objects --------------------------------------------------------------------------

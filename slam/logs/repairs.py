@@ -17,6 +17,7 @@ STAMPS_SORTED = "stamps_stepped_back"
 STAMPS_SPREAD = "stamps_equal_spread"
 CLOCK_STEPS = "clock_steps_back"
 STRAY_STAMPS = "stamps_stray"
+STAMPS_WRAPPED = "stamps_wrapped"
 SHORT_ODOM = "odom_lines_without_speeds"
 NO_ODOMETRY = "scans_with_assumed_odometry"
 WORDS = {
@@ -25,6 +26,7 @@ WORDS = {
     STAMPS_SPREAD: "{} scans with the time of another spread over the time there was",
     CLOCK_STEPS: "{} times the clock steps back by 1 s or more: order of the file kept",
     STRAY_STAMPS: "{} stamps far from their neighbours' replaced",
+    STAMPS_WRAPPED: "{} stamps of 4.29497e+09 s (below 0, in 32 bits) put back where they were",
     SHORT_ODOM: "{} ODOM lines without speeds and host read as x y theta t",
     NO_ODOMETRY: "no odometry: {} scans with that of a constant velocity",
 }
@@ -50,7 +52,7 @@ class Repairs:
 
     def facts(self) -> dict[str, int]:
         """The counts, of all kinds that most text logs can have, for ``StreamMetadata.extra``."""
-        rare = (SHORT_ODOM, NO_ODOMETRY)
+        rare = (SHORT_ODOM, NO_ODOMETRY, STAMPS_WRAPPED)
         return {kind: self.counts[kind] for kind in WORDS if kind not in rare or self.counts[kind]}
 
     def warn(self) -> None:

@@ -79,16 +79,20 @@ class _Odometry:
         if how is None:
             return None
         if isinstance(how, Poses):
-            at = (_number(words, column, LARGEST) for column in (how.x, how.y, how.theta))
-            x, y, theta = next(at) * how.m, next(at) * how.m, next(at) * how.rad
+            x = _number(words, how.x, LARGEST, "x") * how.m
+            y = _number(words, how.y, LARGEST, "y") * how.m
+            theta = _number(words, how.theta, LARGEST, "theta") * how.rad
         else:
             x, y, theta = self._driven(how, words)
         if max(abs(x), abs(y), abs(theta)) > MAX_COORDINATE:
-            raise ValueError(f"a pose must lie within {MAX_COORDINATE:g} m, got {x:g}, {y:g}")
+            raise ValueError(
+                f"a pose must lie within {MAX_COORDINATE:g} m and rad, got {x:g}, {y:g}, {theta:g}"
+            )
         return x, y, theta
 
     def _driven(self, how: Ticks, words: list[str]) -> Pose:
-        now = _number(words, how.left, LARGEST), _number(words, how.right, LARGEST)
+        left = _number(words, how.left, LARGEST, "left")
+        now = left, _number(words, how.right, LARGEST, "right")
         before = self._before or now
         left, right = (
             _since(a, b, how.counter) * how.m_per_tick for a, b in zip(before, now, strict=True)
@@ -120,9 +124,7 @@ def _scan(
     if robot is not None:
         x, y, theta = se2.compose(robot, mount).tolist()
         laser = (x, y, theta)
-    stamp_s = _number(words, log_format.time, LARGEST * NS_PER_S)
-    if abs(stamp_s * log_format.s) > MAX_STAMP_S:
-        raise ValueError(f"a time must lie within {MAX_STAMP_S:g} s, got {stamp_s:g}")
+    _number(words, log_format.time, MAX_STAMP_S / log_format.s, "time")
     return LaserMessage(
         line=number,
         stamp_ns=_ns(words[log_format.time], log_format.s),
@@ -149,7 +151,9 @@ def _ranges(words: list[str], log_format: RoverFormat) -> list[float]:
     if not first < last <= len(words):
         wanted = f"{n} ranges from" if n else "ranges from"
         raise ValueError(f"{len(words)} columns; expected {wanted} column {first + 1}")
-    values = [_number(words, column, LARGEST) * log_format.m for column in range(first, last)]
+    values = [
+        _number(words, column, LARGEST, "range") * log_format.m for column in range(first, last)
+    ]
     for k, value in enumerate(values):
         if not 0.0 <= value <= MAX_RANGE_M:
             raise ValueError(f"range in column {first + k + 1} must be 0 to {MAX_RANGE_M:g} m, "
@@ -157,14 +161,17 @@ def _ranges(words: list[str], log_format: RoverFormat) -> list[float]:
     return values
 
 
-def _number(words: list[str], column: int, limit: float) -> float:
+def _number(words: list[str], column: int, limit: float, field: str) -> float:
     if column >= len(words):
-        raise ValueError(f"{len(words)} columns; expected a number in column {column + 1}")
+        raise ValueError(f"{field}: {len(words)} columns; expected a number in column {column + 1}")
     word = words[column].strip()
     try:
         value = float(word)
     except ValueError:
         value = math.nan
     if not abs(value) <= limit:
-        raise ValueError(f"expected a number in column {column + 1}, got {word[:40]!r}")
+        raise ValueError(
+            f"{field}: expected a number in column {column + 1}, within +-{limit:g}, "
+            f"got {word[:40]!r}"
+        )
     return value

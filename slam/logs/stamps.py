@@ -8,14 +8,25 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from pathlib import Path
 
+from slam.checked import MOST_NS
+from slam.errors import LogFormatError
 from slam.frames import NS_PER_S, to_s
-from slam.logs.repairs import CLOCK_STEPS, STAMPS_SORTED, STAMPS_SPREAD, STRAY_STAMPS, Repairs
+from slam.logs.repairs import (
+    CLOCK_STEPS,
+    STAMPS_SORTED,
+    STAMPS_SPREAD,
+    STAMPS_WRAPPED,
+    STRAY_STAMPS,
+    Repairs,
+)
 
 MAX_STEP_BACK_NS = NS_PER_S  # what clocks of several processes differ by
 MAX_SPREAD_NS = NS_PER_S  # over which equal stamps are spread where nobody says how long they took
 STRAYS = 3  # so many stamps in a row may be wrong before they count as another clock
 FAR_NS = 10 * NS_PER_S  # ahead of its neighbours, a stamp is a stray one
 COARSE_NS = 10 * NS_PER_S  # stamps printed so coarsely do not even say how long a pause was
+WRAP_NS = 2**32 * NS_PER_S  # what 32 bits without a sign add to seconds below 0
+NEAR_ZERO_NS = 10**7 * NS_PER_S  # the clock of such seconds began within months
 FINE_DIGITS = 19  # significant digits of 64-bit nanoseconds
 
 
@@ -43,6 +54,41 @@ def tick_ns(stamp_ns: int, digits: int) -> int:
     return int(10 ** max(len(str(abs(stamp_ns))) - digits, 0))
 
 
+def unwrapped(stamps_ns: Sequence[int], lines: Sequence[int], repairs: Repairs) -> list[int]:
+    """The stamps, in the order of the log; those that lost their sign in 32 bits have it again.
+
+    Such a log has 4294967295.75 s for -0.25 s. Where the digits do not tell (``4.29497e+09``), the
+    clock did not begin at 0, or time goes on beyond them, when they were is unknown: they follow
+    those before them and stay before those after them.
+    """
+    sound = [k for k, stamp in enumerate(stamps_ns) if abs(stamp - WRAP_NS) >= NEAR_ZERO_NS]
+    out = list(stamps_ns)
+    if len(sound) in (0, len(out)):
+        return out
+    clock = [out[k] for k in sound]
+    far = abs(sorted(clock)[len(clock) // 2]) > NEAR_ZERO_NS
+    steps = sorted(b - a for a, b in pairwise(clock) if b >= a)
+    usual = steps[len(steps) // 2] if steps else 0
+    for a, b in pairwise([-1, *sound, len(out)]):
+        if b - a > 1:
+            why = f"a time of {to_s(out[a + 1]):.16g} s, as of one below 0 in 32 bits"
+            repairs.note(STAMPS_WRAPPED, why, lines[a + 1], b - a - 1)
+            out[a + 1 : b] = _signed(out, a, b, usual, known=not far)
+    return out
+
+
+def _signed(stamps_ns: list[int], a: int, b: int, usual: int, *, known: bool) -> list[int]:
+    """Times of the stamps between ``a`` and ``b`` (the ends: -1 and their number) with a sign."""
+    run = range(a + 1, b)
+    inside = a >= 0 and b < len(stamps_ns)
+    passed = stamps_ns[b] - stamps_ns[a] if inside else -1
+    if known and passed < 0 and all(stamps_ns[k] % COARSE_NS for k in run):
+        return [stamps_ns[k] - WRAP_NS for k in run]
+    step = usual if passed < 0 else min(usual, passed // (b - a))
+    start = stamps_ns[a] - step * a if a >= 0 else stamps_ns[b] - step * b
+    return [start + step * k for k in run]
+
+
 def continued(
     stamps_ns: Sequence[int], lines: Sequence[int], repairs: Repairs, digits: int = FINE_DIGITS
 ) -> list[int]:
@@ -50,6 +96,7 @@ def continued(
 
     A clock that was set back goes on from where it was. Up to three stamps in a row that lie before
     their neighbours, or more than 10 s ahead, are stray ones: they get the stamp before them.
+    Raises ``LogFormatError`` where that adds up to more than 64 bits of nanoseconds.
     """
     out: list[int] = []
     offset = latest = 0
@@ -72,6 +119,10 @@ def continued(
                 now = latest + usual
         out.append(now)
         latest = max(latest, now) if k else now
+    for now, line in zip(out, lines, strict=True):
+        if abs(now) > MOST_NS:
+            why = f"stamp: expected a time that fits 64 bits of nanoseconds, got {to_s(now):g} s"
+            raise LogFormatError(repairs.path, why, line)
     return out
 
 

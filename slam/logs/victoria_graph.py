@@ -21,6 +21,8 @@ from slam import se2
 from slam.errors import LogFormatError
 from slam.frames import Float, Frame
 from slam.landmarks.filter import EkfFilter
+from slam.logs.border import about
+from slam.logs.carmen_messages import number
 from slam.logs.text import numbered_lines
 from slam.logs.victoria_park import LASER_AHEAD_M, LASER_LEFT_M
 from slam.posegraph import Edge, optimise
@@ -105,27 +107,35 @@ def read_graph(path: str | Path) -> Graph:
     poses: list[Float] = [np.zeros(3)]
     seen: list[tuple[str, str, list[float], int]] = []
     edges: list[Edge] = []
-    for number, line in numbered_lines(file):
-        kind, *words = line.split()
-        try:
-            numbers = [float(word) for word in words[2:]]
-            if kind not in ("ODOMETRY", "LANDMARK") or len(numbers) < 5:
-                raise ValueError(f"expected ODOMETRY or LANDMARK with numbers, got {line!r}")
-            i, j = words[:2]
+    for at, line in numbered_lines(file):
+        with about(file, "no edge", at):
+            kind, i, j, numbers = _edge(line)
             if kind == "LANDMARK":
-                seen.append((i, j, numbers, number))
+                seen.append((i, j, numbers, at))
                 continue
             if not poses[1:]:
                 index[i] = 0
-            step = np.array(numbers[:3])
+            if i not in index:
+                raise ValueError(f"i: expected a pose that is there, got {i[:40]!r}")
+            step = np.array(numbers)
             edges.append(
                 Edge(a=index[i], b=len(poses), T_a_b=step, information=ODOMETRY_INFORMATION)
             )
             index[j] = len(poses)
             poses.append(se2.compose(poses[index[i]], step))
-        except (ValueError, KeyError) as error:
-            raise LogFormatError(file, f"no edge: {error}", number) from error
     return _with_landmarks(file, index, np.array(poses), edges, seen)
+
+
+def _edge(line: str) -> tuple[str, str, str, list[float]]:
+    """ODOMETRY or LANDMARK, the names of its two ends, its numbers but the noise of odometry."""
+    words = line.split()
+    kind = words[0] if words else ""
+    if len(words) != {"ODOMETRY": 12, "LANDMARK": 8}.get(kind):
+        raise ValueError(
+            f"expected ODOMETRY i j and 9 numbers, or LANDMARK i j and 5 numbers, got {line[:80]!r}"
+        )
+    names = "dx dy dtheta" if kind == "ODOMETRY" else "dx dy sxx sxy syy"
+    return kind, words[1], words[2], list(map(number, words[3:], names.split()))
 
 
 def _with_landmarks(
@@ -137,9 +147,12 @@ def _with_landmarks(
 ) -> Graph:
     landmarks: dict[str, int] = {}
     places: list[Float] = []
-    for i, j, (dx, dy, sxx, sxy, syy), number in seen:
+    for i, j, (dx, dy, sxx, sxy, syy), at in seen:
         if i not in index or j in index:
-            raise LogFormatError(file, f"pose {i} or landmark {j} is not one", number)
+            raise LogFormatError(file, f"pose {i} or landmark {j} is not one", at)
+        if not (sxx > 0.0 and syy > 0.0 and sxx * syy > sxy * sxy):
+            why = f"sxx, sxy, syy: expected a covariance, got {sxx:g}, {sxy:g}, {syy:g}"
+            raise LogFormatError(file, why, at)
         pose = poses[index[i]]
         if j not in landmarks:
             landmarks[j] = len(poses) + len(places)

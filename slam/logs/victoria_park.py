@@ -27,6 +27,8 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.errors import LogFormatError
 from slam.frames import NS_PER_S, Features, Float, Frame, Odometry, Stream, StreamMetadata, to_ns
+from slam.logs.border import about
+from slam.logs.carmen_messages import MAX_COORDINATE, MAX_RANGE_M, MAX_STAMP_S, number
 from slam.logs.text import numbered_lines
 from slam.logs.unpacking import check_mat
 
@@ -38,6 +40,12 @@ WHERE = "README.md names where to get the dataset"
 MAT_FILES = ("features_trees.mat", "features_segments.mat")
 TEXT_FILE = "rfs_measurements.dat"
 _PACKED = ("", ".xz", ".gz")
+MOST_SPEED, MOST_STEERING = 100.0, 1.2  # m/s, rad: of a truck, whose wheels cannot stand across
+Fields = tuple[tuple[str, float], ...]  # columns as errors name them, how far from 0 they may be
+_TIME = ("time", MAX_STAMP_S)
+_CONTROL = (_TIME, ("speed", MOST_SPEED), ("steering angle", MOST_STEERING))
+_TRUNK = (("range", MAX_RANGE_M), ("bearing", 2.0 * math.tau), ("diameter", MAX_RANGE_M))
+_FIX = (_TIME, ("x", MAX_COORDINATE), ("y", MAX_COORDINATE))
 _MAT_MAGIC = b"MATLAB 5.0 MAT-file"
 
 
@@ -98,7 +106,9 @@ def read_victoria_park(path: str | Path) -> Stream:
         "gps_file": gps.name if gps else None,
     }
     metadata = StreamMetadata(source="victoria_park", robot="pick-up truck", extra=extra)
-    return Stream(metadata=metadata, frames=lambda: _frames(drive), length=len(drive.scan_times))
+    return Stream(
+        metadata=metadata, frames=lambda: _frames(main, drive), length=len(drive.scan_times)
+    )
 
 
 def read_gps(path: str | Path) -> GpsTrack:
@@ -110,10 +120,12 @@ def read_gps(path: str | Path) -> GpsTrack:
     if file.suffix == ".mat":
         values = _load(file)
         names = ("timeGps", "Lo_m", "La_m")
-        table = np.column_stack([_row(file, values, name) for name in names])
+        with about(file, "times and places"):
+            table = np.column_stack([_row(file, values, name) for name in names])
         table[:, 0] /= 1000.0
+        _within(file, "fix", table, _FIX)
     else:
-        table = _table(file, 3)
+        table = _table(file, _FIX)
     stamps_ns = np.array([to_ns(t) for t in table[:, 0].tolist()], dtype=np.int64)
     return GpsTrack(stamps_ns=stamps_ns, points=table[:, 1:])
 
@@ -152,7 +164,8 @@ def _from_mat(path: Path) -> _Drive:
     values = _load(path)
     if "zt" in values:
         times, cells = _row(path, values, "TLsr"), values["zt"]
-        u = _row(path, values, "u").reshape(2, -1)
+        with about(path, "'u', speed and steering angle"):
+            u = _row(path, values, "u").reshape(2, -1)
         control_times, speed, steering = _row(path, values, "time"), u[0], u[1]
     else:
         times, cells = _row(path, values, "laserTime") / 1000.0, values.get("laserData", [])
@@ -172,7 +185,8 @@ def _cells(path: Path, cells: NDArray[np.object_], n: int) -> list[Float]:
         raise LogFormatError(path, f"{n} scan times but detections of {len(cells)} scans")
     out = []
     for k, cell in enumerate(cells):
-        found = np.asarray(cell, dtype=np.float64)
+        with about(path, f"scan {k}"):
+            found = np.asarray(cell, dtype=np.float64)
         if found.size and (found.ndim != 2 or found.shape[0] != 3):
             raise LogFormatError(path, f"scan {k}: expected 3 x n numbers, got {found.shape}")
         out.append(found.reshape(3, -1).T)
@@ -186,42 +200,65 @@ def _from_text(path: Path) -> _Drive:
     beside = next((file for file in inputs if file.is_file()), None)
     if beside is None:
         raise LogFormatError(path, f"needs its controls beside it: no {stem} there; {WHERE}")
-    table = _table(path, 4)
+    table = _table(path, (_TIME, *_TRUNK))
     times, first = np.unique(table[:, 0], return_index=True)
     return _Drive(
         scan_times=times,
         detections=[found[:, 1:] for found in np.split(table, first[1:])],
-        controls=_table(beside, 3),
+        controls=_table(beside, _CONTROL),
     )
 
 
-def _table(path: Path, columns: int) -> Float:
+def _table(path: Path, fields: Fields) -> Float:
+    """Numbers (n, columns) of a text file in the order of time."""
     rows: list[list[float]] = []
-    for number, line in numbered_lines(path):
-        words = line.split()
-        try:
-            row = [float(word) for word in words]
-        except ValueError as error:
-            raise LogFormatError(path, str(error), number) from error
-        if len(row) != columns or not all(map(math.isfinite, row)):
-            raise LogFormatError(path, f"expected {columns} finite numbers, got {line!r}", number)
-        if rows and row[0] < rows[-1][0]:
-            raise LogFormatError(path, "time steps back", number)
+    for line_number, line in numbered_lines(path):
+        with about(path, line=line_number):
+            row = _numbers(line, fields)
+            if rows and row[0] < rows[-1][0]:
+                raise ValueError(f"time steps back from {rows[-1][0]} to {row[0]} s")
+            if rows and row[0] == rows[-1][0] and fields is _CONTROL:
+                raise ValueError(f"time: the times of the controls do not increase, got {row[0]} s")
         rows.append(row)
     return np.array(rows)
+
+
+def _numbers(line: str, fields: Fields) -> list[float]:
+    words = line.split()
+    if len(words) != len(fields):
+        names = ", ".join(name for name, _ in fields)
+        raise ValueError(f"expected {len(fields)} finite numbers ({names}), got {line[:80]!r}")
+    row = [number(word, name, limit) for word, (name, limit) in zip(words, fields, strict=True)]
+    if fields[1] == _TRUNK[0] and row[1] <= 0.0:
+        raise ValueError(f"range: expected a number > 0 m, got {words[1][:40]!r}")
+    return row
+
+
+def _within(path: Path, what: str, rows: Float, fields: Fields) -> None:
+    """The same of numbers from MATLAB files: they have no lines."""
+    for column, (name, limit) in zip(rows.T, fields, strict=True):
+        bad = ~(np.abs(column) <= limit)  # true for NaN too
+        if bad.any():
+            k = int(bad.argmax())
+            raise LogFormatError(
+                path, f"{what} {k}, {name}: expected a number within +-{limit:g}, got {column[k]:g}"
+            )
 
 
 def _check(path: Path, drive: _Drive) -> None:
     if len(drive.scan_times) == 0 or len(drive.controls) == 0:
         raise LogFormatError(path, "has no scans or no controls")
     for what, times in (("scans", drive.scan_times), ("controls", drive.controls[:, 0])):
-        if not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
+        _within(path, what, times[:, None], (_TIME,))
+        if np.any(np.diff(times) <= 0.0):
             raise LogFormatError(path, f"the times of the {what} do not increase")
-    if not np.isfinite(drive.controls).all():
-        raise LogFormatError(path, "controls must be finite")
+    _within(path, "control", drive.controls, _CONTROL)
     for k, found in enumerate(drive.detections):
-        if not np.isfinite(found).all() or np.any(found[:, 0] <= 0.0):
-            raise LogFormatError(path, f"scan {k}: ranges must be finite and > 0 m")
+        _within(path, f"scan {k}, trunk", found, _TRUNK)
+        if np.any(found[:, 0] <= 0.0):
+            raise LogFormatError(
+                path, f"scan {k}, range: expected a number > 0 m, got {found[:, 0].min():g}"
+            )
 
 
 def twist_of(speed: float, steering: float) -> tuple[float, float, float]:
@@ -269,15 +306,22 @@ class _DeadReckoning:
         return covariance + 1e-8 * np.eye(3)
 
 
-def _frames(drive: _Drive) -> Iterator[Frame]:
+def _frames(path: Path, drive: _Drive) -> Iterator[Frame]:
     reckoning = _DeadReckoning(drive.controls)
-    for time_s, found in zip(drive.scan_times.tolist(), drive.detections, strict=True):
-        covariance = reckoning.advance(time_s)
-        stamp_ns = round(time_s * NS_PER_S)
-        odometry = Odometry(
-            stamp_ns=stamp_ns, T_odom_robot=reckoning.pose, increment_covariance=covariance
-        )
-        yield Frame(stamp_ns=stamp_ns, odometry=odometry, features=_features(stamp_ns, found))
+    scans = zip(drive.scan_times.tolist(), drive.detections, strict=True)
+    for k, (time_s, found) in enumerate(scans):
+        with about(path, f"scan {k}"):
+            frame = _frame(reckoning, time_s, found)
+        yield frame
+
+
+def _frame(reckoning: _DeadReckoning, time_s: float, found: Float) -> Frame:
+    covariance = reckoning.advance(time_s)
+    stamp_ns = round(time_s * NS_PER_S)
+    odometry = Odometry(
+        stamp_ns=stamp_ns, T_odom_robot=reckoning.pose, increment_covariance=covariance
+    )
+    return Frame(stamp_ns=stamp_ns, odometry=odometry, features=_features(stamp_ns, found))
 
 
 def _features(stamp_ns: int, found: Float) -> Features:

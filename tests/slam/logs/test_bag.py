@@ -188,7 +188,7 @@ def test_a_scanner_that_changes_is_an_error(tmp_path):
 )
 def test_an_impossible_scanner_is_an_error(tmp_path, changes):
     path = bags.write_ros2(tmp_path / "a", drive(bags.Maker(), **changes))
-    with pytest.raises(LogFormatError, match="topic /scan"):
+    with pytest.raises(LogFormatError, match="topic /scan, message 1: "):
         read_bag(path)
 
 

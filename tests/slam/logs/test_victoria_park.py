@@ -185,8 +185,9 @@ def test_without_data_the_error_says_so(tmp_path):
 
 @pytest.mark.parametrize(
     ("line", "message"),
-    [("1.0 2.0 x 0.3", "could not convert"), ("1.0 2.0", "4 finite"), ("0.1 2 1 1", "steps back"),
-     ("2.0 -1.0 1.0 0.3", "> 0 m"), ("2.0 nan 1.0 0.3", "4 finite")],
+    [("1.0 2.0 x 0.3", "bearing: expected .* got .x."), ("1.0 2.0", "4 finite"),
+     ("0.1 2 1 1", "steps back"), ("2.0 -1.0 1.0 0.3", "> 0 m"),
+     ("2.0 nan 1.0 0.3", "range: expected .* got .nan.")],
 )  # fmt: skip
 def test_damaged_text_is_refused_with_its_line(tmp_path, line, message):
     (tmp_path / "rfs_measurements.dat").write_text(f"1.0 2.0 1.5 0.3\n{line}\n")
