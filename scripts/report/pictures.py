@@ -16,7 +16,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Affine2D
 
 from scenes.kinds import is_door
-from scripts.comparison.folder import RunFile
+from scripts.comparison.run_file import RunFile
 from scripts.figures import error_series, in_first_frame, log_axis
 from scripts.report import style
 from slam import se2

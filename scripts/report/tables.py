@@ -9,7 +9,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from scripts.comparison.tables import FAILED, by_seed, number
+from scripts.comparison.schema import FAILED
+from scripts.comparison.tables import by_seed, number
 from scripts.metrics.row import Metric, digits
 from scripts.metrics.table import METRICS
 from scripts.report.answer import percent

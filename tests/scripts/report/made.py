@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from scripts.closed_loop import tables as closed_loop
+from scripts.closed_loop import folder as drives
 from scripts.comparison import folder as files
 from scripts.comparison import tables
-from scripts.comparison.columns import COLUMNS
+from scripts.comparison.csv_files import write_checked
 from scripts.days import scores
 from scripts.days.lifelong import COLUMNS as SESSION
 from scripts.output import write_recipe
@@ -39,14 +39,19 @@ def make(folder: Path, seeds: tuple[int, ...] = SEEDS) -> Path:
     }  # fmt: skip
     folder.mkdir(parents=True)
     write_recipe(folder, "compare", settings)
-    files.write_csv(folder / files.RUNS, rows, COLUMNS)
-    files.write_csv(folder / files.LEVELS, tables.levels(rows), tables.LEVEL_COLUMNS)
-    files.write_csv(folder / files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS)
+    write_tables(folder, rows)
     (folder / "runs").mkdir()
     for level in LEVELS:
         for seed in seeds:
             np.savez_compressed(folder / "runs" / f"{SCENE}_d{level:g}_s{seed}.npz", **run_of())
     return folder
+
+
+def write_tables(folder: Path, rows: list[dict[str, Any]]) -> None:
+    """The tables of these rows of ``runs.csv``."""
+    files.write_table(folder / files.RUNS, rows)
+    files.write_table(folder / files.LEVELS, tables.levels(rows))
+    files.write_table(folder / files.PAIRED, tables.pairs(rows))
 
 
 def row_of(slam: str, level: float, seed: int) -> dict[str, Any]:
@@ -112,11 +117,12 @@ def add_days(folder: Path, buildings: int = 6) -> Path:
                 for age in (1, 3) if slam == OURS
             ]  # fmt: skip
             for motion in LEVELS:
-                of = {"scene": SCENE, "motion": motion, "change": 0.3, "seed": seed, "slam": slam}
+                of = {"scene": SCENE, "motion": motion, "change": 0.3, "seed": SEEDS[seed],
+                      "slam": slam}  # fmt: skip
                 rows.append(scores.of_building(of, sessions, aged, failure))
     (folder / "recipe.json").write_text(json.dumps(recipe))
-    files.write_csv(folder / files.AGES, rows, scores.COLUMNS)
-    files.write_csv(folder / files.AGES_LEVELS, scores.levels(rows), scores.LEVEL_COLUMNS)
+    files.write_table(folder / files.AGES, rows)
+    files.write_table(folder / files.AGES_LEVELS, scores.levels(rows))
     return folder
 
 
@@ -152,5 +158,5 @@ def make_drive(folder: Path, reached: int = 6) -> Path:
     folder.mkdir(parents=True)
     loop = {"tolerance_m": 0.5, "plan_on": "layout"}
     write_recipe(folder, "drive", {"drive_schema": 1, "loop": loop})
-    files.write_csv(folder / "levels.csv", rows, closed_loop.LEVEL_COLUMNS)
+    write_checked(folder / "levels.csv", rows, drives.COLUMNS)
     return folder

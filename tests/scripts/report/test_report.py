@@ -15,12 +15,12 @@ import pytest
 from typer.testing import CliRunner
 
 from scripts import cli
+from scripts.closed_loop.folder import driven
 from scripts.comparison import folder as files
-from scripts.comparison.columns import COLUMNS
+from scripts.comparison.csv_files import write_csv
 from scripts.metrics.row import digits
 from scripts.metrics.table import METRICS
 from scripts.report import closed, page, pictures, tables, words
-from scripts.report.closed import driven
 from scripts.report.study import study, verdict
 from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.report import made
@@ -149,9 +149,11 @@ def test_a_ratio_has_its_interval(folder: Path):
 def kept(folder: Path, keep) -> None:
     """Rewrite the tables of a comparison with some of its rows alone."""
     rows = [row for row in files.read(folder).runs if keep(row)]
-    files.write_csv(folder / files.RUNS, rows, COLUMNS)
-    files.write_csv(folder / files.LEVELS, made.tables.levels(rows), made.tables.LEVEL_COLUMNS)
-    files.write_csv(folder / files.PAIRED, made.tables.pairs(rows), made.tables.PAIRED_COLUMNS)
+    made.write_tables(folder, rows)
+    recipe = json.loads((folder / "recipe.json").read_text())
+    recipe["settings"]["slams"] = list(dict.fromkeys(row["slam"] for row in rows))
+    recipe["settings"]["levels"] = sorted({row["dynamism"] for row in rows})
+    (folder / "recipe.json").write_text(json.dumps(recipe))
 
 
 @pytest.mark.parametrize(
@@ -272,7 +274,7 @@ def damage(name: str):
 
 def without_a_column(folder: Path) -> None:
     rows = files.read(folder).runs
-    files.write_csv(folder / files.RUNS, rows, [name for name in rows[0] if name != "outcome"])
+    write_csv(folder / files.RUNS, rows, [name for name in rows[0] if name != "outcome"])
 
 
 def of_another_schema(folder: Path) -> None:
