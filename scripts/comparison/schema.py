@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a comparison on file is: its tables, the settings of its recipe, the arrays of its runs.
+
+This is the one place that says so: ``Plan`` and the writer are held to it, and ``folder`` reads by
+it, for ``report`` and ``verify`` alike. A table, a recipe or a run may hold more: a column, key or
+array that is not named here is not read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from scripts.comparison.arrays import Array
+from scripts.comparison.rules import (
+    MAX_MESSAGE,
+    Cell,
+    Many,
+    Named,
+    Number,
+    Plain,
+    Rule,
+    Truth,
+    Word,
+)
+from scripts.days import scores
+from scripts.days.ages import AGES as OLD
+from scripts.knobs import AXES
+from scripts.metrics.row import Metric
+from scripts.metrics.table import COLUMNS as MEASURED
+from scripts.metrics.table import METRICS
+from sim.recording.recipe import MAX_SECONDS
+from sim.world.times_of_day import MOST_SESSIONS
+from slam.answers import LEAST_CELL_M, MOST_CELL_M, MOST_M
+
+SCHEMA = 1
+RUNS, RUNS_JSON, LEVELS, PAIRED = "runs.csv", "runs.json", "levels.csv", "paired.csv"
+AGES, AGES_LEVELS = "ages.csv", "ages_levels.csv"
+LEVEL = "level"  # the axis of ``Plan.sets``
+FAILED = ("raised", "hung", "nan", "bad")
+OUTCOMES = ("finished", "lost", *FAILED)
+Columns = Mapping[str, Cell]
+_NAME = Word()
+_SEED = Number(most=2.0**63, whole=True)
+_SHARE, _MAYBE_SHARE = Number(most=1.0), Number(most=1.0, optional=True)
+_COUNT, _MAYBE_COUNT = Number(most=1e9, whole=True), Number(most=1e9, whole=True, optional=True)
+_SIGNED = Number(least=-math.inf)
+_POSITIVE, _MAYBE = Number(), Number(optional=True)
+_FAILURE = Word(most=MAX_MESSAGE, optional=True)
+
+
+def level_of(axis: str) -> Number:
+    """What a level of that axis may be."""
+    return Number(least=-1e6, most=1e6) if axis == LEVEL else Number(most=1.0)
+
+
+def _measured(metric: Metric) -> Number:
+    return Number(least=metric.least, most=metric.most, whole=metric.whole, optional=True)
+
+
+# "dynamism" is the level, of whatever axis: a table over motion or change calls it so on file.
+_RUNS: Columns = {
+    "scene": _NAME, "dynamism": level_of("dynamism"), "seed": _SEED, "slam": _NAME,
+    "outcome": Word(among=OUTCOMES), "failure": _FAILURE, "scans": _COUNT,
+    **{key: _measured(METRICS[key]) for key in MEASURED},
+    "lost": Number(most=1.0, whole=True),
+}  # fmt: skip
+_SUMMARY: Columns = {
+    "metric": Word(among=tuple(METRICS)), "statistic": Word(among=("median", "share")),
+    "n": Number(least=1.0, most=1e9, whole=True),
+    "value": _SIGNED, "low": _SIGNED, "high": _SIGNED,
+}  # fmt: skip
+_LEVELS: Columns = {
+    "scene": _NAME, "dynamism": level_of("dynamism"), "slam": _NAME, **_SUMMARY,
+    "q25": Number(least=-math.inf, optional=True), "q75": Number(least=-math.inf, optional=True),
+}  # fmt: skip
+_PAIRED: Columns = {
+    "scene": _NAME, "dynamism": level_of("dynamism"), "metric": Word(among=tuple(METRICS)),
+    "slam_a": _NAME, "slam_b": _NAME, "n": _SUMMARY["n"],
+    "median_difference": _SIGNED, "low": _SIGNED, "high": _SIGNED,
+    "wins": _COUNT, "ties": _COUNT, "losses": _COUNT, "p_sign": _SHARE,
+}  # fmt: skip
+_BUILDING: Columns = {"scene": _NAME, "motion": _SHARE, "change": _SHARE}
+_TO_FIND = ("to_find", "found", "found_soon", "wrong", "known", "known_soon")
+_AGES: Columns = {
+    **dict.fromkeys(scores.COLUMNS, _MAYBE), **_BUILDING, "seed": _SEED, "slam": _NAME,
+    "map": Word(among=(scores.DAYS, scores.ANEW)),
+    "sessions": Number(least=1.0, most=MOST_SESSIONS, whole=True), "failed": _COUNT,
+    "failure": _FAILURE, **dict.fromkeys(_TO_FIND, _MAYBE_COUNT),
+    "found_share": _MAYBE_SHARE, "found_soon_share": _MAYBE_SHARE,
+    **{f"right_age{age}": Number(most=1.0, whole=True, optional=True) for age in OLD},
+}  # fmt: skip
+_AGES_LEVELS: Columns = {
+    **_BUILDING, "slam": _NAME, **_SUMMARY,
+    "metric": Word(among=tuple(score.key for score in scores.SCORES)),
+}  # fmt: skip
+TABLES: Mapping[str, Columns] = {
+    RUNS: _RUNS, LEVELS: _LEVELS, PAIRED: _PAIRED, AGES: _AGES, AGES_LEVELS: _AGES_LEVELS,
+}  # fmt: skip
+"""By file: its columns, in the order in which they are written."""
+KEYS: Mapping[str, tuple[str, ...]] = {
+    RUNS: ("scene", "dynamism", "seed", "slam"),
+    LEVELS: ("scene", "dynamism", "slam", "metric"),
+    PAIRED: ("scene", "dynamism", "metric", "slam_a", "slam_b"),
+    AGES: ("scene", "motion", "change", "seed", "slam"),
+    AGES_LEVELS: ("scene", "motion", "change", "slam", "metric"),
+}
+"""By file: the columns that name a row; no two rows have the same in them."""
+
+
+def impossible(row: Mapping[str, Any]) -> str:
+    """Of a row whose cells are what they must be: why they cannot stand together; "" if they can.
+
+    Counts of what happened are not above those of what could have: a share has an interval.
+    """
+    told = [name for name in _TO_FIND if row.get(name) is not None]
+    if told and len(told) < len(_TO_FIND):
+        return f"{', '.join(_TO_FIND)} must all be there or none, got {', '.join(told)} alone"
+    for part, whole in _PARTS:
+        if row.get(part) is not None and row.get(whole) is not None and row[part] > row[whole]:
+            return f"{part} must be at most {whole}, {row[whole]}, got {row[part]}"
+    if row.get("statistic") == "share":
+        for name in ("value", "low", "high"):
+            if not _SHARE.holds(row[name]):
+                return f"{name} must be {_SHARE.wanted}, as it is of a share, got {row[name]}"
+    return ""
+
+
+_PARTS = (
+    ("failed", "sessions"), ("found", "to_find"), ("found_soon", "to_find"), ("wrong", "to_find"),
+    ("known", "to_find"), ("known_soon", "known"), ("reached", "goals"), ("wrong", "goals"),
+    ("given_up", "goals"), ("failed", "goals"), ("runs_lost", "runs"),
+    ("runs_recovered", "runs_lost"),
+)  # fmt: skip
+
+
+def settings(axis: str) -> Mapping[str, Rule]:
+    """The settings of a recipe, levels being of that axis."""
+    return {
+        "compare_schema": Number(least=SCHEMA, most=SCHEMA, whole=True),
+        "slams": Many(of=_NAME), "scenes": Many(of=_NAME), "levels": Many(of=level_of(axis)),
+        "seeds": Many(of=_SEED), "seconds": Number(most=MAX_SECONDS),
+        "every": Number(least=1.0, most=1000.0, whole=True), "scanner": _NAME,
+        "scan_limit_s": Number(most=1e9), "lost_rule": Word(),
+        "machine": Named(fields={"processor": Word()}, others=Plain()),
+    }  # fmt: skip
+
+
+LATER: Mapping[str, Rule] = {
+    "axis": Word(among=(*AXES, LEVEL)), "motion": _MAYBE_SHARE, "change": _MAYBE_SHARE,
+    "crowd": Word(optional=True), "odometry": _NAME, "sets": Plain(), "judge_maps": Truth(),
+    "sessions": Number(least=2.0, most=MOST_SESSIONS, whole=True, optional=True),
+}  # fmt: skip
+"""Settings that recipes of before did not have."""
+RECIPE: Mapping[str, Rule] = {
+    "command": Word(among=("compare",)),
+    "settings": Named(fields={}),
+    "versions": Named(fields={}, others=Plain()),
+}
+"""The recipe around them."""
+
+_LENGTH_M = {"least": -MOST_M, "most": MOST_M}
+_CELL_M = Array(kinds="f", least=LEAST_CELL_M, most=MOST_CELL_M)
+_POSE = Array(kinds="f", shape=(3,), **_LENGTH_M)
+RUN: Mapping[str, Array] = {
+    "schema": Array(kinds="iu", least=SCHEMA, most=SCHEMA),
+    "slams": Array(kinds="U", shape=("slams",)),
+    "stamps_ns": Array(kinds="i", shape=("scans",), rising=True),
+    "truth": Array(kinds="f", shape=("scans", 3), **_LENGTH_M),
+    "ranges": Array(kinds="f", shape=("scans", "beams"), finite=False),
+    "hit": Array(kinds="i", shape=("scans", "beams"), least=-2.0, most=2.0**15),
+    "mover_poses": Array(kinds="f", shape=("scans", "movers", 3), **_LENGTH_M),
+    "moving": Array(kinds="b", shape=("scans", "movers")),
+    "names": Array(kinds="U", shape=("movers",)),
+    "kinds": Array(kinds="U", shape=("movers",)),
+    "radii_m": Array(kinds="f", shape=("movers",), most=MOST_M),
+    "closed": Array(kinds="f", shape=("movers", 3), **_LENGTH_M),
+    "static_map": Array(kinds="u", shape=("rows", "columns"), most=1.0),
+    "static_map_resolution_m": _CELL_M,
+    "T_world_origin": _POSE,
+    "laser_angle_min": Array(kinds="f", least=-100.0, most=100.0),
+    "laser_angle_increment": Array(kinds="f", least=-100.0, most=100.0),
+    "laser_range_max": Array(kinds="f", most=MOST_M),
+    "laser_T_robot_laser": _POSE,
+}
+"""The arrays of a file of ``runs/``; what is called alike has the same length."""
+ENTRY: Mapping[str, Array] = {
+    "stamps_ns": Array(kinds="i", shape=("answered",), rising=True),
+    "poses": Array(kinds="f", shape=("answered", 3), **_LENGTH_M),
+    "covariances": Array(kinds="f", shape=("answered", 3, 3), least=-math.inf),
+    "converged": Array(kinds="b", shape=("answered",)),
+    "milliseconds": Array(kinds="f", shape=("answered",)),
+}
+"""Those of each SLAM in it, after ``slam0_`` and so on: of the first scans, which it answered."""
+ENTRY_MAP: Mapping[str, Array] = {
+    "map": Array(kinds="u", shape=("map rows", "map columns"), most=255.0),
+    "map_resolution_m": _CELL_M,
+    "T_map_origin": _POSE,
+}
+"""And of its last map: all three or none."""
