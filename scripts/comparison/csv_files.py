@@ -98,7 +98,7 @@ def read_csv(
 
 
 def _rows(path: Path, lines: Any, rules: Columns, names: Mapping[str, str]) -> Iterator[Row]:
-    head = next(lines, [])
+    head: list[str] = next(lines, [])
     for name in names.values():
         if head.count(name) != 1:
             many = "more than one column" if name in head else "a table without the column"

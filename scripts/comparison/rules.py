@@ -74,7 +74,7 @@ class Word:
 
 @dataclass(frozen=True, kw_only=True)
 class Number:
-    """A number from ``least`` to ``most``. An infinite end allows itself and ``MOST``, none between.
+    """A number from ``least`` to ``most``. An infinite end allows ``MOST`` and itself.
 
     whole     whole numbers alone
     optional  None too

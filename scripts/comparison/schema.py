@@ -160,22 +160,27 @@ RECIPE: Mapping[str, Rule] = {
 }
 """The recipe around them."""
 
-_LENGTH_M = {"least": -MOST_M, "most": MOST_M}
+
+def _poses(*shape: int | str) -> Array:
+    """Of places and headings, m and rad."""
+    return Array(kinds="f", shape=shape, least=-MOST_M, most=MOST_M)
+
+
 _CELL_M = Array(kinds="f", least=LEAST_CELL_M, most=MOST_CELL_M)
-_POSE = Array(kinds="f", shape=(3,), **_LENGTH_M)
+_POSE = _poses(3)
 RUN: Mapping[str, Array] = {
     "schema": Array(kinds="iu", least=SCHEMA, most=SCHEMA),
     "slams": Array(kinds="U", shape=("slams",)),
     "stamps_ns": Array(kinds="i", shape=("scans",), rising=True),
-    "truth": Array(kinds="f", shape=("scans", 3), **_LENGTH_M),
+    "truth": _poses("scans", 3),
     "ranges": Array(kinds="f", shape=("scans", "beams"), finite=False),
     "hit": Array(kinds="i", shape=("scans", "beams"), least=-2.0, most=2.0**15),
-    "mover_poses": Array(kinds="f", shape=("scans", "movers", 3), **_LENGTH_M),
+    "mover_poses": _poses("scans", "movers", 3),
     "moving": Array(kinds="b", shape=("scans", "movers")),
     "names": Array(kinds="U", shape=("movers",)),
     "kinds": Array(kinds="U", shape=("movers",)),
     "radii_m": Array(kinds="f", shape=("movers",), most=MOST_M),
-    "closed": Array(kinds="f", shape=("movers", 3), **_LENGTH_M),
+    "closed": _poses("movers", 3),
     "static_map": Array(kinds="u", shape=("rows", "columns"), most=1.0),
     "static_map_resolution_m": _CELL_M,
     "T_world_origin": _POSE,
@@ -187,7 +192,7 @@ RUN: Mapping[str, Array] = {
 """The arrays of a file of ``runs/``; what is called alike has the same length."""
 ENTRY: Mapping[str, Array] = {
     "stamps_ns": Array(kinds="i", shape=("answered",), rising=True),
-    "poses": Array(kinds="f", shape=("answered", 3), **_LENGTH_M),
+    "poses": _poses("answered", 3),
     "covariances": Array(kinds="f", shape=("answered", 3, 3), least=-math.inf),
     "converged": Array(kinds="b", shape=("answered",)),
     "milliseconds": Array(kinds="f", shape=("answered",)),

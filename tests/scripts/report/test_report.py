@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from scripts import cli
 from scripts.closed_loop.folder import driven
 from scripts.comparison import folder as files
+from scripts.comparison import schema
 from scripts.comparison.csv_files import write_csv
 from scripts.metrics.row import digits
 from scripts.metrics.table import METRICS
@@ -198,9 +199,11 @@ def test_a_drive_beside_the_comparison_is_told_too(folder: Path, tmp_path: Path)
 
 @pytest.mark.parametrize(
     ("name", "content", "says"),
-    [("recipe.json", "{}", "no closed-loop drive of schema"),
-     ("levels.csv", "scene,dynamism\n", "a table without 'scene'"),
-     ("levels.csv", "scene,dynamism\na,0\n", "a table without 'slam'")],
+    [("recipe.json", "{}", "lacks settings, which must be a mapping"),
+     ("recipe.json", '{"settings": {"drive_schema": 2}}', "no closed-loop drive of schema 1"),
+     ("recipe.json", '{"settings": {"drive_schema": 1, "loop": {"plan_on": 3}}}', "loop must be"),
+     ("levels.csv", "scene,dynamism\n", "a table without the column 'slam'"),
+     ("levels.csv", "scene,slam\na,b\n", "a table without the column 'dynamism'")],
 )  # fmt: skip
 def test_what_is_no_drive_is_told(tmp_path: Path, name: str, content: str, says: str):
     folder = made.make_drive(tmp_path / "drive")
@@ -274,7 +277,7 @@ def damage(name: str):
 
 def without_a_column(folder: Path) -> None:
     rows = files.read(folder).runs
-    write_csv(folder / files.RUNS, rows, [name for name in rows[0] if name != "outcome"])
+    write_csv(folder / schema.RUNS, rows, [name for name in rows[0] if name != "outcome"])
 
 
 def of_another_schema(folder: Path) -> None:
@@ -295,16 +298,16 @@ def run_of_another_schema(folder: Path) -> None:
             lambda folder: (folder / "recipe.json").unlink(),
             "recipe.json: cannot be read: No such file",
         ),
-        (lambda folder: (folder / "recipe.json").write_text("[1]"), "holds no JSON object"),
-        (damage("recipe.json"), "recipe.json: cannot be read"),
+        (lambda folder: (folder / "recipe.json").write_text("[1]"), "no recipe: not a JSON object"),
+        (damage("recipe.json"), "recipe.json: no recipe: "),
         (of_another_schema, "no comparison of schema 1"),
         (lambda folder: (folder / "runs.csv").unlink(), "runs.csv: cannot be read"),
-        (damage("levels.csv"), "levels.csv: no table"),
-        (lambda folder: (folder / "paired.csv").write_bytes(b"\xff"), "paired.csv: no table"),
-        (lambda folder: (folder / "runs.csv").write_text("scene\n"), "a table without rows"),
+        (damage("levels.csv"), "levels.csv:7: must have 11 cells, got "),
+        (lambda folder: (folder / "paired.csv").write_bytes(b"\xff"), "paired.csv: not a text file"),
+        (lambda folder: (folder / "runs.csv").write_text("scene\n"), "runs.csv:1: a table without the column 'dynamism'"),
         (without_a_column, "a table without the column 'outcome'"),
         (damage("runs/room_d1_s102.npz"), "room_d1_s102.npz: no whole NumPy archive"),
-        (run_of_another_schema, "it lacks 'stamps_ns'"),
+        (run_of_another_schema, "holds no array 'schema'"),
     ],
 )
 def test_what_is_no_comparison_is_told_in_a_line(tmp_path: Path, harm, says, monkeypatch, capsys):
