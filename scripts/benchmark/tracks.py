@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from scripts.comparison.plan import Plan
-from scripts.comparison.schema import LEVEL
+from scripts.comparison.rules import LEVEL
 from scripts.report.answer import ODOMETRY
 from sim.core.versions import WORLD
 from slam.errors import InvalidValueError, UnknownNameError

@@ -11,15 +11,14 @@ from scripts.closed_loop.plan import SCHEMA
 from scripts.closed_loop.tables import LEVEL_COLUMNS
 from scripts.comparison.csv_files import Row, read_csv
 from scripts.comparison.folder import axis_in, check_keys, check_recipe
-from scripts.comparison.rules import Named, Number, Plain, Word
-from scripts.comparison.schema import Columns
+from scripts.comparison.rules import Columns, Named, Number, Plain, Table, Word
 from scripts.output import RECIPE, check_whole
 from slam.errors import LogFormatError
 
 LEVELS = "levels.csv"
 _COUNT, _SHARE = Number(most=1e9, whole=True), Number(most=1.0)
 _SOME = Number(least=1.0, most=1e9, whole=True)
-COLUMNS: Columns = {
+_COLUMNS: Columns = {
     **dict.fromkeys(LEVEL_COLUMNS, Number(optional=True)),
     "scene": Word(), "dynamism": _SHARE, "slam": Word(), "runs": _SOME, "goals": _SOME,
     **dict.fromkeys(
@@ -28,8 +27,14 @@ COLUMNS: Columns = {
     ),
     **dict.fromkeys(("success", "success_low", "success_high"), _SHARE),
 }  # fmt: skip
-"""Of ``levels.csv``, in the order in which they are written."""
-_KEY = ("scene", "dynamism", "slam")
+TABLE = Table(
+    columns=_COLUMNS, key=("scene", "dynamism", "slam"),
+    parts=(
+        *((outcome, "goals") for outcome in ("reached", "wrong", "given_up", "failed")),
+        ("runs_lost", "runs"), ("runs_recovered", "runs_lost"),
+    ),
+)  # fmt: skip
+"""``levels.csv``."""
 _LOOP = Named(fields={"tolerance_m": Number(most=1e9), "plan_on": Word(among=("layout", "map"))})
 
 
@@ -77,7 +82,7 @@ def driven(folder: Path, *, vouched: bool = False) -> Driven:
         got = f"settings.drive_schema is {settings.get('drive_schema')!r:.80}"
         raise LogFormatError(folder, f"no closed-loop drive of schema {SCHEMA}: {got}")
     check_keys(path, "settings.", settings, {"loop": _LOOP})
-    rows = read_csv(folder / LEVELS, COLUMNS, _KEY, axis_in(settings, path), vouched=vouched)
+    rows = read_csv(folder / LEVELS, TABLE, axis_in(settings, path), vouched=vouched)
     if not rows:
         raise LogFormatError(folder / LEVELS, "a table without rows")
     return Driven(settings=settings, rows=rows)

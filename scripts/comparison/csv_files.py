@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scripts.comparison.schema import Columns, impossible, level_of
+from scripts.comparison.rules import Table
 from sim.recording.sums import check_vouched
 from slam.bounded import text_of
 from slam.csv_cells import cell_of
@@ -43,10 +43,10 @@ def _cell(value: Any) -> str:
 
 
 def write_checked(
-    path: Path, rows: Sequence[Mapping[str, Any]], columns: Columns, axis: str = "dynamism"
+    path: Path, rows: Sequence[Mapping[str, Any]], table: Table, axis: str = "dynamism"
 ) -> None:
-    """The same by the rules of the columns; ``InvalidValueError`` for rows that break one."""
-    rules = rules_at(columns, axis)
+    """The same by the rules of the table; ``InvalidValueError`` for rows that break one."""
+    rules = table.at(axis)
     for number, row in enumerate(rows, 1):
         for column, rule in rules.items():
             value = row.get(column)
@@ -56,27 +56,16 @@ def write_checked(
                 raise InvalidValueError(
                     f"{path.name}, row {number}: {column} must be {rule.wanted}, got {value!r:.80}"
                 )
-        if said := impossible(row):
+        if said := table.impossible(row):
             raise InvalidValueError(f"{path.name}, row {number}: {said}")
-    write_csv(path, rows, tuple(columns), axis)
-
-
-def rules_at(columns: Columns, axis: str) -> Columns:
-    """The rules of columns, that of the level as levels of this axis have it."""
-    return {c: level_of(axis) if c == "dynamism" else rule for c, rule in columns.items()}
+    write_csv(path, rows, tuple(table.columns), axis)
 
 
 def read_csv(
-    path: Path,
-    columns: Columns,
-    key: Sequence[str],
-    axis: str = "dynamism",
-    *,
-    vouched: bool = False,
+    path: Path, table: Table, axis: str = "dynamism", *, vouched: bool = False
 ) -> list[Row]:
-    """The rows of a table by the rules of its columns, empty cells as None; others are not read.
+    """The rows of a table by its rules, empty cells as None; columns that it has not are not read.
 
-    key      the columns that name a row, no two of which are the same
     axis     as in ``write_csv``
     vouched  its hash has been checked; else by whatever SHA256SUMS lists it
 
@@ -85,24 +74,25 @@ def read_csv(
     if not vouched:
         check_vouched(path)
     lines = csv.reader(io.StringIO(text_of(path, MAX_BYTES), newline=""), strict=True)
-    names = {column: axis if column == "dynamism" else column for column in columns}
+    names = {column: axis if column == "dynamism" else column for column in table.columns}
     found: dict[tuple[Any, ...], Row] = {}
     try:
-        for row in _rows(path, lines, rules_at(columns, axis), names):
-            if found.setdefault(tuple(row[column] for column in key), row) is not row:
-                told = ", ".join(f"{names[column]} {row[column]!s:.80}" for column in key)
+        for row in _rows(path, lines, table, names):
+            if found.setdefault(tuple(row[column] for column in table.key), row) is not row:
+                told = ", ".join(f"{names[column]} {row[column]!s:.80}" for column in table.key)
                 raise LogFormatError(path, f"a second row of {told}", lines.line_num)
     except csv.Error as error:
         raise LogFormatError(path, f"no table: {error}", lines.line_num) from error
     return list(found.values())
 
 
-def _rows(path: Path, lines: Any, rules: Columns, names: Mapping[str, str]) -> Iterator[Row]:
+def _rows(path: Path, lines: Any, table: Table, names: Mapping[str, str]) -> Iterator[Row]:
     head: list[str] = next(lines, [])
     for name in names.values():
         if head.count(name) != 1:
             many = "more than one column" if name in head else "a table without the column"
             raise LogFormatError(path, f"{many} {name!r}", 1)
+    rules = table.at(names.get("dynamism", ""))
     places = {column: head.index(name) for column, name in names.items()}
     for line in lines:
         if len(line) != len(head):
@@ -119,6 +109,6 @@ def _rows(path: Path, lines: Any, rules: Columns, names: Mapping[str, str]) -> I
                     f"column {names[column]!r} must be {rule.wanted}, got {cell!r:.80}",
                     lines.line_num,
                 )
-        if said := impossible(row):
+        if said := table.impossible(row):
             raise LogFormatError(path, said, lines.line_num)
         yield row

@@ -27,7 +27,6 @@ from scripts.comparison.run_file import RunFile
 from scripts.comparison.schema import (
     AGES,
     AGES_LEVELS,
-    KEYS,
     LATER,
     LEVELS,
     PAIRED,
@@ -52,7 +51,7 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]], axis: str = AXES[
 
 def write_json(path: Path, rows: Sequence[Mapping[str, Any]], axis: str = AXES[0]) -> None:
     """``{"schema": 1, "runs": [...]}``; null where a cell is empty. ``axis``: as ``write_csv``."""
-    names = {name: axis if name == "dynamism" else name for name in TABLES[RUNS]}
+    names = {name: axis if name == "dynamism" else name for name in TABLES[RUNS].columns}
     plain = [{names[name]: _plain(row.get(name)) for name in names} for row in rows]
     text = json.dumps({"schema": SCHEMA, "runs": plain}, indent=1, allow_nan=False)
     write_text(path, text + "\n")
@@ -138,7 +137,7 @@ class Compared:
     def _rows(self, name: str) -> list[Row]:
         """Of a table, all of whose names are in the recipe."""
         path = self.folder / name
-        rows = read_csv(path, TABLES[name], KEYS[name], self.axis, vouched=self.vouched)
+        rows = read_csv(path, TABLES[name], self.axis, vouched=self.vouched)
         if not rows and name != PAIRED:
             raise LogFormatError(path, "a table without rows")
         known = {column: set(self.settings[named]) for column, named in _NAMED.items()}

@@ -16,7 +16,8 @@ import sim
 import slam
 from scripts.checked import whole
 from scripts.comparison import entry, recording
-from scripts.comparison.schema import LATER, LEVEL, settings
+from scripts.comparison.rules import LEVEL
+from scripts.comparison.schema import LATER, settings
 from scripts.imports import with_imports
 from scripts.jobs import Job
 from scripts.knobs import axis_of, options_with

@@ -112,6 +112,51 @@ class Number:
         return value
 
 
+SHARE = Number(most=1.0)
+Columns = Mapping[str, Cell]
+LEVEL = "level"  # the axis of ``scripts.comparison.plan.Plan.sets``
+
+
+def level_of(axis: str) -> Number:
+    """What a level of that axis may be."""
+    return Number(least=-1e6, most=1e6) if axis == LEVEL else Number(most=1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """What a table on file must be.
+
+    columns   in the order in which they are written; "dynamism" is the level, of whatever axis
+    key       those that name a row, of which no two have the same
+    parts     (part, whole): of counts, the first is at most the second
+    together  in a row they are all empty or none of them is
+    """
+
+    columns: Columns
+    key: tuple[str, ...]
+    parts: tuple[tuple[str, str], ...] = ()
+    together: tuple[str, ...] = ()
+
+    def at(self, axis: str) -> Columns:
+        """The rules of its columns where levels are of that axis."""
+        level = {"dynamism": level_of(axis)} if "dynamism" in self.columns else {}
+        return {**self.columns, **level}
+
+    def impossible(self, row: Mapping[str, Any]) -> str:
+        """Why the cells of a row, each right by its rule, cannot stand together; "" if they can."""
+        told = [name for name in self.together if row.get(name) is not None]
+        if told and len(told) < len(self.together):
+            return f"{', '.join(self.together)} must all be there or none, got {', '.join(told)}"
+        for part, whole in self.parts:
+            most, count = row.get(whole), row.get(part)
+            if count is not None and most is not None and count > most:
+                return f"{part} must be at most {whole}, {most}, got {count}"
+        for name in ("value", "low", "high") if row.get("statistic") == "share" else ():
+            if not SHARE.holds(row[name]):
+                return f"{name} must be {SHARE.wanted}, as it is of a share, got {row[name]}"
+        return ""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Many:
     """A list of values, each of them by the same rule and there once; 1 at least."""

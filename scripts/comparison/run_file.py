@@ -137,9 +137,7 @@ class RunFile:
     laser_angles (beams,) rad, ``laser_range_max`` m, ``T_robot_laser`` of the scanner
     """
 
-    def __init__(
-        self, path: Path, slams: Sequence[str] = (), *, vouched: bool = False
-    ) -> None:
+    def __init__(self, path: Path, slams: Sequence[str] = (), *, vouched: bool = False) -> None:
         """Of a file.
 
         slams    that must be in it

@@ -10,19 +10,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 from scripts.comparison.arrays import Array
 from scripts.comparison.rules import (
+    LEVEL,
     MAX_MESSAGE,
-    Cell,
+    SHARE,
+    Columns,
     Many,
     Named,
     Number,
     Plain,
     Rule,
+    Table,
     Truth,
     Word,
+    level_of,
 )
 from scripts.days import scores
 from scripts.days.ages import AGES as OLD
@@ -37,22 +40,15 @@ from slam.answers import LEAST_CELL_M, MOST_CELL_M, MOST_M
 SCHEMA = 1
 RUNS, RUNS_JSON, LEVELS, PAIRED = "runs.csv", "runs.json", "levels.csv", "paired.csv"
 AGES, AGES_LEVELS = "ages.csv", "ages_levels.csv"
-LEVEL = "level"  # the axis of ``Plan.sets``
 FAILED = ("raised", "hung", "nan", "bad")
 OUTCOMES = ("finished", "lost", *FAILED)
-Columns = Mapping[str, Cell]
 _NAME = Word()
 _SEED = Number(most=2.0**63, whole=True)
-_SHARE, _MAYBE_SHARE = Number(most=1.0), Number(most=1.0, optional=True)
+_MAYBE_SHARE = Number(most=1.0, optional=True)
 _COUNT, _MAYBE_COUNT = Number(most=1e9, whole=True), Number(most=1e9, whole=True, optional=True)
 _SIGNED = Number(least=-math.inf)
 _POSITIVE, _MAYBE = Number(), Number(optional=True)
 _FAILURE = Word(most=MAX_MESSAGE, optional=True)
-
-
-def level_of(axis: str) -> Number:
-    """What a level of that axis may be."""
-    return Number(least=-1e6, most=1e6) if axis == LEVEL else Number(most=1.0)
 
 
 def _measured(metric: Metric) -> Number:
@@ -79,9 +75,9 @@ _PAIRED: Columns = {
     "scene": _NAME, "dynamism": level_of("dynamism"), "metric": Word(among=tuple(METRICS)),
     "slam_a": _NAME, "slam_b": _NAME, "n": _SUMMARY["n"],
     "median_difference": _SIGNED, "low": _SIGNED, "high": _SIGNED,
-    "wins": _COUNT, "ties": _COUNT, "losses": _COUNT, "p_sign": _SHARE,
+    "wins": _COUNT, "ties": _COUNT, "losses": _COUNT, "p_sign": SHARE,
 }  # fmt: skip
-_BUILDING: Columns = {"scene": _NAME, "motion": _SHARE, "change": _SHARE}
+_BUILDING: Columns = {"scene": _NAME, "motion": SHARE, "change": SHARE}
 _TO_FIND = ("to_find", "found", "found_soon", "wrong", "known", "known_soon")
 _AGES: Columns = {
     **dict.fromkeys(scores.COLUMNS, _MAYBE), **_BUILDING, "seed": _SEED, "slam": _NAME,
@@ -95,44 +91,20 @@ _AGES_LEVELS: Columns = {
     **_BUILDING, "slam": _NAME, **_SUMMARY,
     "metric": Word(among=tuple(score.key for score in scores.SCORES)),
 }  # fmt: skip
-TABLES: Mapping[str, Columns] = {
-    RUNS: _RUNS, LEVELS: _LEVELS, PAIRED: _PAIRED, AGES: _AGES, AGES_LEVELS: _AGES_LEVELS,
+TABLES: Mapping[str, Table] = {
+    RUNS: Table(columns=_RUNS, key=("scene", "dynamism", "seed", "slam")),
+    LEVELS: Table(columns=_LEVELS, key=("scene", "dynamism", "slam", "metric")),
+    PAIRED: Table(columns=_PAIRED, key=("scene", "dynamism", "metric", "slam_a", "slam_b")),
+    AGES: Table(
+        columns=_AGES, key=("scene", "motion", "change", "seed", "slam"), together=_TO_FIND,
+        parts=(
+            ("failed", "sessions"), ("found", "to_find"), ("found_soon", "to_find"),
+            ("wrong", "to_find"), ("known", "to_find"), ("known_soon", "known"),
+        ),
+    ),
+    AGES_LEVELS: Table(columns=_AGES_LEVELS, key=("scene", "motion", "change", "slam", "metric")),
 }  # fmt: skip
-"""By file: its columns, in the order in which they are written."""
-KEYS: Mapping[str, tuple[str, ...]] = {
-    RUNS: ("scene", "dynamism", "seed", "slam"),
-    LEVELS: ("scene", "dynamism", "slam", "metric"),
-    PAIRED: ("scene", "dynamism", "metric", "slam_a", "slam_b"),
-    AGES: ("scene", "motion", "change", "seed", "slam"),
-    AGES_LEVELS: ("scene", "motion", "change", "slam", "metric"),
-}
-"""By file: the columns that name a row; no two rows have the same in them."""
-
-
-def impossible(row: Mapping[str, Any]) -> str:
-    """Of a row whose cells are what they must be: why they cannot stand together; "" if they can.
-
-    Counts of what happened are not above those of what could have: a share has an interval.
-    """
-    told = [name for name in _TO_FIND if row.get(name) is not None]
-    if told and len(told) < len(_TO_FIND):
-        return f"{', '.join(_TO_FIND)} must all be there or none, got {', '.join(told)} alone"
-    for part, whole in _PARTS:
-        if row.get(part) is not None and row.get(whole) is not None and row[part] > row[whole]:
-            return f"{part} must be at most {whole}, {row[whole]}, got {row[part]}"
-    if row.get("statistic") == "share":
-        for name in ("value", "low", "high"):
-            if not _SHARE.holds(row[name]):
-                return f"{name} must be {_SHARE.wanted}, as it is of a share, got {row[name]}"
-    return ""
-
-
-_PARTS = (
-    ("failed", "sessions"), ("found", "to_find"), ("found_soon", "to_find"), ("wrong", "to_find"),
-    ("known", "to_find"), ("known_soon", "known"), ("reached", "goals"), ("wrong", "goals"),
-    ("given_up", "goals"), ("failed", "goals"), ("runs_lost", "runs"),
-    ("runs_recovered", "runs_lost"),
-)  # fmt: skip
+"""By file."""
 
 
 def settings(axis: str) -> Mapping[str, Rule]:

@@ -11,6 +11,7 @@ import pytest
 
 from scripts import results
 from scripts.comparison.csv_files import read_csv
+from scripts.comparison.schema import RUNS, TABLES
 from scripts.output import read_recipe_words, write_recipe
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe, read_recipe
@@ -48,7 +49,7 @@ def nested(folder: Path) -> None:
         (read_recipe, "recipe.json"),
         (read_recipe_words, "recipe.json"),
         (check_vouched, "recipe.json"),
-        (lambda path: read_csv(path, {}, ()), "runs.csv"),
+        (lambda path: read_csv(path, TABLES[RUNS]), "runs.csv"),
         (Bag, "a.mcap"),
     ],
 )

@@ -20,8 +20,8 @@ from typer.testing import CliRunner
 from scripts.comparison import csv_files, folder, make, schema, tables
 from scripts.comparison.columns import lost_at
 from scripts.comparison.plan import Plan
-from scripts.comparison.rules import Number, Word
 from scripts.comparison.recording import load
+from scripts.comparison.rules import Number, Table, Word
 from scripts.experiments import dynamism_curve
 from scripts.levels import levels
 from scripts.many import ManyValues, repeated
@@ -101,7 +101,7 @@ def rows_of(compared, slam):
 def test_tables_are_tidy_and_whole(compared):
     with (compared.folder / "runs.csv").open() as file:
         header = next(csv.reader(file))
-    assert header == list(schema.TABLES[schema.RUNS])
+    assert header == list(schema.TABLES[schema.RUNS].columns)
     assert len(compared.runs) == 5
     assert {row["n"] for row in compared.levels if row["metric"] == "lost"} == {1}
     assert all(row["value"] is not None for row in compared.levels)
@@ -308,7 +308,8 @@ def test_the_dynamism_curve(tmp_path, capsys):
 def test_a_failure_in_a_table_is_no_formula(tmp_path):
     rows = [{"slam": "=cmd|' /C calc'!A0", "failure": "-2+3", "off": -0.5, "word": "@SUM(A1)"}]
     columns = {"slam": Word(), "failure": Word(), "off": Number(least=-1.0), "word": Word()}
-    csv_files.write_checked(tmp_path / "t.csv", rows, columns)
+    table = Table(columns=columns, key=("slam",))
+    csv_files.write_checked(tmp_path / "t.csv", rows, table)
     written = (tmp_path / "t.csv").read_text().splitlines()[1]
     assert written == "'=cmd|' /C calc'!A0,'-2+3,-0.5,'@SUM(A1)"
-    assert csv_files.read_csv(tmp_path / "t.csv", columns, ("slam",)) == rows
+    assert csv_files.read_csv(tmp_path / "t.csv", table) == rows

@@ -158,5 +158,5 @@ def make_drive(folder: Path, reached: int = 6) -> Path:
     folder.mkdir(parents=True)
     loop = {"tolerance_m": 0.5, "plan_on": "layout"}
     write_recipe(folder, "drive", {"drive_schema": 1, "loop": loop})
-    write_checked(folder / "levels.csv", rows, drives.COLUMNS)
+    write_checked(folder / "levels.csv", rows, drives.TABLE)
     return folder

@@ -302,9 +302,15 @@ def run_of_another_schema(folder: Path) -> None:
         (damage("recipe.json"), "recipe.json: no recipe: "),
         (of_another_schema, "no comparison of schema 1"),
         (lambda folder: (folder / "runs.csv").unlink(), "runs.csv: cannot be read"),
-        (damage("levels.csv"), "levels.csv:7: must have 11 cells, got "),
-        (lambda folder: (folder / "paired.csv").write_bytes(b"\xff"), "paired.csv: not a text file"),
-        (lambda folder: (folder / "runs.csv").write_text("scene\n"), "runs.csv:1: a table without the column 'dynamism'"),
+        (damage("levels.csv"), "levels.csv:26: must have 11 cells, got 5"),
+        (
+            lambda folder: (folder / "paired.csv").write_bytes(b"\xff"),
+            "paired.csv: not a text file",
+        ),
+        (
+            lambda folder: (folder / "runs.csv").write_text("scene\n"),
+            "runs.csv:1: a table without the column 'dynamism'",
+        ),
         (without_a_column, "a table without the column 'outcome'"),
         (damage("runs/room_d1_s102.npz"), "room_d1_s102.npz: no whole NumPy archive"),
         (run_of_another_schema, "holds no array 'schema'"),
