@@ -90,12 +90,14 @@ def _check_result(folder: Path) -> list[Finding]:
 def _unreadable(folder: Path) -> list[Fault]:
     """What the readers of a folder say of files whose hashes are right."""
     try:
-        command = read_recipe_words(folder / RECIPE).get("command")
-        if command == "compare":
+        recipe = read_recipe_words(folder / RECIPE)
+        command, settings = recipe.get("command"), recipe.get("settings")
+        schemas = {*settings} if isinstance(settings, dict) else set()
+        if command == "compare" or "compare_schema" in schemas:
             compared.read(folder, vouched=True).check()
             for drive in closed_loop.drives_in(folder):
                 closed_loop.driven(drive)
-        elif command == "drive":
+        elif command == "drive" or "drive_schema" in schemas:
             closed_loop.driven(folder, vouched=True)
     except LogFormatError as error:
         return [Fault(kind="damaged", name=error.path.name, why=str(error))]

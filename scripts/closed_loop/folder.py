@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from scripts.closed_loop.plan import SCHEMA
 from scripts.closed_loop.tables import LEVEL_COLUMNS
 from scripts.comparison.csv_files import Row, read_csv
 from scripts.comparison.folder import axis_in, check_keys, check_recipe
-from scripts.comparison.rules import Columns, Named, Number, Plain, Table, Word
+from scripts.comparison.rules import Columns, Named, Number, Rule, Table, Word
 from scripts.output import RECIPE, check_whole
 from slam.errors import LogFormatError
 
@@ -35,6 +36,7 @@ TABLE = Table(
     ),
 )  # fmt: skip
 """``levels.csv``."""
+_RECIPE: Mapping[str, Rule] = {"command": Word(among=("drive",)), "settings": Named(fields={})}
 _LOOP = Named(fields={"tolerance_m": Number(most=1e9), "plan_on": Word(among=("layout", "map"))})
 
 
@@ -77,7 +79,7 @@ def driven(folder: Path, *, vouched: bool = False) -> Driven:
     """
     check_whole(folder)
     path = folder / RECIPE
-    settings = check_recipe(path, {"settings": Named(fields={}, others=Plain())})["settings"]
+    settings = check_recipe(path, _RECIPE)["settings"]
     if settings.get("drive_schema") != SCHEMA:
         got = f"settings.drive_schema is {settings.get('drive_schema')!r:.80}"
         raise LogFormatError(folder, f"no closed-loop drive of schema {SCHEMA}: {got}")

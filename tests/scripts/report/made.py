@@ -151,8 +151,8 @@ def make_drive(folder: Path, reached: int = 6) -> Path:
             rows.append({
                 "scene": SCENE, "dynamism": level, "slam": slam, "runs": 2, "goals": 8,
                 "reached": count, "success": count / 8, "success_low": 0.1 * count,
-                "success_high": 0.95, "wrong": 1, "given_up": 0, "given_up_taken": 0, "failed": 0, "time_s": 20.0,
-                "collisions_per_km": 1.5, "near_misses_per_km": 0.0, "runs_lost": 1,
+                "success_high": 0.95, "wrong": 1, "given_up": 0, "given_up_taken": 0, "failed": 0,
+                "time_s": 20.0, "collisions_per_km": 1.5, "near_misses_per_km": 0.0, "runs_lost": 1,
                 "runs_recovered": 1, **(arrived if count else {}),
             })  # fmt: skip
     folder.mkdir(parents=True)
