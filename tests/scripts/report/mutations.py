@@ -28,6 +28,12 @@ ODD_NUMBERS = (
 )  # fmt: skip
 
 
+_TABLE_WAYS = (
+    "row gone", "row twice", "column gone", "column twice", "cell gone", "cell more", "empty",
+    "bytes", "none but the head",
+)  # fmt: skip
+
+
 def mutate(folder: Path, draw: random.Random) -> str:
     """Harm one of its files; says how."""
     found = [path for path in folder.rglob("*") if path.suffix in _WAYS]
@@ -69,8 +75,7 @@ def _places(words: Any) -> list[tuple[Any, Any]]:
 def _table(path: Path, draw: random.Random) -> str:
     lines = list(csv.reader(io.StringIO(path.read_text(), newline="")))
     k, c = draw.randrange(len(lines)), draw.randrange(len(lines[0]))
-    way = draw.choice((*["cell"] * 12, "row gone", "row twice", "column gone", "column twice",
-                       "cell gone", "cell more", "empty", "bytes", "none but the head"))  # fmt: skip
+    way = draw.choice(("cell",) * 12 + _TABLE_WAYS)
     said = f"{way} at {k}, {lines[0][c]}"
     if way == "cell":
         lines[k][c] = draw.choice(ODD_CELLS)
