@@ -90,7 +90,11 @@ class Number:
         """In words."""
         kind = "a whole number" if self.whole else "a number"
         low = -MOST if self.least == -math.inf else self.least
-        high = f"{MOST:g} or infinite" if self.most == math.inf else f"{self.most:.17g}"
+        high = f"{self.most:g}"
+        if self.most == math.inf:
+            high = f"{MOST:g} or infinite"
+        elif int(self.most) == self.most:
+            high = str(int(self.most))
         return f"{kind} from {low:g} to {high}" + _or_none(self.optional)
 
     def holds(self, value: object) -> bool:
