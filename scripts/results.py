@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from scripts.benchmark import submission
+from scripts.closed_loop import folder as closed_loop
 from scripts.comparison import folder as compared
-from scripts.comparison.plan import Run
+from scripts.comparison import schema
+from scripts.comparison.run_file import RunFile
 from scripts.names import file_name, is_run
-from scripts.output import MAX_RECIPE_BYTES, RECIPE
+from scripts.output import MAX_RECIPE_BYTES, RECIPE, read_recipe_words
 from sim.recording.dataset import PLAN, check_dataset
 from sim.recording.sums import SUMS, Fault, check_vouched, faults
 from sim.recording.verify import METADATA, Finding, check_hashes, finding, listed_in
@@ -79,9 +81,27 @@ def _check_result(folder: Path) -> list[Finding]:
             if name not in listed and name not in known:
                 why = f"{folder / SUMS} does not list {name}"
                 found.append(Fault(kind="damaged", name=name, why=why))
+        found = found or _unreadable(folder)
     inner = [path.parent for path in sorted(folder.glob(f"*/{SUMS}"))]
     inner = [path for path in inner if not path.is_symlink()]  # foreign, and may lead back here
     return [finding(folder.resolve().name, found), *(f for one in inner for f in check(one))]
+
+
+def _unreadable(folder: Path) -> list[Fault]:
+    """What the readers of a folder say of files whose hashes are right."""
+    try:
+        recipe = read_recipe_words(folder / RECIPE)
+        command, settings = recipe.get("command"), recipe.get("settings")
+        schemas = {*settings} if isinstance(settings, dict) else set()
+        if command == "compare" or "compare_schema" in schemas:
+            compared.read(folder, vouched=True).check()
+            for drive in closed_loop.drives_in(folder):
+                closed_loop.driven(drive)
+        elif command == "drive" or "drive_schema" in schemas:
+            closed_loop.driven(folder, vouched=True)
+    except LogFormatError as error:
+        return [Fault(kind="damaged", name=error.path.name, why=str(error))]
+    return []
 
 
 def _wanted(folder: Path) -> list[str]:
@@ -97,13 +117,10 @@ def _wanted(folder: Path) -> list[str]:
             slams = recipe["settings"].get("slams", [])
             names += [f"trajectory_{file_name(str(slam))}.tum" for slam in slams]
         if command == "compare":
-            axis = compared.axis_in(recipe["settings"], folder / RECIPE)
-            rows = compared.read_csv(folder / compared.RUNS, axis)
-            runs = {(row["scene"], row["dynamism"], int(row["seed"])) for row in rows}
-            named = [Run(scene=s, dynamism=d, seed=k, axis=axis).name for s, d, k in runs]
-            names += [f"runs/{name}.npz" for name in named]
-            if recipe["settings"].get("sessions") is not None:
-                names += [compared.AGES, compared.AGES_LEVELS]
+            made = compared.read(folder)
+            names += [f"runs/{name}.npz" for name in made.names()]
+            if made.settings.get("sessions") is not None:
+                names += [schema.AGES, schema.AGES_LEVELS]
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return [RECIPE]  # damaged, which its hash says
     except LogFormatError:  # the same
@@ -117,7 +134,7 @@ def _check_file(path: Path) -> Finding:
         if path.suffix in (".yaml", ".pgm"):
             return _check_map(path.with_suffix(".yaml"))
         if is_run(path):
-            compared.RunFile(path)
+            RunFile(path)
         elif path.suffix == ".json":
             submission.read(path)
         elif path.suffix == ".npz":

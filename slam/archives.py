@@ -8,10 +8,11 @@ import struct
 import warnings
 import zipfile
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from tokenize import TokenError
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.lib import format as npy
@@ -34,6 +35,13 @@ BROKEN = (
 )  # fmt: skip
 
 
+class Header(NamedTuple):
+    """What an array is before it is unpacked."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+
+
 def write_arrays(file: IO[bytes], arrays: Mapping[str, NDArray[Any]]) -> None:
     """As ``np.savez_compressed``, in two thirds of the time and 7 % more bytes."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
@@ -54,22 +62,41 @@ def read_arrays(
     the archive claims. Objects (pickles) are refused. Raises ``LogFormatError``, which names the
     file, for one that is missing, torn, damaged, too large or lacks a name.
     """
+    with _opened(path) as archive:
+        members = _members(path, archive)
+        wanted = list(members) if names is None else list(names)
+        for name in wanted:
+            if name not in members:
+                raise LogFormatError(path, f"holds no array {name!r}")
+        claimed = sum(members[name].file_size for name in wanted)
+        if claimed > max_bytes:
+            raise LogFormatError(
+                path, f"unpacks to {claimed} bytes; at most {max_bytes} are allowed"
+            )
+        return {name: _array(path, archive, members[name], max_bytes) for name in wanted}
+
+
+def read_headers(path: Path) -> dict[str, Header]:
+    """Type and shape of all arrays of such a file, by name, of which none is unpacked.
+
+    Raises ``LogFormatError`` as ``read_arrays`` does.
+    """
+    with _opened(path) as archive:
+        return {
+            name: _header(path, archive, info, MAX_BYTES)
+            for name, info in _members(path, archive).items()
+        }
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """The archive; whatever is wrong with it in here is a ``LogFormatError``."""
     check_file(path)
     try:
-        with zipfile.ZipFile(path) as archive:
-            members = _members(path, archive)
-            wanted = list(members) if names is None else list(names)
-            for name in wanted:
-                if name not in members:
-                    raise LogFormatError(path, f"holds no array {name!r}")
-            claimed = sum(members[name].file_size for name in wanted)
-            if claimed > max_bytes:
-                raise LogFormatError(
-                    path, f"unpacks to {claimed} bytes; at most {max_bytes} are allowed"
-                )
-            with warnings.catch_warnings():  # a header of Python 2 is no damage in itself
-                warnings.filterwarnings("ignore", "Reading `.npy`", UserWarning)
-                return {name: _array(path, archive, members[name], max_bytes) for name in wanted}
+        with zipfile.ZipFile(path) as archive, warnings.catch_warnings():
+            # A header of Python 2 is no damage in itself.
+            warnings.filterwarnings("ignore", "Reading `.npy`", UserWarning)
+            yield archive
     except LogFormatError:
         raise
     except BROKEN as error:
@@ -93,24 +120,25 @@ def _members(path: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]
 def _array(
     path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, max_bytes: int
 ) -> NDArray[Any]:
-    with archive.open(info) as member:
-        _check_header(path, info, member, max_bytes)
+    _header(path, archive, info, max_bytes)
     with archive.open(info) as member:
         array: NDArray[Any] = npy.read_array(member, allow_pickle=False)
         return array
 
 
-def _check_header(path: Path, info: zipfile.ZipInfo, member: IO[bytes], max_bytes: int) -> None:
+def _header(path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, max_bytes: int) -> Header:
     """Shape times item size must be the bytes that the archive claims for it."""
-    version = npy.read_magic(member)
-    if version not in _HEADERS:
-        raise LogFormatError(path, f"{info.filename}: version {version} of .npy is not known")
-    shape, _, dtype = _HEADERS[version](member)
+    with archive.open(info) as member:
+        version = npy.read_magic(member)
+        if version not in _HEADERS:
+            raise LogFormatError(path, f"{info.filename}: version {version} of .npy is not known")
+        shape, _, dtype = _HEADERS[version](member)
+        rest = info.file_size - member.tell()
     count = math.prod(shape)
     if dtype.hasobject:
         raise LogFormatError(path, f"{info.filename}: holds objects, not numbers or text")
-    rest = info.file_size - member.tell()
     if min(shape, default=0) < 0 or count * dtype.itemsize != rest or count > max_bytes:
         raise LogFormatError(
             path, f"{info.filename}: shape {shape} of {dtype} does not fit its {rest} bytes"
         )
+    return Header(shape, dtype)

@@ -12,8 +12,8 @@ from typing import Any
 
 from scripts.benchmark.scores import COLUMNS, SILENT, TRACKING, Row, scores
 from scripts.benchmark.tracks import LEVELS, Track
-from scripts.comparison.folder import write_csv
-from scripts.comparison.tables import FAILED
+from scripts.comparison.csv_files import write_csv
+from scripts.comparison.schema import FAILED
 from scripts.metrics.row import digits
 from scripts.report.answer import ODOMETRY, against
 from scripts.report.study import LEAST_RUNS

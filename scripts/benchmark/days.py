@@ -16,7 +16,7 @@ from scripts import workers
 from scripts.benchmark.board import markdown_table
 from scripts.benchmark.tracks import TEST, TRAIN
 from scripts.checked import whole
-from scripts.comparison.folder import write_csv
+from scripts.comparison.csv_files import write_csv
 from scripts.days import make, scores
 from scripts.days.plan import Buildings
 from scripts.days.scores import Row

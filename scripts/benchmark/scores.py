@@ -12,7 +12,8 @@ from scipy.optimize import isotonic_regression
 from scipy.stats import spearmanr
 
 from scripts.benchmark.tracks import Track
-from scripts.comparison.tables import FAILED, number
+from scripts.comparison.schema import FAILED
+from scripts.comparison.tables import number
 from slam.evaluation.statistics import bootstrap_draws, central_interval, quantile
 from slam.frames import Float
 

@@ -10,7 +10,8 @@ from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
-from scripts.comparison.plan import LEVEL, Plan
+from scripts.comparison.plan import Plan
+from scripts.comparison.rules import LEVEL
 from scripts.report.answer import ODOMETRY
 from sim.core.versions import WORLD
 from slam.errors import InvalidValueError, UnknownNameError

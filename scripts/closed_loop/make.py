@@ -12,9 +12,10 @@ from rich.table import Table
 
 from scenes import registry
 from scripts.closed_loop import pictures, tables
+from scripts.closed_loop.folder import LEVELS, TABLE
 from scripts.closed_loop.plan import RUNS, SCHEMA, Plan
 from scripts.closed_loop.runs import Driven, load
-from scripts.comparison.folder import write_csv
+from scripts.comparison.csv_files import write_checked, write_csv
 from scripts.console import level_table
 from scripts.jobs import run_jobs
 from scripts.machine import machine
@@ -55,7 +56,7 @@ def _write(out: Path, plan: Plan, runs: list[Driven]) -> list[dict[str, Any]]:
     summary = tables.levels(goals, rows)
     write_csv(out / "goals.csv", goals, tables.GOAL_COLUMNS, plan.axis)
     write_csv(out / "runs.csv", rows, tables.RUN_COLUMNS, plan.axis)
-    write_csv(out / "levels.csv", summary, tables.LEVEL_COLUMNS, plan.axis)
+    write_checked(out / LEVELS, summary, TABLE, plan.axis)
     whole = [
         {plan.axis if k == "dynamism" else k: v for k, v in row.items()} | {"results": run.goals}
         for row, run in zip(rows, runs, strict=True)

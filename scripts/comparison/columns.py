@@ -18,10 +18,6 @@ from slam.trajectory import Trajectory
 
 STEADY_SCANS = 5  # timings count after this
 
-# "dynamism" is the level, of whatever axis: a table over motion or change calls it so on file.
-IDENTITY = ("scene", "dynamism", "seed", "slam")
-COLUMNS = (*IDENTITY, "outcome", "failure", "scans", *table.COLUMNS)
-
 
 def scored(
     track: Track, final: Trajectory | None, failure: SlamFailedError | None, truth: Trajectory

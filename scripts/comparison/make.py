@@ -14,9 +14,10 @@ from rich.table import Table
 from scenes import registry
 from scripts.comparison import folder as files
 from scripts.comparison import tables
-from scripts.comparison.columns import COLUMNS
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.recording import load
+from scripts.comparison.run_file import merge
+from scripts.comparison.schema import LEVELS, PAIRED, RUNS, RUNS_JSON, SCHEMA
 from scripts.console import level_table
 from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
@@ -27,8 +28,8 @@ from slam.evaluation.lost import LOST_RULE
 from slam.frames import BeamClass
 from slam.guests import Limits, limited
 
-Tables = Mapping[str, tuple[Sequence[Mapping[str, Any]], Sequence[str]]]
-"""By the name of a file its rows and columns."""
+Tables = Mapping[str, Sequence[Mapping[str, Any]]]
+"""By the name of a file its rows."""
 
 
 def carry_out(
@@ -52,7 +53,7 @@ def carry_out(
         raise InvalidValueError("Plan.sessions needs more=scripts.days.make.beside(plan)")
     out = out.absolute()
     with locked_folder(out):
-        settings = {"compare_schema": files.SCHEMA, **plan.settings(), "lost_rule": LOST_RULE}
+        settings = {"compare_schema": SCHEMA, **plan.settings(), "lost_rule": LOST_RULE}
         settings["machine"] = machine()
         if not (out / RECIPE).exists():  # else that of the tables there stays with them
             write_recipe(out, "compare", settings)
@@ -66,19 +67,14 @@ def carry_out(
             rows: list[dict[str, Any]] = []
             for run in plan.runs():
                 own = {name: done[job.name] for its, name, job in entries if its == run}
-                merged = files.merge(staged / "runs" / f"{run.name}.npz", recordings[run.name], own)
+                merged = merge(staged / "runs" / f"{run.name}.npz", recordings[run.name], own)
                 about = {k: v for k, v in asdict(run).items() if k != "axis"}
                 about |= _about(recordings[run.name])
                 rows += [about | row for row in merged]
-            files.write_json(staged / files.RUNS_JSON, rows, plan.axis)
-            for name, table, columns in (
-                (files.RUNS, rows, COLUMNS),
-                (files.LEVELS, tables.levels(rows), tables.LEVEL_COLUMNS),
-                (files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS),
-            ):
-                files.write_csv(staged / name, table, columns, plan.axis)
-            for name, (lines, heads) in added.items():
-                files.write_csv(staged / name, lines, heads)
+            files.write_json(staged / RUNS_JSON, rows, plan.axis)
+            own_tables = {RUNS: rows, LEVELS: tables.levels(rows), PAIRED: tables.pairs(rows)}
+            for name, table in {**own_tables, **added}.items():
+                files.write_table(staged / name, table, plan.axis)
             write_recipe(staged, "compare", settings)
     return rows
 

@@ -16,6 +16,8 @@ import sim
 import slam
 from scripts.checked import whole
 from scripts.comparison import entry, recording
+from scripts.comparison.rules import LEVEL
+from scripts.comparison.schema import LATER, settings
 from scripts.imports import with_imports
 from scripts.jobs import Job
 from scripts.knobs import axis_of, options_with
@@ -30,7 +32,6 @@ from slam.variants import PIPE, inside
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
-LEVEL = "level"  # the axis of ``Plan.sets``
 # What a level may set of a recipe; whatever else it sets are options of the scene.
 _OF_RECIPE = (
     "dynamism", "motion", "change", "moving_share", "change_at_s", "kidnap_every_s", "range_mode",
@@ -105,6 +106,7 @@ class Plan:
         for run in self.runs():
             self.recipe(run)  # complains of values that cannot be
         self._check_sessions()
+        self._check_file()
         period_s = self.recipe(self.runs()[0]).laser().scanner().period_s
         if n_frames(self.seconds, float(period_s)) <= self.every:
             raise InvalidValueError(
@@ -122,6 +124,13 @@ class Plan:
             raise InvalidValueError(
                 f"Plan.sets must have a mapping a level of axis 'level', got {self.sets!r:.80}"
             )
+
+    def _check_file(self) -> None:
+        """What no recipe could hold would not be read again."""
+        for name, rule in {**settings(self.axis), **LATER}.items():
+            value = getattr(self, name, None)
+            if hasattr(self, name) and not rule.holds(value):
+                raise InvalidValueError(f"Plan.{name} must be {rule.wanted}, got {value!r:.80}")
 
     def _check_sessions(self) -> None:
         if self.sessions is None:

@@ -8,18 +8,11 @@ from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
+from scripts.comparison.schema import FAILED
 from scripts.metrics.table import JUDGED, MEDIANS, METRICS, SHARES
 from slam.evaluation.statistics import median_interval, paired, quantile, share_interval
 
 Row = dict[str, Any]
-FAILED = ("raised", "hung", "nan", "bad")
-LEVEL_COLUMNS = (
-    "scene", "dynamism", "slam", "metric", "statistic", "n", "value", "low", "high", "q25", "q75",
-)  # fmt: skip
-PAIRED_COLUMNS = (
-    "scene", "dynamism", "metric", "slam_a", "slam_b", "n", "median_difference", "low", "high",
-    "wins", "ties", "losses", "p_sign",
-)  # fmt: skip
 
 
 def number(row: Row, metric: str) -> float | None:

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from scripts.comparison.folder import AGES, AGES_LEVELS
 from scripts.comparison.make import Tables
 from scripts.comparison.plan import Plan
+from scripts.comparison.schema import AGES, AGES_LEVELS
 from scripts.days import living, scores
 from scripts.days.plan import LIVES, SESSIONS, Buildings, identity, of_comparison
 from scripts.jobs import run_jobs
@@ -46,6 +46,6 @@ def beside(plan: Plan) -> Callable[..., Tables] | None:
     def make(out: Path, **ways: Any) -> Tables:
         rows = carry_out(buildings, out / DAYS, **ways)
         summary = scores.levels(rows)
-        return {AGES: (rows, scores.COLUMNS), AGES_LEVELS: (summary, scores.LEVEL_COLUMNS)}
+        return {AGES: rows, AGES_LEVELS: summary}
 
     return make

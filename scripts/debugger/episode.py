@@ -11,7 +11,7 @@ from typing import Any
 
 from scripts.checked import whole
 from scripts.comparison.again import run_of, why_no_run
-from scripts.comparison.folder import RunFile
+from scripts.comparison.run_file import RunFile
 from scripts.names import file_name, is_run
 from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
 from scripts.trust import admitted

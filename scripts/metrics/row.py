@@ -33,6 +33,8 @@ class Metric:
     name           plain words for the report; "" where that does not explain it
     shown          the report's unit, which is ``factor`` times ``unit``
     log            drawn on a logarithmic axis
+    least, most    of its values in runs.csv; infinite ones are there where ``most`` is
+    whole          its values are whole numbers
     about          one sentence for people who have not read the code
     curve          place among the report's curves, from 1; 0: not drawn
     paired         in the report's table of pairs
@@ -55,6 +57,9 @@ class Metric:
     shown: str = ""
     factor: float = 1.0
     log: bool = False
+    least: float = 0.0
+    most: float = math.inf
+    whole: bool = False
     about: str = ""
     curve: int = 0
     paired: bool = False

@@ -36,6 +36,7 @@ def _moments() -> list[Metric]:
             unit=unit if mean else unit + "²",
             compute=lambda run: float(getattr(run.statistics, "mean" if mean else which)[k]),
             label=f"{kind}({of}) {axis}", section="errors", summary=None,
+            least=-math.inf if mean else 0.0,
             in_run=f"{which}_{axis}", form=form,
         )  # fmt: skip
 
@@ -48,12 +49,12 @@ def _moments() -> list[Metric]:
 
 def _count(key: str, section: Section, unit: str = "") -> Metric:
     """A column of ``runs.csv`` that is not summed up."""
-    return Metric(key=key, unit=unit, label=key, section=section, summary=None)
+    return Metric(key=key, unit=unit, label=key, section=section, summary=None, whole=not unit)
 
 
 def _share(key: str, name: str, about: str, better: Better) -> Metric:
     return Metric(key=key, unit="", better=better, label=name, section="maps", name=name,
-                  shown="%", factor=100.0, about=about)  # fmt: skip
+                  shown="%", factor=100.0, most=1.0, about=about)  # fmt: skip
 
 
 _ALL = (
@@ -106,7 +107,7 @@ _ALL = (
            about="relative heading error over each second"),
     *_moments(),
     Metric(key="lost", unit="", better="less", label="lost", section="errors", summary="share",
-           name="runs lost", shown="%", factor=100.0, curve=2, paired=True,
+           name="runs lost", shown="%", factor=100.0, curve=2, paired=True, most=1.0, whole=True,
            about="share of runs in which the SLAM failed or lost its way, see Outcomes"),
     _count("lost_at_s", "errors", "s"),
     Metric(key="nees_over_3", unit="", compute=lambda run: run.nees_over_3(),
@@ -119,11 +120,11 @@ _ALL = (
     Metric(key="not_trusted_share", unit="",
            compute=lambda run: float(np.mean([not e.converged for e in run.estimates])),
            label="share of scans it did not trust", section="honesty",
-           name="scans it did not trust", shown="%", factor=100.0,
+           name="scans it did not trust", shown="%", factor=100.0, most=1.0,
            about="share of estimates that the SLAM itself marked as not converged"),
     Metric(key="silent_share", unit="", better="less", compute=lambda run: run.silent_share(),
            label="share of silent failures", section="honesty",
-           name="silent failures", shown="%", factor=100.0,
+           name="silent failures", shown="%", factor=100.0, most=1.0,
            about="share of scans that are more than 10 cm off, beyond 3 sigma of the SLAM's own "
            "covariance, and still marked as converged; empty where it claims no covariance"),
     Metric(key="ms_per_scan_p50", unit="ms", better="less", without_truth=True,
@@ -173,9 +174,9 @@ _ALL = (
     _count("duration_s", "drive", "s"),
     Metric(key="distance_m", unit="m", label="distance driven", section="drive"),
     Metric(key="moving_share_of_returns", unit="", label="returns from what moves",
-           section="drive"),
+           section="drive", most=1.0),
     Metric(key="semi_static_share_of_returns", unit="", label="returns from what was moved",
-           section="drive"),
+           section="drive", most=1.0),
 )  # fmt: skip
 
 METRICS = {metric.key: metric for metric in _ALL}

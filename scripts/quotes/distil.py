@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from scripts.comparison.folder import Compared, Row, read
+from scripts.comparison.csv_files import Row
+from scripts.comparison.folder import Compared, read
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.tables import by_seed
 from scripts.experiments.dynamism_curve import Curve

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from scripts.comparison.tables import FAILED, by_seed, number
+from scripts.comparison.schema import FAILED
+from scripts.comparison.tables import by_seed, number
 from scripts.report.study import LEAST_RUNS, verdict
 from scripts.report.words import listed
 from slam.evaluation.statistics import paired, share_interval

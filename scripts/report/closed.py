@@ -5,75 +5,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 from matplotlib.ticker import MaxNLocator
 
-from scripts.closed_loop.plan import SCHEMA
-from scripts.closed_loop.tables import LEVEL_COLUMNS
-from scripts.comparison.folder import Row, axis_in, read_csv, read_json
+from scripts.closed_loop.folder import Driven
+from scripts.comparison.csv_files import Row
 from scripts.metrics.row import digits
-from scripts.output import check_whole
 from scripts.report import style
 from scripts.report.answer import percent
 from scripts.report.curves import HEIGHT, WIDTH
 from scripts.report.study import LEAST_RUNS
 from scripts.report.tables import Cell, Table
-from slam.errors import LogFormatError
 
 SUCCESS = ("success", "success_low", "success_high")
 PRECISION = ("precision_m", "precision_m_low", "precision_m_high")
 _OF = {SUCCESS: ("goals",), PRECISION: ("reached", "wrong")}  # whose sum each is of
-
-
-@dataclass(frozen=True, kw_only=True)
-class Driven:
-    """The folder of a drive: its recipe's settings and the rows of its ``levels.csv``."""
-
-    settings: dict[str, Any]
-    rows: list[Row]
-
-    @property
-    def scene(self) -> str:
-        """A drive has one."""
-        return str(self.rows[0]["scene"])
-
-    @property
-    def slams(self) -> list[str]:
-        """In the order in which they were named."""
-        return list(dict.fromkeys(str(row["slam"]) for row in self.rows))
-
-    @property
-    def axis(self) -> str:
-        """What the levels are of."""
-        return str(self.settings.get("axis", "dynamism"))
-
-    @property
-    def levels(self) -> list[float]:
-        """Of that axis, ascending."""
-        return sorted({float(row["dynamism"]) for row in self.rows})
-
-    def of(self, slam: str) -> list[Row]:
-        """A SLAM's rows."""
-        return [row for row in self.rows if row["slam"] == slam]
-
-
-def driven(folder: Path) -> Driven:
-    """A drive on file; ``LogFormatError`` for a folder that holds none."""
-    check_whole(folder)
-    settings = read_json(folder / "recipe.json").get("settings")
-    if not isinstance(settings, dict) or settings.get("drive_schema") != SCHEMA:
-        raise LogFormatError(folder, f"no closed-loop drive of schema {SCHEMA}")
-    loop = settings.get("loop")
-    if not isinstance(loop, dict) or not {"tolerance_m", "plan_on"} <= loop.keys():
-        raise LogFormatError(folder / "recipe.json", "its settings lack 'loop'")
-    rows = read_csv(folder / "levels.csv", axis_in(settings, folder / "recipe.json"))
-    missing = [column for column in LEVEL_COLUMNS if not rows or column not in rows[0]]
-    if missing:
-        raise LogFormatError(folder / "levels.csv", f"a table without '{missing[0]}'")
-    return Driven(settings=settings, rows=rows)
 
 
 def curves(drive: Driven, slams: Sequence[str]) -> list[tuple[str, str]]:

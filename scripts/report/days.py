@@ -9,7 +9,6 @@ from scripts.days import scores
 from scripts.report import score_tables
 from scripts.report.study import Study
 from scripts.report.tables import Cell, Table
-from slam.errors import LogFormatError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,17 +21,8 @@ class Days:
 
 
 def days(study: Study) -> list[Days]:
-    """Scene by scene, level by level; none of a comparison without buildings.
-
-    Raises ``LogFormatError`` for tables that are not what ``mobilia compare`` writes.
-    """
+    """Scene by scene, level by level; none of a comparison without buildings."""
     rows = study.compared.ages
-    if not rows:
-        return []
-    missing = [column for column in scores.COLUMNS if column not in rows[0]]
-    if missing:
-        where = study.compared.folder / "ages.csv"
-        raise LogFormatError(where, f"a table without the column '{missing[0]}'")
     return [
         Days(
             heading=score_tables.where(group),

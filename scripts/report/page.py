@@ -13,10 +13,11 @@ from typing import Any
 
 import jinja2
 
+from scripts.closed_loop.folder import Driven
 from scripts.comparison.plan import Run
+from scripts.comparison.schema import LATER, settings
 from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, of_section
 from scripts.report import answer, closed, curves, pictures, style, tables, words
-from scripts.report.closed import Driven
 from scripts.report.days import days
 from scripts.report.study import LEAST_RUNS, Study
 from sim.recording.sums import add_to_sums
@@ -44,7 +45,7 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
         marks={slam: (style.glyph(slam, slams), style.color(slam, slams)) for slam in slams},
         drives=[(drive, closed.curves(drive, slams), closed.table(drive)) for drive in drives],
         css=TEMPLATE.with_name("page.css").read_text(encoding="utf-8"),
-        settings=study.compared.recipe["settings"],
+        settings=study.compared.settings,
         answers=answers(study),
         controls=_controls(study),
         failures=answer.failed(study.compared.runs, study.axis),
@@ -185,34 +186,35 @@ def blame_worst(study: Study) -> list[str]:
 def _recipe(study: Study) -> dict[str, Any]:
     """What it takes to make the same folder again."""
     recipe = study.compared.recipe
-    settings = recipe["settings"]
+    told = study.compared.settings
+    known = {**settings(study.axis), **LATER}
     return {
-        "command": _command(settings),
-        "versions": recipe.get("versions", {}),
-        "machine": settings.get("machine", {}),
+        "command": _command(told),
+        "versions": recipe["versions"],
+        "machine": told["machine"],
         "rest": {
             key: value
-            for key, value in settings.items()
-            if key not in ("machine", "slams", "scenes", "levels", "seeds")
+            for key, value in told.items()
+            if key in known and key not in ("machine", "slams", "scenes", "levels", "seeds")
         },
     }
 
 
-def _command(settings: dict[str, Any]) -> str:
+def _command(told: dict[str, Any]) -> str:
     """The command line that asks for this comparison."""
-    seeds = settings["seeds"]
+    seeds = told["seeds"]
     words_ = ["mobilia", "compare"]
-    for option, values in (("--slam", settings["slams"]), ("--scene", settings["scenes"])):
+    for option, values in (("--slam", told["slams"]), ("--scene", told["scenes"])):
         words_ += [option, *map(str, values)]
-    axis = settings.get("axis", "dynamism")
-    words_ += [f"--{axis}", *(f"{level:g}" for level in settings["levels"])]
+    axis = told.get("axis", "dynamism")
+    words_ += [f"--{axis}", *(f"{level:g}" for level in told["levels"])]
     for name in ("motion", "change", "crowd"):
-        if settings.get(name) is not None:
-            words_ += [f"--{name}", str(settings[name])]
-    if settings.get("sessions") is not None:
-        words_ += ["--sessions", str(settings["sessions"])]
+        if told.get(name) is not None:
+            words_ += [f"--{name}", str(told[name])]
+    if told.get("sessions") is not None:
+        words_ += ["--sessions", str(told["sessions"])]
     words_ += ["--seeds", str(len(seeds)), "--first-seed", str(seeds[0])]
-    words_ += ["--seconds", f"{settings['seconds']:g}", "--every", str(settings["every"])]
-    words_ += ["--scanner", settings["scanner"], "--scan-limit", f"{settings['scan_limit_s']:g}"]
+    words_ += ["--seconds", f"{told['seconds']:g}", "--every", str(told["every"])]
+    words_ += ["--scanner", told["scanner"], "--scan-limit", f"{told['scan_limit_s']:g}"]
     words_ += ["--out", "FOLDER"]
     return shlex.join(words_)

@@ -16,7 +16,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Affine2D
 
 from scenes.kinds import is_door
-from scripts.comparison.folder import RunFile
+from scripts.comparison.run_file import RunFile
 from scripts.figures import error_series, in_first_frame, log_axis
 from scripts.report import style
 from slam import se2
@@ -126,8 +126,10 @@ def _panel(run: RunFile, paths: Float | None = None) -> tuple[Figure, Axes]:
     low = room.T_map_origin[:2]
     high = low + np.array(room.values.shape[::-1]) * room.resolution_m
     if paths is not None:
-        low = np.maximum(low, paths.min(axis=0) - AROUND_M)
-        high = np.minimum(high, paths.max(axis=0) + AROUND_M)
+        near = np.maximum(low, paths.min(axis=0) - AROUND_M)
+        far = np.minimum(high, paths.max(axis=0) + AROUND_M)
+        if (near < far).all():  # else the whole of both is outside the room
+            low, high = near, far
     (x, y), (width, height) = low.tolist(), (high - low).tolist()
     shape = min(max(height / width, 0.4), 1.6)
     figure = style.new_figure(_PANEL, _PANEL * shape, margins=False)

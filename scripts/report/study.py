@@ -8,19 +8,14 @@ from collections.abc import Container
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from scripts.comparison import tables
-from scripts.comparison.columns import COLUMNS
-from scripts.comparison.folder import LEVELS, PAIRED, RUNS, Compared, RunFile, read
-from slam.errors import InvalidValueError, LogFormatError
+from scripts.comparison.csv_files import Row
+from scripts.comparison.folder import Compared, read
+from scripts.comparison.run_file import RunFile
+from slam.errors import InvalidValueError
 from slam.variants import ORACLE
 
-Row = dict[str, Any]
-SETTINGS = (
-    "slams", "scenes", "levels", "seeds", "seconds", "every", "scanner", "scan_limit_s",
-    "lost_rule",
-)  # fmt: skip
 LEAST_RUNS = 6  # with fewer not even all wins are unlikely enough by chance (sign test, 5 %)
 WORST = 3  # runs of a scene that the page lists
 
@@ -136,11 +131,8 @@ class Study:
         )
 
     def run(self, row: Row) -> RunFile:
-        """The file of a row's run; ``LogFormatError`` where it does not hold that SLAM."""
-        file = self.compared.run(row["scene"], row["dynamism"], int(row["seed"]))
-        if row["slam"] not in file.slams:
-            raise LogFormatError(self.compared.folder, f"a run without {row['slam']}")
-        return file
+        """The file of a row's run."""
+        return self.compared.run(row["scene"], row["dynamism"], row["seed"])
 
     def worst(self, scene: str, slam: str, outcomes: Container[str] | None = None) -> list[Row]:
         """Its worst runs, the very worst first: those that failed, then by the error.
@@ -202,23 +194,10 @@ def verdict(row: Row, less_is_better: bool) -> int:
 def study(folder: Path, subject: str | None = None) -> Study:
     """The comparison in ``folder``, about ``subject`` (the SLAM named first).
 
-    Raises ``LogFormatError`` for one that is missing, old or damaged, ``InvalidValueError`` for a
-    subject that did not take part.
+    Raises ``LogFormatError`` for one that is missing, old or damaged, as far as its recipe and
+    tables tell: a run is read when it is shown. ``InvalidValueError`` for a subject that did not
+    take part.
     """
     compared = read(folder)
-    absent = [key for key in SETTINGS if key not in compared.recipe["settings"]]
-    if absent:
-        raise LogFormatError(folder / "recipe.json", f"its settings lack '{absent[0]}'")
-    for name, rows, wanted in (
-        (RUNS, compared.runs, COLUMNS),
-        (LEVELS, compared.levels, tables.LEVEL_COLUMNS),
-        (PAIRED, compared.paired, tables.PAIRED_COLUMNS if compared.paired else ()),
-    ):
-        if not rows:
-            if name == PAIRED:  # one SLAM alone
-                continue
-            raise LogFormatError(folder / name, "a table without rows")
-        missing = [column for column in wanted if column not in rows[0]]
-        if missing:
-            raise LogFormatError(folder / name, f"a table without the column '{missing[0]}'")
+    compared.check_tables()
     return Study(compared, subject)

@@ -9,15 +9,16 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from scripts.comparison.tables import FAILED, by_seed, number
+from scripts.comparison.csv_files import Row
+from scripts.comparison.schema import OUTCOMES
+from scripts.comparison.tables import by_seed, number
 from scripts.metrics.row import Metric, digits
 from scripts.metrics.table import METRICS
 from scripts.report.answer import percent
-from scripts.report.study import LEAST_RUNS, Row, Study, verdict
+from scripts.report.study import LEAST_RUNS, Study, verdict
 from slam.evaluation.statistics import quantile, ratio_interval
 from slam.variants import ORACLE
 
-OUTCOMES = ("finished", "lost", *FAILED)
 _MARKS = {1: "better", -1: "worse", 0: ""}
 
 

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from scripts.comparison.folder import LEVELS, PAIRED, RUNS
+from scripts.comparison.schema import LEVELS, PAIRED, RUNS
 from scripts.names import DATASET
 from scripts.output import RECIPE, read_recipe_words
 from slam.errors import LogFormatError, MissingPathError

@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from scripts.closed_loop import make as drives
+from scripts.closed_loop.folder import driven
 from scripts.closed_loop.plan import Plan as DrivePlan
 from scripts.comparison import make as comparisons
-from scripts.comparison.folder import RunFile, read
+from scripts.comparison.folder import read
 from scripts.comparison.plan import Plan
+from scripts.comparison.run_file import RunFile
 from scripts.debugger.episode import case_of
 from scripts.film.footage import of_log, open_run
 from scripts.report import page
-from scripts.report.closed import driven
 from scripts.report.study import study
 from scripts.verbs.blame import blame
 from scripts.verbs.generate import generate

@@ -129,11 +129,12 @@ def tell(plan: Plan, rows: list[dict[str, Any]]) -> None:
 
 def tell_ages(out: Path) -> str:
     """Print the scores of age of each scene and level; the names of their files."""
-    from scripts.comparison import folder as files
+    from scripts.comparison.folder import read
+    from scripts.comparison.schema import AGES, AGES_LEVELS
     from scripts.report import score_tables
 
-    for group, rows in score_tables.groups(files.read(out).ages).items():
+    for group, rows in score_tables.groups(read(out).ages).items():
         console.print(score_tables.printed(group, rows))
         for line in score_tables.sentences(rows):
             fact(line)
-    return f", {files.AGES}, {files.AGES_LEVELS}"
+    return f", {AGES}, {AGES_LEVELS}"

@@ -31,14 +31,14 @@ def report(
 
     [bold]mobilia report out/compare --subject ekf[/bold]
     """
+    from scripts.closed_loop.folder import driven, drives_in
     from scripts.report import page
     from scripts.report.answer import failed
-    from scripts.report.closed import driven
     from scripts.report.study import study
     from scripts.report.wanted import check_comparison
 
     check_comparison(folder)
-    found = [*(drive or []), *sorted(path for path in folder.glob("drive*") if path.is_dir())]
+    found = [*(drive or []), *drives_in(folder)]
     about = study(folder, subject)
     with working("drawing the page"):
         path = page.write(about, [driven(one) for one in found])

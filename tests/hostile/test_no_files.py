@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from scripts import results
-from scripts.comparison.folder import read_csv, read_json
+from scripts.comparison.csv_files import read_csv
+from scripts.comparison.schema import RUNS, TABLES
 from scripts.output import read_recipe_words, write_recipe
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe, read_recipe
@@ -48,8 +49,7 @@ def nested(folder: Path) -> None:
         (read_recipe, "recipe.json"),
         (read_recipe_words, "recipe.json"),
         (check_vouched, "recipe.json"),
-        (read_csv, "runs.csv"),
-        (read_json, "runs.json"),
+        (lambda path: read_csv(path, TABLES[RUNS]), "runs.csv"),
         (Bag, "a.mcap"),
     ],
 )

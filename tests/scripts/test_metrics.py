@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.comparison import maps, tables
-from scripts.comparison.columns import COLUMNS, scored
+from scripts.comparison import maps, schema, tables
+from scripts.comparison.columns import scored
 from scripts.metrics import table
 from scripts.metrics.judged import Judged, lost_s
 from scripts.metrics.table import METRICS
@@ -42,7 +42,7 @@ def run() -> tuple[Track, Trajectory]:
 def test_every_metric_is_a_column_with_a_direction_and_words():
     for key, metric in METRICS.items():
         assert metric.label, key
-        assert (key in COLUMNS) == metric.column
+        assert (key in schema.TABLES[schema.RUNS].columns) == metric.column
         assert (key in (*tables.MEDIANS, *tables.SHARES)) == (metric.summary is not None)
         if metric.better is not None:  # the report compares by it, so it must explain it
             assert metric in table.EXPLAINED
@@ -59,7 +59,7 @@ def test_run_and_compare_compute_the_same_figures(run):
     shared = [m for m in table.IN_RUN if m.column and m.section == "errors"]
     assert len(shared) > 10
     assert {m.key: block[m.in_run] for m in shared} == {m.key: row[m.key] for m in shared}
-    assert set(row) <= set(COLUMNS)
+    assert set(row) <= set(schema.TABLES[schema.RUNS].columns)
     computed = {m.key for m in METRICS.values() if m.column and m.compute is not None}
     assert computed <= set(row)
 

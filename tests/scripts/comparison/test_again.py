@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 from scripts.cli import app
 from scripts.comparison import make
 from scripts.comparison.again import run_of
-from scripts.comparison.folder import RunFile
 from scripts.comparison.plan import Plan
+from scripts.comparison.run_file import RunFile
 from scripts.debugger.episode import case_of
 from scripts.debugger.recording import record
 from scripts.film.footage import open_run

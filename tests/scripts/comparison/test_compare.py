@@ -17,10 +17,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from scripts.comparison import folder, make, tables
-from scripts.comparison.columns import COLUMNS, lost_at
+from scripts.comparison import csv_files, folder, make, schema, tables
+from scripts.comparison.columns import lost_at
 from scripts.comparison.plan import Plan
 from scripts.comparison.recording import load
+from scripts.comparison.rules import Number, Table, Word
 from scripts.experiments import dynamism_curve
 from scripts.levels import levels
 from scripts.many import ManyValues, repeated
@@ -100,7 +101,7 @@ def rows_of(compared, slam):
 def test_tables_are_tidy_and_whole(compared):
     with (compared.folder / "runs.csv").open() as file:
         header = next(csv.reader(file))
-    assert tuple(header) == COLUMNS
+    assert header == list(schema.TABLES[schema.RUNS].columns)
     assert len(compared.runs) == 5
     assert {row["n"] for row in compared.levels if row["metric"] == "lost"} == {1}
     assert all(row["value"] is not None for row in compared.levels)
@@ -288,10 +289,12 @@ def test_the_dynamism_curve(tmp_path, capsys):
     from scripts.output import write_recipe
 
     rows = rows_rising("ekf", (0.1, 0.2, 0.9)) + rows_rising("odometry", (0.3, 0.1, 0.2))
-    settings = {"compare_schema": folder.SCHEMA, "scenes": ["arena"], "slams": ["ekf", "odometry"]}
-    settings |= {"levels": [0.0, 0.5, 1.0], "seeds": [0, 1, 2, 3], "seconds": 60.0}
+    settings = {"compare_schema": schema.SCHEMA, "scenes": ["arena"], "slams": ["ekf", "odometry"]}
+    settings |= {"levels": [0.0, 0.5, 1.0], "seeds": [0, 1, 2, 3], "seconds": 60.0, "every": 8}
+    settings |= {"scanner": "full", "scan_limit_s": 10.0, "lost_rule": "far off"}
+    settings |= {"machine": {"processor": "an abacus"}}
     write_recipe(tmp_path, "compare", settings)
-    folder.write_csv(tmp_path / "levels.csv", tables.levels(rows), tables.LEVEL_COLUMNS)
+    folder.write_table(tmp_path / "levels.csv", tables.levels(rows))
     found = {row["slam"]: row for row in dynamism_curve.correlations(folder.read(tmp_path))}
     assert found["ekf"]["ATE"] == pytest.approx(1.0)
     assert found["odometry"]["ATE"] == pytest.approx(-0.5)
@@ -303,11 +306,10 @@ def test_the_dynamism_curve(tmp_path, capsys):
 
 
 def test_a_failure_in_a_table_is_no_formula(tmp_path):
-    rows = [
-        {"slam": "=cmd|' /C calc'!A0", "failure": "-2+3", "dynamism": -0.5, "outcome": "@SUM(A1)"}
-    ]
-    columns = ["slam", "failure", "dynamism", "outcome"]
-    folder.write_csv(tmp_path / "t.csv", rows, columns)
+    rows = [{"slam": "=cmd|' /C calc'!A0", "failure": "-2+3", "off": -0.5, "word": "@SUM(A1)"}]
+    columns = {"slam": Word(), "failure": Word(), "off": Number(least=-1.0), "word": Word()}
+    table = Table(columns=columns, key=("slam",))
+    csv_files.write_checked(tmp_path / "t.csv", rows, table)
     written = (tmp_path / "t.csv").read_text().splitlines()[1]
     assert written == "'=cmd|' /C calc'!A0,'-2+3,-0.5,'@SUM(A1)"
-    assert folder.read_csv(tmp_path / "t.csv") == rows
+    assert csv_files.read_csv(tmp_path / "t.csv", table) == rows

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from scripts.comparison.columns import COLUMNS
-from scripts.comparison.folder import LEVELS, RUNS, Compared, write_csv
-from scripts.comparison.tables import LEVEL_COLUMNS, levels
+from scripts.comparison.folder import Compared, write_table
+from scripts.comparison.schema import LEVELS, RUNS
+from scripts.comparison.tables import levels
 from scripts.quotes.distil import distil, main
 from scripts.quotes.results import Comparison, Pair, write
 from slam.errors import InvalidValueError
@@ -19,7 +19,8 @@ DYNAMISM, SEEDS = [0.0, 0.5, 1.0], [100, 101, 102]
 SETTINGS = {
     "compare_schema": 1, "slams": ["shunting", "occupancy"], "scenes": ["arena"],
     "levels": DYNAMISM, "seeds": SEEDS, "seconds": 60.0, "every": 8, "scanner": "full",
-    "scan_limit_s": 10.0, "machine": {"processor": "p", "cores": 2, "python": "3.12.0"},
+    "scan_limit_s": 10.0, "lost_rule": "far off",
+    "machine": {"processor": "p", "cores": 2, "python": "3.12.0"},
 }  # fmt: skip
 
 
@@ -30,7 +31,7 @@ def compared(tmp_path: Path) -> Compared:
     rows = []
     for k, dynamism in enumerate(DYNAMISM):
         for seed in SEEDS:
-            head = {"scene": "arena", "dynamism": dynamism, "seed": seed, "lost": 0}
+            head = {"scene": "arena", "dynamism": dynamism, "seed": seed, "lost": 0, "scans": 9}
             head |= {"moving_share_of_returns": 0.01 * k, "outcome": "finished"}
             for slam, further in (("shunting", 0.0), ("occupancy", 0.01 * (k + 1))):
                 error = 0.02 + further * (seed != 102)
@@ -42,8 +43,8 @@ def compared(tmp_path: Path) -> Compared:
     failed |= {"outcome": "nan", "lost": 1}
     recipe = {"command": "compare", "settings": SETTINGS, "versions": {}}
     (tmp_path / "recipe.json").write_text(json.dumps(recipe))
-    write_csv(tmp_path / RUNS, rows, COLUMNS)
-    write_csv(tmp_path / LEVELS, levels(Compared(tmp_path).runs), LEVEL_COLUMNS)
+    write_table(tmp_path / RUNS, rows)
+    write_table(tmp_path / LEVELS, levels(Compared(tmp_path).runs))
     return Compared(tmp_path)
 
 

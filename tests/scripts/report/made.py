@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from scripts.closed_loop import tables as closed_loop
+from scripts.closed_loop import folder as drives
 from scripts.comparison import folder as files
-from scripts.comparison import tables
-from scripts.comparison.columns import COLUMNS
+from scripts.comparison import schema, tables
+from scripts.comparison.csv_files import write_checked
 from scripts.days import scores
 from scripts.days.lifelong import COLUMNS as SESSION
 from scripts.output import write_recipe
@@ -33,20 +33,25 @@ def make(folder: Path, seeds: tuple[int, ...] = SEEDS) -> Path:
         row_of(slam, level, seed) for level in LEVELS for seed in seeds for slam in (OURS, EKF, OWN)
     ]
     settings = {
-        "compare_schema": files.SCHEMA, "slams": [OURS, EKF, OWN], "scenes": [SCENE],
+        "compare_schema": schema.SCHEMA, "slams": [OURS, EKF, OWN], "scenes": [SCENE],
         "levels": LEVELS, "seeds": seeds, "seconds": 4.0, "every": 8, "scanner": "full",
         "scan_limit_s": 10.0, "lost_rule": LOST_RULE, "machine": {"processor": "an abacus"},
     }  # fmt: skip
     folder.mkdir(parents=True)
     write_recipe(folder, "compare", settings)
-    files.write_csv(folder / files.RUNS, rows, COLUMNS)
-    files.write_csv(folder / files.LEVELS, tables.levels(rows), tables.LEVEL_COLUMNS)
-    files.write_csv(folder / files.PAIRED, tables.pairs(rows), tables.PAIRED_COLUMNS)
+    write_tables(folder, rows)
     (folder / "runs").mkdir()
     for level in LEVELS:
         for seed in seeds:
             np.savez_compressed(folder / "runs" / f"{SCENE}_d{level:g}_s{seed}.npz", **run_of())
     return folder
+
+
+def write_tables(folder: Path, rows: list[dict[str, Any]]) -> None:
+    """The tables of these rows of ``runs.csv``."""
+    files.write_table(folder / schema.RUNS, rows)
+    files.write_table(folder / schema.LEVELS, tables.levels(rows))
+    files.write_table(folder / schema.PAIRED, tables.pairs(rows))
 
 
 def row_of(slam: str, level: float, seed: int) -> dict[str, Any]:
@@ -72,7 +77,7 @@ def run_of() -> dict[str, Any]:
     room[[0, -1]] = room[:, 0] = room[:, -1] = 1
     movers = np.tile([[4.0, 2.0, 0.0], [6.0, 0.1, 1.0]], (SCANS, 1, 1))
     arrays = {
-        "schema": files.SCHEMA, "slams": np.array([OURS, EKF, OWN]), "stamps_ns": stamps,
+        "schema": schema.SCHEMA, "slams": np.array([OURS, EKF, OWN]), "stamps_ns": stamps,
         "truth": truth, "ranges": np.full((SCANS, BEAMS), 2.0, np.float32),
         "hit": np.zeros((SCANS, BEAMS), np.int16), "mover_poses": movers,
         "moving": np.arange(SCANS)[:, None] % 2 == [0, 0], "names": np.array(["chair1", "door1"]),
@@ -112,11 +117,12 @@ def add_days(folder: Path, buildings: int = 6) -> Path:
                 for age in (1, 3) if slam == OURS
             ]  # fmt: skip
             for motion in LEVELS:
-                of = {"scene": SCENE, "motion": motion, "change": 0.3, "seed": seed, "slam": slam}
+                of = {"scene": SCENE, "motion": motion, "change": 0.3, "seed": SEEDS[seed],
+                      "slam": slam}  # fmt: skip
                 rows.append(scores.of_building(of, sessions, aged, failure))
     (folder / "recipe.json").write_text(json.dumps(recipe))
-    files.write_csv(folder / files.AGES, rows, scores.COLUMNS)
-    files.write_csv(folder / files.AGES_LEVELS, scores.levels(rows), scores.LEVEL_COLUMNS)
+    files.write_table(folder / schema.AGES, rows)
+    files.write_table(folder / schema.AGES_LEVELS, scores.levels(rows))
     return folder
 
 
@@ -145,12 +151,12 @@ def make_drive(folder: Path, reached: int = 6) -> Path:
             rows.append({
                 "scene": SCENE, "dynamism": level, "slam": slam, "runs": 2, "goals": 8,
                 "reached": count, "success": count / 8, "success_low": 0.1 * count,
-                "success_high": 0.95, "wrong": 1, "given_up": 0, "failed": 0, "time_s": 20.0,
-                "collisions_per_km": 1.5, "near_misses_per_km": 0.0, "runs_lost": 1,
+                "success_high": 0.95, "wrong": 1, "given_up": 0, "given_up_taken": 0, "failed": 0,
+                "time_s": 20.0, "collisions_per_km": 1.5, "near_misses_per_km": 0.0, "runs_lost": 1,
                 "runs_recovered": 1, **(arrived if count else {}),
             })  # fmt: skip
     folder.mkdir(parents=True)
     loop = {"tolerance_m": 0.5, "plan_on": "layout"}
     write_recipe(folder, "drive", {"drive_schema": 1, "loop": loop})
-    files.write_csv(folder / "levels.csv", rows, closed_loop.LEVEL_COLUMNS)
+    write_checked(folder / "levels.csv", rows, drives.TABLE)
     return folder

@@ -15,12 +15,13 @@ import pytest
 from typer.testing import CliRunner
 
 from scripts import cli
+from scripts.closed_loop.folder import driven
 from scripts.comparison import folder as files
-from scripts.comparison.columns import COLUMNS
+from scripts.comparison import schema
+from scripts.comparison.csv_files import write_csv
 from scripts.metrics.row import digits
 from scripts.metrics.table import METRICS
 from scripts.report import closed, page, pictures, tables, words
-from scripts.report.closed import driven
 from scripts.report.study import study, verdict
 from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.report import made
@@ -149,9 +150,11 @@ def test_a_ratio_has_its_interval(folder: Path):
 def kept(folder: Path, keep) -> None:
     """Rewrite the tables of a comparison with some of its rows alone."""
     rows = [row for row in files.read(folder).runs if keep(row)]
-    files.write_csv(folder / files.RUNS, rows, COLUMNS)
-    files.write_csv(folder / files.LEVELS, made.tables.levels(rows), made.tables.LEVEL_COLUMNS)
-    files.write_csv(folder / files.PAIRED, made.tables.pairs(rows), made.tables.PAIRED_COLUMNS)
+    made.write_tables(folder, rows)
+    recipe = json.loads((folder / "recipe.json").read_text())
+    recipe["settings"]["slams"] = list(dict.fromkeys(row["slam"] for row in rows))
+    recipe["settings"]["levels"] = sorted({row["dynamism"] for row in rows})
+    (folder / "recipe.json").write_text(json.dumps(recipe))
 
 
 @pytest.mark.parametrize(
@@ -194,11 +197,16 @@ def test_a_drive_beside_the_comparison_is_told_too(folder: Path, tmp_path: Path)
     assert "ways planned on the layout" in text
 
 
+DRIVE = '{"command": "drive", "settings": {"drive_schema": 1, "loop": {"plan_on": 3}}}'
+
+
 @pytest.mark.parametrize(
     ("name", "content", "says"),
-    [("recipe.json", "{}", "no closed-loop drive of schema"),
-     ("levels.csv", "scene,dynamism\n", "a table without 'scene'"),
-     ("levels.csv", "scene,dynamism\na,0\n", "a table without 'slam'")],
+    [("recipe.json", "{}", "lacks command, which must be drive"),
+     ("recipe.json", DRIVE.replace("1", "2"), "no closed-loop drive of schema 1"),
+     ("recipe.json", DRIVE, "settings.loop must be a mapping with"),
+     ("levels.csv", "scene,dynamism\n", "a table without the column 'slam'"),
+     ("levels.csv", "scene,slam\na,b\n", "a table without the column 'dynamism'")],
 )  # fmt: skip
 def test_what_is_no_drive_is_told(tmp_path: Path, name: str, content: str, says: str):
     folder = made.make_drive(tmp_path / "drive")
@@ -272,7 +280,7 @@ def damage(name: str):
 
 def without_a_column(folder: Path) -> None:
     rows = files.read(folder).runs
-    files.write_csv(folder / files.RUNS, rows, [name for name in rows[0] if name != "outcome"])
+    write_csv(folder / schema.RUNS, rows, [name for name in rows[0] if name != "outcome"])
 
 
 def of_another_schema(folder: Path) -> None:
@@ -293,16 +301,22 @@ def run_of_another_schema(folder: Path) -> None:
             lambda folder: (folder / "recipe.json").unlink(),
             "recipe.json: cannot be read: No such file",
         ),
-        (lambda folder: (folder / "recipe.json").write_text("[1]"), "holds no JSON object"),
-        (damage("recipe.json"), "recipe.json: cannot be read"),
+        (lambda folder: (folder / "recipe.json").write_text("[1]"), "no recipe: not a JSON object"),
+        (damage("recipe.json"), "recipe.json: no recipe: "),
         (of_another_schema, "no comparison of schema 1"),
         (lambda folder: (folder / "runs.csv").unlink(), "runs.csv: cannot be read"),
-        (damage("levels.csv"), "levels.csv: no table"),
-        (lambda folder: (folder / "paired.csv").write_bytes(b"\xff"), "paired.csv: no table"),
-        (lambda folder: (folder / "runs.csv").write_text("scene\n"), "a table without rows"),
+        (damage("levels.csv"), "levels.csv:26: must have 11 cells, got 5"),
+        (
+            lambda folder: (folder / "paired.csv").write_bytes(b"\xff"),
+            "paired.csv: not a text",
+        ),
+        (
+            lambda folder: (folder / "runs.csv").write_text("scene\n"),
+            "runs.csv:1: a table without",
+        ),
         (without_a_column, "a table without the column 'outcome'"),
         (damage("runs/room_d1_s102.npz"), "room_d1_s102.npz: no whole NumPy archive"),
-        (run_of_another_schema, "it lacks 'stamps_ns'"),
+        (run_of_another_schema, "holds no array 'schema'"),
     ],
 )
 def test_what_is_no_comparison_is_told_in_a_line(tmp_path: Path, harm, says, monkeypatch, capsys):

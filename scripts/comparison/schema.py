@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a comparison on file is: its tables, the settings of its recipe, the arrays of its runs.
+
+This is the one place that says so: ``Plan`` and the writer are held to it, and ``folder`` reads by
+it, for ``report`` and ``verify`` alike. A table, a recipe or a run may hold more: a column, key or
+array that is not named here is not read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from scripts.comparison.arrays import Array
+from scripts.comparison.rules import (
+    LEVEL,
+    MAX_MESSAGE,
+    SHARE,
+    Columns,
+    Many,
+    Named,
+    Number,
+    Plain,
+    Rule,
+    Table,
+    Truth,
+    Word,
+    level_of,
+)
+from scripts.days import scores
+from scripts.days.ages import AGES as OLD
+from scripts.knobs import AXES
+from scripts.metrics.row import Metric
+from scripts.metrics.table import COLUMNS as MEASURED
+from scripts.metrics.table import METRICS
+from sim.recording.recipe import MAX_SECONDS
+from sim.world.times_of_day import MOST_SESSIONS
+from slam.answers import LEAST_CELL_M, MOST_CELL_M, MOST_M
+
+SCHEMA = 1
+RUNS, RUNS_JSON, LEVELS, PAIRED = "runs.csv", "runs.json", "levels.csv", "paired.csv"
+AGES, AGES_LEVELS = "ages.csv", "ages_levels.csv"
+FAILED = ("raised", "hung", "nan", "bad")
+OUTCOMES = ("finished", "lost", *FAILED)
+_NAME = Word()
+_SEED = Number(most=2.0**63, whole=True)
+_MAYBE_SHARE = Number(most=1.0, optional=True)
+_COUNT, _MAYBE_COUNT = Number(most=1e9, whole=True), Number(most=1e9, whole=True, optional=True)
+_SIGNED = Number(least=-math.inf)
+_POSITIVE, _MAYBE = Number(), Number(optional=True)
+_FAILURE = Word(most=MAX_MESSAGE, optional=True)
+
+
+def _measured(metric: Metric) -> Number:
+    return Number(least=metric.least, most=metric.most, whole=metric.whole, optional=True)
+
+
+# "dynamism" is the level, of whatever axis: a table over motion or change calls it so on file.
+_RUNS: Columns = {
+    "scene": _NAME, "dynamism": level_of("dynamism"), "seed": _SEED, "slam": _NAME,
+    "outcome": Word(among=OUTCOMES), "failure": _FAILURE, "scans": _COUNT,
+    **{key: _measured(METRICS[key]) for key in MEASURED},
+    "lost": Number(most=1.0, whole=True),
+}  # fmt: skip
+_SUMMARY: Columns = {
+    "metric": Word(among=tuple(METRICS)), "statistic": Word(among=("median", "share")),
+    "n": Number(least=1.0, most=1e9, whole=True),
+    "value": _SIGNED, "low": _SIGNED, "high": _SIGNED,
+}  # fmt: skip
+_LEVELS: Columns = {
+    "scene": _NAME, "dynamism": level_of("dynamism"), "slam": _NAME, **_SUMMARY,
+    "q25": Number(least=-math.inf, optional=True), "q75": Number(least=-math.inf, optional=True),
+}  # fmt: skip
+_PAIRED: Columns = {
+    "scene": _NAME, "dynamism": level_of("dynamism"), "metric": Word(among=tuple(METRICS)),
+    "slam_a": _NAME, "slam_b": _NAME, "n": _SUMMARY["n"],
+    "median_difference": _SIGNED, "low": _SIGNED, "high": _SIGNED,
+    "wins": _COUNT, "ties": _COUNT, "losses": _COUNT, "p_sign": SHARE,
+}  # fmt: skip
+_BUILDING: Columns = {"scene": _NAME, "motion": SHARE, "change": SHARE}
+_TO_FIND = ("to_find", "found", "found_soon", "wrong", "known", "known_soon")
+_AGES: Columns = {
+    **dict.fromkeys(scores.COLUMNS, _MAYBE), **_BUILDING, "seed": _SEED, "slam": _NAME,
+    "map": Word(among=(scores.DAYS, scores.ANEW)),
+    "sessions": Number(least=1.0, most=MOST_SESSIONS, whole=True), "failed": _COUNT,
+    "failure": _FAILURE, **dict.fromkeys(_TO_FIND, _MAYBE_COUNT),
+    "found_share": _MAYBE_SHARE, "found_soon_share": _MAYBE_SHARE,
+    **{f"right_age{age}": Number(most=1.0, whole=True, optional=True) for age in OLD},
+}  # fmt: skip
+_AGES_LEVELS: Columns = {
+    **_BUILDING, "slam": _NAME, **_SUMMARY,
+    "metric": Word(among=tuple(score.key for score in scores.SCORES)),
+}  # fmt: skip
+TABLES: Mapping[str, Table] = {
+    RUNS: Table(columns=_RUNS, key=("scene", "dynamism", "seed", "slam")),
+    LEVELS: Table(columns=_LEVELS, key=("scene", "dynamism", "slam", "metric")),
+    PAIRED: Table(columns=_PAIRED, key=("scene", "dynamism", "metric", "slam_a", "slam_b")),
+    AGES: Table(
+        columns=_AGES, key=("scene", "motion", "change", "seed", "slam"), together=_TO_FIND,
+        parts=(
+            ("failed", "sessions"), ("found", "to_find"), ("found_soon", "to_find"),
+            ("wrong", "to_find"), ("known", "to_find"), ("known_soon", "known"),
+        ),
+    ),
+    AGES_LEVELS: Table(columns=_AGES_LEVELS, key=("scene", "motion", "change", "slam", "metric")),
+}  # fmt: skip
+"""By file."""
+
+
+def settings(axis: str) -> Mapping[str, Rule]:
+    """The settings of a recipe, levels being of that axis."""
+    return {
+        "compare_schema": Number(least=SCHEMA, most=SCHEMA, whole=True),
+        "slams": Many(of=_NAME), "scenes": Many(of=_NAME), "levels": Many(of=level_of(axis)),
+        "seeds": Many(of=_SEED), "seconds": Number(most=MAX_SECONDS),
+        "every": Number(least=1.0, most=1000.0, whole=True), "scanner": _NAME,
+        "scan_limit_s": Number(most=1e9), "lost_rule": Word(),
+        "machine": Named(fields={"processor": Word()}, others=Plain()),
+    }  # fmt: skip
+
+
+LATER: Mapping[str, Rule] = {
+    "axis": Word(among=(*AXES, LEVEL)), "motion": _MAYBE_SHARE, "change": _MAYBE_SHARE,
+    "crowd": Word(optional=True), "odometry": _NAME, "sets": Plain(), "judge_maps": Truth(),
+    "sessions": Number(least=2.0, most=MOST_SESSIONS, whole=True, optional=True),
+}  # fmt: skip
+"""Settings that recipes of before did not have."""
+RECIPE: Mapping[str, Rule] = {
+    "command": Word(among=("compare",)),
+    "settings": Named(fields={}),
+    "versions": Named(fields={}, others=Plain()),
+}
+"""The recipe around them."""
+
+
+def _poses(*shape: int | str) -> Array:
+    """Of places and headings, m and rad."""
+    return Array(kinds="f", shape=shape, least=-MOST_M, most=MOST_M)
+
+
+_CELL_M = Array(kinds="f", least=LEAST_CELL_M, most=MOST_CELL_M)
+_POSE = _poses(3)
+RUN: Mapping[str, Array] = {
+    "schema": Array(kinds="iu", least=SCHEMA, most=SCHEMA),
+    "slams": Array(kinds="U", shape=("slams",)),
+    "stamps_ns": Array(kinds="i", shape=("scans",), rising=True),
+    "truth": _poses("scans", 3),
+    "ranges": Array(kinds="f", shape=("scans", "beams"), finite=False),
+    "hit": Array(kinds="i", shape=("scans", "beams"), least=-2.0, most=2.0**15),
+    "mover_poses": _poses("scans", "movers", 3),
+    "moving": Array(kinds="b", shape=("scans", "movers")),
+    "names": Array(kinds="U", shape=("movers",)),
+    "kinds": Array(kinds="U", shape=("movers",)),
+    "radii_m": Array(kinds="f", shape=("movers",), most=MOST_M),
+    "closed": _poses("movers", 3),
+    "static_map": Array(kinds="u", shape=("rows", "columns"), most=1.0),
+    "static_map_resolution_m": _CELL_M,
+    "T_world_origin": _POSE,
+    "laser_angle_min": Array(kinds="f", least=-100.0, most=100.0),
+    "laser_angle_increment": Array(kinds="f", least=-100.0, most=100.0),
+    "laser_range_max": Array(kinds="f", most=MOST_M),
+    "laser_T_robot_laser": _POSE,
+}
+"""The arrays of a file of ``runs/``; what is called alike has the same length."""
+ENTRY: Mapping[str, Array] = {
+    "stamps_ns": Array(kinds="i", shape=("answered",), rising=True),
+    "poses": _poses("answered", 3),
+    "covariances": Array(kinds="f", shape=("answered", 3, 3), least=-math.inf),
+    "converged": Array(kinds="b", shape=("answered",)),
+    "milliseconds": Array(kinds="f", shape=("answered",)),
+}
+"""Those of each SLAM in it, after ``slam0_`` and so on: of the first scans, which it answered."""
+ENTRY_MAP: Mapping[str, Array] = {
+    "map": Array(kinds="u", shape=("map rows", "map columns"), most=255.0),
+    "map_resolution_m": _CELL_M,
+    "T_map_origin": _POSE,
+}
+"""And of its last map: all three or none."""

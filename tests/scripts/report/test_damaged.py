@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison that somebody harmed is shown or refused in a line, and ``verify`` agrees."""
+
+from __future__ import annotations
+
+import json
+import random
+import resource
+import shutil
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scripts import results
+from scripts.closed_loop.folder import driven
+from scripts.report import page, pictures
+from scripts.report.study import study
+from sim.recording.sums import write_sums
+from slam.errors import LogFormatError
+from tests.scripts.report import made, mutations
+
+CASES, DRAWN = 500, 8
+MOST_BYTES = 48 << 20  # by which the process may grow; the folder has 100 kB
+# What ``verify`` wants to be there, and no report reads.
+UNREAD = (
+    "runs.json", "drive/runs.csv", "drive/runs.json", "drive/goals.csv", "drive/closed_loop.png",
+    "drive/paths.png",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One seed at two levels, with buildings and a drive."""
+    folder = made.make(tmp_path_factory.mktemp("damaged") / "compare", seeds=(100,))
+    made.add_days(folder, buildings=1)
+    made.make_drive(folder / "drive")
+    for name in UNREAD:
+        (folder / name).write_text("x")
+    return folder
+
+
+@pytest.fixture
+def folder(whole: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / "compare"))
+
+
+def read_all(folder: Path) -> None:
+    """All that a report of it could read."""
+    study(folder).compared.check()
+    driven(folder / "drive")
+
+
+def well(folder: Path) -> bool:
+    """Whether ``verify`` calls it well, all hashes being right."""
+    write_sums(folder / "drive")
+    write_sums(folder)
+    return all(found.ok for found in results.check(folder))
+
+
+def refusal(folder: Path) -> str:
+    """What is said of it; "" where all is read."""
+    try:
+        read_all(folder)
+    except LogFormatError as error:
+        said = str(error)
+    else:
+        return ""
+    assert str(folder) in said
+    assert said.isprintable()
+    assert len(said) < 4000
+    return said
+
+
+def test_what_is_whole_is_read_and_called_well(folder: Path):
+    assert refusal(folder) == ""
+    assert well(folder)
+
+
+def peak_bytes() -> int:
+    """The most memory that this process has held so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def array(name: str, value: Any):
+    def harm(folder: Path) -> None:
+        path = folder / "runs" / "room_d1_s100.npz"
+        with np.load(path) as file:
+            arrays = dict(file)
+        arrays[name] = value(arrays[name]) if callable(value) else np.array(value)
+        np.savez(path, **arrays)
+
+    return harm
+
+
+def cell(table: str, column: str, word: str):
+    def harm(folder: Path) -> None:
+        lines = [line.split(",") for line in (folder / table).read_text().splitlines()]
+        lines[1][lines[0].index(column)] = word
+        (folder / table).write_text("".join(",".join(line) + "\n" for line in lines))
+
+    return harm
+
+
+def setting(key: str, value: Any):
+    def harm(folder: Path) -> None:
+        words = json.loads((folder / "recipe.json").read_text())
+        words["settings"][key] = value
+        (folder / "recipe.json").write_text(json.dumps(words))
+
+    return harm
+
+
+@pytest.mark.parametrize(
+    ("harm", "says"),
+    [
+        (array("static_map_resolution_m", 0.0),
+         "array 'static_map_resolution_m' must lie in 0.001..1000, got 0.0"),
+        (array("static_map_resolution_m", 1e300),
+         "array 'static_map_resolution_m' must lie in 0.001..1000, got 1e+300"),
+        (array("slam0_map_resolution_m", np.nan),
+         "array 'slam0_map_resolution_m' must be finite, got nan"),
+        (array("truth", lambda a: a[:, :2]), "array 'truth' must have shape (20 scans, 3), got "),
+        (array("truth", lambda a: a[:-1]), "array 'truth' must have shape (20 scans, 3), got "),
+        (array("hit", lambda a: a + 9), "array 'hit' must lie in -2..1, got 9"),
+        (array("moving", lambda a: a * 1.0), "array 'moving' must hold booleans, got float64"),
+        (array("static_map", lambda a: a * 2), "array 'static_map' must lie in 0..1, got 2"),
+        (array("slams", np.array(["ekf", "ekf", "own"])), "array 'slams' must name each once"),
+        (array("slam1_stamps_ns", lambda a: a + 1), "must begin as 'stamps_ns' does"),
+        (array("stamps_ns", lambda a: a[::-1]), "array 'stamps_ns' must strictly increase"),
+        (cell("runs.csv", "seed", "nan"),
+         "runs.csv:2: column 'seed' must be a whole number from 0 to 9223372036854775808, got "
+         "'nan'"),
+        (cell("runs.csv", "ate_unaligned_m", "far"),
+         "column 'ate_unaligned_m' must be a number from 0 to 1e+100 or infinite or nothing, got "
+         "'far'"),
+        (cell("levels.csv", "n", "1.5"), "column 'n' must be a whole number from 1 to"),
+        (cell("runs.csv", "outcome", "well"), "column 'outcome' must be one of finished, lost,"),
+        (cell("runs.csv", "slam", "karto"),
+         "row 1: column 'slam' must be one of settings.slams of the recipe, got 'karto'"),
+        (cell("levels.csv", "value", "2"), "value must be a number from 0 to 1, as it is of a sh"),
+        (cell("ages.csv", "found", "9"), "found must be at most to_find, 4, got 9"),
+        (setting("machine", ["processor"]), "settings.machine must be a mapping with 'processor'"),
+        (setting("slams", "shunting"), "settings.slams must be a list of one or more, each once"),
+        (setting("seeds", [1, 1]), "settings.seeds must be a list of one or more, each once and"),
+        (setting("every", "8"), "settings.every must be a whole number from 1 to 1000, got '8'"),
+        (setting("seconds", float("nan")), "settings.seconds must be a number from 0 to"),
+    ],
+)  # fmt: skip
+def test_one_wrong_value_is_named_with_what_is_wanted(folder: Path, harm, says: str):
+    harm(folder)
+    assert says in refusal(folder)
+    assert not well(folder)
+
+
+def test_whatever_is_harmed_is_read_or_refused_in_a_line(whole: Path, tmp_path: Path):
+    """500 harms: no traceback, no memory that the folder does not have, and ``verify`` agrees."""
+    ended: Counter[bool] = Counter()
+    before = peak_bytes()
+    for case in range(CASES):
+        folder = tmp_path / "harmed"
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(whole, folder)
+        how = mutations.mutate(folder, random.Random(case))
+        said = refusal(folder)
+        if case % 8 == 0:  # it reads all once more
+            assert well(folder) == (said == ""), (how, said)
+        assert peak_bytes() - before < MOST_BYTES, how
+        ended[said == ""] += 1
+    assert min(ended.values()) > CASES // 10, ended  # it tries what is refused and what is not
+
+
+@pytest.mark.parametrize("first", range(DRAWN))
+def test_whatever_is_read_is_drawn(whole: Path, tmp_path: Path, first: int, monkeypatch):
+    """A harm that is no fault, or none that the schema knows, has a page."""
+    monkeypatch.setattr(pictures, "MOMENTS", 2)
+    draw = random.Random(1000 + first)
+    while True:
+        folder = tmp_path / "harmed"
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(whole, folder)
+        mutations.mutate(folder, draw)
+        if refusal(folder) == "":
+            break
+    assert page.render(study(folder), [driven(folder / "drive")]).rstrip().endswith("</html>")
