@@ -27,8 +27,6 @@ from scripts.comparison.rules import (
     Word,
     level_of,
 )
-from scripts.days import scores
-from scripts.days.ages import AGES as OLD
 from scripts.knobs import AXES
 from scripts.metrics.row import Metric
 from scripts.metrics.table import COLUMNS as MEASURED
@@ -42,12 +40,19 @@ RUNS, RUNS_JSON, LEVELS, PAIRED = "runs.csv", "runs.json", "levels.csv", "paired
 AGES, AGES_LEVELS = "ages.csv", "ages_levels.csv"
 FAILED = ("raised", "hung", "nan", "bad")
 OUTCOMES = ("finished", "lost", *FAILED)
+DAYS, ANEW = "days", "anew"  # of the column "map"
+OLD = (1, 3, 10)  # sessions, of maps of some age
+OVER_TIME = (
+    "ghost_rate", "ghost_seen_rate", "recall", "map_kb", "memory_mb", "ms_per_scan", "load_s",
+)  # fmt: skip
+"""Columns of sessions of which there is an early and a late one. The last two are times."""
 _NAME = Word()
 _SEED = Number(most=2.0**63, whole=True)
 _MAYBE_SHARE = Number(most=1.0, optional=True)
 _COUNT, _MAYBE_COUNT = Number(most=1e9, whole=True), Number(most=1e9, whole=True, optional=True)
 _SIGNED = Number(least=-math.inf)
 _POSITIVE, _MAYBE = Number(), Number(optional=True)
+_MAYBE_ONE = Number(most=1.0, whole=True, optional=True)
 _FAILURE = Word(most=MAX_MESSAGE, optional=True)
 
 
@@ -80,16 +85,21 @@ _PAIRED: Columns = {
 _BUILDING: Columns = {"scene": _NAME, "motion": SHARE, "change": SHARE}
 _TO_FIND = ("to_find", "found", "found_soon", "wrong", "known", "known_soon")
 _AGES: Columns = {
-    **dict.fromkeys(scores.COLUMNS, _MAYBE), **_BUILDING, "seed": _SEED, "slam": _NAME,
-    "map": Word(among=(scores.DAYS, scores.ANEW)),
+    **_BUILDING, "seed": _SEED, "slam": _NAME, "map": Word(among=(DAYS, ANEW)),
     "sessions": Number(least=1.0, most=MOST_SESSIONS, whole=True), "failed": _COUNT,
     "failure": _FAILURE, **dict.fromkeys(_TO_FIND, _MAYBE_COUNT),
     "found_share": _MAYBE_SHARE, "found_soon_share": _MAYBE_SHARE,
-    **{f"right_age{age}": Number(most=1.0, whole=True, optional=True) for age in OLD},
+    **dict.fromkeys(("rmse_session0_m", "rmse_session1_m", "rmse_last_m", "rmse_growth"), _MAYBE),
+    **{
+        name: rule
+        for age in OLD
+        for name, rule in ((f"right_age{age}", _MAYBE_ONE), (f"rmse_age{age}_m", _MAYBE))
+    },
+    **{f"{name}_{when}": _MAYBE for name in OVER_TIME for when in ("early", "late")},
+    "outdated_told": _MAYBE, "outdated_false": _MAYBE,
 }  # fmt: skip
 _AGES_LEVELS: Columns = {
-    **_BUILDING, "slam": _NAME, **_SUMMARY,
-    "metric": Word(among=tuple(score.key for score in scores.SCORES)),
+    **_BUILDING, "slam": _NAME, **_SUMMARY, "metric": _NAME,
 }  # fmt: skip
 TABLES: Mapping[str, Table] = {
     RUNS: Table(columns=_RUNS, key=("scene", "dynamism", "seed", "slam")),

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from scenes.kinds import is_door
 from scripts.comparison.recording import Recording
+from scripts.comparison.schema import OLD as AGES
 from scripts.comparison.sight import Sight
 from scripts.days.truth import Still, moved_since, still_things
 from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float
 from slam.tracker.belief.status import Status
 
-AGES = (1, 3, 10)  # sessions
 NEWS_S = 2.0  # after which the map has learnt what it saw
 CLEARLY, HARDLY = 0.1, 0.01  # share of a scan's beams that what changed has met or let pass
 COLUMNS = ("slam", "age", "session", "found_after_s", "place", "rmse_m", "worst_m", "tracked")

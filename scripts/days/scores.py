@@ -13,33 +13,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from scripts.days.ages import AGES
+from scripts.comparison import schema
+from scripts.comparison.schema import ANEW, DAYS, OVER_TIME
+from scripts.comparison.schema import OLD as AGES
 from sim.world.times_of_day import DAY
 from slam.evaluation.statistics import median_interval, quantile, share_interval
 
 Row = Mapping[str, Any]
 SOON_S = 10.0  # within which a session is to be found
-DAYS, ANEW = "days", "anew"  # of the column "map"
-IDENTITY = ("scene", "motion", "change", "seed", "slam")
-OVER_TIME = (
-    "ghost_rate", "ghost_seen_rate", "recall", "map_kb", "memory_mb", "ms_per_scan", "load_s",
-)  # fmt: skip
-"""Columns of sessions of which there is an early and a late one. The last two are times."""
 _OF_A_MAP = ("ghost_seen_rate", "map_kb", "memory_mb", "load_s")  # none for a SLAM without days
 A_DAY = len(DAY)  # sessions
 _ERRORS = ("rmse_session0_m", "rmse_session1_m", "rmse_last_m")
-COLUMNS = (
-    *IDENTITY, "map", "sessions", "failed", "failure",
-    "to_find", "found", "found_soon", "wrong", "known", "known_soon",
-    "found_share", "found_soon_share", *_ERRORS, "rmse_growth",
-    *(column for age in AGES for column in (f"right_age{age}", f"rmse_age{age}_m")),
-    *(f"{column}_{when}" for column in OVER_TIME for when in ("early", "late")),
-    "outdated_told", "outdated_false",
-)  # fmt: skip
+COLUMNS = tuple(schema.TABLES[schema.AGES].columns)
 """Of ages.csv: docs/days.md says what they are."""
-LEVEL_COLUMNS = (
-    "scene", "motion", "change", "slam", "metric", "statistic", "n", "value", "low", "high",
-)  # fmt: skip
+LEVEL_COLUMNS = tuple(schema.TABLES[schema.AGES_LEVELS].columns)
 """Of ages_levels.csv."""
 
 

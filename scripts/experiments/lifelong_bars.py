@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from scripts.days.scores import A_DAY, OVER_TIME, SOON_S, Row, counts, early, late, later, mean
+from scripts.comparison.schema import OVER_TIME
+from scripts.days.scores import A_DAY, SOON_S, Row, counts, early, late, later, mean
 from slam.errors import LogFormatError, MobiliaError
 
 

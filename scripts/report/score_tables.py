@@ -11,7 +11,8 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
-from scripts.days.scores import ANEW, SCORES, Row, Score, first_words, levels
+from scripts.comparison.schema import ANEW
+from scripts.days.scores import SCORES, Row, Score, first_words, levels
 from scripts.metrics.row import digits
 from scripts.report.answer import percent
 from scripts.report.study import LEAST_RUNS

@@ -11,7 +11,7 @@ import pytest
 
 import sim
 from scripts.closed_loop.plan import Plan as DrivePlan
-from scripts.comparison import folder
+from scripts.comparison import schema
 from scripts.comparison.make import carry_out
 from scripts.comparison.plan import Plan
 from scripts.film.footage import title_of
@@ -101,11 +101,11 @@ def test_a_comparison_over_one_axis_names_it_everywhere(tmp_path: Path, axis: st
     )  # fmt: skip
     assert [run.name for run in plan.runs()] == [f"arena_{axis[0]}{d}_s7" for d in ("0", "0.5")]
     carry_out(plan, tmp_path)
-    for name in (folder.RUNS, folder.LEVELS):
+    for name in (schema.RUNS, schema.LEVELS):
         header = (tmp_path / name).read_text().splitlines()[0].split(",")
         assert axis in header
         assert "dynamism" not in header
-    told = json.loads((tmp_path / folder.RUNS_JSON).read_text())["runs"]
+    told = json.loads((tmp_path / schema.RUNS_JSON).read_text())["runs"]
     assert [run[axis] for run in told] == [0.0, 0.5]
     read = study(tmp_path)
     assert (read.axis, read.levels) == (axis, [0.0, 0.5])

@@ -300,12 +300,15 @@ def test_a_folder_that_grows_is_vouched_for_when_its_tables_are_in_place(tmp_pat
     assert check_vouched(out / RECIPE) is None
 
 
-def test_a_drive_within_a_comparison_is_a_result_of_its_own(comparison, tmp_path):
+def test_a_result_within_a_comparison_is_one_of_its_own(comparison, tmp_path):
     folder = Path(shutil.copytree(comparison, tmp_path / "compared"))
-    with whole_folder(folder / "drive", overwrite=False) as part:
+    with whole_folder(folder / "within", overwrite=False) as part:
         write_recipe(part, "other", {})
     assert [finding.verdict for finding in results.check(folder)] == ["whole", "whole"]
-    append("drive/recipe.json")(folder)
+    (folder / "within").rename(folder / "drive")  # which a report would show
+    assert [finding.verdict for finding in results.check(folder)] == ["damaged", "whole"]
+    (folder / "drive").rename(folder / "within")
+    append("within/recipe.json")(folder)
     assert status(folder) == 1
 
 
