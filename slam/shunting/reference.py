@@ -6,11 +6,12 @@
         x, y, heading = reference.update(frame)
     pyplot.imshow(reference.activity, origin="lower")
 
-Beams as Gaussians, and the prior by odometry, come from ``slam.frontend``. What the paper does not
-say is marked "ours". A test holds ``create("shunting", config="paper")`` to this file.
+The front end turns beams into Gaussians, and odometry into a prior. "Ours" is not in the paper.
+A test holds ``create("shunting", config="paper")`` to this file: docs/paper/method.md.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -27,27 +28,24 @@ ACROSS = 1024  # neurons, edge of the array, in whose middle the drive starts: 3
 A = 0.8  # 1/s, decay of Eq. (8)
 SIGMA = 0.01  # activity, threshold of Eq. (8): "a very small positive number"
 NEAR = np.array([(j, i) for j in (-1, 0, 1) for i in (-1, 0, 1) if j or i])  # 0 < d < r0 of Eq. (8)
-MU = 0.19 / (4.0 + 4.0 / math.sqrt(2.0))  # 1/s, of Eq. (8): A and all w sum to "less than 1"
-W = MU / np.hypot(NEAR[:, :1], NEAR[:, 1:])  # 1/s, (8, 1) w = mu / d of Eq. (8)
+W = 1.0 / np.hypot(NEAR[:, :1], NEAR[:, 1:])  # (8, 1) w = mu / d of Eq. (8), up to mu
+W *= 0.19 / W.sum()  # 1/s: A and all w sum to "less than 1"
 FIRST_S = 1.0  # s, how long the first scan acts; ours
 ENDS = 12.0  # squared Mahalanobis distance at which I of Eq. (8) ends: exp(-12 / 2) = 0.0025; ours
 SWEEPS = 8  # passes that make one Gauss-Seidel sweep (section 3.4), to 1e-6
-ORDER = np.arange(ACROSS**2).reshape(128, 128, 8, 8).swapaxes(1, 2).reshape(ACROSS, -1)  # of a sweep
+ORDER = np.arange(ACROSS**2).reshape(128, 128, 8, 8).swapaxes(1, 2).reshape(ACROSS, ACROSS)  # ours
 REWARD = 0.3  # weight of the logarithms of Eq. (13), as beams are not independent; ours
 FLOOR = 0.1  # overlap, added before the logarithm: no beam may outweigh all others; ours
 TAIL = 3.3  # standard deviations, and at least 3 neurons, at which a beam's Gaussian ends; ours
 FEW = 90  # beams at most in the coarse step of the "multiresolution search" (section 3.4); ours
-WIDEST = 3.0  # neurons, widest blur in that step; ours
+BLUR = 0.03  # m, standard deviation by which they are wider there; ours
 ENOUGH = 3e-3  # log-likelihood: a Newton step that should gain less is the last; ours
 STEPS = 20  # Newton steps at most; ours
-Beams = tuple[Float, ...]  # places (n, 2), covariances (n, 2, 2), weights (n,), tangents (n, 2)
+Beams = Sequence[Float]  # places (n, 2), covariances (n, 2, 2), weights (n,), tangents (n, 2)
 
 
 class Reference:
-    """Scan by scan, in order; the first one is the origin of the map.
-
-    activity  (1024, 1024) x of Eq. (8); [512, 512] is the square from (0, 0) to (3 cm, 3 cm)
-    """
+    """The network ``activity``, x of Eq. (8), by rows of y; [512, 512] is right above the start."""
 
     def __init__(self) -> None:
         self.activity: Float = np.zeros((ACROSS, ACROSS))
@@ -62,7 +60,10 @@ class Reference:
         if before is not frame.odometry:
             C = seen.covariances[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
             beams = seen.points_robot, C, seen.weights, seen.tangents
-            start = self._climb(_coarse(beams, prior), prior.T_map_robot, prior)
+            every = math.ceil(len(C) / FEW) or 1
+            wide = C + BLUR**2 * np.eye(2), seen.weights * every
+            few = [part[::every] for part in (seen.points_robot, *wide, seen.tangents)]
+            start = self._climb(few, prior.T_map_robot, prior)
             self.T_map_robot = se2.compose(self._climb(beams, start, prior), se2.IDENTITY)
         self._excite(seen, prior.elapsed or FIRST_S)
         return self.T_map_robot
@@ -81,10 +82,9 @@ class Reference:
         """Eq. (13), its slope (3,) and its negative curvature (3, 3)."""
         (points, C, weights, tangents), R = beams, se2.rotation(float(pose[2]))
         C = R @ C @ R.T / CELL**2
-        P, widest = np.linalg.inv(C), math.sqrt(C[:, [0, 1], [0, 1]].max(initial=0.0))
-        (j, i), d = _around(se2.transform(pose, points), wide := max(3.0, TAIL * widest))
+        P, wide = np.linalg.inv(C), max(3.0, TAIL * math.sqrt(C.max(initial=0.0)))
+        (j, i), d = _around(se2.transform(pose, points), wide)
         k = self.activity[j, i] * (1.0 + A)  # Eq. (8) comes to rest at x = 1 / (1 + A) for I = 1
-        k *= (abs(d) <= wide).all(axis=2)
         k *= np.exp(-0.5 * np.einsum("nci,nij,ncj->nc", d, P, d))  # overlapped volumes of Fig. 5:
         k /= math.pi * np.sqrt(np.linalg.det(C))[:, None]  # 1 where a landmark meets itself
         f = FLOOR + k.sum(axis=1)  # p(z_j | x, m) of Eq. (13)
@@ -95,7 +95,9 @@ class Reference:
         H = (V * np.maximum(low, 0.0)[:, None, :]) @ V.transpose(0, 2, 1)
         t = tangents @ R.T  # ours: along a surface the slope says only where the map is older
         g -= (g * t).sum(axis=1)[:, None] * t
-        J, w, off = _jacobian(points @ R.T) / CELL, REWARD * weights, pose - prior.T_map_robot
+        (x, y), one, w = R @ points.T, np.ones(len(points)), REWARD * weights
+        J = np.array([[one, 0.0 * one, -y], [0.0 * one, one, x]]).transpose(2, 0, 1) / CELL
+        off = pose - prior.T_map_robot
         off[2], precision = se2.wrap(float(off[2])), np.linalg.inv(prior.prior)
         score = w @ np.log(f) - 0.5 * off @ precision @ off  # Eq. (13)
         slope = np.einsum("n,nia,ni->a", w, J, g) - precision @ off
@@ -105,12 +107,14 @@ class Reference:
         """Eq. (8) for h s, implicit in x, where I > 0 or x > 0 is in view; others stay (ours)."""
         x, given = self.activity, self._inputs(seen)
         j, i = np.nonzero((x > 0.0) | (given > 0.0))
-        T_laser_map, view = se2.inverse(se2.compose(self.T_map_robot, seen.T_robot_laser)), seen.view
-        dx, dy = se2.transform(T_laser_map, (np.stack([i, j], 1) + (1 - ACROSS) / 2) * CELL).T
-        r, turns, bins = np.hypot(dx, dy), np.arctan2(dy, dx) / view.step, len(view.limit)
-        k = np.floor(turns + 0.5).astype(int)  # section 3.3: hidden if its line passes an observation
-        aside = np.min([abs(turns - k - m - view.offset[(k + m) % bins]) for m in (-1, 0, 1)], axis=0)
-        empty = (r < view.limit[k % bins] - view.margin) & (aside * view.step * r <= view.gate)
+        T_laser_map = se2.inverse(se2.compose(self.T_map_robot, seen.T_robot_laser))
+        dx, dy = se2.transform(T_laser_map, (np.stack([i, j], axis=1) + (1 - ACROSS) / 2) * CELL).T
+        view, r, bins = seen.view, np.hypot(dx, dy), len(seen.view.limit)
+        k = np.floor((turns := np.arctan2(dy, dx) / view.step) + 0.5).astype(int)
+        beams = [abs(turns - k - m - view.offset[(k + m) % bins]) for m in (-1, 0, 1)]
+        empty = (r < view.limit[k % bins] - view.margin) & (
+            np.min(beams, 0) * view.step * r <= view.gate
+        )
         j, i = j[empty | (given[j, i] > 0.0)], i[empty | (given[j, i] > 0.0)]
         beside, new = (j + NEAR[:, :1], i + NEAR[:, 1:]), x.copy()
         swept = ORDER[beside] < ORDER[j, i]
@@ -139,23 +143,6 @@ class Reference:
         inputs = np.zeros_like(self.activity)
         np.maximum.at(inputs, (j[near], i[near]), np.exp(-0.5 * m[near]))
         return inputs
-
-
-def _coarse(beams: Beams, prior: Prediction) -> Beams:
-    """A few of the beams, blurred by what the prior may be off."""
-    every = math.ceil(len(beams[0]) / FEW) or 1
-    points, C, weights, tangents = (part[::every] for part in beams)
-    R = se2.rotation(float(prior.T_map_robot[2]))
-    J = R.T @ _jacobian(points @ R.T)
-    blur = J @ prior.prior @ J.swapaxes(1, 2)
-    share = (WIDEST * CELL) ** 2 / np.trace(blur, axis1=1, axis2=2)
-    return points, C + blur * np.minimum(share, 1.0)[:, None, None], weights * every, tangents
-
-
-def _jacobian(points: Float) -> Float:
-    """(n, 2, 3) by which points turned into the map's axes move with a pose."""
-    one, zero = np.ones(len(points)), np.zeros(len(points))
-    return np.array([[one, zero, -points[:, 1]], [zero, one, points[:, 0]]]).transpose(2, 0, 1)
 
 
 def _around(points_map: Float, wide: float) -> tuple[Float, Float]:
