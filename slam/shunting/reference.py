@@ -58,9 +58,7 @@ class Reference:
             C = seen.covariances[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
             beams = seen.points_robot, C, seen.weights, seen.tangents
             start = self._climb(beams, prior.T_map_robot, prior, coarse=True)
-            self.T_map_robot = se2.compose(
-                self._climb(beams, start, prior, coarse=False), se2.IDENTITY
-            )
+            self.T_map_robot = self._climb(beams, start, prior, coarse=False)
         self._excite(seen, prior.elapsed or FIRST_S)
         return self.T_map_robot
 
@@ -71,7 +69,7 @@ class Reference:
             pose = pose + (step := np.linalg.solve(curvature, slope))
             if slope @ step < ENOUGH:
                 break
-        return pose
+        return se2.compose(pose, se2.IDENTITY)  # the heading wrapped
 
     def posterior(self, beams: Arrays, pose: Float, prior: Prediction, coarse: bool) -> Arrays:
         """Eq. (13), its slope (3,) and its negative curvature (3, 3)."""
@@ -86,11 +84,9 @@ class Reference:
         P, wide = np.linalg.inv(C), max(3.0, TAIL * math.sqrt(C.max(initial=0.0)))
         (j, i), d = _around(se2.transform(pose, points), wide)
         k = self.activity[j, i] * (1.0 + A)  # Eq. (8) comes to rest at x = 1 / (1 + A) for I = 1
-        k *= np.exp(
-            -0.5 * np.einsum("nci,nij,ncj->nc", d, P, d)
-        )  # overlap (Fig. 5), 1 for a perfect one
+        k *= np.exp(-0.5 * np.einsum("nci,nij,ncj->nc", d, P, d))  # overlapped volumes of Fig. 5
         k *= (abs(d) <= wide).all(axis=2) / (math.pi * np.sqrt(np.linalg.det(C)))[:, None]
-        f = FLOOR + k.sum(axis=1)  # p(z_j | x, m) of Eq. (13)
+        f = FLOOR + k.sum(axis=1)  # p(z_j | x, m) of Eq. (13), 1 where a landmark meets itself
         g = np.einsum("nij,ncj,nc->ni", P, d, k) / f[:, None]
         H = P * (1.0 - FLOOR / f)[:, None, None] + g[:, :, None] * g[:, None, :]
         H -= P @ np.einsum("nc,nci,ncj->nij", k / f[:, None], d, d) @ P
@@ -110,6 +106,7 @@ class Reference:
         j, i = np.nonzero((x > 0.0) | (given > 0.0))
         T_laser_map = se2.inverse(se2.compose(self.T_map_robot, seen.T_robot_laser))
         dx, dy = se2.transform(T_laser_map, (np.stack([i, j], axis=1) + (1 - ACROSS) / 2) * CELL).T
+        # Section 3.3: hidden is what lies behind an observation; ours: or what no beam passed near
         view, r, n = seen.view, np.hypot(dx, dy), len(seen.view.limit)
         k = np.floor((turns := np.arctan2(dy, dx) / view.step) + 0.5).astype(int)
         aside = np.min([abs(turns - k - m - view.offset[(k + m) % n]) for m in (-1, 0, 1)], axis=0)
