@@ -18,6 +18,7 @@ from slam.errors import LogFormatError
 MAX_LETTERS = 2000  # of a word in an array, whose every entry takes as much as the longest
 MOST_CELLS = 1 << 28  # of a raster, as ``slam.maps`` reads it
 MAYBE_NONE = ("movers", "answered")  # lengths that may be 0
+_TYPES = {"b": np.bool_, "i": np.int64, "u": np.uint8, "f": np.float64, "U": np.str_}
 _KINDS = {"b": "booleans", "i": "whole numbers", "u": "whole numbers", "f": "floats", "U": "words"}
 
 
@@ -67,7 +68,7 @@ class Array:
         """The array without entries, in full shape."""
         shape = [lengths.get(length, 0) if isinstance(length, str) else length
                  for length in self.shape]  # fmt: skip
-        return np.zeros(shape, dtype=np.dtype(self.kinds[0]))
+        return np.zeros(shape, dtype=_TYPES[self.kinds[0]])
 
     def wrong(self, array: NDArray[Any]) -> str:
         """What is wrong with its values; "" for nothing."""

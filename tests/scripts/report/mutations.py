@@ -34,12 +34,12 @@ _TABLE_WAYS = (
 )  # fmt: skip
 
 
-def mutate(folder: Path, draw: random.Random) -> str:
-    """Harm one of its files; says how."""
+def mutate(folder: Path, draw: random.Random) -> tuple[Path, str]:
+    """Harm one of its files; which, and how."""
     found = [path for path in folder.rglob("*") if path.suffix in _WAYS]
     path = draw.choice(sorted(path for path in found if path.stat().st_size > 1))
     said = _WAYS[path.suffix](path, draw)
-    return f"{path.relative_to(folder)}: {said}"
+    return path, f"{path.relative_to(folder)}: {said}"
 
 
 def _recipe(path: Path, draw: random.Random) -> str:

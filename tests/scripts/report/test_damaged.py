@@ -16,10 +16,12 @@ import pytest
 
 from scripts import results
 from scripts.closed_loop.folder import driven
+from scripts.comparison.folder import read, write_table
+from scripts.comparison.plan import Plan
 from scripts.report import page, pictures
 from scripts.report.study import study
-from sim.recording.sums import write_sums
-from slam.errors import LogFormatError
+from sim.recording.sums import SUMS, write_sums
+from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.report import made, mutations
 
 CASES, DRAWN = 500, 8
@@ -155,18 +157,40 @@ def test_one_wrong_value_is_named_with_what_is_wanted(folder: Path, harm, says: 
     assert not well(folder)
 
 
-def test_whatever_is_harmed_is_read_or_refused_in_a_line(whole: Path, tmp_path: Path):
+def test_a_run_without_movers_is_read_in_full_shape(folder: Path):
+    """An array without entries is written without its type and inner lengths."""
+    array("hit", lambda a: a * 0 - 1)(folder)
+    for name in ("names", "kinds", "radii_m", "closed"):
+        array(name, [])(folder)
+    array("moving", lambda a: a[:, :0])(folder)
+    array("mover_poses", lambda a: a[:, :0])(folder)
+    run = read(folder).run(made.SCENE, 1.0, 100)
+    assert (run.mover_poses.shape, run.moving.shape) == ((20, 0, 3), (20, 0))
+    assert (run.names, run.kinds, run.moving.dtype) == ([], [], bool)
+    assert pictures.moving_share(run).tolist() == [0.0] * 20
+
+
+def test_what_cannot_be_read_is_not_written(tmp_path: Path):
+    row = {**made.row_of(made.OURS, 0.0, 100), "lost": 2}
+    with pytest.raises(InvalidValueError, match="row 1: lost must be a whole number from 0 to 1,"):
+        write_table(tmp_path / "runs.csv", [row])
+    with pytest.raises(InvalidValueError, match=r"Plan\.seeds must be a list of one or more"):
+        Plan(slams=("ekf",), scenes=("arena",), levels=(0.0,), seeds=(10**30,))
+    assert not (tmp_path / "runs.csv").exists()
+
+
+def test_whatever_is_harmed_is_read_or_refused_in_a_line(whole: Path, folder: Path):
     """500 harms: no traceback, no memory that the folder does not have, and ``verify`` agrees."""
     ended: Counter[bool] = Counter()
     before = peak_bytes()
     for case in range(CASES):
-        folder = tmp_path / "harmed"
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(whole, folder)
-        how = mutations.mutate(folder, random.Random(case))
+        path, how = mutations.mutate(folder, random.Random(case))
         said = refusal(folder)
         if case % 8 == 0:  # it reads all once more
             assert well(folder) == (said == ""), (how, said)
+            for sums in folder.rglob(SUMS):
+                sums.unlink()
+        shutil.copyfile(whole / path.relative_to(folder), path)
         assert peak_bytes() - before < MOST_BYTES, how
         ended[said == ""] += 1
     assert min(ended.values()) > CASES // 10, ended  # it tries what is refused and what is not
