@@ -146,6 +146,7 @@ STAY = {
     "frontend/surfaces.py": "layout of a byte; AWAY, from the tree",
     "shunting/featured.py": "PAPER_REWARD, which makes a preset",
     "shunting/map/peaks.py": "capacity of the list of peaks",
+    "shunting/reference.py": "the paper in one file, to be read: all of its numbers, no options",
     "tracker/belief/posterior.py": "a unit; guards against logarithms of nothing",
     "tracker/cell_map.py": "bounds of the directory's memory",
     "tracker/cells.py": "layout: a block is 8 x 8; how fast arrays grow",

@@ -28,7 +28,7 @@ EQUATIONS_ALONE = {
     "uncertainty.odometry.at_first": 1e6,  # learnt scale of odometry's variances: 3 mm
     "uncertainty.odometry.memory": 1e5,
     "uncertainty.odometry.memory_s": 1e4,
-    "matching.local.vague_cells": 1e3,  # wide search where little is matched: 0.7 mm
+    "matching.local.vague_cells": 1e3,  # wide search where little is matched: 0.13 mm
     "matching.local.good_share": 0.0,
 }
 
