@@ -16,8 +16,9 @@ help:            ## list the targets
 demo: $(RUN)     ## 60 s of a moving office, SLAM against odometry, a map and a film in out/demo/
 	@$(BIN)/mobilia demo --overwrite
 
-test: $(STAMP)   ## the whole test suite, on up to four cores
-	@$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+test: $(STAMP)   ## the whole test suite, on up to four cores; of one package: make test PKG=slam/tracker
+	@$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder \
+	  $(if $(PKG),tests/$(PKG))
 
 coverage: $(STAMP)  ## the same suite with a table of the lines that no test runs; takes longer
 	@$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder \

@@ -10,7 +10,9 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import json
+import mmap
 import os
+import random
 import subprocess
 import sys
 from collections.abc import Callable
@@ -186,6 +188,52 @@ def temporary_folders() -> bytes:
 def all_files() -> bytes:
     above = FOLDER.parents[2]
     return shell(f"find '{above}' -name '{SECRET.name}' -type f -exec cat {{}} + 2>/dev/null")
+
+
+def spelled(chance: random.Random) -> str:
+    """The path in other words: detours, links of ``/proc``, from elsewhere."""
+    start = chance.choice(["", "", "/proc/self/root", "/proc/thread-self/root", f"{PROC}/root"])
+    words: list[str] = []
+    for word in FOLDER.parts[1:]:
+        words += [word, *chance.choices([[], ["."], [""], ["..", word]], [4, 1, 1, 1])[0]]
+    text = "/".join([start, *words, SECRET.name])
+    return os.path.relpath(text) if not start and chance.random() < 0.3 else text
+
+
+def read_by(how: str, path: str) -> bytes:
+    """Ways to read a file, or to change it."""
+    if how == "link":
+        copy = MINE / f"l{random.getrandbits(60)}"
+        os.link(path, copy)
+        return copy.read_bytes()
+    if how == "in its folder":
+        folder = os.open(os.path.dirname(path), os.O_PATH)
+        return os.read(os.open(os.path.basename(path), os.O_RDONLY, dir_fd=folder), 99)
+    flags = {"path": os.O_PATH, "write": os.O_RDWR, "append": os.O_WRONLY | os.O_APPEND}
+    number = os.open(path, flags.get(how, os.O_RDONLY))
+    try:
+        if how == "path":  # may be had without a right; to open it again may not
+            return Path(f"/proc/self/fd/{number}").read_bytes()
+        if how == "map":
+            return mmap.mmap(number, 0, prot=mmap.PROT_READ)[:99]
+        if how == "send":
+            with open(MINE / "sent", "w+b") as out:
+                os.sendfile(out.fileno(), number, 0, 99)
+                out.seek(0)
+                return out.read()
+        return b"opened" if how == "append" else os.pread(number, 99, 0)
+    finally:
+        os.close(number)
+
+
+@attempt
+def five_hundred_at_random() -> bytes:
+    chance, got = random.Random(26), []
+    ways = ("read", "path", "write", "append", "map", "send", "link", "in its folder")
+    for _ in range(500):
+        with contextlib.suppress(OSError):
+            got.append(read_by(chance.choice(ways), spelled(chance)))
+    return b"%d times: " % len(got) + b"".join(got) if got else b""
 
 
 @attempt

@@ -69,6 +69,7 @@ def test_most_attempts_get_it_from_who_is_not_confined(secret: Path):
     seen = [name for name, said in got.items() if TRUTH[:9].decode() in said]
     assert {"known_path", "argument_lists", "copied_by_a_program", "all_files"} <= set(seen)
     assert len(seen) >= 12, got
+    assert got["five_hundred_at_random"].startswith(("4", "5")), got  # nearly all of them
 
 
 def cheating_attempts() -> list[str]:
