@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from scripts.closed_loop.folder import driven
 from scripts.comparison import folder as compared
 from scripts.comparison.again import run_of
 from scripts.names import run_name
@@ -20,7 +21,6 @@ from scripts.output import (
     whole_folder,
     write_recipe,
 )
-from scripts.report.closed import driven
 from sim.recording.dataset import PLAN
 from sim.recording.sums import SUMS
 from slam.errors import LogFormatError, OutputError
