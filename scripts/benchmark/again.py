@@ -20,8 +20,10 @@ from scripts.comparison.recording import digest, load, record
 from scripts.machine import machine, versions
 from scripts.report.answer import ODOMETRY
 from sim.recording.verify import Finding
+from slam.frames import BeamClass
 from slam.guests import Limits, limited
 
+NOT_OF_POSES = "are not those of its poses"
 _TOLD = ("outcome", "ate_unaligned_m", "error_tracking_m")  # of a run with other poses
 
 
@@ -45,11 +47,12 @@ def made_again(path: Path, count: int, seed: int = 0, slam: str | None = None) -
         there = _elsewhere(given.made_with)
         if not wrong:
             yield Finding(episode=name, verdict="same bytes")
-        elif there:
+        elif there and NOT_OF_POSES not in wrong:
             why = f"{wrong}, and it was made with {there}"
             yield Finding(episode=name, verdict="cannot be checked here", why=why)
         else:
-            why = f"{wrong}, on the same processor and versions"
+            here = "" if there else ", on the same processor and versions"
+            why = f"{wrong}{here}"
             yield Finding(episode=name, verdict="differs", why=why)
 
 
@@ -78,8 +81,9 @@ def _wrong(
     arrays = entry.arrays()
     row = json.loads(arrays["row"])
     if submission.digest_of(arrays["stamps_ns"], arrays["poses"]) == run["poses"]:
-        wrong = [key for key in submission.OF_POSES if key in row and row[key] != run[key]]
-        return f"its {', '.join(wrong)} are not those of its poses" if wrong else ""
+        row |= {"moving_share_of_returns": drive.share_of_returns(BeamClass.MOVING)}
+        wrong = [k for k in submission.OF_POSES if submission.plain(row.get(k)) != run[k]]
+        return f"its {', '.join(wrong)} {NOT_OF_POSES}" if wrong else ""
     return f"its poses are others here ({_told(_TOLD, run)}; here {_told(_TOLD, row)})"
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import secrets
 from dataclasses import dataclass
@@ -19,8 +20,7 @@ from scripts.benchmark.submission import MAX_SEED, MAX_SEEDS, SEALED
 from scripts.benchmark.tracks import TEST, TRACKS, TRAIN
 from sim.core.versions import WORLD, check_world, world_of
 from slam.bounded import text_of
-from slam.errors import InvalidValueError, LogFormatError
-from slam.files import write_text
+from slam.errors import InvalidValueError, LogFormatError, OutputError
 
 WHAT = "sealed seeds of the benchmark of mobilia"
 MAX_BYTES = 1 << 20
@@ -64,10 +64,18 @@ def drawn(count: int) -> SealedSeeds:
 
 
 def write(path: Path, sealed: SealedSeeds) -> None:
-    """A new file; ``InvalidValueError`` where there is one: its seal may be published."""
-    if path.exists():
-        raise InvalidValueError(f"{path} exists: its seal may be published")
-    write_text(path, json.dumps(sealed.data(), indent=1) + "\n")
+    """A new file that others cannot read.
+
+    Raises ``InvalidValueError`` where there is one, as its seal may be published, ``OutputError``.
+    """
+    try:
+        number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError as error:
+        raise InvalidValueError(f"{path} exists: its seal may be published") from error
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
+    with open(number, "w", encoding="utf-8") as file:
+        file.write(json.dumps(sealed.data(), indent=1) + "\n")
 
 
 def read(path: Path) -> SealedSeeds:

@@ -130,7 +130,7 @@ def digest_of(stamps_ns: NDArray[np.int64], poses: Float) -> str:
 
 def run_of(row: Mapping[str, Any], recording: str, poses: str) -> Row:
     """What a submission keeps of a row of ``runs.csv``."""
-    numbers = {key: _plain(row.get(key)) for key in NUMBERS}
+    numbers = {key: plain(row.get(key)) for key in NUMBERS}
     return {
         "level": float(row["dynamism"]), "seed": int(row["seed"]), "recording": recording,
         "poses": poses,
@@ -145,8 +145,9 @@ def _line(words: Any) -> str | None:
     return line[:MAX_WORDS] or None
 
 
-def _plain(value: Any) -> Any:
-    return None if value is None or not math.isfinite(value) else value
+def plain(value: Any) -> Any:
+    """As JSON has it: None where it is no finite number."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def made_with(slam: str) -> Row:

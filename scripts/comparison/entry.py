@@ -15,6 +15,7 @@ from scripts.comparison.columns import scored
 from scripts.comparison.maps import MapJudge
 from scripts.comparison.memory import PeakMemory
 from scripts.comparison.recording import Recording, load
+from sim.recording.recipe import RECIPE
 from slam.errors import SlamFailedError
 from slam.frames import Float, Frame
 from slam.guests import Limits, limited
@@ -44,11 +45,16 @@ def enter(
     """
     out = path.parent.parent
     drive = load(out / recording)
-    limits = Limits(scan_s=scan_limit_s, hidden=(out,))
+    limits = Limits(scan_s=scan_limit_s, hidden=(whole_result(out),))
     _warm_up(slam, drive.frames, limits)
     run = Entry(slam, drive, limits, judge_maps=judge_maps)
     run.over(drive.frames)
     np.savez_compressed(path, **run.arrays())
+
+
+def whole_result(out: Path) -> Path:
+    """The folder of results that ``out`` is of: a benchmark's, of one of its tracks."""
+    return out.parent if (out.parent / RECIPE).exists() else out
 
 
 def _warm_up(slam: str, frames: Sequence[Frame], limits: Limits) -> None:

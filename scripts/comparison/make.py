@@ -14,6 +14,7 @@ from rich.table import Table
 from scenes import registry
 from scripts.comparison import folder as files
 from scripts.comparison import tables
+from scripts.comparison.entry import whole_result
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.recording import load
 from scripts.comparison.run_file import merge
@@ -48,7 +49,7 @@ def carry_out(
     for name in plan.scenes:
         registry.build(name)  # wrong names are told before anything starts
     for name in plan.slams:
-        limited(name, Limits(hidden=(out,)))
+        limited(name, Limits(hidden=(whole_result(out),)))
     if plan.sessions is not None and more is None:
         raise InvalidValueError("Plan.sessions needs more=scripts.days.make.beside(plan)")
     out = out.absolute()

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from scripts.comparison.entry import whole_result
 from scripts.days import lifelong
 from scripts.days.sessions import Drive, loaded
 from slam.errors import LogFormatError
@@ -29,7 +30,7 @@ def live(
     that fails, even at its start, is a row.
     """
     out = path.parent.parent
-    limits = Limits(scan_s=scan_limit_s, hidden=(out,))
+    limits = Limits(scan_s=scan_limit_s, hidden=(whole_result(out),))
     with tempfile.TemporaryDirectory() as folder:
         (building,) = lifelong.started([slam], Path(folder), limits)
         last: list[Drive] = []

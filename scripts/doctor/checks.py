@@ -19,7 +19,7 @@ from packaging.requirements import Requirement
 import mobilia
 from sim.core.versions import WORLD
 from slam.errors import MissingDependencyError
-from slam.guests.confined import kernel_version
+from slam.guests.confined import WHOLE, kernel_version
 
 State = Literal["ok", "can do without", "missing"]
 PACKAGE = "mobilia"
@@ -168,7 +168,7 @@ def _machine() -> Iterator[Finding]:
     landlock = kernel_version()
     yield Finding(
         what="guests see no truth (Landlock)", state="ok" if landlock else "can do without",
-        found=f"version {landlock}" if landlock else "a program behind pipe: sees all your files",
+        found=_kept_off(landlock),
         how="" if landlock else "Linux 5.13 or newer, with landlock in /sys/kernel/security/lsm",
     )  # fmt: skip
     free_gb = shutil.disk_usage(Path.cwd()).free / 1e9
@@ -178,6 +178,14 @@ def _machine() -> Iterator[Finding]:
         found=f"{free_gb:.1f} GB free",
         how="" if enough else "outputs go to --out: name a folder on another disk",
     )  # fmt: skip
+
+
+def _kept_off(landlock: int) -> str:
+    if not landlock:
+        return "a program behind pipe: sees all your files"
+    return f"version {landlock}" + (
+        "" if landlock >= WHOLE else ": it can empty files, not read them"
+    )
 
 
 def cores() -> int:

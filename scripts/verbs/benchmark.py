@@ -90,6 +90,8 @@ def benchmark(
     [bold]mobilia benchmark --quick --slam my_package:MySlam --jobs 2[/bold]
     """
     if seal is not None:
+        if slam or subject or sealed or submit or merge:
+            raise InvalidValueError("--seal only draws seeds: beside it goes --seeds alone")
         _seal(seal, seeds)
         return
     slams = named(slam or [])

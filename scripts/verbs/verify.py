@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -43,7 +44,10 @@ def verify(
     sealed: Annotated[
         Path | None, typer.Option(help="Of a submission: its seeds are those of this file.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Which ones: seed of that choice.")] = 0,
+    seed: Annotated[
+        int | None,
+        typer.Option(help="Which ones: seed of that choice; default 0, of a submission by chance."),
+    ] = None,
     trust: Trust = False,
 ) -> None:
     """Check every file by its hash; with --regenerate also make episodes again.
@@ -59,7 +63,7 @@ def verify(
     submitter's word. --rerun also runs its SLAM, which must be installed here, on recordings drawn
     by --seed.
     """
-    if min(regenerate_, rerun, seed) < 0:
+    if min(regenerate_, rerun, seed or 0) < 0:
         raise InvalidValueError("--regenerate, --rerun and --seed must be >= 0")
     from scripts.results import check
 
@@ -69,10 +73,13 @@ def verify(
     submitted = folder.suffix == ".json" and folder.is_file()
     if not submitted and (rerun or slam or sealed):
         raise InvalidValueError("--rerun, --slam and --sealed are for a submission")
+    if slam is not None and not rerun:
+        raise InvalidValueError("--slam is the SLAM to --rerun: say how many runs")
     if submitted and findings[0].ok:
+        seed = _by_chance(regenerate_ or rerun) if seed is None else seed
         findings += _of_submission(folder, regenerate_, rerun, seed, slam, sealed, trust)
     elif regenerate_:
-        findings += _made_again(_drawn(_sound(folder, findings), regenerate_, seed), trust)
+        findings += _made_again(_drawn(_sound(folder, findings), regenerate_, seed or 0), trust)
     for finding in findings:
         _tell(finding)
     _exit_if_bad(findings)
@@ -101,14 +108,29 @@ def _of_submission(
     return list(made_again(path, rerun or regenerate_, seed, runs))
 
 
+def _by_chance(count: int) -> int:
+    """A seed that nobody who submits can know."""
+    seed = secrets.randbelow(2**32)
+    if count:
+        console.print(f"drawn with --seed {seed}")
+    return seed
+
+
 def _check_sealed(given: Submission, path: Path) -> None:
     from scripts.benchmark import sealed, submission
+    from scripts.benchmark.tracks import LEVELS, TRACKS
 
     opened = sealed.read(path)
     wanted = opened.seeds[: len(given.seeds)]
     if given.seeds_of != submission.SEALED or given.seeds != wanted:
         raise InvalidValueError(f"the seeds of {given.name!r} are not those of {path}")
     console.print(f"its seeds were sealed as {opened.sha256}", soft_wrap=True)
+    seconds = "as long as the tracks say" if given.seconds is None else f"{given.seconds:g} s"
+    console.print(
+        f"it has {len(given.seeds)} of {len(opened.seeds)} sealed seeds, {len(given.levels)} of "
+        f"{len(LEVELS)} levels, {len(given.runs)} of {len(TRACKS)} tracks, runs {seconds}",
+        soft_wrap=True,
+    )
 
 
 def _judgement(again: int, rerun: int) -> str:

@@ -16,13 +16,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import mobilia
+from slam.errors import InvalidValueError
 
 MORE = "MOBILIA_GUEST_FOLDERS"  # of the user's environment: folders that guests read and write too
+EVERYTHING = "all"  # as ``MORE``: guests are not confined
+WHOLE = 3  # version from which on a file cannot be emptied either (Linux 6.2)
 RESULTS = "out"  # folder in the working folder, where results lie unless --out says otherwise
 LISTED, READ, WRITTEN = 0, 1, 2  # what may be done in a folder and in all that it holds
 _SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc", "/opt", "/nix", "/snap",
-           "/proc", "/sys")  # fmt: skip
-_DEVICES = ("null", "zero", "full", "random", "urandom", "tty", "ptmx", "pts", "shm", "dri")
+           "/run", "/proc", "/sys")  # fmt: skip
+_DEVICES = ("null", "zero", "full", "random", "urandom", "shm", "dri", "kfd", "dxg")
 _BINARIES = ("bin", "sbin", "shims", "Scripts")  # folders of programs, whose libraries lie beside
 _CREATE_RULESET, _VERSION = 444, 1  # linux/landlock.h; the number is the same on all processors
 
@@ -40,13 +43,14 @@ def rules(
     """Paths that ``command`` may see, and what it may do in each; None: the kernel has no rules.
 
     hidden  folders of results, beside ``RESULTS``: nothing in them, wherever they lie
+
+    Raises ``InvalidValueError`` for a folder in ``MORE`` that is not there.
     """
-    if not kernel_version():
+    if not kernel_version() or environment.get(MORE) == EVERYTHING:
         return None
     never = {path.resolve() for path in (Path.cwd() / RESULTS, *hidden)}
     found: dict[Path, int] = {}
-    written = environment.get(MORE, "").split(os.pathsep)
-    for root in _there(written):
+    for root in _more(environment.get(MORE, "")):
         _add(found, root, never, WRITTEN)
     for root in _there(_devices()):
         found[root] = WRITTEN
@@ -67,9 +71,21 @@ def _add(found: dict[Path, int], root: Path, never: set[Path], may: int) -> None
         found[root] = max(may, found.get(root, may))
         return
     found.setdefault(root, LISTED)
-    for entry in os.scandir(root):
+    try:
+        entries = list(os.scandir(root))
+    except OSError:
+        return  # not ours to read: not the guest's either
+    for entry in entries:
         if not entry.is_symlink():  # it leads to what has a rule of its own, or none
             _add(found, root / entry.name, never, may)
+
+
+def _more(folders: str) -> Iterator[Path]:
+    for folder in filter(None, folders.split(os.pathsep)):
+        path = Path(folder).expanduser()
+        if not path.is_dir():
+            raise InvalidValueError(f"{MORE} must name folders that exist, got {folder!r:.80}")
+        yield path.resolve()
 
 
 def _there(paths: Iterable[str]) -> Iterator[Path]:
@@ -85,13 +101,14 @@ def _devices() -> Iterator[str]:
 
 
 def _own(command: Sequence[str]) -> set[str]:
-    """The folders of the files that the command names; the working folder if it names none."""
-    named = [word for word in command[1:] if os.path.exists(word)]
-    if os.sep in command[0]:
-        named.append(command[0])
+    """The folders of the files that the command names; the working folder if it names none beside
+    the program.
+    """
+    given = [word for word in command[1:] if os.path.exists(word)]
+    named = [command[0], *given] if os.sep in command[0] else given
     folders = {word if os.path.isdir(word) else os.path.dirname(word) or "." for word in named}
     real = {os.path.dirname(os.path.realpath(word)) for word in named}
-    return folders | real if named else {"."}
+    return folders | real | (set() if given else {"."})
 
 
 def _on_paths(command: Sequence[str], environment: Mapping[str, str]) -> Iterator[str]:

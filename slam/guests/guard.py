@@ -21,12 +21,14 @@ one that is still being loaded has had no time to tie itself to its parent.
 from __future__ import annotations
 
 import ctypes
+import errno
 import marshal
 import os
 import select
 import signal
 import sys
 import time
+import warnings  # noqa: F401 (os.execvpe imports it, and Python's own folder may be hidden by then)
 from contextlib import suppress
 
 KILL_LIMIT_S = 3.0  # then it gives up: a process of another user, or one stuck in the kernel
@@ -60,9 +62,13 @@ def main(words: list[str]) -> None:
     _prctl(_CHILD_SUBREAPER, 1)
     own = b""
     if rules is not None:
-        own = os.path.join(environment.get(b"TMPDIR", b"/tmp"), b"mobilia-guest-%d" % os.getpid())
-        os.mkdir(own, 0o700)
+        own = _own_folder(environment.get(b"TMPDIR", b""))
+        if not own:
+            _say(control, b"errno %d\n" % errno.EACCES)
+            return
         environment[b"TMPDIR"] = own
+        for name in (b"NUMBA_CACHE_DIR", b"XDG_CACHE_HOME"):  # it cannot write to the usual ones
+            environment.setdefault(name, own)
         rules.append((own, 2))
     try:
         _guard(control, parent, command, environment, rules)
@@ -90,15 +96,23 @@ def _guard(
     _kill(guest)
 
 
+def _own_folder(wanted: bytes) -> bytes:
+    """A new one for temporary files, b"" where none can be made."""
+    for place in (wanted, b"/tmp", b"/var/tmp"):
+        folder = os.path.join(place, b"mobilia-guest-" + os.urandom(8).hex().encode())
+        with suppress(OSError):
+            if os.path.isabs(place):
+                os.mkdir(folder, 0o700)
+                return os.path.realpath(folder)
+    return b""
+
+
 def _remove(folder: bytes) -> None:
     """The guest's own: it has gone."""
-    for root, folders, files in os.walk(folder, topdown=False) if folder else ():
-        for name in (*files, *folders):
-            path = os.path.join(root, name)
-            with suppress(OSError):
-                (os.unlink if name in files or os.path.islink(path) else os.rmdir)(path)
-    with suppress(OSError):
-        os.rmdir(folder)
+    if folder:
+        import shutil  # it takes time to load, of which nobody waits for a guest here
+
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _confine(rules: list[tuple[bytes, int]]) -> None:

@@ -147,8 +147,10 @@ class Wire:
                 self._words += data
         lines = self._words[-KEPT_WORDS:].decode(errors="replace").split("\n")
         said = [text for text in (" ".join(part.split()) for part in lines) if text]
-        refused = self._confined and "Permission denied" in " ".join(said)
-        hint = "; it sees only its own folder: docs/bring_your_own.md" if refused else ""
+        words = " ".join(said)
+        refused = "Permission denied" in words or "No module named" in words
+        hint = "; it sees only its own folder: docs/bring_your_own.md"
+        hint = hint if self._confined and refused else ""
         return f"; its last words: {' | '.join(said[-3:])[-400:]!r}{hint}" if said else ""
 
     def processor_s(self) -> float | None:

@@ -23,6 +23,7 @@ def test_they_come_back_and_are_none_that_is_published(tmp_path: Path):
     assert len(set(drawn.seeds)) == 50
     assert not {*TRAIN, *TEST} & set(drawn.seeds)
     sealed.write(path, drawn)
+    assert path.stat().st_mode & 0o077 == 0
     assert sealed.read(path) == drawn
     with pytest.raises(InvalidValueError, match="exists"):
         sealed.write(path, drawn)
@@ -86,6 +87,10 @@ def test_another_slam_or_other_numbers_do_not(submitted: Path, tmp_path: Path):
     assert other.verdict == "differs"
     assert "its poses are others here (outcome finished, ate_unaligned_m" in other.why
     given = submission.read(submitted)
+    nothing = [run | {"nees_abs_log": 0.0} for run in given.runs[TRACK.name]]
+    submission.write(tmp_path / "null.json", replace(given, runs={TRACK.name: nothing}))
+    (wrong,) = made_again(tmp_path / "null.json", 1, slam="ekf")
+    assert wrong.verdict == "differs", "a number that the run does not have"
     better = [run | {"error_tracking_m": 0.0} for run in given.runs[TRACK.name]]
     faked = tmp_path / "faked.json"
     submission.write(faked, replace(given, runs={TRACK.name: better}))

@@ -255,6 +255,12 @@ def change_of_the_results() -> bytes:
 
 
 @attempt
+def emptied_results() -> bytes:
+    os.truncate(SECRET, 0)
+    return b"emptied"
+
+
+@attempt
 def change_of_the_code() -> bytes:
     with open(Path(__file__), "ab"):
         return b"can be written"

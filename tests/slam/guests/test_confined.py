@@ -12,9 +12,19 @@ from pathlib import Path
 
 import pytest
 
-from slam.errors import SlamFailedError
+from scripts.comparison.entry import whole_result
+from slam.errors import InvalidValueError, SlamFailedError
 from slam.guests import Limits, limited
-from slam.guests.confined import LISTED, MORE, READ, WRITTEN, kernel_version, rules
+from slam.guests.confined import (
+    EVERYTHING,
+    LISTED,
+    MORE,
+    READ,
+    WHOLE,
+    WRITTEN,
+    kernel_version,
+    rules,
+)
 from slam.guests.pipe import PipeSlam
 from slam.guests.wire import Wire
 from tests.slam.guests import misbehaving
@@ -59,6 +69,8 @@ def test_no_attempt_gets_the_truth_or_changes_it(secret: Path):
     assert len(got) == len(cheating_attempts()) >= 20
     if os.geteuid() == 0:  # a superuser may read them; no truth is in them
         got.pop("environments")
+    if kernel_version() < WHOLE:
+        got.pop("emptied_results")
     assert {name: said for name, said in got.items() if said} == {}
     assert secret.read_bytes() == TRUTH
 
@@ -110,6 +122,33 @@ def test_what_it_may_see(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     assert of_ours == {
         "more": WRITTEN, "given": READ, "mine": LISTED, "mine/slam.sh": READ, "mine/lib": READ,
     }  # fmt: skip
+
+
+def test_folders_that_are_not_there_are_told_and_all_is_all():
+    with pytest.raises(InvalidValueError, match="folders that exist, got '/nowhere'"):
+        rules(["sh"], {MORE: "/nowhere"})
+    assert rules(["sh"], {MORE: EVERYTHING}) is None
+
+
+@pytest.mark.parametrize("program", ["python3", sys.executable])
+def test_a_module_in_the_working_folder_is_found(
+    program: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Though Python itself may lie where the guest sees nothing: a PATH of the system's alone."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_slam.py").write_text("print('here', flush=True); input()")
+    command = [program, "-m", "my_slam"]
+    environment = {"PATH": "/usr/local/bin:/usr/bin:/bin", "TMPDIR": "/nowhere"}
+    wire = Wire(command, environment, rules=rules(command, environment))
+    assert wire.ask(b"", 20.0) == b"here"
+    wire.close()
+
+
+def test_a_track_of_a_benchmark_hides_the_others(tmp_path: Path):
+    (tmp_path / "bench" / "no-walls").mkdir(parents=True)
+    assert whole_result(tmp_path / "bench" / "no-walls") == tmp_path / "bench" / "no-walls"
+    (tmp_path / "bench" / "recipe.json").touch()
+    assert whole_result(tmp_path / "bench" / "no-walls") == tmp_path / "bench"
 
 
 def test_a_good_guest_notices_nothing():
