@@ -101,7 +101,7 @@ def test_looking_back_shows_the_past_and_touches_nothing(client: Client):
     assert "an earlier moment is shown" in client.call("/push")
     assert "is not kept, only 0.00 to" in client.call("/seek", time_s=1e6)
     client.call("/seek", back_s=0)
-    client.until(lambda: client.playback()["time_s"] == present)
+    client.until(lambda: client.playback()["time_s"] >= present)  # a step may have been under way
 
 
 def test_the_time_line_of_the_app_is_obeyed(client: Client):
