@@ -23,7 +23,6 @@ from sim.recording.verify import Finding
 from slam.frames import BeamClass
 from slam.guests import Limits, limited
 
-NOT_OF_POSES = "are not those of its poses"
 _TOLD = ("outcome", "ate_unaligned_m", "error_tracking_m")  # of a run with other poses
 
 
@@ -37,17 +36,17 @@ def made_again(path: Path, count: int, seed: int = 0, slam: str | None = None) -
     """
     given = submission.read(path)
     if slam is not None:
-        _must_start(slam)
+        limited(slam, Limits())  # what cannot start here is told before anything is simulated
     runs = [(track, run) for track, own in given.runs.items() for run in own]
     chosen = np.random.default_rng(seed).choice(len(runs), min(count, len(runs)), replace=False)
     for track, run in (runs[k] for k in sorted(chosen.tolist())):
         name = f"{path.name}: {track}, level {run['level']:g}, seed {run['seed']}"
         with tempfile.TemporaryDirectory() as folder:
-            wrong = _wrong(given, track, run, slam, Path(folder))
+            wrong, proven = _wrong(given, track, run, slam, Path(folder))
         there = _elsewhere(given.made_with)
         if not wrong:
             yield Finding(episode=name, verdict="same bytes")
-        elif there and NOT_OF_POSES not in wrong:
+        elif there and not proven:
             why = f"{wrong}, and it was made with {there}"
             yield Finding(episode=name, verdict="cannot be checked here", why=why)
         else:
@@ -56,15 +55,10 @@ def made_again(path: Path, count: int, seed: int = 0, slam: str | None = None) -
             yield Finding(episode=name, verdict="differs", why=why)
 
 
-def _must_start(slam: str) -> None:
-    """Raise what says why it cannot run here."""
-    limited(slam, Limits())
-
-
 def _wrong(
     given: Submission, track: str, run: Mapping[str, Any], slam: str | None, folder: Path
-) -> str:
-    """What is others here, "" where nothing is."""
+) -> tuple[str, bool]:
+    """What is others here, "" where nothing is, and whether no other machine can explain it."""
     file = folder / "again.npz"
     plan = TRACKS[track].plan(
         (ODOMETRY,), (run["seed"],), levels=(float(run["level"]),), seconds=given.seconds
@@ -72,9 +66,9 @@ def _wrong(
     (one,) = plan.runs()
     record(file, every=plan.every, **asdict(plan.recipe(one)))
     if digest(file) != run["recording"]:
-        return "its scans are others here"
+        return "its scans are others here", False
     if slam is None:
-        return ""
+        return "", False
     drive = load(file)
     entry = Entry(slam, drive, Limits(hidden=(folder,)), judge_maps=False)
     entry.over(drive.frames)
@@ -83,8 +77,8 @@ def _wrong(
     if submission.digest_of(arrays["stamps_ns"], arrays["poses"]) == run["poses"]:
         row |= {"moving_share_of_returns": drive.share_of_returns(BeamClass.MOVING)}
         wrong = [k for k in submission.OF_POSES if submission.plain(row.get(k)) != run[k]]
-        return f"its {', '.join(wrong)} {NOT_OF_POSES}" if wrong else ""
-    return f"its poses are others here ({_told(_TOLD, run)}; here {_told(_TOLD, row)})"
+        return (f"its {', '.join(wrong)} are not those of its poses" if wrong else ""), True
+    return f"its poses are others here ({_told(_TOLD, run)}; here {_told(_TOLD, row)})", False
 
 
 def _told(keys: Sequence[str], row: Mapping[str, Any]) -> str:

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scripts.comparison.rules import MAX_WORD
 from slam.archives import Header
 from slam.errors import LogFormatError
 
-MAX_LETTERS = 2000  # of a word in an array, whose every entry takes as much as the longest
 MOST_CELLS = 1 << 28  # of a raster, as ``slam.maps`` reads it
 MAYBE_NONE = ("movers", "answered")  # lengths that may be 0
 _TYPES = {"b": np.bool_, "i": np.int64, "u": np.uint8, "f": np.float64, "U": np.str_}
@@ -46,8 +46,8 @@ class Array:
         if math.prod(header.shape) and header.dtype.kind not in self.kinds:
             kinds = " or ".join(dict.fromkeys(_KINDS[kind] for kind in self.kinds))
             return f"must hold {kinds}, got {header.dtype}"
-        if header.dtype.kind == "U" and header.dtype.itemsize > 4 * MAX_LETTERS:
-            return f"must hold words of at most {MAX_LETTERS} letters, got {header.dtype}"
+        if header.dtype.kind == "U" and header.dtype.itemsize > 4 * MAX_WORD:
+            return f"must hold words of at most {MAX_WORD} letters, got {header.dtype}"
         if not self._fits(header.shape, lengths):
             wanted = ", ".join(_named(length, lengths) for length in self.shape)
             return f"must have shape ({wanted}), got {header.shape}"

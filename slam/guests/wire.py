@@ -149,8 +149,9 @@ class Wire:
         said = [text for text in (" ".join(part.split()) for part in lines) if text]
         words = " ".join(said)
         refused = "Permission denied" in words or "No module named" in words
-        hint = "; it sees only its own folder: docs/bring_your_own.md"
-        hint = hint if self._confined and refused else ""
+        hint = ""
+        if self._confined and refused:
+            hint = "; it sees only its own folder: docs/bring_your_own.md"
         return f"; its last words: {' | '.join(said[-3:])[-400:]!r}{hint}" if said else ""
 
     def processor_s(self) -> float | None:

@@ -8,8 +8,8 @@ What moves there moves as in world 1, without a crowd or change out of sight, bu
 code that moves things must leave the file alone. A change that moves a number writes it in a commit
 of its own, which says which figure moved.
 
-A digest holds every bit, so it is promised only on the same versions and CPU features. The numbers
-beside it (end poses and the like) are compared everywhere, to ``TOLERANCE``.
+A digest holds every bit, so it is promised only on the same versions, for SLAMs on x86-64-v3. The
+numbers beside it (end poses and the like) are compared everywhere, to ``TOLERANCE``.
 """
 
 from __future__ import annotations
