@@ -8,10 +8,10 @@ DOCS   := .venv-docs
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test coverage check bench docs wheel lock clean
+.PHONY: help demo test test-fast coverage check bench docs wheel lock clean
 
 help:            ## list the targets
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
 demo: $(RUN)     ## 60 s of a moving office, SLAM against odometry, a map and a film in out/demo/
 	@$(BIN)/mobilia demo --overwrite
@@ -19,6 +19,10 @@ demo: $(RUN)     ## 60 s of a moving office, SLAM against odometry, a map and a 
 test: $(STAMP)   ## the whole test suite, on up to four cores; of one package: make test PKG=slam/tracker
 	@$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder \
 	  $(if $(PKG),tests/$(PKG))
+
+test-fast: $(STAMP)  ## the quick half of it, a minute on two cores: no film, docs, fuzz, golden, slow; takes PKG too
+	@$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder \
+	  -m "not (slow or docs or film or fuzz or golden)" $(if $(PKG),tests/$(PKG))
 
 coverage: $(STAMP)  ## the same suite with a table of the lines that no test runs; takes longer
 	@$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder \

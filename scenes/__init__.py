@@ -13,16 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scenes.filling import filled
-    from scenes.mounting import at_scan_height
     from scenes.registry import build, describe, names, register
-    from scenes.scan_plane import SCAN_HEIGHT
-    from scenes.scene import Mover, Scene
+    from scenes.scene import Mover, Scene, at_scan_height
 
+SCAN_HEIGHT = 0.36
+"""Usual height of the scan plane above the floor, m (where parts/robot.xml has its laser)."""
 _WHERE = {
     **dict.fromkeys(("build", "describe", "names", "register"), "registry"),
-    "SCAN_HEIGHT": "scan_plane",
-    **dict.fromkeys(("Mover", "Scene"), "scene"),
-    "at_scan_height": "mounting",
+    **dict.fromkeys(("Mover", "Scene", "at_scan_height"), "scene"),
     "filled": "filling",
 }
 

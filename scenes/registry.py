@@ -9,7 +9,7 @@ import inspect
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from scenes.scan_plane import SCAN_HEIGHT
+from scenes import SCAN_HEIGHT
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.names import first_line, join_folders, refuse_code
 
@@ -85,8 +85,7 @@ def build(
         raise InvalidValueError(f"scene '{name}' cannot take these options: {error}") from None
     from scenes.crowd import crowd_of
     from scenes.crowd_kinds import with_crowd
-    from scenes.mounting import at_scan_height
-    from scenes.scene import Scene
+    from scenes.scene import Scene, at_scan_height
 
     scene = recipe(seed, **options)
     if not isinstance(scene, Scene):

@@ -6,33 +6,14 @@ from __future__ import annotations
 import logging
 import os
 import sys
+from importlib import import_module, metadata
 from typing import Annotated
 
 import typer
 
 from scripts import interrupt
 from scripts.console import LogLines, console, fail, note
-from scripts.many import ManyValues
-from scripts.option_names import Verb
-from scripts.verbs.bench import bench
-from scripts.verbs.benchmark import benchmark
-from scripts.verbs.blame import blame
-from scripts.verbs.compare import compare
-from scripts.verbs.config import config
-from scripts.verbs.demo import demo
-from scripts.verbs.doctor import doctor
-from scripts.verbs.drive import drive
-from scripts.verbs.export import export
-from scripts.verbs.generate import generate
-from scripts.verbs.lifelong import lifelong
-from scripts.verbs.listing import listing
-from scripts.verbs.live import live
-from scripts.verbs.render import render
-from scripts.verbs.report import report
-from scripts.verbs.reproduce import reproduce
-from scripts.verbs.run import run
-from scripts.verbs.sensor_card import sensor_card
-from scripts.verbs.verify import verify
+from scripts.option_names import ManyValues, Verb
 from slam.errors import MissingPathError, MobiliaError
 from slam.names import load, look_in
 
@@ -49,30 +30,33 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("demo", cls=Verb)(demo)
-app.command("run", cls=Verb)(run)
-app.command("render", cls=Verb)(render)
-app.command("generate", cls=Verb)(generate)
-app.command("verify", cls=Verb)(verify)
-app.command("export", cls=Verb)(export)
-app.command("list", cls=Verb)(listing)
-app.command("config", cls=Verb)(config)
-app.command("bench", cls=Verb)(bench)
-app.command("doctor", cls=Verb)(doctor)
-app.command("sensor-card", cls=Verb)(sensor_card)
-app.command("reproduce", cls=Verb)(reproduce)
-app.command("compare", cls=ManyValues)(compare)
-app.command("benchmark", cls=ManyValues)(benchmark)
-app.command("drive", cls=ManyValues)(drive)
-app.command("blame", cls=ManyValues)(blame)
-app.command("live", cls=ManyValues)(live)
-app.command("report", cls=Verb)(report)
-app.command("lifelong", cls=Verb)(lifelong)
+# Each is a function of that name in a module of that name, but for the name of a built-in type.
+VERBS: dict[str, type[Verb]] = {
+    "demo": Verb, "run": Verb, "render": Verb, "generate": Verb, "verify": Verb, "export": Verb,
+    "list": Verb, "config": Verb, "bench": Verb, "doctor": Verb, "sensor-card": Verb,
+    "reproduce": Verb, "compare": ManyValues, "benchmark": ManyValues, "drive": ManyValues,
+    "blame": ManyValues, "live": ManyValues, "report": Verb, "lifelong": Verb,
+}  # fmt: skip
+for _name, _kind in VERBS.items():
+    _own = {"list": "listing"}.get(_name, _name.replace("-", "_"))
+    app.command(_name, cls=_kind)(getattr(import_module(f"scripts.verbs.{_own}"), _own))
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        console.print(f"mobilia {metadata.version('mobilia')}", highlight=False)
+        raise typer.Exit
 
 
 @app.callback()
 def options(
     verbose: bool = typer.Option(False, "--verbose", "-v", help="Also print what is going on."),
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Print the version and end.", callback=_version, is_eager=True
+        ),
+    ] = False,
     modules: Annotated[
         list[str] | None,
         typer.Option(

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 
+from rich import box
 from rich.console import Console
 from rich.logging import RichHandler
 from rich.markup import escape
@@ -47,6 +48,11 @@ def fail(message: str) -> None:
 def note(message: str) -> None:
     """One line that the user should see but that is no error."""
     console.print(f"[yellow]note:[/yellow] {plain(message)}", highlight=False, soft_wrap=True)
+
+
+def say(words: str, *, highlight: bool = True) -> None:
+    """A sentence with its markup, as one line however narrow the terminal is."""
+    console.print(words, highlight=highlight, soft_wrap=True)
 
 
 class LogLines(RichHandler):
@@ -160,6 +166,14 @@ class _Ticks:
         """No call begins after this."""
         self._over.set()
         self._thread.join()
+
+
+def plain_table(title: str, caption: str | None = None) -> Table:
+    """A table without rules between rows, close enough for nine columns in 80 characters."""
+    return Table(
+        title=escape(title), title_justify="left", caption=caption, caption_justify="left",
+        box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False,
+    )  # fmt: skip
 
 
 def level_table(

@@ -72,7 +72,7 @@ def save(figure: Figure, path: Path) -> None:
 def _axes(
     width: float, height: float, rows: int = 1, margins: Margins | None = None
 ) -> tuple[Figure, NDArray[np.object_]]:
-    """``margins``: inches left, right, below and above; else found anew by measuring all words,
+    """``margins``: inches left, right, below and above; else found again by measuring all words,
     which takes a third of the time of a picture."""
     with mpl.rc_context({"figure.constrained_layout.use": margins is None}):
         figure = Figure(figsize=(width, height))

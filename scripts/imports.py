@@ -1,11 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which files a Python file imports from its own folder or package, found without running it."""
+"""What the result of a job depends on: which files its code is, found without running any of it.
+
+Of a file: those that it imports from its own folder or package. Of a job: ``code_of``.
+"""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+import importlib.util
+import inspect
+import shlex
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from slam.names import join_folders, loaded
+from slam.variants import PIPE, inside
 
 INSTALLED = ("site-packages", "dist-packages")
 
@@ -58,3 +70,63 @@ def _files(root: Path, module: str) -> Iterator[tuple[Path, str]]:
             if path.is_file():
                 yield path, name
                 break
+
+
+def code_of(
+    call: Callable[..., Any], *packages: ModuleType, slam: str = "", scene: str = ""
+) -> tuple[Path, ...]:
+    """For ``Job.code``: folders of packages, the module of ``call`` with the scripts that it
+    imports, the files of a SLAM and of a scene of somebody's own, and what ``--with`` has loaded.
+    """
+    scripts = scripts_of(inspect.getfile(call), call.__module__)
+    own = (*source_of(slam), *source_of_scene(scene), *source_of_loaded())
+    return (*sources(*packages), *scripts, *own)
+
+
+def sources(*packages: Any) -> tuple[Path, ...]:
+    """The folders of packages, for ``Job.code``."""
+    return tuple(Path(package.__file__).parent for package in packages)
+
+
+@cache
+def scripts_of(file: str, module: str) -> tuple[Path, ...]:
+    """A script and those that it imports, for ``Job.code`` beside the packages that it calls."""
+    folder = Path(__file__).resolve().parent
+    return tuple(path for path in with_imports(Path(file), module) if folder in path.parents)
+
+
+def source_of(slam: str) -> tuple[Path, ...]:
+    """The file of a SLAM's own module, or those that a command names, and what Python files among
+    them import from beside them: with any of it changed, its runs are made again."""
+    slam = inside(slam)
+    kind, _, command = slam.partition(":")
+    if not command:
+        return ()
+    if slam.startswith(PIPE):
+        named = [path for path in map(Path, shlex.split(command)) if path.is_file()]
+        return tuple(file for path in named for file in _whole(path, path.stem))
+    return _of_module(kind)
+
+
+def source_of_scene(scene: str) -> tuple[Path, ...]:
+    """The files of a scene's own module as ``source_of`` has them, and the plans and parts (MJCF)
+    in their folders."""
+    module, colon, _ = scene.partition(":")
+    python = _of_module(module) if colon else ()
+    return (*python, *sorted({xml for file in python for xml in file.parent.glob("*.xml")}))
+
+
+def source_of_loaded() -> tuple[Path, ...]:
+    """The files of the modules that ``--with`` has loaded: what they register is known by a name
+    that does not tell where it comes from."""
+    return tuple(file for module in loaded() for file in _of_module(module))
+
+
+def _of_module(module: str) -> tuple[Path, ...]:
+    join_folders()
+    spec = importlib.util.find_spec(module)
+    return _whole(Path(spec.origin), module) if spec and spec.origin and spec.has_location else ()
+
+
+def _whole(file: Path, module: str) -> tuple[Path, ...]:
+    return with_imports(file, module) if file.suffix == ".py" else (file,)

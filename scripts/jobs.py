@@ -14,13 +14,14 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
 
+from scenes import registry
 from scripts import interrupt, workers
 from scripts.console import note, progress
 from scripts.machine import versions
@@ -28,6 +29,7 @@ from sim.recording.sums import damage_beside, write_beside
 from slam import locks
 from slam.errors import InvalidValueError, MobiliaError, OutputError, SlamFailedError
 from slam.files import PART, is_full, is_part, make_folder, put, reason, remove
+from slam.guests import Limits, limited
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +55,10 @@ class Job:
             raise InvalidValueError(
                 f"Job.name must be letters, digits, '-', '_' and '.', got {self.name!r}"
             )
+
+    def over(self, what: str, arguments: Mapping[str, Any]) -> Job:
+        """The same on what is called so, and these arguments besides."""
+        return replace(self, name=f"{what}_{self.name}", arguments={**self.arguments, **arguments})
 
     def file_name(self) -> str:
         """Where its result goes, within the folder of the jobs."""
@@ -88,6 +94,14 @@ def _files(path: Path) -> list[tuple[str, Path]]:
         for name, file in files
         if not any(part.startswith((".", "__pycache__")) for part in name.parts)
     )
+
+
+def try_names(slams: Iterable[str], scenes: Iterable[str], out: Path) -> None:
+    """Make each once: wrong names are told before anything starts. ``out``: hidden from SLAMs."""
+    for name in scenes:
+        registry.build(name)
+    for name in slams:
+        limited(name, Limits(hidden=(out,)))
 
 
 def run_jobs(

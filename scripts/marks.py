@@ -4,10 +4,15 @@
 A rendered page does not show the marks. A place of its own lines has each mark on a line of its
 own; a place within a line is within one line, and not at its beginning, where Markdown would take
 all of the line for HTML.
+
+A page has no long tables: their rows go to CSV files in ``docs/results``, which the page links.
 """
 
 from __future__ import annotations
 
+import csv
+import io
+import os
 import re
 from pathlib import Path
 
@@ -15,6 +20,9 @@ from slam.errors import InvalidValueError
 from slam.files import write_text
 
 _BEGIN = re.compile(r"<!-- ([\w.-]+) -->")
+MOST_CELLS = 40  # of a table on a page
+_TABLE = re.compile(r"(?:^\|.*\|\n?){3,}", re.MULTILINE)
+SUM = "all"  # how those rows of a long table begin that stay on the page
 
 
 def names(text: str) -> list[str]:
@@ -38,9 +46,45 @@ def filled(text: str, name: str, told: str, page: object) -> str:
     return f"{before}{told}{after}"
 
 
-def fill_page(page: Path, name: str, told: str) -> None:
-    """Write ``told`` at the place ``name`` of a page that is there, the rest as it is."""
-    write_text(page, filled(page.read_text(encoding="utf-8"), name, told, page))
+def fill_page(page: Path, name: str, told: str, most: int = MOST_CELLS) -> None:
+    """Write ``told`` at the place ``name`` of a page that is there, the rest as it is.
+
+    Tables of more than ``most`` cells become CSV files in the folder ``results`` beside the page.
+    """
+    text = filled(page.read_text(encoding="utf-8"), name, told, page)  # refuses wrong marks first
+    stem = name if name == page.stem else f"{page.stem}_{name}"
+    short = with_tables_apart(told, stem, page.parent / "results", page.parent, most)
+    write_text(page, text if short == told else filled(text, name, short, page))
+
+
+def with_tables_apart(
+    told: str, stem: str, results: Path, folder: Path, most: int = MOST_CELLS
+) -> str:
+    """``told`` with a link in place of every table of more than ``most`` cells.
+
+    Each is written to ``results``, as ``stem.csv``, ``stem_2.csv`` and so on. Of its rows those
+    that sum up (``SUM``) stay. folder: where the page is that links it.
+    """
+    count = 0
+
+    def apart(table: re.Match[str]) -> str:
+        nonlocal count
+        lines = table[0].strip().splitlines()
+        head, *rows = ([cell.strip() for cell in line[1:-1].split("|")] for line in lines)
+        if len(head) * len(rows[1:]) <= most:
+            return table[0]
+        count += 1
+        path = results / (f"{stem}.csv" if count == 1 else f"{stem}_{count}.csv")
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows([head, *rows[1:]])
+        write_text(path, text.getvalue())
+        link = Path(os.path.relpath(path, folder)).as_posix()
+        sums = [row[0].startswith(SUM) for row in rows[1:]]
+        kept = [line for line, is_sum in zip(lines[2:], sums, strict=True) if is_sum]
+        said = f"All {len(rows) - 1} rows: [{path.name}]({link}).\n"
+        return "\n".join([*lines[:2], *kept, "", said]) if kept else said
+
+    return _TABLE.sub(apart, told)
 
 
 def without(text: str) -> str:

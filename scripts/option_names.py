@@ -52,6 +52,34 @@ class Verb(TyperCommand):
             raise InvalidValueError(said) from error
 
 
+class ManyValues(Verb):
+    """A command whose list options take all the words up to the next option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat each list option before every one of its words."""
+        lists = {
+            name
+            for parameter in self.params
+            if getattr(parameter, "multiple", False)
+            for name in parameter.opts
+        }
+        return super().parse_args(ctx, repeated(args, lists))
+
+
+def repeated(args: list[str], lists: set[str]) -> list[str]:
+    """``args`` with the words after each option of ``lists`` given to that option one by one."""
+    out: list[str] = []
+    option, first = "", False  # the list option whose words these are; whether its first comes next
+    for word in args:
+        if word.startswith("-") and word != "-":
+            option, first = (word, True) if word in lists else ("", False)
+            out.append(word)
+            continue
+        out += [word] if first or not option else [option, word]
+        first = False
+    return out
+
+
 def flowing(text: str) -> str:
     """Each paragraph as one line: rich keeps the line ends of the source, which are elsewhere."""
     return "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))

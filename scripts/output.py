@@ -8,8 +8,8 @@ import math
 import os
 import re
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -138,6 +138,26 @@ def together(folder: Path) -> Iterator[Path]:
     finally:
         remove(staged)
     put_tables(folder)
+
+
+@contextmanager
+def result_folder(
+    out: Path, command: str, settings: Mapping[str, Any]
+) -> Iterator[Callable[[], AbstractContextManager[Path]]]:
+    """``locked_folder`` with its recipe there from the start; yields what its tables are written
+    in: ``together``, which ends with the recipe.
+    """
+    with locked_folder(out):
+        if not (out / RECIPE).exists():  # else that of the tables there stays with them
+            write_recipe(out, command, settings)
+
+        @contextmanager
+        def tables() -> Iterator[Path]:
+            with together(out) as staged:
+                yield staged
+                write_recipe(staged, command, settings)
+
+        yield tables
 
 
 def put_tables(folder: Path) -> None:

@@ -6,16 +6,18 @@ from __future__ import annotations
 import json
 import math
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from slam.bounded import text_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import write_text
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "results"
 SCHEMA = 1
+MAX_BYTES = 1 << 25
 CODE = ("slam", "sim", "scenes", "scripts")
 
 
@@ -67,12 +69,26 @@ def _rounded(value: Any) -> Any:
     return float(f"{value:.6g}") if math.isfinite(value) else str(value)
 
 
-def load(path: Path) -> dict[str, Any]:
-    """A results file; ``LogFormatError`` for what is none of this schema."""
+def finite(value: Any) -> Any:
+    """As strict JSON has it: None where it is no finite number."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def load(
+    path: Path,
+    what: str = "results file",
+    schema: int | None = SCHEMA,
+    constant: Callable[[str], Any] | None = None,
+) -> dict[str, Any]:
+    """The object in a JSON file; ``LogFormatError`` for what is no ``what`` of this schema.
+
+    schema    None: it has none
+    constant  called with Infinity and NaN
+    """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise LogFormatError(path, f"no results file: {error}") from error
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        raise LogFormatError(path, f"no results file of schema {SCHEMA}")
+        data = json.loads(text_of(path, MAX_BYTES), parse_constant=constant)
+    except (ValueError, RecursionError) as error:
+        raise LogFormatError(path, f"no {what}: {error}") from error
+    if not isinstance(data, dict) or (schema is not None and data.get("schema") != schema):
+        raise LogFormatError(path, f"no {what}" + (f" of schema {schema}" if schema else ""))
     return data

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from scripts.checked import whole
+from scripts.options import whole
 from slam import locks
 from slam.errors import InvalidValueError, MissingDependencyError, MobiliaError, OutputError
 from slam.files import write_text

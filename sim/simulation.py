@@ -332,7 +332,7 @@ def n_frames(seconds: float, period_s: float) -> int:
 def stream(
     scene: str = "office", *, seconds: float = 60.0, baud: int | None = None, **settings: Any
 ) -> Stream:
-    """A stream that simulates a tour anew each time it is iterated, byte for byte the same.
+    """A stream that simulates a tour again each time it is iterated, byte for byte the same.
 
     baud      of the scanner's serial line: most scans are lost at 38400
               (``sim.sensors.lidar.link``); None: all arrive

@@ -3,7 +3,7 @@
 
 No ``fastmath`` and no ``parallel``: results must not depend on how a compiler reassociates sums.
 Where no folder for the compile cache can be written (read-only install, no HOME) the kernels are
-compiled anew in each process, which takes some seconds and is said once in the log.
+compiled again in each process, which takes some seconds and is said once in the log.
 
 Numba's cache looks at the file of the kernel itself only; a kernel that calls one of another module
 would keep its old code after that module changed. So the files of imported kernels count too, and

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from slam.frames import Float, Frame
 from slam.system import HasChanges, HasLandmarks, RunsAtTheEnd, SlamSystem, told
 from slam.trajectory import Trajectory
 
+T = TypeVar("T")
 MOST_M = 1e9  # m and rad, of a pose or a map's origin: the squares of errors must not overflow
 LEAST_CELL_M, MOST_CELL_M = 1e-3, 1e3  # edge of a map's cell
 
@@ -22,15 +24,21 @@ LEAST_CELL_M, MOST_CELL_M = 1e-3, 1e3  # edge of a map's cell
 def asked(system: SlamSystem, frame: Frame) -> Estimate:
     """One update, judged: raises ``SlamFailedError`` for whatever is no estimate of this frame."""
     with judged():
-        estimate: object = system.update(frame)
-    if not isinstance(estimate, Estimate):
-        raise SlamFailedError(f"returned no Estimate but {estimate!r:.80}", "bad")
+        found: object = system.update(frame)
+    estimate = _of(Estimate, found)
     if estimate.stamp_ns != frame.stamp_ns:
         raise SlamFailedError(
             f"returned an estimate for {estimate.stamp_ns} ns instead of {frame.stamp_ns} ns", "bad"
         )
     _check_near("a pose", estimate.T_map_robot)
     return estimate
+
+
+def _of(kind: type[T], found: object, none: str = "") -> T:
+    """``found``, which must be of that type; ``none`` is what else may be, for the error."""
+    if not isinstance(found, kind):
+        raise SlamFailedError(f"returned no {kind.__name__}{none} but {found!r:.80}", "bad")
+    return found
 
 
 def _check_near(what: str, poses: Float) -> None:
@@ -50,8 +58,7 @@ def as_map(raster: object) -> Raster | None:
     """That map; ``SlamFailedError`` for what no map can be."""
     if raster is None:
         return None
-    if not isinstance(raster, Raster):
-        raise SlamFailedError(f"returned no Raster or None but {raster!r:.80}", "bad")
+    raster = _of(Raster, raster, " or None")
     if raster.T_map_origin[2] != 0.0:
         raise SlamFailedError(
             "returned a map that does not lie along the map's axes, its origin is turned by "
@@ -72,26 +79,21 @@ def asked_landmarks(system: HasLandmarks) -> Landmarks:
     """Its landmarks now; ``SlamFailedError`` for what cannot be any."""
     with judged():
         found: object = system.landmarks()
-    if not isinstance(found, Landmarks):
-        raise SlamFailedError(f"returned no Landmarks but {found!r:.80}", "bad")
-    return found
+    return _of(Landmarks, found)
 
 
 def asked_changes(system: HasChanges) -> Changes | None:
     """What moved lately; ``SlamFailedError`` for what cannot be that."""
     with judged():
         found: object = system.changes()
-    if found is not None and not isinstance(found, Changes):
-        raise SlamFailedError(f"returned no Changes or None but {found!r:.80}", "bad")
-    return found
+    return None if found is None else _of(Changes, found, " or None")
 
 
 def asked_trajectory(system: SlamSystem, stamps_ns: NDArray[np.int64]) -> Trajectory:
     """Its final poses, one at least for each of ``stamps_ns``; ``SlamFailedError`` otherwise."""
     with judged():
-        final: object = system.trajectory()
-    if not isinstance(final, Trajectory):
-        raise SlamFailedError(f"returned no Trajectory but {final!r:.80}", "bad")
+        found: object = system.trajectory()
+    final = _of(Trajectory, found)
     if not np.isin(stamps_ns, final.stamps_ns).all():
         raise SlamFailedError(
             f"returned {len(final)} poses and leaves out frames; it must have one for each of the "

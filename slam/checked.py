@@ -129,6 +129,12 @@ def stamp(owner: str, value: object) -> int:
     return int(value)
 
 
+def set_fields(owner: object, **values: object) -> None:
+    """Give fields of a frozen dataclass what was checked of them, while it is made."""
+    for name, value in values.items():
+        object.__setattr__(owner, name, value)
+
+
 class ByContent:
     """Equality of dataclasses that hold arrays: same type, equal fields, NaN equal to NaN."""
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.checked import covariance, frozen, pose
+from slam.checked import covariance, frozen, pose, set_fields
 from slam.errors import InvalidValueError
 from slam.frames import Float
 
@@ -37,9 +37,10 @@ class Estimate:
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "T_map_robot", pose("Estimate", "T_map_robot", self.T_map_robot))
-        object.__setattr__(
-            self, "covariance", covariance("Estimate", "covariance", self.covariance)
+        set_fields(
+            self,
+            T_map_robot=pose("Estimate", "T_map_robot", self.T_map_robot),
+            covariance=covariance("Estimate", "covariance", self.covariance),
         )
 
 
@@ -66,8 +67,8 @@ class Raster:
             )
         if not 0.0 < self.resolution_m < np.inf:
             raise InvalidValueError(f"Raster.resolution_m must be > 0 m, got {self.resolution_m}")
-        object.__setattr__(self, "values", values)
-        object.__setattr__(self, "T_map_origin", pose("Raster", "T_map_origin", self.T_map_origin))
+        origin = pose("Raster", "T_map_origin", self.T_map_origin)
+        set_fields(self, values=values, T_map_origin=origin)
 
 
 SQUARE = 256  # cells along the edge of a square of ``MapSquares``

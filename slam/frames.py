@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any
 
@@ -27,6 +27,7 @@ from slam.checked import (
     is_whole,
     pose,
     possible,
+    set_fields,
     stamp,
 )
 from slam.errors import InvalidValueError
@@ -94,17 +95,16 @@ class LaserSpec(ByContent):
                 f"LaserSpec needs 0 <= range_min < range_max <= {MOST_RANGE_M:.3g}, "
                 f"got {self.range_min} and {self.range_max} m"
             )
-        object.__setattr__(self, "beam_time_offsets", self._offsets())
         mounted = pose("LaserSpec", "T_robot_laser", self.T_robot_laser)
         if max(map(abs, mounted.tolist())) > MOST_MOUNT_M:
             raise InvalidValueError(
                 f"LaserSpec.T_robot_laser must lie within {MOST_MOUNT_M:g} m and rad, "
                 f"got {mounted.tolist()}"
             )
-        object.__setattr__(self, "T_robot_laser", mounted)
         angles = self.angle_min + np.arange(self.n_beams) * self.angle_increment
         angles.setflags(write=False)
-        object.__setattr__(self, "_angles", angles)
+        offsets = self._offsets()
+        set_fields(self, beam_time_offsets=offsets, T_robot_laser=mounted, _angles=angles)
 
     def _check_angles(self) -> None:
         if not is_whole(self.n_beams) or not 1 <= self.n_beams <= MOST_BEAMS:
@@ -178,22 +178,17 @@ class Scan(ByContent):
     intensities: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stamp_ns", stamp("Scan", self.stamp_ns))
-        n = self.spec.n_beams
+        stamp_ns, n = stamp("Scan", self.stamp_ns), self.spec.n_beams
         ranges = frozen("Scan", "ranges", self.ranges, (n,), np.float32)
-        if (ranges < 0.0).any():
-            bad = int(np.flatnonzero(ranges < 0.0)[0])
+        for bad in np.flatnonzero(ranges < 0.0).tolist():
             raise InvalidValueError(
                 f"Scan.ranges[{bad}] must be >= 0 m, inf (no return) or NaN (error), "
                 f"got {ranges[bad]}"
             )
-        object.__setattr__(self, "ranges", ranges)
+        set_fields(self, stamp_ns=stamp_ns, ranges=ranges)
         if self.intensities is not None:
-            object.__setattr__(
-                self,
-                "intensities",
-                frozen("Scan", "intensities", self.intensities, (n,), np.float32),
-            )
+            given = frozen("Scan", "intensities", self.intensities, (n,), np.float32)
+            set_fields(self, intensities=given)
 
     @property
     def valid(self) -> NDArray[np.bool_]:
@@ -218,13 +213,12 @@ class Features(ByContent):
     ids: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stamp_ns", stamp("Features", self.stamp_ns))
+        stamp_ns = stamp("Features", self.stamp_ns)
         points = frozen("Features", "points_robot", self.points_robot, (None, 2))
         finite("Features", "points_robot", points)
-        if points.size and np.abs(points).max() > MOST_FEATURE_M:
+        if (farthest := np.abs(points).max(initial=0.0)) > MOST_FEATURE_M:
             raise InvalidValueError(
-                f"Features.points_robot must lie within {MOST_FEATURE_M:g} m, "
-                f"got {np.abs(points).max():g}"
+                f"Features.points_robot must lie within {MOST_FEATURE_M:g} m, got {farthest:g}"
             )
         k = len(points)
         covariances = frozen("Features", "covariances", self.covariances, (k, 2, 2))
@@ -240,10 +234,9 @@ class Features(ByContent):
                     f"Features.covariances[{index}] must be positive semidefinite (no correlation "
                     f"beyond 1), got {covariances[index].tolist()}"
                 )
-        object.__setattr__(self, "points_robot", points)
-        object.__setattr__(self, "covariances", covariances)
+        set_fields(self, stamp_ns=stamp_ns, points_robot=points, covariances=covariances)
         if self.ids is not None:
-            object.__setattr__(self, "ids", frozen("Features", "ids", self.ids, (k,), np.int64))
+            set_fields(self, ids=frozen("Features", "ids", self.ids, (k,), np.int64))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -264,18 +257,13 @@ class Odometry(ByContent):
     twist: Float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stamp_ns", stamp("Odometry", self.stamp_ns))
-        object.__setattr__(
-            self, "T_odom_robot", pose("Odometry", "T_odom_robot", self.T_odom_robot)
-        )
-        if self.increment_covariance is not None:
-            object.__setattr__(
-                self,
-                "increment_covariance",
-                covariance("Odometry", "increment_covariance", self.increment_covariance),
-            )
+        T_odom_robot = pose("Odometry", "T_odom_robot", self.T_odom_robot)
+        set_fields(self, stamp_ns=stamp("Odometry", self.stamp_ns), T_odom_robot=T_odom_robot)
+        if (spread := self.increment_covariance) is not None:
+            known = covariance("Odometry", "increment_covariance", spread)
+            set_fields(self, increment_covariance=known)
         if self.twist is not None:
-            object.__setattr__(self, "twist", pose("Odometry", "twist", self.twist))
+            set_fields(self, twist=pose("Odometry", "twist", self.twist))
             fastest = max(map(abs, self.twist.tolist()))
             if fastest > MOST_TWIST:
                 raise InvalidValueError(
@@ -319,7 +307,7 @@ class BeamLabels(ByContent):
             ("mixed", np.bool_),
         ):
             value = frozen("BeamLabels", name, getattr(self, name), (n,), dtype)
-            object.__setattr__(self, name, value)
+            set_fields(self, **{name: value})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -342,7 +330,7 @@ class Frame(ByContent):
     labels: BeamLabels | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stamp_ns", stamp("Frame", self.stamp_ns))
+        set_fields(self, stamp_ns=stamp("Frame", self.stamp_ns))
         sensed = self.scan if self.scan is not None else self.features
         if self.odometry.stamp_ns != self.stamp_ns or (
             sensed is not None and sensed.stamp_ns != self.stamp_ns
@@ -353,7 +341,7 @@ class Frame(ByContent):
                 + ("" if sensed is None else f" and {sensed.stamp_ns} ns")
             )
         if self.truth is not None:
-            object.__setattr__(self, "truth", pose("Frame", "truth", self.truth))
+            set_fields(self, truth=pose("Frame", "truth", self.truth))
         if self.labels is not None and (
             self.scan is None or len(self.labels.body) != self.scan.spec.n_beams
         ):
@@ -368,14 +356,8 @@ class Frame(ByContent):
         """The same frame as a robot would get it: no truth, no labels, no feature identities."""
         features = self.features
         if features is not None and features.ids is not None:
-            features = Features(
-                stamp_ns=features.stamp_ns,
-                points_robot=features.points_robot,
-                covariances=features.covariances,
-            )
-        return Frame(
-            stamp_ns=self.stamp_ns, odometry=self.odometry, scan=self.scan, features=features
-        )
+            features = replace(features, ids=None)
+        return replace(self, features=features, truth=None, labels=None)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,14 +11,13 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from slam.bounded import bytes_of, text_of
-from slam.errors import InvalidValueError, LogFormatError, OutputError
+from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Raster
-from slam.files import part_of, put, replacing, sync, sync_names, unfinished, write_bytes
+from slam.files import part_of, put, replacing, sync, sync_names, unfinished
 from slam.strips import MapStrips, of_raster
 
 OCCUPIED_THRESHOLD = 0.65
@@ -156,21 +155,6 @@ def raster_image(raster: Raster) -> NDArray[np.uint8]:
     image = np.round(np.stack(channels, axis=-1)).astype(np.uint8)
     image[unknown] = _UNKNOWN_RGB
     return image
-
-
-def write_png(path: Path, raster: Raster, *, scale: int = 1) -> None:
-    """``raster_image`` as a PNG, each cell ``scale`` pixels wide.
-
-    Raises ``OutputError`` when it cannot be written, ``InvalidValueError`` for no cells.
-    """
-    if scale < 1:
-        raise InvalidValueError(f"scale must be >= 1 pixel per cell, got {scale}")
-    _check_cells(raster.values.size * scale**2, raster.values.shape)
-    image = raster_image(raster).repeat(scale, axis=0).repeat(scale, axis=1)
-    ok, data = cv2.imencode(".png", np.ascontiguousarray(image[..., ::-1]))
-    if not ok:
-        raise OutputError(f"cannot write {path}: OpenCV could not encode {image.shape}")
-    write_bytes(path, data.tobytes())
 
 
 def _check_cells(count: int, shape: tuple[int, ...]) -> None:

@@ -23,6 +23,7 @@ INLIER = 11.3  # chi squared of 3 degrees of freedom, 99 %
 ROUNDS = 60
 STILL = 1e-5  # m or rad: largest step at which it has converged
 SHARPER = 1.4
+DIGITS = 6  # of m and rad that a solution has: those beyond follow the processor's algebra
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,6 +84,7 @@ class Relaxation:
         self._mu = max(self._mu / SHARPER, 1.0)
         if self.done:
             self.poses[:, 2] = se2.wrap_array(self.poses[:, 2])
+            self.poses = np.round(self.poses, DIGITS)
 
 
 def optimise(poses: Float, edges: list[Edge]) -> tuple[Float, Float]:
@@ -152,12 +154,7 @@ def least_moved(poses: Float, before: Float) -> Float:
     A graph says nothing of where it lies as a whole. Geodesy calls this choice the datum of a free
     network.
     """
-    middle, goal = poses[:, :2].mean(axis=0), before[:, :2].mean(axis=0)
-    p, q = poses[:, :2] - middle, before[:, :2] - goal
-    across = float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum())
-    theta = math.atan2(across, float((p * q).sum()))
-    origin = goal - se2.transform([0.0, 0.0, theta], middle)
-    T = np.array([*origin.tolist(), theta])
+    T = se2.fit(poses[:, :2], before[:, :2])
     return np.array([se2.compose(T, pose) for pose in poses])
 
 

@@ -99,21 +99,27 @@ def interpolate(T_a_b: ArrayLike, T_a_c: ArrayLike, fraction: float) -> Array:
     return compose(T_a_b, exp(log(between(T_a_b, T_a_c)), fraction))
 
 
-def adjoint(T_a_b: ArrayLike) -> Array:
-    """(3, 3) matrix that carries a small motion ``(dx, dy, dtheta)`` of frame b into frame a.
-
-    ``compose(T_a_b, d_b)`` equals ``compose(d_a, T_a_b)`` to first order with
-    ``d_a = adjoint(T_a_b) @ d_b``.
-    """
-    x, y, theta = np.asarray(T_a_b, dtype=np.float64).tolist()
-    c, s = math.cos(theta), math.sin(theta)
-    return np.array([[c, -s, y], [s, c, -x], [0.0, 0.0, 1.0]])
-
-
 def rotation(theta: float) -> Array:
     """(2, 2) rotation by ``theta`` rad."""
     c, s = math.cos(theta), math.sin(theta)
     return np.array([[c, -s], [s, c]])
+
+
+def fit(points_b: ArrayLike, points_a: ArrayLike) -> Array:
+    """``T_a_b`` with least sum |points_a - T_a_b points_b|^2; points (n, 2) m, pair by pair.
+
+    (Umeyama 1991 without scale; in the plane the rotation is an arctangent.) The rotation is zero
+    where the points do not determine one.
+    """
+    b = np.asarray(points_b, dtype=np.float64)
+    a = np.asarray(points_a, dtype=np.float64)
+    mean_b, mean_a = b.mean(axis=0), a.mean(axis=0)
+    db, da = b - mean_b, a - mean_a
+    cosine = float((db * da).sum())
+    sine = float((db[:, 0] * da[:, 1] - db[:, 1] * da[:, 0]).sum())
+    theta = math.atan2(sine, cosine)
+    x, y = mean_a - transform([0.0, 0.0, theta], mean_b)
+    return np.array([x, y, theta])
 
 
 def propagate(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam._jit import njit
-from slam.checked import pose
+from slam.checked import pose, set_fields
 from slam.errors import InvalidValueError
 from slam.estimate import SQUARE, MapSquares, Raster
 from slam.frames import Float
@@ -51,9 +51,7 @@ class MapStrips:
     extent: Callable[[], Rectangle | None] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "T_map_origin", pose("MapStrips", "T_map_origin", self.T_map_origin)
-        )
+        set_fields(self, T_map_origin=pose("MapStrips", "T_map_origin", self.T_map_origin))
 
     def strips(self, low: int = 0, high: int | None = None) -> Iterator[Span]:
         """First and past-the-last row of each strip of rows ``low`` to before ``high``, lowest y

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.bounded import text_of
-from slam.checked import finite, frozen
+from slam.checked import finite, frozen, set_fields
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import write_text
 from slam.frames import NS_PER_S, Float
@@ -34,8 +34,7 @@ class Trajectory:
             raise InvalidValueError("Trajectory.stamps_ns must strictly increase")
         poses = frozen("Trajectory", "poses", self.poses, (len(stamps), 3))
         finite("Trajectory", "poses", poses)
-        object.__setattr__(self, "stamps_ns", stamps)
-        object.__setattr__(self, "poses", poses)
+        set_fields(self, stamps_ns=stamps, poses=poses)
 
     def __len__(self) -> int:
         return len(self.stamps_ns)

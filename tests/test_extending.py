@@ -15,12 +15,22 @@ import pytest
 from typer.testing import CliRunner
 
 import scenes
+from scripts.benchmark.tracks import TRACKS
 from scripts.cli import app
 from scripts.film import panes
+from scripts.single_run import session
+from sim.core import versions
+from sim.core.versions import WorldVersionError
 from sim.recording import topics
 from sim.sensors.lidar import registry as scanners
 from slam import system
-from slam.errors import InvalidValueError, UnknownNameError, UntrustedNameError
+from slam.errors import (
+    InvalidValueError,
+    LogFormatError,
+    UnknownNameError,
+    UntrustedNameError,
+)
+from slam.logs import open as logs
 from slam.logs.bag_topics import Bag
 from slam.names import NameFromFile, load
 
@@ -35,6 +45,9 @@ MODULES = (
     "lab_lidar",
     "my_slam",
     "my_guest",
+    "my_log",
+    "my_track",
+    "speeds",
     "worst",
     "turning",
     "speed",
@@ -48,12 +61,15 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
     for module, registry in (
         (panes, "_panes"), (topics, "_topics"), (scanners, "_models"), (system, "_registry"),
+        (session, "_files"), (logs, "_registered"),
     ):  # fmt: skip
-        monkeypatch.setattr(module, registry, dict(getattr(module, registry)))
+        monkeypatch.setattr(module, registry, getattr(module, registry).copy())
+    monkeypatch.setattr(versions, "WORLD", versions.WORLD)
     monkeypatch.setattr(sys.modules["slam.names"], "_loaded", [])
     for name in MODULES:
         monkeypatch.delitem(sys.modules, name, raising=False)
     yield tmp_path
+    TRACKS.pop("full-hall-v1", None)
     scenes.kinds.KINDS.pop("cart", None)
     for name in MODULES:
         sys.modules.pop(name, None)
@@ -197,6 +213,38 @@ def test_slam_and_guest(outside: Path, heading: str, name: str, out: str):
     assert set(results["slams"]) == {name, "odometry"}
 
 
+def test_log_format(outside: Path):
+    rows = [[0.1 * k, 0.02 * k, 0.0, 0.0, *[4.0] * 19] for k in range(20)]
+    np.savetxt(outside / "drive.csv", rows, delimiter=",", header="t,x,y,theta,ranges")
+    follow("Log format", outside)
+    assert json.loads((outside / "out/log/results.json").read_text())["slams"]["odometry"]
+    logs._registered.clear()
+    with pytest.raises(LogFormatError, match="of no known format"):
+        logs.open_log(outside / "drive.csv")
+
+
+def test_track(outside: Path):
+    follow("Track", outside)
+    board = json.loads((outside / "out/track/leaderboard.json").read_text())
+    assert set(board["tracks"]) == {"full-hall-v1"}
+    assert board["tracks"]["full-hall-v1"]["sha256"] == TRACKS["full-hall-v1"].sha256
+
+
+def test_file_of_a_run(outside: Path):
+    follow("File of a run", outside)
+    assert len(np.loadtxt(outside / "out/speeds/speeds.csv")) > 10
+    assert "speeds.csv" in (outside / "out/speeds/SHA256SUMS").read_text()
+    with pytest.raises(InvalidValueError, match="name of its own"):
+        session.run_file("speeds.csv")(lambda path, show: None)
+
+
+def test_world(outside: Path):
+    before = versions.WORLD
+    follow("World", outside)
+    with pytest.raises(WorldVersionError, match=f"of world version {before}, this mobilia has"):
+        TRACKS["rush-hour-v1"].plan((), (720,))
+
+
 def test_metric(outside: Path, capsys: pytest.CaptureFixture[str]):
     follow("Metric", outside)
     found = eval(capsys.readouterr().out)
@@ -239,11 +287,11 @@ def test_a_pane_of_another_size_is_refused_by_name(outside: Path):
         panes.registered()[-1](None, None, (20, 10))
 
 
-@pytest.mark.parametrize("heading", ["Dynamism rate", "Lost rule", "Number of a SLAM"])
+@pytest.mark.parametrize("heading", ["Dynamism rate", "Lost rule", "Loop gate", "Number of a SLAM"])
 def test_numbers(outside: Path, heading: str):
     follow(heading, outside)
     if heading != "Dynamism rate":
-        folder = "decay" if heading == "Number of a SLAM" else "lost"
+        folder = {"Lost rule": "lost", "Loop gate": "gate", "Number of a SLAM": "decay"}[heading]
         assert (outside / "out" / folder / "results.json").exists()
 
 

@@ -33,23 +33,26 @@ def statements(tree: ast.AST) -> Iterator[ast.AST]:
         yield from statements(node)
 
 
+def imported(path: Path) -> set[str]:
+    """Which files of ours the file at ``path`` imports."""
+    found = set[str]()
+    for node in statements(ast.parse(path.read_bytes())):
+        words: list[str] = []
+        if isinstance(node, ast.Import):
+            words = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            words = [f"{node.module}.{alias.name}" for alias in node.names]
+        for word in words:
+            while word and word not in files():
+                word = word.rpartition(".")[0]
+            found.update({word} - {""})
+    return found
+
+
 @cache
 def imports() -> Mapping[str, set[str]]:
-    """Which files of ours each file imports."""
-    graph = {}
-    for name, path in files().items():
-        graph[name] = found = set()
-        for node in statements(ast.parse(path.read_bytes())):
-            words: list[str] = []
-            if isinstance(node, ast.Import):
-                words = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom):
-                words = [f"{node.module}.{alias.name}" for alias in node.names]
-            for word in words:
-                while word and word not in files():
-                    word = word.rpartition(".")[0]
-                found.update({word} - {"", name})
-    return graph
+    """Which files of ours each file of ours imports."""
+    return {name: imported(path) - {name} for name, path in files().items()}
 
 
 def folder(name: str) -> str:
@@ -87,3 +90,11 @@ def test_arrows_point_down():
         rank = allowed[name.partition(".")[0]]
         for other in found:
             assert allowed[other.partition(".")[0]] <= rank, f"{name} imports {other}"
+
+
+def test_only_the_command_line_imports_verbs():
+    """And what tries whole commands: a verb parses, calls and prints, and is no part of another."""
+    above = ("scripts.cli", "scripts.verbs", "scripts.robustness")
+    for name, found in imports().items():
+        if not any(within(name, own) for own in above):
+            assert not [word for word in found if within(word, "scripts.verbs")], name

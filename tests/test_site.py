@@ -17,7 +17,7 @@ import yaml
 import scenes
 from scripts.benchmark.tracks import TRACKS
 from scripts.cli import app
-from scripts.experiments.gallery import with_clips
+from scripts.experiments.pictures import with_clips
 from scripts.site.check import faults, main
 from scripts.site.columns import as_markdown
 

@@ -4,24 +4,17 @@
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from scripts.benches.world import SEED, Row, median, note_poses, row
+from scripts.benches.dataset import written
+from scripts.benches.world import SEED, Row, row, scan_us
 from sim.core.dynamism import Dynamism
-from sim.moments import toured
-from sim.recording.bag import BagWriter
-from sim.sensors.lidar.device import LaserScanner
 from sim.sensors.lidar.models.lms221 import Lms221Config
-from sim.simulation import Simulation, n_frames
+from sim.simulation import Simulation
 from sim.world.world import World
 
-WARM_S = 2.0
 WORLD_1 = Dynamism.world_1(0.5)
 # What, scene, what a simulation is made with, target x real time.
 CASES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
@@ -30,6 +23,7 @@ CASES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
     ("office, 16 escorts", "office", {"dynamism": WORLD_1, "crowd": "escorts:16"}, "≥ 6"),
     ("station, motion 1", "station", {"dynamism": 0.0, "motion": 1.0}, "≥ 3"),
 )
+EMPTY: dict[str, Any] = {"n_people": 0, "n_chairs": 0, "n_trolleys": 0}
 STREAMS = (10, 20, 40, 80)  # of the scans; each twice the one before
 TWICE = 2.0  # a cost that grows with the number at most doubles with it
 
@@ -39,52 +33,21 @@ def rows(seconds: float) -> Iterator[Row]:
     for what, scene, settings, target in CASES:
         simulation = Simulation(scene, seed=SEED, labels=True, **settings)
         people = len(simulation.world.people.names)
-        figure = seconds / _made(simulation, seconds)
+        with tempfile.TemporaryDirectory() as scratch:
+            made, _, _ = written(simulation, seconds, Path(scratch))
         how = f"simulated and written, labels, {people} people"
-        yield row(f"episode, made, {what}", figure, "× real time", target, how)
+        yield row(f"episode, made, {what}", seconds / made, "× real time", target, how)
     yield from scans(seconds)
-
-
-def _made(simulation: Simulation, seconds: float) -> float:
-    """s of processor time, after a warm-up."""
-    moments = toured(simulation, seconds + WARM_S)
-    with tempfile.TemporaryDirectory() as scratch:
-        movers = simulation.world.scene.movers
-        with BagWriter(Path(scratch) / "bag", simulation.spec, movers=movers) as bag:
-            for moment in islice(moments, n_frames(WARM_S, simulation.scan_period_s)):
-                bag.write(moment)
-            started = time.process_time()
-            for moment in moments:
-                bag.write(moment)
-            return time.process_time() - started
 
 
 def scans(seconds: float) -> Iterator[Row]:
     """A scan in a station at rest against the number of people in it."""
     costs = {}
     for n in STREAMS:
-        options: dict[str, Any] = {
-            "crowd": f"streams:{n}",
-            "n_people": 0,
-            "n_chairs": 0,
-            "n_trolleys": 0,
-        }
-        world = World("station", seed=SEED, dynamism=0.0, **options)
-        costs[n] = _scan_us(world, max(20, round(5 * seconds)))
+        world = World("station", seed=SEED, dynamism=0.0, crowd=f"streams:{n}", **EMPTY)
+        costs[n] = scan_us(world, Lms221Config(), max(20, round(5 * seconds)))
         how = "station at rest, 361 beams, every effect"
         yield row(f"scan, {n} people", costs[n], "µs", "", how)
     worst = max(costs[2 * n] / costs[n] for n in STREAMS[:-1])
     how = f"the most of {', '.join(map(str, STREAMS[:-1]))}; at most linear in their number"
     yield row("scan, twice the people", worst, "× as much", f"≤ {TWICE:g}", how)
-
-
-def _scan_us(world: World, count: int) -> float:
-    laser = LaserScanner(world.model, Lms221Config(), np.random.default_rng(0))
-
-    def many() -> None:
-        for _ in range(count):
-            note_poses(laser.begin(world.data), int(laser.window.marks[1:].sum()))
-            laser.finish()
-
-    many()
-    return median(many) / count * 1e6

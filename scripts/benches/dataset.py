@@ -52,7 +52,8 @@ def _making(recipe: Recipe, folder: Path) -> tuple[float, dict[str, float], Path
     for labels in (False, True) * LABEL_REPEATS:  # in turn: both meet the same machine
         spent[labels].append(_driven(recipe, labels))
     bare, labelled = (float(np.median(spent[labels])) for labels in (False, True))
-    made, writing, bag = _written(recipe, folder)
+    simulation = Simulation(**recipe.simulation())
+    made, writing, bag = written(simulation, recipe.seconds, folder)
     return made, shares(bare, labelled, writing / made), bag
 
 
@@ -70,17 +71,17 @@ def _driven(recipe: Recipe, labels: bool) -> float:
     """Processor seconds of a drive that nobody writes."""
     simulation = Simulation(**{**recipe.simulation(), "labels": labels})
     moments = toured(simulation, recipe.seconds + WARM_S)
-    _skip(moments)
+    for _ in islice(moments, n_frames(WARM_S, simulation.scan_period_s)):
+        pass
     started = time.process_time()
     for _ in moments:
         pass
     return time.process_time() - started
 
 
-def _written(recipe: Recipe, folder: Path) -> tuple[float, float, Path]:
-    """Processor seconds of all, and of writing among them; the bag."""
-    simulation = Simulation(**recipe.simulation())
-    moments, writing = toured(simulation, recipe.seconds + WARM_S), 0.0
+def written(simulation: Simulation, seconds: float, folder: Path) -> tuple[float, float, Path]:
+    """Processor seconds of all after a warm-up, and of writing among them; the bag."""
+    moments, writing = toured(simulation, seconds + WARM_S), 0.0
     with BagWriter(folder / "bag", simulation.spec, movers=simulation.world.scene.movers) as bag:
         for moment in islice(moments, n_frames(WARM_S, simulation.scan_period_s)):
             bag.write(moment)
@@ -91,11 +92,6 @@ def _written(recipe: Recipe, folder: Path) -> tuple[float, float, Path]:
             writing += time.process_time() - begun
         made = time.process_time() - started
     return made, writing, folder / "bag"
-
-
-def _skip(moments: Iterator[object]) -> None:
-    for _ in islice(moments, n_frames(WARM_S, 1.0 / 37.5)):
-        pass
 
 
 def _reading(bag: Path, labels: bool) -> float:

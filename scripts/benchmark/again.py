@@ -19,6 +19,7 @@ from scripts.comparison.entry import Entry
 from scripts.comparison.recording import digest, load, record
 from scripts.machine import machine, versions
 from scripts.report.answer import ODOMETRY
+from scripts.result_files import finite
 from sim.recording.verify import Finding
 from slam.frames import BeamClass
 from slam.guests import Limits, limited
@@ -76,7 +77,7 @@ def _wrong(
     row = json.loads(arrays["row"])
     if submission.digest_of(arrays["stamps_ns"], arrays["poses"]) == run["poses"]:
         row |= {"moving_share_of_returns": drive.share_of_returns(BeamClass.MOVING)}
-        wrong = [k for k in submission.OF_POSES if submission.plain(row.get(k)) != run[k]]
+        wrong = [k for k in submission.OF_POSES if finite(row.get(k)) != run[k]]
         return (f"its {', '.join(wrong)} are not those of its poses" if wrong else ""), True
     return f"its poses are others here ({_told(_TOLD, run)}; here {_told(_TOLD, row)})", False
 

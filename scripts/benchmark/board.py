@@ -15,7 +15,7 @@ from scripts.benchmark.tracks import LEVELS, Track
 from scripts.comparison.csv_files import write_csv
 from scripts.comparison.schema import FAILED
 from scripts.metrics.row import digits
-from scripts.report.answer import ODOMETRY, against
+from scripts.report.answer import ODOMETRY, against, answer, standing
 from scripts.report.study import LEAST_RUNS
 from scripts.result_files import write as write_results
 from slam.evaluation.lost import EXCUSED_S, LOST_RULE
@@ -95,7 +95,7 @@ class Board:
         few = min((row["seeds"] for row in every), default=0)
         own = [row for row in every if row["counts"]]
         if few < LEAST_RUNS:
-            return [f"Too few runs to tell: {few} at each level, {LEAST_RUNS} are needed."]
+            return self._seen(few)
         out = []
         lost = sorted((r for r in own if math.isfinite(r["lost_from"])), key=_lost_from)
         if lost:
@@ -120,6 +120,15 @@ class Board:
             )
         return out
 
+    def _seen(self, few: int) -> list[str]:
+        """Of too few runs for an interval of the level: what was seen in each track."""
+        said = [
+            answer(standing([row | {"scene": track} for row in rows], self.subject, track, "level"))
+            for track, rows in self.runs.items()
+            if any(row["slam"] == self.subject for row in rows)
+        ]
+        return [*said, f"{LEAST_RUNS} seeds tell from which level on; these are {few}."]
+
     def _worse_than_wheels(self, track: str) -> bool:
         rows = [row for row in self.runs[track] if row["dynamism"] == LEVELS[0]]
         return against(rows, self.subject, ODOMETRY) == -1
@@ -135,7 +144,7 @@ class Board:
         tracks = {
             t.name: {
                 "about": t.about, "scene": t.scene, "axis": t.axis, "levels": list(LEVELS),
-                "says": list(t.says), "sha256": t.sha256, **self.fair[t.name],
+                "says": list(t.says), "world": t.world, "sha256": t.sha256, **self.fair[t.name],
             }
             for t in self.tracks
         }  # fmt: skip

@@ -15,13 +15,15 @@ from typing import Any
 from scripts import workers
 from scripts.benchmark.board import markdown_table
 from scripts.benchmark.tracks import TEST, TRAIN
-from scripts.checked import whole
 from scripts.comparison.csv_files import write_csv
-from scripts.days import make, scores
-from scripts.days.plan import Buildings
+from scripts.days import buildings as lives
+from scripts.days import scores
+from scripts.days.buildings import Buildings
 from scripts.days.scores import Row
+from scripts.jobs import try_names
 from scripts.machine import machine, versions
-from scripts.output import RECIPE, locked_folder, together, write_recipe
+from scripts.options import whole
+from scripts.output import result_folder
 from scripts.report import score_tables
 from scripts.report.answer import ODOMETRY
 from scripts.result_files import SCHEMA, load
@@ -29,7 +31,6 @@ from scripts.result_files import write as write_results
 from sim.core.versions import WORLD
 from sim.recording.recipe import Recipe
 from slam.errors import LogFormatError, MobiliaError
-from slam.guests import Limits, limited
 
 COMMAND = "days"
 NAMES = ("days.csv", "days.json")
@@ -96,12 +97,14 @@ def _value(column: str, value: Any) -> Any:
     return value if value is None or column in _WORDS else float(value)
 
 
-def section(rows: Sequence[Row]) -> str:
-    """Markdown: what each share of change shows, and its table."""
+def section(rows: Sequence[Row], *, tables: bool = True) -> str:
+    """Markdown: what each share of change shows, and its table unless ``tables`` is off."""
     parts = [HEADING, _ABOUT.format(n=int(rows[0]["sessions"]))]
     for group, own in score_tables.groups(rows).items():
         parts.append(f"### {score_tables.where(group)}: {score_tables.size(own)}")
         parts.append("\n".join(f"- {line}" for line in score_tables.sentences(own)))
+        if not tables:
+            continue
         heads = ["score", *score_tables.slams_of(own)]
         lines = [
             [heading, *(score_tables.both(*cell) for cell in cells)]
@@ -134,17 +137,12 @@ def carry_out(
     of: Buildings, out: Path, *, jobs: int = 1, cluster: str | None = None
 ) -> list[dict[str, Any]]:
     """The section alone, into a folder of its own; its rows."""
-    for name in of.slams:
-        limited(name, Limits(hidden=(out,)))  # wrong names are told before anything starts
-    out = out.absolute()
-    with locked_folder(out):
-        settings = head(of)
-        if not (out / RECIPE).exists():
-            write_recipe(out, COMMAND, settings)
-        rows = make.carry_out(of, out / make.DAYS, jobs=jobs, cluster=cluster)
-        with together(out) as staged:
+    try_names(of.slams, (), out)
+    out, settings = out.absolute(), head(of)
+    with result_folder(out, COMMAND, settings) as written:
+        rows = lives.carry_out(of, out / lives.DAYS, jobs=jobs, cluster=cluster)
+        with written() as staged:
             write(staged, settings, rows)
-            write_recipe(staged, COMMAND, settings)
     return rows
 
 

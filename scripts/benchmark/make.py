@@ -12,21 +12,20 @@ from scripts.benchmark import days, submission
 from scripts.benchmark.board import Board
 from scripts.benchmark.sealed import SealedSeeds
 from scripts.benchmark.submission import Submission
-from scripts.benchmark.systems import installed
 from scripts.benchmark.tracks import LEVELS, TEST, TRACKS, TRAIN, Track
 from scripts.comparison.folder import Compared
 from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
 from scripts.comparison.recording import digest
 from scripts.console import note
-from scripts.days.make import DAYS
-from scripts.days.make import carry_out as live
-from scripts.days.plan import Buildings
+from scripts.days.buildings import DAYS, Buildings
+from scripts.days.buildings import carry_out as live
 from scripts.days.scores import Row
 from scripts.machine import machine, versions
-from scripts.output import RECIPE, locked_folder, together, write_recipe
+from scripts.output import result_folder
 from sim.core.versions import WORLD
-from slam.errors import InvalidValueError
+from slam import system
+from slam.errors import InvalidValueError, MissingDependencyError
 
 COMMAND = "benchmark"
 SEEDS, QUICK_SEEDS = 6, 2
@@ -68,6 +67,8 @@ class Wanted:
             submission.checked_name(self.submit, self.subject)
         if self.subject not in self.slams:
             raise InvalidValueError(f"the subject {self.subject!r:.80} is none of the SLAMs")
+        if self.sealed is not None:
+            self.sealed.check_for(self.tracks)
         most = min(len(self.seeds_of(track)) for track in self.tracks)
         if not 1 <= self.seeds <= most:
             raise InvalidValueError(f"--seeds must be 1 to {most}, got {self.seeds}")
@@ -145,10 +146,8 @@ def carry_out(
     plans = {track.name: wanted.plan(track) for track in wanted.tracks}  # all, before any is made
     _check_alike(merge, wanted, {name for plan in plans.values() for name in plan.slams})
     out = out.absolute()
-    with locked_folder(out):
-        settings = {**wanted.head(), "machine": machine()}
-        if not (out / RECIPE).exists():
-            write_recipe(out, COMMAND, settings)
+    settings = {**wanted.head(), "machine": machine()}
+    with result_folder(out, COMMAND, settings) as written:
         runs: Runs = {}
         for name, plan in plans.items():
             note(f"{name}: {TRACKS[name].about}")
@@ -160,14 +159,13 @@ def carry_out(
         for one in merge:
             for name in plans:
                 runs[name] = runs[name] + _on_the_same_scans(one, name, digests[name])
-        with together(out) as staged:
+        with written() as staged:
             made = _board(wanted, runs, merge, aged)
             made.write(staged)
             if lives is not None:
                 days.write(staged, days.head(lives), aged)
             if own is not None:
                 submission.write(staged / submission.file_of(own.name), own)
-            write_recipe(staged, COMMAND, settings)
     return made
 
 
@@ -218,6 +216,10 @@ def _check_alike(merge: Sequence[Submission], wanted: Wanted, taken: set[str]) -
     head = wanted.head()
     ours = (head["seeds_of"], tuple(head["seeds"]), wanted.levels, wanted.seconds)
     for one in merge:
+        if not set(one.runs) & set(head["tracks_run"]):
+            raise InvalidValueError(
+                f"submission {one.name!r}: the board has none of its tracks: {', '.join(one.runs)}"
+            )
         theirs = (one.seeds_of, one.seeds, one.levels, one.seconds)
         for what, a, b in zip(("kind of seeds", *_ALIKE), theirs, ours, strict=True):
             if a != b:
@@ -241,3 +243,22 @@ def _on_the_same_scans(
                 "or on another kind of processor"
             )
     return rows
+
+
+# A control; and one that runs on corners of the paper's kind, not on scans.
+_NOT_BY_THEMSELVES = ("odometry", "shunting-features")
+
+
+def installed() -> tuple[tuple[str, ...], dict[str, str]]:
+    """The names of those that can run here; of each of the others, why it cannot."""
+    there: list[str] = []
+    missing: dict[str, str] = {}
+    for name in system.names():
+        if name in _NOT_BY_THEMSELVES:
+            continue
+        try:
+            system.create(name)
+            there.append(name)
+        except MissingDependencyError as error:
+            missing[name] = str(error).partition("\n")[0]
+    return tuple(there), missing

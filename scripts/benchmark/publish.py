@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Put a leaderboard into the docs: ``python -m scripts.benchmark.publish out/benchmark``.
 
-Copies ``leaderboard.json`` to ``docs/results`` and ``leaderboard.md`` to ``docs``, draws the two
-pictures of ``scripts.benchmark.picture``, and writes a row for each SLAM into docs/benchmark.md.
+Copies ``leaderboard.json`` to ``docs/results`` and writes ``leaderboard.csv`` beside it, takes the
+beginning of ``leaderboard.md`` to ``docs`` (without the tables of the tracks: the CSV has them),
+draws the two pictures of ``scripts.benchmark.picture``, and writes a row for each SLAM and each
+track into docs/benchmark.md.
 
-Scores over days (``days.json``) go to ``docs/results`` too; the section of docs/leaderboard.md is
-made from that file. A folder of ``scripts.benchmark.days`` has nothing else, and the rest stays.
+Scores over days (``days.json``) go to ``docs/results`` too, and as ``days.csv``; the section of
+docs/leaderboard.md is made from that file. A folder of ``scripts.benchmark.days`` has nothing else,
+and the rest stays.
 """
 
 from __future__ import annotations
@@ -14,13 +17,16 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from scripts.benchmark import days, picture
 from scripts.benchmark.board import markdown_table
-from scripts.benchmark.scores import SILENT, TRACKING
+from scripts.benchmark.scores import COLUMNS, SILENT, TRACKING
+from scripts.benchmark.tracks import LEVELS, TRACKS
+from scripts.comparison.csv_files import write_csv
+from scripts.days.scores import LEVEL_COLUMNS, levels
 from scripts.marks import fill_page
 from scripts.metrics.row import digits
 from scripts.result_files import RESULTS, ROOT
@@ -35,6 +41,17 @@ HEADS = (
     "SLAM", "tracks on which half of the runs are lost", "lost at level 1, %",
     "error while not lost, cm", "silent, % of scans", "rank correlation ≥ 0.9 on", "ms a scan, p50",
 )  # fmt: skip
+
+
+def tracks_table(board: dict[str, Any]) -> str:
+    """A row for each track of the board that is declared here."""
+    table = []
+    for track in (TRACKS[name] for name in board["tracks"] if name in TRACKS):
+        says = f"{track.axis}: {', '.join(word.split(' ', 1)[0] for word in track.says)}"
+        words = [f"`{track.name}`", track.about, says, track.scene]
+        table.append([*words, f"{track.seconds:g}", str(track.world)])
+    levels = f"level {', '.join(f'{at:g}' for at in LEVELS)}"
+    return markdown_table(("track", "what happens", levels, "scene", "s", "world"), table, left=4)
 
 
 def rows(board: dict[str, Any]) -> list[list[str]]:
@@ -120,12 +137,34 @@ def publish(folder: Path, docs: Path, results: Path, commit: str) -> None:
 def _publish_board(folder: Path, docs: Path, results: Path, commit: str) -> None:
     source = folder / "leaderboard.json"
     lost = picture.read(source)
-    text = told(json.loads(source.read_text(encoding="utf-8")))
+    board = json.loads(source.read_text(encoding="utf-8"))
+    text, tracks = told(board), tracks_table(board)
     _copy(source, results / "leaderboard.json", commit, _made_board)
-    write_text(docs / BOARD, (folder / BOARD).read_text(encoding="utf-8"))
+    rows = list(json.loads(source.read_text(encoding="utf-8"))["leaderboard"].values())
+    write_csv(results / "leaderboard.csv", rows, COLUMNS)
+    write_text(docs / BOARD, beginning((folder / BOARD).read_text(encoding="utf-8"), lost.tracks))
     picture.overall(lost, docs / "pictures" / "benchmark.png")
     picture.by_track(lost, docs / "pictures" / "benchmark_tracks.png")
-    fill_page(docs / PAGE, MARK, text)
+    fill_page(docs / PAGE, MARK, text, most=len(text))  # the table of the page, however many SLAMs
+    fill_page(docs / PAGE, "tracks", tracks, most=len(tracks))
+
+
+def beginning(page: str, tracks: Iterable[str]) -> str:
+    """``leaderboard.md`` without what it says of each track: that is in the CSV."""
+    cuts = [at for name in tracks if (at := page.find(f"\n## {name}\n")) >= 0]
+    return f"{page[: min(cuts)].rstrip()}\n\n{_EACH}\n" if cuts else page
+
+
+_EACH = (
+    "Errors, silent failures, times and memory of each SLAM on each track are in "
+    "[leaderboard.csv](results/leaderboard.csv) ([its columns](benchmark.md#what-the-leaderboard-"
+    "says)), the levels of each track in [benchmark](benchmark.md#the-tracks)."
+)
+
+_DAYS = (
+    "All scores with their intervals: [days.csv](results/days.csv); of each building: "
+    "[days.json](results/days.json)."
+)
 
 
 def _copy(source: Path, copy: Path, commit: str, made: Callable[[dict[str, Any]], str]) -> None:
@@ -152,7 +191,9 @@ def _publish_days(page: Path, results: Path) -> None:
     if not results.exists() or not page.exists():
         return
     before, _, _ = page.read_text(encoding="utf-8").partition(f"\n{days.HEADING}\n")
-    write_text(page, f"{before.rstrip()}\n\n{days.section(days.read(results))}\n")
+    rows = days.read(results)
+    write_csv(results.with_suffix(".csv"), levels(rows), LEVEL_COLUMNS)
+    write_text(page, f"{before.rstrip()}\n\n{days.section(rows, tables=False)}\n\n{_DAYS}\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -92,12 +92,7 @@ def by_seed_interval(values: Sequence[tuple[int, float]]) -> tuple[float, float]
 
 def by_level(rows: Sequence[Row], metric: str) -> dict[float, float]:
     """The median of each level that has one, infinite for failures as everywhere."""
-    found: dict[float, list[float]] = {}
-    for row in rows:
-        value = number(row, metric)
-        if value is not None:
-            found.setdefault(float(row["dynamism"]), []).append(value)
-    return {level: quantile(values, 0.5) for level, values in sorted(found.items())}
+    return {level: quantile(values, 0.5) for level, values in _at_levels(rows, metric).items()}
 
 
 def drift_by_level(rows: Sequence[Row]) -> dict[float, float]:
@@ -106,15 +101,20 @@ def drift_by_level(rows: Sequence[Row]) -> dict[float, float]:
     When in a run a SLAM slips, and how far from the start, decides its ATE, and is chance. Drift
     counts each metre once. Its geometric mean weighs every seed alike, whatever its size.
     """
+    return {
+        level: math.exp(sum(math.log(max(value, LEAST_DRIFT)) for value in values) / len(values))
+        for level, values in _at_levels(rows, DRIFT).items()
+    }
+
+
+def _at_levels(rows: Sequence[Row], metric: str) -> dict[float, list[float]]:
+    """What the runs have of a metric, level by level, ascending."""
     found: dict[float, list[float]] = {}
     for row in rows:
-        value = number(row, DRIFT)
+        value = number(row, metric)
         if value is not None:
-            found.setdefault(float(row["dynamism"]), []).append(max(value, LEAST_DRIFT))
-    return {
-        level: math.exp(sum(map(math.log, values)) / len(values))
-        for level, values in sorted(found.items())
-    }
+            found.setdefault(float(row["dynamism"]), []).append(value)
+    return dict(sorted(found.items()))
 
 
 def spearman(errors: Mapping[float, float]) -> float | None:

@@ -12,18 +12,18 @@ import json
 import os
 import re
 import secrets
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark.submission import MAX_SEED, MAX_SEEDS, SEALED
-from scripts.benchmark.tracks import TEST, TRACKS, TRAIN
-from sim.core.versions import WORLD, check_world, world_of
-from slam.bounded import text_of
+from scripts.benchmark.submission import MAX_SEED, MAX_SEEDS, SEALED, SEEDS
+from scripts.benchmark.tracks import TEST, TRAIN, Track, check_known, newest
+from scripts.result_files import load
+from sim.core.versions import WORLD, world_of
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 
 WHAT = "sealed seeds of the benchmark of mobilia"
-MAX_BYTES = 1 << 20
 _SALT_BYTES = 32  # without it, the few seeds could be found from their hash
 _SALT = re.compile(r"[0-9a-f]{64}")
 _KEYS = {"what", "world", "tracks", "salt", SEALED}
@@ -31,16 +31,28 @@ _KEYS = {"what", "world", "tracks", "salt", SEALED}
 
 @dataclass(frozen=True, kw_only=True)
 class SealedSeeds:
-    """Seeds of every track, and the words that hide them in their hash."""
+    """Seeds of some tracks, and the words that hide them in their hash.
+
+    world, tracks  what they are for: a version of the world, and by name the hashes of its tracks
+    """
 
     seeds: tuple[int, ...]
     salt: str
+    world: int = WORLD
+    tracks: Mapping[str, str] = field(
+        default_factory=lambda: {track.name: track.sha256 for track in newest().values()}
+    )
+
+    def check_for(self, tracks: Iterable[Track]) -> None:
+        """Raise ``InvalidValueError`` for a track that these seeds were not sealed for."""
+        for track in tracks:
+            if track.name not in self.tracks:
+                raise InvalidValueError(f"the sealed seeds are not for track {track.name}")
 
     def data(self) -> dict[str, Any]:
-        """What the file holds: the tracks and the world they are for, too."""
-        tracks = {name: track.sha256 for name, track in TRACKS.items()}
+        """What the file holds."""
         return {
-            "what": WHAT, "world": WORLD, "tracks": tracks, "salt": self.salt,
+            "what": WHAT, "world": self.world, "tracks": dict(self.tracks), "salt": self.salt,
             SEALED: list(self.seeds),
         }  # fmt: skip
 
@@ -82,24 +94,21 @@ def read(path: Path) -> SealedSeeds:
     """Inverse of ``write``.
 
     Raises ``LogFormatError`` for something else, or for other tracks, ``WorldVersionError`` for
-    those of another world.
+    those of a newer world.
     """
-    try:
-        data = json.loads(text_of(path, MAX_BYTES))
-    except (ValueError, RecursionError) as error:
-        raise LogFormatError(path, f"no {WHAT}: {error}") from error
-    if not isinstance(data, dict) or data.get("what") != WHAT or set(data) != _KEYS:
+    data = load(path, WHAT, None)
+    if data.get("what") != WHAT or set(data) != _KEYS:
         raise LogFormatError(path, f"no {WHAT}")
-    check_world(path, world_of(path, data))
+    world, tracks = world_of(path, data), data["tracks"]
+    if not isinstance(tracks, dict) or not tracks:
+        raise LogFormatError(
+            path, f"tracks must be one or more with their hashes, got {tracks!r:.80}"
+        )
+    check_known(path, world, tracks)
     seeds, salt = data[SEALED], data["salt"]
-    known = isinstance(seeds, list) and 0 < len(seeds) <= MAX_SEEDS
-    if not known or not all(type(seed) is int and 0 <= seed <= MAX_SEED for seed in seeds):
-        raise LogFormatError(path, f"seeds must be whole numbers, 0 to {MAX_SEED}")
-    if len(set(seeds)) < len(seeds) or {*TRAIN, *TEST} & set(seeds):
-        raise LogFormatError(path, "seeds must be each once, and none that is published")
+    if not SEEDS.holds(seeds) or {*TRAIN, *TEST} & set(seeds):
+        wanted = f"{SEEDS.wanted}, each once, and none that is published"
+        raise LogFormatError(path, f"seeds must be {wanted}")
     if not isinstance(salt, str) or not _SALT.fullmatch(salt):
         raise LogFormatError(path, "salt must be 64 hexadecimal digits")
-    sealed = SealedSeeds(seeds=tuple(seeds), salt=salt)
-    if data["tracks"] != sealed.data()["tracks"]:
-        raise LogFormatError(path, "its tracks are others than those of this version")
-    return sealed
+    return SealedSeeds(seeds=tuple(seeds), salt=salt, world=world, tracks=tracks)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,13 +18,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scripts.benchmark.tracks import LEVELS, TRACKS
+from scripts.benchmark.tracks import LEVELS, TRACKS, check_known
+from scripts.comparison.rules import (
+    MAX_DEPTH,
+    MOST,
+    Rule,
+    check_keys,
+    is_shallow,
+    many,
+    number,
+    word,
+)
 from scripts.machine import machine, versions
 from scripts.metrics.table import METRICS
 from scripts.output import configs_of
-from sim.core.versions import WORLD, check_world, world_of
+from scripts.result_files import finite, load
+from sim.core.versions import WORLD, world_of
 from sim.recording.sums import check_vouched
-from slam.bounded import text_of
+from slam.checked import is_number
 from slam.errors import FAILURES, InvalidValueError, LogFormatError
 from slam.files import write_text
 from slam.frames import Float
@@ -33,11 +43,8 @@ from slam.system import names as registered
 from slam.variants import ORACLE
 
 SCHEMA, WHAT = 2, "submission to the benchmark of mobilia"
-MAX_BYTES = 1 << 25
 MAX_SEEDS, MAX_WORDS = 1000, 2000  # of a file; characters of a name or failure
 MAX_SEED, MAX_SECONDS = 2**32 - 1, 86_400.0  # s of a run
-MAX_DEPTH = 16  # objects and lists within each other, in what it was made with
-MAX_NUMBER = 1e300  # of any metric; JSON has whole numbers that no double holds
 SEALED = "sealed"  # seeds that were published as a hash first (``scripts.benchmark.sealed``)
 SETS = ("test", "train", SEALED)
 OUTCOMES = ("finished", "lost", *FAILURES)
@@ -49,7 +56,6 @@ _METRICS = {
     if metric.column and metric.better == "less" and metric.section in _SECTIONS and key != "lost"
 }
 _COSTS = tuple(key for key in _METRICS if METRICS[key].section == "costs")
-_FINISHED = ("ate_unaligned_m", "error_tracking_m")  # what every run that finished has
 _ALSO = ("scans", "lost_at_s", "not_trusted_share", "moving_share_of_returns")
 NUMBERS = (*_METRICS, *_ALSO)  # none of them is below 0
 OF_POSES = ("outcome", "lost", *(key for key in NUMBERS if key not in _COSTS))  # not of a machine
@@ -130,7 +136,7 @@ def digest_of(stamps_ns: NDArray[np.int64], poses: Float) -> str:
 
 def run_of(row: Mapping[str, Any], recording: str, poses: str) -> Row:
     """What a submission keeps of a row of ``runs.csv``."""
-    numbers = {key: plain(row.get(key)) for key in NUMBERS}
+    numbers = {key: finite(row.get(key)) for key in NUMBERS}
     return {
         "level": float(row["dynamism"]), "seed": int(row["seed"]), "recording": recording,
         "poses": poses,
@@ -143,11 +149,6 @@ def _line(words: Any) -> str | None:
     """One printable line of it; None of nothing."""
     line = " ".join("".join(c if c.isprintable() else " " for c in str(words or "")).split())
     return line[:MAX_WORDS] or None
-
-
-def plain(value: Any) -> Any:
-    """As JSON has it: None where it is no finite number."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def made_with(slam: str) -> Row:
@@ -179,17 +180,12 @@ def read(path: Path) -> Submission:
     """Inverse of ``write``.
 
     Raises ``LogFormatError`` for a file that is damaged, something else or of other tracks,
-    ``WorldVersionError`` for one of another version of the world.
+    ``WorldVersionError`` for one of a newer version of the world.
     """
-    text = text_of(path, MAX_BYTES)
+    data = load(path, WHAT, SCHEMA, _refuse)
     check_vouched(path)
-    try:
-        data = json.loads(text, parse_constant=_refuse)
-    except (ValueError, RecursionError) as error:
-        raise LogFormatError(path, f"no submission: {error}") from error
-    if not isinstance(data, dict) or (data.get("schema"), data.get("what")) != (SCHEMA, WHAT):
-        raise LogFormatError(path, f"no {WHAT} of schema {SCHEMA}")
-    check_world(path, world_of(path, data))
+    if data.get("what") != WHAT:
+        raise LogFormatError(path, f"no {WHAT}")
     said = data.pop("sha256", None)
     try:
         if said != _sha256(data):
@@ -204,35 +200,15 @@ def _refuse(constant: str) -> float:
 
 
 def _submission(path: Path, data: Row) -> Submission:
-    _expect(path, "slam", data["slam"], _is_words(data["slam"]), "a name")
-    _expect(path, "name", data["name"], isinstance(data["name"], str), "a name")
-    _expect(path, "seeds_of", data["seeds_of"], data["seeds_of"] in SETS, " or ".join(SETS))
-    seeds, levels, seconds = data["seeds"], data["levels"], data["seconds"]
-    several = isinstance(seeds, list) and 0 < len(seeds) <= MAX_SEEDS
-    whole = several and all(_is_seed(seed) for seed in seeds)
-    _expect(
-        path,
-        "seeds",
-        seeds,
-        whole and len(set(seeds)) == len(seeds),
-        f"whole numbers, 0 to {MAX_SEED}",
-    )
-    known = isinstance(levels, list) and bool(levels) and all(_in(one, LEVELS) for one in levels)
-    _expect(path, "levels", levels, known and levels == sorted(set(levels)), f"of {LEVELS}, rising")
-    timed = seconds is None or (_is_number(seconds) and 0 < seconds <= MAX_SECONDS)
-    _expect(path, "seconds", seconds, timed, f"null, or up to {MAX_SECONDS:g}")
-    tracks, made = data["tracks"], data["made_with"]
-    _expect(path, "tracks", tracks, isinstance(tracks, dict) and bool(tracks), "one or more")
-    shallow = isinstance(made, dict) and _is_shallow(made, MAX_DEPTH)
-    _expect(path, "made_with", made, shallow, f"an object, at most {MAX_DEPTH} deep")
+    check_keys(path, "", data, _HEAD)
+    levels, seeds, tracks = data["levels"], data["seeds"], data["tracks"]
+    check_known(path, world_of(path, data), {name: own["sha256"] for name, own in tracks.items()})
     runs = {}
     for name, own in tracks.items():
-        if name not in TRACKS or own["sha256"] != TRACKS[name].sha256:
-            raise LogFormatError(path, f"track {name!r:.80} is none of this version's")
         runs[name] = _runs(path, name, own["runs"], {(a, b) for a in levels for b in seeds})
     return Submission(
         name=data["name"], slam=data["slam"], seeds_of=data["seeds_of"], seeds=tuple(seeds),
-        levels=tuple(levels), seconds=seconds, runs=runs, made_with=made,
+        levels=tuple(levels), seconds=data["seconds"], runs=runs, made_with=data["made_with"],
     )  # fmt: skip
 
 
@@ -240,71 +216,55 @@ def _runs(path: Path, track: str, runs: Any, wanted: set[tuple[float, int]]) -> 
     if not isinstance(runs, list) or len(runs) != len(wanted):
         raise LogFormatError(path, f"{track}: expected {len(wanted)} runs, one a level and seed")
     for run in runs:
-        _check_run(path, track, run)
+        if not isinstance(run, dict) or set(run) != _WORDS:
+            raise LogFormatError(path, f"{track}: a run must have {', '.join(sorted(_WORDS))}")
+        where = f"{track}, level {run['level']!r:.20}, seed {run['seed']!r:.20}: "
+        check_keys(path, where, run, _RUN)
+        check_keys(path, where, run, _FINISHED if run["outcome"] == "finished" else _LOST)
     if {(run["level"], run["seed"]) for run in runs} != wanted:
         raise LogFormatError(path, f"{track}: its runs are not each level and seed once")
     return runs
 
 
-def _check_run(path: Path, track: str, run: Any) -> None:
-    if not isinstance(run, dict) or set(run) != _WORDS:
-        raise LogFormatError(path, f"{track}: a run must have {', '.join(sorted(_WORDS))}")
-    where = f"{track}, level {run['level']!r:.20}, seed {run['seed']!r:.20}: "
-    _expect(path, f"{where}level", run["level"], _in(run["level"], LEVELS), f"of {LEVELS}")
-    _expect(path, f"{where}seed", run["seed"], _is_seed(run["seed"]), "a whole number")
-    told = run["failure"] is None or _is_words(run["failure"])
-    lost, outcome = run["lost"], run["outcome"]
-    for key in ("recording", "poses"):
-        value = run[key]
-        digest = isinstance(value, str) and _DIGEST.fullmatch(value) is not None
-        _expect(path, where + key, value, digest, "a SHA-256")
-    _expect(path, f"{where}outcome", outcome, _in(outcome, OUTCOMES), ", ".join(OUTCOMES))
-    _expect(path, f"{where}failure", run["failure"], told, "null or words")
-    fits = type(lost) is int and lost == int(outcome != "finished")
-    _expect(path, f"{where}lost", lost, fits, "0 where it finished, else 1")
-    fits = (run["lost_at_s"] is None) == (outcome == "finished")
-    _expect(
-        path, f"{where}lost_at_s", run["lost_at_s"], fits, "null where it finished, and else not"
-    )
-    for key in NUMBERS:
-        value = run[key]
-        most = 1.0 if key.endswith(_SHARES) else math.inf
-        must = key in _FINISHED and outcome == "finished"
-        fits = not must if value is None else _is_number(value) and 0.0 <= value <= most
-        unit = METRICS[key].unit if key in METRICS else ""
-        null = "" if must else "null or "
-        _expect(path, where + key, value, fits, f"{null}a number >= 0 {unit}".strip())
-
-
-def _is_number(value: Any) -> bool:
-    known = isinstance(value, int | float) and not isinstance(value, bool)
-    return known and -MAX_NUMBER <= value <= MAX_NUMBER
-
-
-def _is_seed(value: Any) -> bool:
-    return type(value) is int and 0 <= value <= MAX_SEED
-
-
-def _is_shallow(value: Any, most: int) -> bool:
-    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-    return not inner or (most > 0 and all(_is_shallow(one, most - 1) for one in inner))
-
-
-def _is_words(value: Any) -> bool:
-    return isinstance(value, str) and 0 < len(value) <= MAX_WORDS and value.isprintable()
-
-
-def _in(value: Any, known: Sequence[Any]) -> bool:
-    return isinstance(value, str | int | float) and type(value) is not bool and value in known
-
-
-def _shown(value: Any) -> str:
-    try:
-        return f"{value!r:.80}"
-    except RecursionError:
-        return "what is too deep to show"
-
-
-def _expect(path: Path, field: str, value: Any, fits: bool, wanted: str) -> None:
-    if not fits:
-        raise LogFormatError(path, f"{field} must be {wanted}, got {_shown(value)}")
+_SEED, _POSITIVE = number(most=MAX_SEED, whole=True), number(most=MOST)
+_LEVEL = Rule(f"of {LEVELS}", lambda value: is_number(value) and value in LEVELS)
+_SHA256 = Rule("a SHA-256", lambda value: isinstance(value, str) and bool(_DIGEST.fullmatch(value)))
+SEEDS = Rule(
+    f"whole numbers, 0 to {MAX_SEED}",
+    lambda value: many(_SEED).holds(value) and len(value) <= MAX_SEEDS,
+)
+_HEAD: Mapping[str, Rule] = {
+    "slam": word(most=MAX_WORDS),
+    "name": Rule("a name", lambda value: isinstance(value, str)),
+    "seeds_of": Rule(" or ".join(SETS), word(among=SETS).holds),
+    "seeds": SEEDS,
+    "levels": Rule(
+        f"of {LEVELS}, rising",
+        lambda value: many(_LEVEL).holds(value) and list(value) == sorted(value),
+    ),
+    "seconds": Rule(
+        f"null, or up to {MAX_SECONDS:g}",
+        lambda value: value is None or (value != 0 and number(most=MAX_SECONDS).holds(value)),
+    ),
+    "tracks": Rule("one or more", lambda value: isinstance(value, dict) and bool(value)),
+    "made_with": Rule(
+        f"an object, at most {MAX_DEPTH} deep",
+        lambda value: isinstance(value, dict) and is_shallow(value),
+    ),
+}
+_RUN: Mapping[str, Rule] = {
+    "level": _LEVEL, "seed": _SEED, "recording": _SHA256, "poses": _SHA256,
+    "outcome": word(among=OUTCOMES), "failure": word(most=MAX_WORDS, optional=True),
+    **{
+        key: number(most=1.0 if key.endswith(_SHARES) else MOST, optional=True) for key in NUMBERS
+    },
+}  # fmt: skip
+_FINISHED: Mapping[str, Rule] = {
+    "lost": number(most=0.0, whole=True),
+    "lost_at_s": Rule("null where it finished, and else not", lambda value: value is None),
+    "ate_unaligned_m": _POSITIVE, "error_tracking_m": _POSITIVE,
+}  # fmt: skip
+_LOST: Mapping[str, Rule] = {
+    "lost": number(least=1.0, most=1.0, whole=True),
+    "lost_at_s": Rule("null where it finished, and else not", lambda value: value is not None),
+}

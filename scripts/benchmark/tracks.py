@@ -1,34 +1,43 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The twelve tracks of the benchmark. A track never changes: what is new is a new version of it."""
+"""The tracks of the benchmark. A track never changes: what is new is a new version of it.
+
+A new track, or a new version of one, is one more declaration, which moves the hash of no other: in
+``_ALL`` here, or with ``register`` in a file of one's own (``mobilia --with``).
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 from scripts.comparison.plan import Plan
 from scripts.comparison.rules import LEVEL
 from scripts.report.answer import ODOMETRY
-from sim.core.versions import WORLD
-from slam.errors import InvalidValueError, UnknownNameError
+from sim.core import versions
+from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of every track, from nothing to all that it has
 TRAIN = tuple(range(20))  # seeds to tune on; those that the SLAMs here were tuned on
 TEST = tuple(range(720, 740))  # seeds that count
 GOOD_ODOMETRY = "pioneer3dx"  # in large halls, where with the poor one even an oracle drifts
 Sets = Mapping[str, Any]
+_NAME = re.compile(r"([a-z0-9]+(?:-[a-z0-9]+)*)-v([1-9][0-9]*)")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Track:
     """One track: a room, a drive through it, and five levels of one kind of trouble.
 
-    name     with its version at the end
+    name     with its version at the end: ``rush-hour-v1``
     about    one line
+    world    version of the world (``sim.core.versions.WORLD``) that it was published in. It can be
+             run in that one only; its name, hash and published results stay
     scene    by name
     axis     what a level is, in words, and ``says`` what each of the five is
     sets     what each of them sets: fields of ``sim.recording.recipe.Recipe``, options of the scene
@@ -40,6 +49,7 @@ class Track:
 
     name: str
     about: str
+    world: int
     scene: str
     axis: str
     says: tuple[str, ...]
@@ -53,6 +63,11 @@ class Track:
     test: tuple[int, ...] = field(default=TEST, repr=False)
 
     def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.name):
+            raise InvalidValueError(
+                f"the name of a track must be small letters, digits and '-', and end in its "
+                f"version, such as rush-hour-v1, got '{self.name}'"
+            )
         for name in ("says", "sets"):
             if len(getattr(self, name)) != len(LEVELS):
                 raise InvalidValueError(f"Track.{name} must have {len(LEVELS)} levels: {self.name}")
@@ -65,10 +80,23 @@ class Track:
         return (ODOMETRY, self.oracle)
 
     @property
+    def family(self) -> str:
+        """The name without its version: that of all versions of this track."""
+        return self.name.rpartition("-v")[0]
+
+    @property
+    def version(self) -> int:
+        """1 for the first."""
+        return int(self.name.rpartition("-v")[2])
+
+    def later(self, **changes: Any) -> Track:
+        """The next version of it, with these fields changed."""
+        return replace(self, **{"name": f"{self.family}-v{self.version + 1}", **changes})
+
+    @property
     def sha256(self) -> str:
-        """Of all that it says and of the version of the world."""
-        text = json.dumps({"world": WORLD, **asdict(self)}, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        """Of all that it says, with the version of the world that it was published in."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
 
     def plan(
         self,
@@ -80,8 +108,10 @@ class Track:
     ) -> Plan:
         """The comparison of these SLAMs and the controls; ``seconds`` as the track has them.
 
-        Raises ``InvalidValueError`` for a level that is none of ``LEVELS``.
+        Raises ``InvalidValueError`` for a level that is none of ``LEVELS``, ``WorldVersionError``
+        for a track of another world: its seeds give other scans here.
         """
+        versions.check_world(f"track {self.name}", self.world)
         for level in levels:
             if level not in LEVELS:
                 known = ", ".join(f"{one:g}" for one in LEVELS)
@@ -127,13 +157,13 @@ _TRAINS = ((1, 2), (2, 4), (3, 7), (4, 10))  # and pickers
 _CARRIED = ((2, 75), (4, 60), (6, 40), (8, 25))  # people, and s from one time to the next
 _ALL = (
     Track(
-        name="tour-guide-v1",
+        name="tour-guide-v1", world=2,
         about="the robot leads visitors through a museum; they walk with it, all round it",
         scene="gallery", axis="people who walk with the robot", says=_of("people", 0, 2, 5, 9, 14),
         sets=_each(motion=1.0, change=0.0, crowd=_crowds("escorts", 0, 2, 5, 9, 14), **_QUIET),
     ),
     Track(
-        name="rush-hour-v1",
+        name="rush-hour-v1", world=2,
         about="streams of people cross a station hall",
         scene="station", axis="people in the streams", says=_of("people", 0, 15, 35, 60, 80),
         seconds=90.0, odometry=GOOD_ODOMETRY,
@@ -142,7 +172,7 @@ _ALL = (
         ),
     ),
     Track(
-        name="busy-chairs-v1",
+        name="busy-chairs-v1", world=2,
         about="chairs roll about in a flat and hardly rest",
         scene="apartment", axis="share of 80 chairs on the move at any time",
         says=_of("% of 80 chairs", 0, 25, 50, 75, 100), seconds=120.0,
@@ -151,34 +181,34 @@ _ALL = (
         ),
     ),
     Track(
-        name="moving-boards-v1",
+        name="moving-boards-v1", world=2,
         about="partitions of 1.6 m are pushed about",
         scene="gallery", axis="boards on castors", says=_of("boards", 0, 1, 3, 5, 8),
         seconds=120.0,
         sets=_each(motion=1.0, change=0.0, crowd=_crowds("boards", 0, 1, 3, 5, 8), **_QUIET),
     ),
     Track(
-        name="moving-day-v1",
+        name="moving-day-v1", world=2,
         about="what the robot has seen stands elsewhere when it comes back, all day long",
         scene="random-rooms", axis="share of things put elsewhere while out of sight",
         says=_of("% of things", 0, 25, 50, 75, 100), seconds=120.0,
         sets=_each(change=LEVELS, **_SCATTERED),
     ),
     Track(
-        name="overnight-v1",
+        name="overnight-v1", world=2,
         about="two days in one stream: in the middle things out of sight are put elsewhere, once",
         scene="random-rooms", axis="share of things put elsewhere at half time",
         says=_of("% of things", 0, 25, 50, 75, 100), seconds=120.0,
         sets=_each(change=LEVELS, change_at_s=60.0, **_SCATTERED),
     ),
     Track(
-        name="classroom-break-v1",
+        name="classroom-break-v1", world=2,
         about="the lesson is over: pupils in groups, chairs pushed back",
         scene="classroom", axis="pupils in groups", says=_of("pupils", 0, 4, 10, 18, 28),
         sets=_each(motion=LEVELS, change=0.0, crowd=_crowds("groups", 0, 4, 10, 18, 28)),
     ),
     Track(
-        name="warehouse-shift-v1",
+        name="warehouse-shift-v1", world=2,
         about="trains of trolleys, pickers beside the robot, pallets gone when it is back",
         scene="warehouse", axis="trains of two trolleys, and pickers",
         says=("0 trains", *(f"{_of('trains', a)[0]}, {b} pickers" for a, b in _TRAINS)),
@@ -189,7 +219,7 @@ _ALL = (
         ),
     ),
     Track(
-        name="ward-round-v1",
+        name="ward-round-v1", world=2,
         about="doctors walk with the robot from bed to bed, and beds are pushed past them",
         scene="gallery", axis="beds on the move, and doctors",
         says=("0 beds", *(f"{_of('beds', a)[0]}, {b} doctors" for a, b in _BEDS)),
@@ -199,7 +229,7 @@ _ALL = (
         ),
     ),
     Track(
-        name="slow-scans-v1",
+        name="slow-scans-v1", world=2,
         about="two scans a second, 35 cm of way between them, among people",
         scene="office", axis="people, half of them walk with the robot",
         says=_of("people", 0, 2, 4, 8, 12), seconds=90.0, every=19,
@@ -209,7 +239,7 @@ _ALL = (
         ),
     ),
     Track(
-        name="kidnapped-in-a-crowd-v1",
+        name="kidnapped-in-a-crowd-v1", world=2,
         about="among people the robot is carried away, and its wheels do not know",
         scene="apartment", axis="people who walk about, and s from one time to the next",
         says=("0 people, never", *(f"{n} people, {at} s" for n, at in _CARRIED)),
@@ -221,7 +251,7 @@ _ALL = (
         ),
     ),
     Track(
-        name="no-walls-v1",
+        name="no-walls-v1", world=2,
         about="walls that no beam meets: chairs at rest are all there is, and people walk between",
         scene="arena", axis="people who walk with the robot", says=_of("people", 0, 1, 2, 4, 6),
         oracle="oracle(shunting,moving)",
@@ -232,20 +262,60 @@ _ALL = (
     ),
 )  # fmt: skip
 
-TRACKS: Mapping[str, Track] = {track.name: track for track in _ALL}
+TRACKS: dict[str, Track] = {}
+
+
+def register(*tracks: Track) -> None:
+    """Declare tracks; ``InvalidValueError`` for a name that another one has."""
+    for track in tracks:
+        if TRACKS.setdefault(track.name, track) != track:
+            raise InvalidValueError(
+                f"track {track.name} is there already and never changes; a new version of it is "
+                f"TRACKS['{track.name}'].later(...)"
+            )
+
+
+register(*_ALL)
+
+
+def newest() -> dict[str, Track]:
+    """By name without version: the newest version of every track."""
+    found: dict[str, Track] = {}
+    for track in sorted(TRACKS.values(), key=lambda track: track.version):
+        found[track.family] = track
+    return found
 
 
 def chosen(names: Iterable[str] | None) -> tuple[Track, ...]:
-    """The tracks of these names, with or without ``-v1``; all without any.
+    """The tracks of these names, without a version the newest; without any, the newest of all.
 
     Raises ``UnknownNameError`` with the nearest name.
     """
+    latest = newest()
     found: dict[str, Track] = {}
-    for name in names or TRACKS:
-        track = TRACKS.get(name) or TRACKS.get(f"{name}-v1")
+    for name in names or latest:
+        track = TRACKS.get(name) or latest.get(name)
         if track is None:
-            near = get_close_matches(name, TRACKS, n=1)
+            near = get_close_matches(name, (*TRACKS, *latest), n=1)
             hint = f" Did you mean '{near[0]}'?" if near else ""
             raise UnknownNameError(f"no track is called '{name}'.{hint} Known: {', '.join(TRACKS)}")
         found[track.name] = track
     return tuple(found.values())
+
+
+def check_known(path: Path, world: int, hashes: Mapping[str, str]) -> None:
+    """That the tracks in a file, by name with their hash, are those of that name here.
+
+    Raises ``LogFormatError``, and ``WorldVersionError`` for a file of a newer world. One of an
+    older world may be read: only to make its scans again is refused (``Track.plan``).
+    """
+    if world > versions.WORLD:
+        versions.check_world(path, world)
+    for name, sha256 in hashes.items():
+        track = TRACKS.get(name)
+        if track is None or track.sha256 != sha256:
+            raise LogFormatError(path, f"track {name!r:.80} is none of this version's")
+        if track.world != world:
+            raise LogFormatError(
+                path, f"{name} must be of world {track.world}, the file says {world}"
+            )

@@ -8,12 +8,13 @@ TD is the manufacturer's technical description (8008970/06-2003), TL his telegra
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from scripts.card.bench import NONE, Bench, box, only, plate
+from scripts.card.page import Row
 from sim.sensors.lidar.link import SerialLink
 from sim.sensors.lidar.models.lms221 import LMS221_SPOT, NEEDED, RANGE_MODES, Lms221Config
 from sim.sensors.lidar.receiver import SignalModel
@@ -22,80 +23,46 @@ from slam.frames import Float
 NOISE_AT_M = (1.0, 5.0, 10.0, 20.0)
 SPOT_AT_M = (1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 20.0)
 SPOT_CM = (3.0, 4.0, 6.0, 8.0, 12.0, 14.0, 26.0)  # TL table 10-1
-
-
+MODES = {  # resolution and field of view, degrees: values, scans per second
+    (1.0, 180): (181, 75.0), (0.5, 180): (361, 37.5), (0.25, 180): (721, 18.75),
+    (1.0, 100): (101, 75.0), (0.5, 100): (201, 37.5), (0.25, 100): (401, 18.75),
+}  # fmt: skip
+LINKED = ((0.25, 100), (0.5, 180), (1.0, 180))
 NOTHING_MIRRORED = (np.empty(0), np.empty(0, dtype=np.int64), np.empty(0))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Row:
-    """One line of the card; ``kept`` whether what was measured agrees with the data sheet."""
-
-    what: str
-    datasheet: str
-    measured: str
-    source: str
-    kept: bool
-
-
-def table(rows: Sequence[Row]) -> list[str]:
-    """The lines of a Markdown table."""
-    lines = ["| | what | data sheet | measured | source |", "|---|---|---|---|---|"]
-    for row in rows:
-        mark = "✓" if row.kept else "✗"
-        lines.append(f"| {mark} | {row.what} | {row.datasheet} | {row.measured} | {row.source} |")
-    return lines
-
-
 def rows() -> list[Row]:
-    """All rows, measured anew; about ten seconds."""
+    """All rows, measured again; about ten seconds."""
     parts = (modes(), timing(), noise(), systematic(), spot(), reflectivity(), codes(), link())
     return [row for part in parts for row in part]
 
 
 def modes() -> Iterator[Row]:
     """Beams and scan rates of every mode."""
-    known = {
-        (1.0, 180): (181, 75.0),
-        (0.5, 180): (361, 37.5),
-        (0.25, 180): (721, 18.75),
-        (1.0, 100): (101, 75.0),
-        (0.5, 100): (201, 37.5),
-        (0.25, 100): (401, 18.75),
-    }
-    for (resolution, fov), (beams, rate) in known.items():
+    for (resolution, fov), (beams, rate) in MODES.items():
         config = Lms221Config.ideal(resolution_deg=resolution, fov_deg=fov)
         bench = Bench(plate(3.0), config)
         seen = bench.scan().ranges.size
         hertz = 300.0 / bench.steps
         yield Row(
-            what=f"{resolution:g}° over {fov}°: values, scans per second",
-            datasheet=f"{beams}, {rate:g}",
-            measured=f"{seen}, {hertz:g}",
-            source="TD p10, TL p19, p47",
-            kept=seen == beams and hertz == rate,
-        )
+            f"{resolution:g}° over {fov}°: values, scans per second",
+            f"{beams}, {rate:g}", f"{seen}, {hertz:g}",
+            "TD p10, TL p19, p47", seen == beams and hertz == rate,
+        )  # fmt: skip
 
 
 def timing() -> Iterator[Row]:
     """The mirror."""
-    spec = Lms221Config(resolution_deg=0.5).spec()
-    offsets = spec.beam_time_offsets
+    offsets = Lms221Config(resolution_deg=0.5).spec().beam_time_offsets
     per_degree, gap = float(offsets[2] - offsets[0]), float(offsets[1] - offsets[0])
     yield Row(
-        what="time per degree of the mirror",
-        datasheet="37.0 µs (13.32 ms / 360)",
-        measured=f"{per_degree * 1e6:.2f} µs",
-        source="TD p10; STW",
-        kept=abs(per_degree - 37.0e-6) < 0.1e-6,
-    )
+        "time per degree of the mirror", "37.0 µs (13.32 ms / 360)", f"{per_degree * 1e6:.2f} µs",
+        "TD p10; STW", abs(per_degree - 37.0e-6) < 0.1e-6,
+    )  # fmt: skip
     yield Row(
-        what="neighbours in a 0.5° scan lie apart",
-        datasheet="13.32 ms + 18.5 µs",
-        measured=f"{gap * 1e3:.2f} ms",
-        source="TL p19, p47",
-        kept=abs(gap - 13.34e-3) < 0.03e-3,
-    )
+        "neighbours in a 0.5° scan lie apart", "13.32 ms + 18.5 µs", f"{gap * 1e3:.2f} ms",
+        "TL p19, p47", abs(gap - 13.34e-3) < 0.03e-3,
+    )  # fmt: skip
 
 
 def noise_std(distance: float, mode: str) -> float:
@@ -111,12 +78,9 @@ def noise() -> Iterator[Row]:
         for distance in NOISE_AT_M:
             std = noise_std(distance, mode)
             yield Row(
-                what=f"statistical error at {distance:g} m, {mode} mode, one sigma",
-                datasheet="10 mm",
-                measured=f"{std * 1e3:.1f} mm",
-                source="TD p34",
-                kept=abs(std - 0.010) < 0.0008,
-            )
+                f"statistical error at {distance:g} m, {mode} mode, one sigma",
+                "10 mm", f"{std * 1e3:.1f} mm", "TD p34", abs(std - 0.010) < 0.0008,
+            )  # fmt: skip
 
 
 def systematic_curves(mode: str, units: int) -> tuple[Float, Float]:
@@ -125,11 +89,10 @@ def systematic_curves(mode: str, units: int) -> tuple[Float, Float]:
     curves, true = [], np.zeros(0)
     for seed in range(units):
         result = Bench(box(0.0, 1.05, 40.0, 0.05), config, seed).scan()
-        inside = (result.true_ranges >= 1.0) & (result.true_ranges <= 20.0)
+        inside = np.flatnonzero((result.true_ranges >= 1.0) & (result.true_ranges <= 20.0))
+        inside = inside[np.argsort(result.true_ranges[inside])]
         true = result.true_ranges[inside]
-        order = np.argsort(true)
-        true = true[order]
-        curves.append((result.ranges[inside].astype(np.float64))[order] - true)
+        curves.append(result.ranges[inside].astype(np.float64) - true)
     return true, np.array(curves)
 
 
@@ -138,12 +101,10 @@ def systematic() -> Iterator[Row]:
     for mode, bound in (("32m", 0.035), ("80m", 0.05)):
         worst = float(np.abs(systematic_curves(mode, 100)[1]).max())
         yield Row(
-            what=f"systematic error, {mode} mode, worst of 100 units, 1 to 20 m",
-            datasheet=f"± {bound * 1e3:g} mm",
-            measured=f"{worst * 1e3:.1f} mm",
-            source="TD p34",
-            kept=0.5 * bound < worst <= bound + 1e-6,
-        )
+            f"systematic error, {mode} mode, worst of 100 units, 1 to 20 m",
+            f"± {bound * 1e3:g} mm", f"{worst * 1e3:.1f} mm",
+            "TD p34", 0.5 * bound < worst <= bound + 1e-6,
+        )  # fmt: skip
 
 
 def spot_diameter(distance: float) -> float:
@@ -158,12 +119,9 @@ def spot() -> Iterator[Row]:
     for distance, centimetres in zip(SPOT_AT_M, SPOT_CM, strict=True):
         diameter = 100.0 * spot_diameter(distance)
         yield Row(
-            what=f"spot at {distance:g} m",
-            datasheet=f"{centimetres:g} cm (16 mm + 11.9 mrad, rounded up)",
-            measured=f"{diameter:.1f} cm",
-            source="TL table 10-1, p114",
-            kept=abs(diameter - centimetres) < 0.95,
-        )
+            f"spot at {distance:g} m", f"{centimetres:g} cm (16 mm + 11.9 mrad, rounded up)",
+            f"{diameter:.1f} cm", "TL table 10-1, p114", abs(diameter - centimetres) < 0.95,
+        )  # fmt: skip
 
 
 def least_reflectivity(distance: float) -> float:
@@ -188,19 +146,12 @@ def reflectivity() -> Iterator[Row]:
     for distance, needed in NEEDED:
         found = least_reflectivity(distance)
         yield Row(
-            what=f"needed reflectivity at {distance:g} m",
-            datasheet=f"{100 * needed:.1f} %",
-            measured=f"{100 * found:.1f} %",
-            source="TD fig. 4-2",
-            kept=abs(found / needed - 1.0) < 0.05,
-        )
+            f"needed reflectivity at {distance:g} m", f"{100 * needed:.1f} %",
+            f"{100 * found:.1f} %", "TD fig. 4-2", abs(found / needed - 1.0) < 0.05,
+        )  # fmt: skip
     reach = next(d for d in np.arange(20.0, 40.0, 0.25).tolist() if least_reflectivity(d) > 0.10)
     yield Row(
-        what="range at 10 % reflectivity",
-        datasheet="30 m",
-        measured=f"{reach:.1f} m",
-        source="TD p33",
-        kept=abs(reach - 30.0) < 2.0,
+        "range at 10 % reflectivity", "30 m", f"{reach:.1f} m", "TD p33", abs(reach - 30.0) < 2.0
     )
 
 
@@ -216,29 +167,20 @@ def codes() -> Iterator[Row]:
         on_grid = bool(np.allclose(sent / unit, np.rint(sent / unit), atol=2e-3))
         beyond = Bench(plate(top + 0.5, 200.0), config).scan().ranges[180]
         nothing = Bench("", config).scan().ranges[180]
+        step = f"{1e3 * unit:g} mm" if on_grid else "off the grid"
         yield Row(
-            what=f"{mode} mode: step; beyond {top:g} m; no return",
-            datasheet=f"{1e3 * unit:g} mm; +inf; NaN",
-            measured=f"{f'{1e3 * unit:g} mm' if on_grid else 'off the grid'}; "
-            f"{beyond:+f}; {'NaN' if np.isnan(nothing) else nothing}",
-            source="TL table 3-7, 10.8; STW",
-            kept=on_grid and beyond == np.inf and bool(np.isnan(nothing)),
-        )
+            f"{mode} mode: step; beyond {top:g} m; no return", f"{1e3 * unit:g} mm; +inf; NaN",
+            f"{step}; {beyond:+f}; {'NaN' if np.isnan(nothing) else nothing}",
+            "TL table 3-7, 10.8; STW", on_grid and beyond == np.inf and bool(np.isnan(nothing)),
+        )  # fmt: skip
 
 
 def link() -> Iterator[Row]:
     """Scans lost on the serial link."""
     for baud, lost in ((9_600, (16, 29, 30)), (38_400, (4, 8, 8)), (500_000, (0, 0, 0))):
-        ours = tuple(
-            SerialLink(
-                baud=baud, config=Lms221Config(resolution_deg=r, fov_deg=100 if r == 0.25 else 180)
-            ).lost_scans
-            for r in (0.25, 0.5, 1.0)
-        )
+        modes_ = (Lms221Config(resolution_deg=r, fov_deg=f) for r, f in LINKED)
+        ours = tuple(SerialLink(baud=baud, config=config).lost_scans for config in modes_)
         yield Row(
-            what=f"scans lost between two at {baud / 1000:g} kBd: 0.25°, 0.5°, 1°",
-            datasheet=", ".join(map(str, lost)),
-            measured=", ".join(map(str, ours)),
-            source="TL table 10-17",
-            kept=ours == lost,
-        )
+            f"scans lost between two at {baud / 1000:g} kBd: 0.25°, 0.5°, 1°",
+            ", ".join(map(str, lost)), ", ".join(map(str, ours)), "TL table 10-17", ours == lost,
+        )  # fmt: skip

@@ -10,10 +10,10 @@ from fractions import Fraction
 import numpy as np
 
 from scripts.card.bench import Bench, box, plate
-from scripts.card.rows import Row, table
-from sim.sensors.lidar.registry import describe, names, scanner_of
+from scripts.card.page import Row
+from sim.sensors.lidar.registry import names, scanner_of
 from sim.sensors.lidar.scanner import Scanner, Spot
-from sim.sensors.lidar.sheet import NOT_STATED, QUANTITIES, Stated, sheet_of
+from sim.sensors.lidar.sheet import QUANTITIES, Stated, sheet_of
 from slam.errors import InvalidValueError
 from slam.frames import Float
 
@@ -24,7 +24,7 @@ UNIT_OF = {"deg": ("°", 1.0), "hz": ("Hz", 1.0), "us": ("µs", 1.0), "m": ("mm"
 
 
 def rows_of(name: str) -> list[Row]:
-    """Every row of a scanner's data sheet, measured anew; a few seconds.
+    """Every row of a scanner's data sheet, measured again; a few seconds.
 
     Raises ``InvalidValueError`` for a scanner without a data sheet, and for one with settings or
     errors in its name; ``UnknownNameError`` for one that is not registered.
@@ -45,16 +45,13 @@ def _row(model: Scanner, stated: Stated) -> Row:
     what = QUANTITIES[stated.what]
     if stated.at_m is not None:
         what += f" at {stated.at_m:g} m"
-    if stated.value is None:
-        unit = "the model has none"
-        if stated.what in ("range_min_m", "unit_m") and getattr(model, stated.what):
-            unit = f"{1e3 * getattr(model, stated.what):g} mm"
-        return Row(what=what, datasheet=stated.text, measured=unit, source=stated.source, kept=True)
-    measured, words = _measured(model, stated)
-    return Row(
-        what=what, datasheet=stated.text, measured=words, source=stated.source,
-        kept=_kept(stated, measured),
-    )  # fmt: skip
+    if stated.value is not None:
+        measured, words = _measured(model, stated)
+        return Row(what, stated.text, words, stated.source, _kept(stated, measured))
+    words = "the model has none"
+    if stated.what in ("range_min_m", "unit_m") and getattr(model, stated.what):
+        words = f"{1e3 * getattr(model, stated.what):g} mm"
+    return Row(what, stated.text, words, stated.source, kept=True)
 
 
 def _kept(stated: Stated, measured: float | str) -> bool:
@@ -99,10 +96,15 @@ def _word(model: Scanner, what: str) -> str:
     times = model.times_s
     if what == "direction":
         return "clockwise" if times[0] > times[-1] else "counter-clockwise"
-    near = 0.5 * model.range_min_m
-    bench = Bench(plate(near, 0.01) if what == "too_near" else "", model)
-    ahead = int(np.argmin(np.abs(model.spec().angles)))
-    return {"nan": "NaN"}.get(str(bench.scan().ranges[ahead]), str(bench.scan().ranges[ahead]))
+    near = plate(0.5 * model.range_min_m, 0.01)
+    bench = Bench(near if what == "too_near" else "", model)
+    sent = str(bench.scan().ranges[_middle(model)])
+    return "NaN" if sent == "nan" else sent
+
+
+def _middle(model: Scanner) -> int:
+    """The beam ahead."""
+    return int(np.argmin(np.abs(model.spec().angles)))
 
 
 def _rate(model: Scanner) -> float:
@@ -117,11 +119,10 @@ def _rate(model: Scanner) -> float:
 def _limit(model: Scanner, limit_m: float) -> float:
     """Where a plate ahead begins or ends to be measured, by bisection about the limit."""
     bare = model.only("ideal")
-    ahead = int(np.argmin(np.abs(model.spec().angles)))
+    ahead = _middle(model)
 
     def seen(distance: float) -> bool:
-        sent = Bench(plate(distance, 0.2), bare).scan().ranges[ahead]
-        return bool(np.isfinite(sent))
+        return bool(np.isfinite(Bench(plate(distance, 0.2), bare).scan().ranges[ahead]))
 
     low, high = 0.5 * limit_m, 1.5 * limit_m
     rises = seen(high)
@@ -135,12 +136,9 @@ def _ahead(model: Scanner, distance: float, scans: int) -> tuple[Float, Float]:
     """(sent, true) m of the beams within 10 degrees of a plate's normal."""
     bench = Bench(plate(distance), model, seed=1)
     ahead = np.abs(model.spec().angles) < math.radians(10.0)
-    sent, true = [], []
-    for _ in range(scans):
-        result = bench.scan()
-        sent.append(result.ranges[ahead].astype(np.float64))
-        true.append(result.true_ranges[ahead])
-    return np.concatenate(sent), np.concatenate(true)
+    results = [bench.scan() for _ in range(scans)]
+    sent = [result.ranges[ahead].astype(np.float64) for result in results]
+    return np.concatenate(sent), np.concatenate([result.true_ranges[ahead] for result in results])
 
 
 def _noise(model: Scanner, distance: float) -> float:
@@ -179,23 +177,3 @@ def _unit(model: Scanner) -> float:
     tick = 2.5e-5  # far finer than any code
     codes = np.unique(np.rint(sent[np.isfinite(sent)] / tick).astype(np.int64))
     return float(np.gcd.reduce(np.diff(codes))) * tick
-
-
-def page(name: str, rows: list[Row]) -> str:
-    """The card as Markdown."""
-    lines = [
-        f"# {describe(name).rstrip('.')}: the simulated scanner against its data sheet",
-        "",
-        f"Check how real the simulated `{name}` is. Every figure of this page is measured on the",
-        "simulated scanner, by this command:",
-        "",
-        f"    mobilia sensor-card --scanner {name} --out docs",
-        "",
-        f"The top of `sim/sensors/lidar/models/{name}.py` names the sources and their short",
-        f'names, and lists what they do not state. "{NOT_STATED}" means: not by the sources',
-        "read. Such a thing is not simulated, unless the row says so.",
-        "",
-        *table(rows),
-        "",
-    ]
-    return "\n".join(lines)

@@ -11,17 +11,17 @@ from typing import Any
 from scripts.closed_loop.plan import SCHEMA
 from scripts.closed_loop.tables import LEVEL_COLUMNS
 from scripts.comparison.csv_files import Row, read_csv
-from scripts.comparison.folder import axis_in, check_keys, check_recipe
-from scripts.comparison.rules import Columns, Named, Number, Rule, Table, Word
+from scripts.comparison.folder import axis_in, check_recipe
+from scripts.comparison.rules import Columns, Rule, Table, check_keys, named, number, word
 from scripts.output import RECIPE, check_whole
 from slam.errors import LogFormatError
 
 LEVELS = "levels.csv"
-_COUNT, _SHARE = Number(most=1e9, whole=True), Number(most=1.0)
-_SOME = Number(least=1.0, most=1e9, whole=True)
+_COUNT, _SHARE = number(most=1e9, whole=True), number(most=1.0)
+_SOME = number(least=1.0, most=1e9, whole=True)
 _COLUMNS: Columns = {
-    **dict.fromkeys(LEVEL_COLUMNS, Number(optional=True)),
-    "scene": Word(), "dynamism": _SHARE, "slam": Word(), "runs": _SOME, "goals": _SOME,
+    **dict.fromkeys(LEVEL_COLUMNS, number(optional=True)),
+    "scene": word(), "dynamism": _SHARE, "slam": word(), "runs": _SOME, "goals": _SOME,
     **dict.fromkeys(
         ("reached", "wrong", "given_up", "failed", "given_up_taken", "runs_lost", "runs_recovered"),
         _COUNT,
@@ -36,8 +36,8 @@ TABLE = Table(
     ),
 )  # fmt: skip
 """``levels.csv``."""
-_RECIPE: Mapping[str, Rule] = {"command": Word(among=("drive",)), "settings": Named(fields={})}
-_LOOP = Named(fields={"tolerance_m": Number(most=1e9), "plan_on": Word(among=("layout", "map"))})
+_RECIPE: Mapping[str, Rule] = {"command": word(among=("drive",)), "settings": named({})}
+_LOOP = named({"tolerance_m": number(most=1e9), "plan_on": word(among=("layout", "map"))})
 
 
 @dataclass(frozen=True, kw_only=True)

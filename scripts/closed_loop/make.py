@@ -17,13 +17,12 @@ from scripts.closed_loop.plan import RUNS, SCHEMA, Plan
 from scripts.closed_loop.runs import Driven, load
 from scripts.comparison.csv_files import write_checked, write_csv
 from scripts.console import level_table
-from scripts.jobs import run_jobs
+from scripts.jobs import run_jobs, try_names
 from scripts.machine import machine
-from scripts.output import RECIPE, locked_folder, together, write_recipe
+from scripts.output import result_folder
 from slam.errors import UnknownNameError
 from slam.evaluation.lost import FOUND_RULE, LOST_RULE
 from slam.files import write_text
-from slam.guests import Limits, limited
 
 
 def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
@@ -33,20 +32,17 @@ def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
         if name not in built.goals:
             known = ", ".join(sorted(built.goals))
             raise UnknownNameError(f"scene '{plan.scene}' has no goal '{name}'. Known: {known}.")
-    for name in plan.slams:
-        limited(name, Limits(hidden=(out,)))
+    try_names(plan.slams, (), out)
     out = out.absolute()
-    with locked_folder(out):
-        settings = {"drive_schema": SCHEMA, **asdict(plan)}
-        rules = {"lost_rule": LOST_RULE, "found_rule": FOUND_RULE}
-        settings |= {**rules, "machine": machine()}
-        if not (out / RECIPE).exists():  # else that of the tables there stays with them
-            write_recipe(out, "drive", settings)
+    settings = {
+        "drive_schema": SCHEMA, **asdict(plan), "lost_rule": LOST_RULE, "found_rule": FOUND_RULE,
+        "machine": machine(),
+    }  # fmt: skip
+    with result_folder(out, "drive", settings) as written:
         wanted = list(plan.jobs())
         files = run_jobs([j for _, j in wanted], out / RUNS, processes=jobs, title="driving")
         runs = [load(files[job.name], identity) for identity, job in wanted]
-        with together(out) as staged:
-            write_recipe(staged, "drive", settings)
+        with written() as staged:
             return _write(staged, plan, runs)
 
 

@@ -11,53 +11,34 @@ import scenes
 import sim
 import slam
 from scripts.closed_loop import runs
-from scripts.comparison.plan import (
-    scripts_of,
-    source_of,
-    source_of_loaded,
-    source_of_scene,
-    sources,
-)
+from scripts.comparison.plan import MAX_RUNS, Asked, Run
+from scripts.imports import code_of
 from scripts.jobs import Job
-from scripts.knobs import axis_of, options_with
 from scripts.names import file_name
+from scripts.options import options_with
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError
 
 RUNS = "runs"  # folder of the jobs' files
 SCHEMA = 1  # of the tables of a drive
-MAX_RUNS = 100_000
-# "dynamism" is the level, as in ``scripts.comparison.columns``.
+# "dynamism" is the level, as in ``scripts.comparison.entry``.
 IDENTITY = ("scene", "dynamism", "seed", "slam")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class Plan(Asked):
     """Every SLAM in the same worlds: at every level, with every seed.
 
     goals    names, or how many of the seed's order; () is all
-    scanner  by name (``sim.sensors.lidar.registry``)
-    axis     what the levels are of; motion, change and crowd are held (``scripts.knobs.Axis``)
     """
 
     scene: str
-    slams: tuple[str, ...]
-    levels: tuple[float, ...]
-    seeds: tuple[int, ...]
     goals: tuple[str, ...] | int = ()
     loop: LoopConfig = field(default_factory=LoopConfig)
-    scanner: str = "full"
-    axis: str = "dynamism"
-    motion: float | None = None
-    change: float | None = None
-    crowd: str | None = None
 
     def __post_init__(self) -> None:
-        axis_of(asdict(self))
-        for name in ("slams", "levels", "seeds"):
-            values = getattr(self, name)
-            if not values or len(set(values)) != len(values):
-                raise InvalidValueError(f"Plan.{name} must be one or more, each once, got {values}")
+        self.room(0.0)  # complains of an axis that cannot be
+        self.check_each_once("slams", "levels", "seeds")
         if any(not 0.0 <= level <= 1.0 for level in self.levels):
             raise InvalidValueError(f"--{self.axis} must lie in [0, 1], got {self.levels}")
         if min(self.seeds) < 0:
@@ -76,17 +57,15 @@ class Plan:
                     yield dict(zip(IDENTITY, identity, strict=True)), self._job(level, seed, name)
 
     def _job(self, level: float, seed: int, name: str) -> Job:
-        room = axis_of(asdict(self)).at(level) | options_with(self.crowd)
+        room = self.room(level) | options_with(self.crowd)
         goals = list(self.goals) if isinstance(self.goals, tuple) else self.goals
+        run = Run(scene=self.scene, dynamism=level, seed=seed, axis=self.axis)
         return Job(
-            name=f"{file_name(self.scene)}_{self.axis[0]}{level:g}_s{seed}_{file_name(name)}",
+            name=f"{run.name}_{file_name(name)}",
             call=runs.run_one,
             arguments={
                 "scene": self.scene, "room": room, "seed": seed, "slam": name,
                 "goals": goals or None, "loop": asdict(self.loop), "laser": self.scanner,
             },
-            code=(
-                *sources(sim, scenes, slam), *scripts_of(runs.__file__, runs.__name__),
-                *source_of(name), *source_of_scene(self.scene), *source_of_loaded(),
-            ),
+            code=code_of(runs.run_one, sim, scenes, slam, slam=name, scene=self.scene),
         )  # fmt: skip

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from scripts.closed_loop.plan import IDENTITY
 from scripts.closed_loop.runs import Driven
+from scripts.comparison.tables import grouped
 from slam.evaluation.statistics import median_interval, quantile, share_interval
 
 Row = dict[str, Any]
@@ -82,12 +83,9 @@ def levels(goals: Sequence[Row], runs: Sequence[Row]) -> list[Row]:
     Success has Wilson's 95 % interval over the goals, the median precision over the goals believed
     reached a bootstrap interval.
     """
-    keys = list(dict.fromkeys((r["scene"], r["dynamism"], r["slam"]) for r in runs))
-    return [_level(key, _of(goals, key), _of(runs, key)) for key in keys]
-
-
-def _of(rows: Iterable[Row], key: tuple[Any, ...]) -> list[Row]:
-    return [row for row in rows if (row["scene"], row["dynamism"], row["slam"]) == key]
+    keys = ("scene", "dynamism", "slam")
+    by_key = grouped(goals, keys)
+    return [_level(key, by_key.get(key, []), own) for key, own in grouped(runs, keys).items()]
 
 
 def _level(key: tuple[Any, ...], goals: list[Row], runs: list[Row]) -> Row:

@@ -6,22 +6,26 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scripts.comparison.columns import scored
 from scripts.comparison.maps import MapJudge
 from scripts.comparison.memory import PeakMemory
 from scripts.comparison.recording import Recording, load
+from scripts.metrics import table
+from scripts.metrics.judged import Judged, lost_s
 from sim.recording.recipe import RECIPE
 from slam.errors import SlamFailedError
-from slam.frames import Float, Frame
+from slam.evaluation import metrics
+from slam.frames import NS_PER_S, Float, Frame
 from slam.guests import Limits, limited
 from slam.oracle import shown
 from slam.replay import Track
 from slam.system import Raster, create
+from slam.trajectory import Trajectory
 
 WARM_SCANS = 12  # of a throw-away instance, so that no figure holds the loading of code
 UNKNOWN = 255  # of a map on file; else 0 (free) to 254 (occupied)
@@ -58,7 +62,7 @@ def whole_result(out: Path) -> Path:
 
 
 def _warm_up(slam: str, frames: Sequence[Frame], limits: Limits) -> None:
-    if slam in _warm or ":" in slam:  # the latter begin anew with each run
+    if slam in _warm or ":" in slam:  # the latter begin again with each run
         return
     with suppress(SlamFailedError):  # the run itself will tell
         track = Track(name=slam, system=limited(slam, limits))
@@ -144,3 +148,45 @@ def _bytes(values: Float | Any) -> Any:
     """A raster's values in 0..254, ``UNKNOWN`` for NaN."""
     known = np.nan_to_num(values) * 254.0
     return np.where(np.isnan(values), UNKNOWN, np.round(known)).astype(np.uint8)
+
+
+STEADY_SCANS = 5  # timings count after this
+
+
+def scored(
+    track: Track, final: Trajectory | None, failure: SlamFailedError | None, truth: Trajectory
+) -> dict[str, Any]:
+    """The row of one SLAM, its maps and identity aside; None where there is no number."""
+    steady_s = np.array(track.durations_s[STEADY_SCANS:])
+    judged = replace(Judged.of(track, None, final), steady_s=steady_s)
+    row: dict[str, Any] = {"scans": len(track.estimates), **_computed(judged)}
+    lost_at_s = lost_at(track.online(), truth)
+    if failure is not None:
+        outcome = getattr(failure, "outcome", "raised")
+        if lost_at_s is None:
+            lost_at_s = _failed_at_s(track, truth)
+        return row | {
+            "outcome": outcome, "failure": str(failure), "lost": 1, "lost_at_s": lost_at_s,
+        }  # fmt: skip
+    row |= {"outcome": "finished" if lost_at_s is None else "lost", "failure": None}
+    row |= {"lost": int(lost_at_s is not None), "lost_at_s": lost_at_s}
+    return row | _computed(replace(judged, truth=truth))
+
+
+def _computed(judged: Judged) -> dict[str, Any]:
+    """The columns that the table of metrics computes, those without a value left out."""
+    values = {key: table.METRICS[key].of(judged) for key in table.COLUMNS}
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def lost_at(online: Trajectory, truth: Trajectory) -> float | None:
+    """Seconds from the start to the loss (``slam.evaluation.lost``); None if it never was lost."""
+    if len(online) == 0:
+        return None
+    return lost_s(metrics.pose_errors(online, truth), truth)
+
+
+def _failed_at_s(track: Track, truth: Trajectory) -> float:
+    """Of the scan that it did not answer."""
+    k = min(len(track.estimates), len(truth) - 1)
+    return float(truth.stamps_ns[k] - truth.stamps_ns[0]) / NS_PER_S

@@ -22,7 +22,7 @@ from typing import Any
 
 from scripts.comparison.csv_files import Row, read_csv, write_checked
 from scripts.comparison.plan import Run
-from scripts.comparison.rules import Plain, Rule
+from scripts.comparison.rules import PLAIN, Rule, check_keys
 from scripts.comparison.run_file import RunFile
 from scripts.comparison.schema import (
     AGES,
@@ -36,10 +36,11 @@ from scripts.comparison.schema import (
     TABLES,
     settings,
 )
-from scripts.knobs import AXES
 from scripts.names import RUNS as RUN_FILES
+from scripts.options import AXES
 from scripts.output import RECIPE as RECIPE_FILE
 from scripts.output import check_whole, read_recipe_words
+from scripts.result_files import finite
 from slam.errors import LogFormatError
 from slam.files import write_text
 
@@ -52,13 +53,9 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]], axis: str = AXES[
 def write_json(path: Path, rows: Sequence[Mapping[str, Any]], axis: str = AXES[0]) -> None:
     """``{"schema": 1, "runs": [...]}``; null where a cell is empty. ``axis``: as ``write_csv``."""
     names = {name: axis if name == "dynamism" else name for name in TABLES[RUNS].columns}
-    plain = [{names[name]: _plain(row.get(name)) for name in names} for row in rows]
+    plain = [{names[name]: finite(row.get(name)) for name in names} for row in rows]
     text = json.dumps({"schema": SCHEMA, "runs": plain}, indent=1, allow_nan=False)
     write_text(path, text + "\n")
-
-
-def _plain(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +89,7 @@ class Compared:
 
     @cached_property
     def axis(self) -> str:
-        """What the levels are of, of ``scripts.knobs.AXES`` or ``LEVEL``; rows say "dynamism"."""
+        """What the levels are of, of ``scripts.options.AXES`` or ``LEVEL``; rows say "dynamism"."""
         return axis_in(self.settings, self.folder / RECIPE_FILE)
 
     @cached_property
@@ -211,18 +208,7 @@ def axis_in(told: Mapping[str, Any], path: Path) -> str:
 def check_recipe(path: Path, rules: Mapping[str, Rule]) -> Row:
     """The words of a recipe; ``LogFormatError`` for a key that is not there, or not by its rule."""
     recipe = read_recipe_words(path)
-    if not Plain().holds(recipe):  # what is nested deeper cannot even be shown
-        raise LogFormatError(path, f"must be {Plain().wanted}")
+    if not PLAIN.holds(recipe):  # what is nested deeper cannot even be shown
+        raise LogFormatError(path, f"must be {PLAIN.wanted}")
     check_keys(path, "", recipe, rules)
     return recipe
-
-
-def check_keys(path: Path, where: str, found: Mapping[str, Any], rules: Mapping[str, Rule]) -> None:
-    """``LogFormatError`` for the first key that is not there, or not by its rule."""
-    for key, rule in rules.items():
-        if key not in found:
-            raise LogFormatError(path, f"lacks {where}{key}, which must be {rule.wanted}")
-        if not rule.holds(found[key]):
-            raise LogFormatError(
-                path, f"{where}{key} must be {rule.wanted}, got {found[key]!r:.80}"
-            )

@@ -11,7 +11,6 @@ from typing import Any
 
 from rich.table import Table
 
-from scenes import registry
 from scripts.comparison import folder as files
 from scripts.comparison import tables
 from scripts.comparison.entry import whole_result
@@ -20,14 +19,13 @@ from scripts.comparison.recording import load
 from scripts.comparison.run_file import merge
 from scripts.comparison.schema import LEVELS, PAIRED, RUNS, RUNS_JSON, SCHEMA
 from scripts.console import level_table
-from scripts.jobs import Job, run_jobs
+from scripts.jobs import Job, run_jobs, try_names
 from scripts.machine import machine
 from scripts.metrics.table import DRIVES
-from scripts.output import RECIPE, locked_folder, together, write_recipe
+from scripts.output import result_folder
 from slam.errors import InvalidValueError
 from slam.evaluation.lost import LOST_RULE
 from slam.frames import BeamClass
-from slam.guests import Limits, limited
 
 Tables = Mapping[str, Sequence[Mapping[str, Any]]]
 """By the name of a file its rows."""
@@ -44,27 +42,22 @@ def carry_out(
     """Make what is missing and write the tables; the rows of ``runs.csv``.
 
     more  called as ``more(out, jobs=jobs, cluster=cluster)`` after the runs: what else is to be
-          made in ``out``, and the tables of it (``scripts.days.make.beside``)
+          made in ``out``, and the tables of it (``scripts.days.buildings.beside``)
     """
-    for name in plan.scenes:
-        registry.build(name)  # wrong names are told before anything starts
-    for name in plan.slams:
-        limited(name, Limits(hidden=(whole_result(out),)))
+    try_names(plan.slams, plan.scenes, whole_result(out))
     if plan.sessions is not None and more is None:
-        raise InvalidValueError("Plan.sessions needs more=scripts.days.make.beside(plan)")
+        raise InvalidValueError("Plan.sessions needs more=scripts.days.buildings.beside(plan)")
     out = out.absolute()
-    with locked_folder(out):
-        settings = {"compare_schema": SCHEMA, **plan.settings(), "lost_rule": LOST_RULE}
-        settings["machine"] = machine()
-        if not (out / RECIPE).exists():  # else that of the tables there stays with them
-            write_recipe(out, "compare", settings)
+    settings = {"compare_schema": SCHEMA, **plan.settings(), "lost_rule": LOST_RULE}
+    settings["machine"] = machine()
+    with result_folder(out, "compare", settings) as written:
         simulations, entries = plan.recordings(), list(plan.entries())
         ways: dict[str, Any] = {"processes": jobs, "cluster": cluster}
         recordings = run_jobs(simulations.values(), out / RECORDINGS, title="simulating", **ways)
         only: list[Job] = [job for _, _, job in entries]
         done = run_jobs(only, out / ENTRIES, title="running SLAMs", **ways)
         added = {} if more is None else more(out, jobs=jobs, cluster=cluster)
-        with together(out) as staged:
+        with written() as staged:
             rows: list[dict[str, Any]] = []
             for run in plan.runs():
                 own = {name: done[job.name] for its, name, job in entries if its == run}
@@ -76,7 +69,6 @@ def carry_out(
             own_tables = {RUNS: rows, LEVELS: tables.levels(rows), PAIRED: tables.pairs(rows)}
             for name, table in {**own_tables, **added}.items():
                 files.write_table(staged / name, table, plan.axis)
-            write_recipe(staged, "compare", settings)
     return rows
 
 

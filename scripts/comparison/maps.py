@@ -55,13 +55,20 @@ class StaticDistance:
 
 
 def _sampled(values: NDArray[Any], raster: Raster, points: Float, outside: float) -> Float:
-    cells = np.floor((points - raster.T_map_origin[:2]) / raster.resolution_m).astype(np.int64)
-    height, width = values.shape
-    column, row = cells[:, 0], cells[:, 1]
-    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    inside, rows, columns = _cells(raster, points)
     out = np.full(len(points), outside)
-    out[inside] = values[row[inside], column[inside]]
+    out[inside] = values[rows, columns]
     return out
+
+
+def _cells(
+    raster: Raster, points: Float
+) -> tuple[NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64]]:
+    """(n,) which points (n, 2) m are on a raster, and of those the rows and columns."""
+    cells = np.floor((points - raster.T_map_origin[:2]) / raster.resolution_m).astype(np.int64)
+    height, width = raster.values.shape
+    inside = np.asarray((cells >= 0).all(axis=1) & (cells < (width, height)).all(axis=1))
+    return inside, cells[inside, 1], cells[inside, 0]
 
 
 def disc(radius_m: float, cell_m: float) -> NDArray[np.uint8]:
@@ -170,12 +177,8 @@ class MapJudge:
         return None if self._believed is None else self._believed.holds(points)
 
     def _mark(self, points: Float) -> None:
-        raster = self._drive.static_map
-        points = points[np.isfinite(points[:, 0])]
-        cells = np.floor((points - raster.T_map_origin[:2]) / raster.resolution_m).astype(np.int64)
-        height, width = self._seen.shape
-        inside = (cells >= 0).all(axis=1) & (cells < (width, height)).all(axis=1)
-        self._seen[cells[inside, 1], cells[inside, 0]] = 1
+        _, rows, columns = _cells(self._drive.static_map, points[np.isfinite(points[:, 0])])
+        self._seen[rows, columns] = 1
 
     def _ghost_rates(self, occupied: Float, k: int) -> tuple[float, float]:
         """Of the occupied cells: those with nothing near, and those that are left of a mover."""

@@ -9,7 +9,6 @@ import math
 from pathlib import Path
 
 _STATUS, _CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
-_RESET_PEAK = "5"
 
 
 class PeakMemory:
@@ -27,9 +26,7 @@ class PeakMemory:
 
     def begin(self) -> None:
         """Forget the peak so far."""
-        try:
-            _CLEAR.write_text(_RESET_PEAK)
-        except OSError:
+        if not forget_peak():
             self._peak_kb = math.nan
 
     def end(self) -> None:
@@ -48,6 +45,15 @@ def _give_back() -> None:
         ctypes.CDLL(None).malloc_trim(0)
     except (OSError, AttributeError):  # another C library
         return
+
+
+def forget_peak() -> bool:
+    """From now on the process's peak is what is held now; whether the kernel can do that."""
+    try:
+        _CLEAR.write_text("5")  # proc(5)
+    except OSError:
+        return False
+    return True
 
 
 def reading_kb(name: str) -> float:

@@ -3,32 +3,26 @@
 
 from __future__ import annotations
 
-import importlib.util
-import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import scenes
 import sim
 import slam
-from scripts.checked import whole
 from scripts.comparison import entry, recording
 from scripts.comparison.rules import LEVEL
 from scripts.comparison.schema import LATER, settings
-from scripts.imports import with_imports
+from scripts.imports import code_of
 from scripts.jobs import Job
-from scripts.knobs import axis_of, options_with
 from scripts.names import file_name
+from scripts.options import Axis, Held, options_with, whole
 from sim.recording.recipe import Recipe
 from sim.simulation import n_frames
 from sim.world.times_of_day import MOST_SESSIONS
 from slam.errors import InvalidValueError
 from slam.guests import Limits
-from slam.names import join_folders, loaded
-from slam.variants import PIPE, inside
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
@@ -57,37 +51,58 @@ class Run:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class Asked:
+    """What every study of simulated rooms has: SLAMs at every level with every seed.
+
+    slams     by name or as module:Class
+    levels    of dynamism, each in [0, 1], or of another ``axis`` (``scripts.options``)
+    seeds     whole numbers >= 0, the same at every level
+    scanner   by name (``sim.sensors.lidar.registry``)
+    motion, change, crowd  the same in every run; None: as ``scripts.options.Axis`` says
+    """
+
+    slams: tuple[str, ...]
+    levels: tuple[float, ...]
+    seeds: tuple[int, ...]
+    scanner: str = "full"
+    axis: str = "dynamism"
+    motion: float | None = None
+    change: float | None = None
+    crowd: str | None = None
+
+    def room(self, level: float) -> dict[str, Any]:
+        """``dynamism``, ``motion`` and ``change`` at a level; errors for an axis that is none."""
+        held = Held(motion=self.motion, change=self.change, crowd=self.crowd)
+        return Axis(name=self.axis, held=held).at(level)
+
+    def check_each_once(self, *names: str) -> None:
+        """``InvalidValueError`` for a field that names nothing, or something twice."""
+        for name in names:
+            values = getattr(self, name)
+            if not values or len(set(values)) != len(values):
+                raise InvalidValueError(f"Plan.{name} must be one or more, each once, got {values}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan(Asked):
     """Every SLAM on every scene at every level with every seed.
 
-    slams, scenes  by name or as module:Class, module:function
-    levels    of dynamism, each in [0, 1], or of another ``axis`` (``scripts.knobs``)
-    seeds     whole numbers >= 0, the same at every level
+    scenes    by name or as module:function
     seconds   of driving
     every     one scan in so many is kept
-    scanner   by name (``sim.sensors.lidar.registry``)
     odometry  preset of the wheel encoders
-    motion, change, crowd  the same in every run; None: as ``scripts.knobs.Axis`` says
     sets      of axis "level": what each level sets, fields of ``Recipe`` and options of the scene
     scan_limit_s  that module:Class and pipe:COMMAND may take for a scan before they count as hung
     judge_maps  once a second against the truth (``scripts.comparison.maps``); it can take as long
              as the SLAM does
     sessions  of a building beside each run, in whose map SLAMs live from session to session
-             (``scripts.days.plan``); None: no buildings
+             (``scripts.days.buildings``); None: no buildings
     """
 
-    slams: tuple[str, ...]
     scenes: tuple[str, ...]
-    levels: tuple[float, ...]
-    seeds: tuple[int, ...]
     seconds: float = 60.0
     every: int = 8
-    scanner: str = "full"
     scan_limit_s: float = Limits.scan_s
-    axis: str = "dynamism"
-    motion: float | None = None
-    change: float | None = None
-    crowd: str | None = None
     odometry: str = "pioneer3dx"
     sets: tuple[Mapping[str, Any], ...] = ()
     judge_maps: bool = True
@@ -96,10 +111,7 @@ class Plan:
     def __post_init__(self) -> None:
         Limits(scan_s=self.scan_limit_s)
         self._check_axis()
-        for name in ("slams", "scenes", "levels", "seeds"):
-            values = getattr(self, name)
-            if not values or len(set(values)) != len(values):
-                raise InvalidValueError(f"Plan.{name} must be one or more, each once, got {values}")
+        self.check_each_once("slams", "scenes", "levels", "seeds")
         whole("Plan.every", self.every, 1, 1000)
         if len(self.scenes) * len(self.levels) * len(self.seeds) > MAX_RUNS:
             raise InvalidValueError(f"a comparison has at most {MAX_RUNS} runs")
@@ -116,7 +128,7 @@ class Plan:
 
     def _check_axis(self) -> None:
         if self.axis != LEVEL:
-            axis_of(asdict(self))
+            self.room(0.0)  # complains of an axis that cannot be
         elif (self.motion, self.change, self.crowd) != (None, None, None):
             raise InvalidValueError("Plan: with axis 'level' the levels set motion, change, crowd")
         fits = len(self.sets) == (len(self.levels) if self.axis == LEVEL else 0)
@@ -164,7 +176,7 @@ class Plan:
             own = {"dynamism": 0.0, **{k: v for k, v in given.items() if k in _OF_RECIPE}}
             options = {k: v for k, v in given.items() if k not in _OF_RECIPE}
         else:
-            own, options = axis_of(asdict(self)).at(run.dynamism), options_with(self.crowd)
+            own, options = self.room(run.dynamism), options_with(self.crowd)
         return Recipe(
             scene=run.scene, seed=run.seed, **own, seconds=self.seconds, scanner=self.scanner,
             odometry=self.odometry, options=options,
@@ -172,84 +184,40 @@ class Plan:
 
     def recordings(self) -> dict[str, Job]:
         """The jobs that simulate, by the names of the runs."""
-        code = (*sources(sim, scenes), *scripts_of(recording.__file__, recording.__name__))
-        own = {name: (*code, *source_of_scene(name), *source_of_loaded()) for name in self.scenes}
+        code = {scene: simulator(scene) for scene in self.scenes}
         return {
-            run.name: Job(
-                name=run.name,
-                call=recording.record,
-                arguments={**asdict(self.recipe(run)), "every": self.every},
-                code=own[run.scene],
-            )
+            run.name: simulating(run.name, self.recipe(run), self.every, code[run.scene])
             for run in self.runs()
         }
 
     def entries(self) -> Iterator[tuple[Run, str, Job]]:
         """The jobs that run a SLAM over a recording: run, SLAM, job."""
         recordings = {name: job.file_name() for name, job in self.recordings().items()}
-        own = (*sources(slam), *scripts_of(entry.__file__, entry.__name__))
         for name in self.slams:
-            code = (*own, *source_of(name), *source_of_loaded())
+            job = running(entry.enter, name, self.scan_limit_s)
             for run in self.runs():
-                file = f"{RECORDINGS}/{recordings[run.name]}"
-                arguments: dict[str, Any] = {"recording": file, "slam": name}
-                if ":" in name:  # ours are not limited
-                    arguments["scan_limit_s"] = self.scan_limit_s
-                if not self.judge_maps:
-                    arguments["judge_maps"] = False
-                job = Job(
-                    name=f"{run.name}_{file_name(name)}",
-                    call=entry.enter,
-                    arguments=arguments,
-                    code=code,
-                )
-                yield run, name, job
+                own: dict[str, Any] = {"recording": f"{RECORDINGS}/{recordings[run.name]}"}
+                own |= {} if self.judge_maps else {"judge_maps": False}
+                yield run, name, job.over(run.name, own)
 
 
-def sources(*packages: Any) -> tuple[Path, ...]:
-    """The folders of packages, for ``Job.code``."""
-    return tuple(Path(package.__file__).parent for package in packages)
+def simulator(scene: str) -> tuple[Path, ...]:
+    """What a recording in that scene depends on."""
+    return code_of(recording.record, sim, scenes, scene=scene)
 
 
-@cache
-def scripts_of(file: str, module: str) -> tuple[Path, ...]:
-    """A script and those that it imports, for ``Job.code`` beside the packages that it calls."""
-    folder = Path(__file__).resolve().parents[1]
-    return tuple(path for path in with_imports(Path(file), module) if folder in path.parents)
+def simulating(name: str, recipe: Recipe, every: int, code: Sequence[Path]) -> Job:
+    """The job that records one scan in ``every`` of a simulation."""
+    arguments = {**asdict(recipe), "every": every}
+    return Job(name=name, call=recording.record, arguments=arguments, code=code)
 
 
-def source_of(slam: str) -> tuple[Path, ...]:
-    """The file of a SLAM's own module, or those that a command names, and what Python files among
-    them import from beside them: with any of it changed, its runs are made again."""
-    slam = inside(slam)
-    kind, _, command = slam.partition(":")
-    if not command:
-        return ()
-    if slam.startswith(PIPE):
-        named = [path for path in map(Path, shlex.split(command)) if path.is_file()]
-        return tuple(file for path in named for file in _whole(path, path.stem))
-    return _of_module(kind)
-
-
-def source_of_scene(scene: str) -> tuple[Path, ...]:
-    """The files of a scene's own module as ``source_of`` has them, and the plans and parts (MJCF)
-    in their folders."""
-    module, colon, _ = scene.partition(":")
-    python = _of_module(module) if colon else ()
-    return (*python, *sorted({xml for file in python for xml in file.parent.glob("*.xml")}))
-
-
-def source_of_loaded() -> tuple[Path, ...]:
-    """The files of the modules that ``--with`` has loaded: what they register is known by a name
-    that does not tell where it comes from."""
-    return tuple(file for module in loaded() for file in _of_module(module))
-
-
-def _of_module(module: str) -> tuple[Path, ...]:
-    join_folders()
-    spec = importlib.util.find_spec(module)
-    return _whole(Path(spec.origin), module) if spec and spec.origin and spec.has_location else ()
-
-
-def _whole(file: Path, module: str) -> tuple[Path, ...]:
-    return with_imports(file, module) if file.suffix == ".py" else (file,)
+def running(call: Callable[..., None], name: str, scan_limit_s: float) -> Job:
+    """The job of a SLAM on nothing yet: ``Job.over`` says on what. Ours are not limited."""
+    limit = {"scan_limit_s": scan_limit_s} if ":" in name else {}
+    return Job(
+        name=file_name(name),
+        call=call,
+        arguments={"slam": name, **limit},
+        code=code_of(call, slam, slam=name),
+    )

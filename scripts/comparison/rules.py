@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a cell of a table or a setting of a recipe may be: a word, a number, a list of such.
+"""What a cell of a table, a setting of a recipe or a field of a submission may be.
 
-A rule says it in words (``wanted``), judges a value (``holds``) and, of one that a cell can hold,
-takes it from the cell (``parsed``).
+A rule is a word, a number, a list of such, a mapping: ``word``, ``number``, ``many``, ``named``,
+``PLAIN``, ``TRUTH``, or whatever else passes a test.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any
 
 from slam.checked import is_number, is_whole
 from slam.csv_cells import word_of
+from slam.errors import LogFormatError
 
 MOST = 1e100  # of a finite number, either way: its squares and their sums are finite too
 MAX_WORD = 2000  # letters of a name: what is longer is the name of no file
@@ -23,107 +25,123 @@ MAX_DEPTH = 16  # of lists and mappings within each other
 _NUMBER = re.compile(r"[-+]?(\d{1,400}(\.\d{0,400})?(e[-+]?\d{1,4})?|inf)", re.ASCII)
 
 
-class Rule(Protocol):
-    """What a value must be."""
+@dataclass(frozen=True)
+class Rule:
+    """What a value must be.
 
-    @property
-    def wanted(self) -> str:
-        """It in words, for "must be ..."."""
-
-    def holds(self, value: object) -> bool:
-        """Whether this is one."""
-
-
-class Cell(Rule, Protocol):
-    """What the value of a cell must be; an empty cell is None."""
-
-    def parsed(self, cell: str) -> Any:
-        """The value of a cell that is not empty; NaN where it holds none, which no rule allows."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Word:
-    """One line of letters that print; ``among`` these if any, None too where ``optional``."""
-
-    among: tuple[str, ...] = ()
-    most: int = MAX_WORD
-    optional: bool = False
-
-    @property
-    def wanted(self) -> str:
-        """In words."""
-        what = f"a printable word of 1 to {self.most} letters"
-        if self.among:
-            what = self.among[0] if len(self.among) == 1 else f"one of {', '.join(self.among)}"
-        return what + _or_none(self.optional)
-
-    def holds(self, value: object) -> bool:
-        """Whether this is one."""
-        if value is None:
-            return self.optional
-        if not isinstance(value, str):
-            return False
-        if self.among:
-            return value in self.among
-        return 0 < len(value) <= self.most and value.isprintable()
-
-    def parsed(self, cell: str) -> Any:
-        """The word of a cell."""
-        return word_of(cell)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Number:
-    """A number from ``least`` to ``most``. An infinite end allows ``MOST`` and itself.
-
-    whole     whole numbers alone
-    optional  None too
+    wanted  it in words, for "must be ..."
+    holds   whether a value is one
+    parsed  the value of a cell that is not empty; NaN where it holds none, which no rule allows
     """
 
-    least: float = 0.0
-    most: float = math.inf
-    whole: bool = False
-    optional: bool = False
+    wanted: str
+    holds: Callable[[Any], bool]
+    parsed: Callable[[str], Any] = word_of
 
-    @property
-    def wanted(self) -> str:
-        """In words."""
-        kind = "a whole number" if self.whole else "a number"
-        low = -MOST if self.least == -math.inf else self.least
-        high = f"{self.most:g}"
-        if self.most == math.inf:
-            high = f"{MOST:g} or infinite"
-        elif int(self.most) == self.most:
-            high = str(int(self.most))
-        return f"{kind} from {low:g} to {high}" + _or_none(self.optional)
 
-    def holds(self, value: object) -> bool:
-        """Whether this is one."""
+def word(*, among: tuple[str, ...] = (), most: int = MAX_WORD, optional: bool = False) -> Rule:
+    """One line of letters that print; ``among`` these if any, None too where ``optional``."""
+    wanted = f"a printable word of 1 to {most} letters"
+    if among:
+        wanted = among[0] if len(among) == 1 else f"one of {', '.join(among)}"
+
+    def holds(value: Any) -> bool:
+        if value is None or not isinstance(value, str):
+            return optional and value is None
+        return value in among if among else 0 < len(value) <= most and value.isprintable()
+
+    return Rule(wanted + _or_none(optional), holds)
+
+
+def number(
+    *, least: float = 0.0, most: float = math.inf, whole: bool = False, optional: bool = False
+) -> Rule:
+    """A number from ``least`` to ``most``. An infinite end allows ``MOST`` and itself.
+
+    whole     whole numbers alone; a cell may have one as 3.0
+    optional  None too
+    """
+    low, high = -MOST if least == -math.inf else least, f"{most:g}"
+    if most == math.inf:
+        high = f"{MOST:g} or infinite"
+    elif int(most) == most < MOST:
+        high = str(int(most))
+
+    def holds(value: Any) -> bool:
         if value is None:
-            return self.optional
-        if not (is_whole(value) or (is_number(value) and not self.whole)):
+            return optional
+        if not (is_whole(value) or (is_number(value) and not whole)):
             return False
-        within = self.least <= value <= self.most
-        return within and (abs(value) <= MOST or value in (math.inf, -math.inf))
+        return least <= value <= most and (abs(value) <= MOST or value in (math.inf, -math.inf))
 
-    def parsed(self, cell: str) -> Any:
-        """The number of a cell; a whole one may be written as 3.0."""
+    def parsed(cell: str) -> Any:
         if not _NUMBER.fullmatch(cell):
             return math.nan
         value = float(cell)
-        if self.whole and value.is_integer():
+        if whole and value.is_integer():
             return int(cell) if cell.isdecimal() else int(value)
         return value
 
+    kind = "a whole number" if whole else "a number"
+    return Rule(f"{kind} from {low:g} to {high}" + _or_none(optional), holds, parsed)
 
-SHARE = Number(most=1.0)
-Columns = Mapping[str, Cell]
+
+def many(of: Rule) -> Rule:
+    """A list of values, each of them by the same rule and there once; 1 at least."""
+
+    def holds(value: Any) -> bool:
+        if not isinstance(value, list | tuple) or not value:
+            return False
+        return all(map(of.holds, value)) and len(set(value)) == len(value)
+
+    return Rule(f"a list of one or more, each once and {of.wanted}", holds)
+
+
+def named(fields: Mapping[str, Rule], others: Rule | None = None) -> Rule:
+    """A mapping from words, with at least these; what else is in it is ``others``."""
+    told = "; ".join(f"{name!r}: {rule.wanted}" for name, rule in fields.items())
+
+    def holds(value: Any) -> bool:
+        if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+            return False
+        if not all(name in value and rule.holds(value[name]) for name, rule in fields.items()):
+            return False
+        rest = (one for name, one in value.items() if name not in fields)
+        return others is None or all(map(others.holds, rest))
+
+    return Rule(f"a mapping with {told}" if fields else "a mapping of plain values", holds)
+
+
+def is_shallow(value: object, most: int = MAX_DEPTH) -> bool:
+    """Whether lists and mappings are nested at most so deep."""
+    level = [value]
+    for _ in range(most):
+        level = [inner for one in level for inner in _within(one)]
+        if not level:
+            return True
+    return False
+
+
+def _within(value: object) -> Iterable[object]:
+    if isinstance(value, Mapping):
+        return value.values()
+    return value if isinstance(value, list | tuple) else ()
+
+
+def _or_none(optional: bool) -> str:
+    return " or nothing" if optional else ""
+
+
+PLAIN = Rule(f"plain data, nested {MAX_DEPTH} deep at most", is_shallow)
+TRUTH = Rule("true or false", lambda value: isinstance(value, bool))
+SHARE = number(most=1.0)
+Columns = Mapping[str, Rule]
 LEVEL = "level"  # the axis of ``scripts.comparison.plan.Plan.sets``
 
 
-def level_of(axis: str) -> Number:
+def level_of(axis: str) -> Rule:
     """What a level of that axis may be."""
-    return Number(least=-1e6, most=1e6) if axis == LEVEL else Number(most=1.0)
+    return number(least=-1e6, most=1e6) if axis == LEVEL else SHARE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,81 +179,12 @@ class Table:
         return ""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Many:
-    """A list of values, each of them by the same rule and there once; 1 at least."""
-
-    of: Rule
-
-    @property
-    def wanted(self) -> str:
-        """In words."""
-        return f"a list of one or more, each once and {self.of.wanted}"
-
-    def holds(self, value: object) -> bool:
-        """Whether this is one."""
-        if not isinstance(value, list | tuple) or not value:
-            return False
-        return all(map(self.of.holds, value)) and len(set(value)) == len(value)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Named:
-    """A mapping from words, with at least these; what else is in it is ``others``."""
-
-    fields: Mapping[str, Rule]
-    others: Rule | None = None
-
-    @property
-    def wanted(self) -> str:
-        """In words."""
-        if not self.fields:
-            return "a mapping of plain values"
-        told = "; ".join(f"{name!r}: {rule.wanted}" for name, rule in self.fields.items())
-        return f"a mapping with {told}"
-
-    def holds(self, value: object) -> bool:
-        """Whether this is one."""
-        if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
-            return False
-        if not all(name in value and rule.holds(value[name]) for name, rule in self.fields.items()):
-            return False
-        rest = [one for name, one in value.items() if name not in self.fields]
-        return self.others is None or all(map(self.others.holds, rest))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Plain:
-    """What JSON has: anything, nested ``MAX_DEPTH`` deep at most."""
-
-    wanted: str = f"plain data, nested {MAX_DEPTH} deep at most"
-
-    def holds(self, value: object) -> bool:
-        """Whether this is it."""
-        level = [value]
-        for _ in range(MAX_DEPTH):
-            level = [inner for one in level for inner in _within(one)]
-            if not level:
-                return True
-        return False
-
-
-@dataclass(frozen=True, kw_only=True)
-class Truth:
-    """True or False."""
-
-    wanted: str = "true or false"
-
-    def holds(self, value: object) -> bool:
-        """Whether this is it."""
-        return isinstance(value, bool)
-
-
-def _within(value: object) -> list[object]:
-    if isinstance(value, Mapping):
-        return list(value.values())
-    return list(value) if isinstance(value, list | tuple) else []
-
-
-def _or_none(optional: bool) -> str:
-    return " or nothing" if optional else ""
+def check_keys(path: Path, where: str, found: Mapping[str, Any], rules: Mapping[str, Rule]) -> None:
+    """``LogFormatError`` for the first key that is not there, or not by its rule."""
+    for key, rule in rules.items():
+        if key not in found:
+            raise LogFormatError(path, f"lacks {where}{key}, which must be {rule.wanted}")
+        if not rule.holds(found[key]):
+            raise LogFormatError(
+                path, f"{where}{key} must be {rule.wanted}, got {found[key]!r:.80}"
+            )

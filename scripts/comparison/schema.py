@@ -15,22 +15,22 @@ from scripts.comparison.arrays import Array
 from scripts.comparison.rules import (
     LEVEL,
     MAX_MESSAGE,
+    PLAIN,
     SHARE,
+    TRUTH,
     Columns,
-    Many,
-    Named,
-    Number,
-    Plain,
     Rule,
     Table,
-    Truth,
-    Word,
     level_of,
+    many,
+    named,
+    number,
+    word,
 )
-from scripts.knobs import AXES
 from scripts.metrics.row import Metric
 from scripts.metrics.table import COLUMNS as MEASURED
 from scripts.metrics.table import METRICS
+from scripts.options import AXES
 from sim.recording.recipe import MAX_SECONDS
 from sim.world.times_of_day import MOST_SESSIONS
 from slam.answers import LEAST_CELL_M, MOST_CELL_M, MOST_M
@@ -46,38 +46,38 @@ OVER_TIME = (
     "ghost_rate", "ghost_seen_rate", "recall", "map_kb", "memory_mb", "ms_per_scan", "load_s",
 )  # fmt: skip
 """Columns of sessions of which there is an early and a late one. The last two are times."""
-_NAME = Word()
-_SEED = Number(most=2.0**63, whole=True)
-_MAYBE_SHARE = Number(most=1.0, optional=True)
-_COUNT, _MAYBE_COUNT = Number(most=1e9, whole=True), Number(most=1e9, whole=True, optional=True)
-_SIGNED = Number(least=-math.inf)
-_POSITIVE, _MAYBE = Number(), Number(optional=True)
-_MAYBE_ONE = Number(most=1.0, whole=True, optional=True)
-_FAILURE = Word(most=MAX_MESSAGE, optional=True)
+_NAME = word()
+_SEED = number(most=2.0**63, whole=True)
+_MAYBE_SHARE = number(most=1.0, optional=True)
+_COUNT, _MAYBE_COUNT = number(most=1e9, whole=True), number(most=1e9, whole=True, optional=True)
+_SIGNED = number(least=-math.inf)
+_POSITIVE, _MAYBE = number(), number(optional=True)
+_MAYBE_ONE = number(most=1.0, whole=True, optional=True)
+_FAILURE = word(most=MAX_MESSAGE, optional=True)
 
 
-def _measured(metric: Metric) -> Number:
-    return Number(least=metric.least, most=metric.most, whole=metric.whole, optional=True)
+def _measured(metric: Metric) -> Rule:
+    return number(least=metric.least, most=metric.most, whole=metric.whole, optional=True)
 
 
 # "dynamism" is the level, of whatever axis: a table over motion or change calls it so on file.
 _RUNS: Columns = {
     "scene": _NAME, "dynamism": level_of("dynamism"), "seed": _SEED, "slam": _NAME,
-    "outcome": Word(among=OUTCOMES), "failure": _FAILURE, "scans": _COUNT,
+    "outcome": word(among=OUTCOMES), "failure": _FAILURE, "scans": _COUNT,
     **{key: _measured(METRICS[key]) for key in MEASURED},
-    "lost": Number(most=1.0, whole=True),
+    "lost": number(most=1.0, whole=True),
 }  # fmt: skip
 _SUMMARY: Columns = {
-    "metric": Word(among=tuple(METRICS)), "statistic": Word(among=("median", "share")),
-    "n": Number(least=1.0, most=1e9, whole=True),
+    "metric": word(among=tuple(METRICS)), "statistic": word(among=("median", "share")),
+    "n": number(least=1.0, most=1e9, whole=True),
     "value": _SIGNED, "low": _SIGNED, "high": _SIGNED,
 }  # fmt: skip
 _LEVELS: Columns = {
     "scene": _NAME, "dynamism": level_of("dynamism"), "slam": _NAME, **_SUMMARY,
-    "q25": Number(least=-math.inf, optional=True), "q75": Number(least=-math.inf, optional=True),
+    "q25": number(least=-math.inf, optional=True), "q75": number(least=-math.inf, optional=True),
 }  # fmt: skip
 _PAIRED: Columns = {
-    "scene": _NAME, "dynamism": level_of("dynamism"), "metric": Word(among=tuple(METRICS)),
+    "scene": _NAME, "dynamism": level_of("dynamism"), "metric": word(among=tuple(METRICS)),
     "slam_a": _NAME, "slam_b": _NAME, "n": _SUMMARY["n"],
     "median_difference": _SIGNED, "low": _SIGNED, "high": _SIGNED,
     "wins": _COUNT, "ties": _COUNT, "losses": _COUNT, "p_sign": SHARE,
@@ -85,8 +85,8 @@ _PAIRED: Columns = {
 _BUILDING: Columns = {"scene": _NAME, "motion": SHARE, "change": SHARE}
 _TO_FIND = ("to_find", "found", "found_soon", "wrong", "known", "known_soon")
 _AGES: Columns = {
-    **_BUILDING, "seed": _SEED, "slam": _NAME, "map": Word(among=(DAYS, ANEW)),
-    "sessions": Number(least=1.0, most=MOST_SESSIONS, whole=True), "failed": _COUNT,
+    **_BUILDING, "seed": _SEED, "slam": _NAME, "map": word(among=(DAYS, ANEW)),
+    "sessions": number(least=1.0, most=MOST_SESSIONS, whole=True), "failed": _COUNT,
     "failure": _FAILURE, **dict.fromkeys(_TO_FIND, _MAYBE_COUNT),
     "found_share": _MAYBE_SHARE, "found_soon_share": _MAYBE_SHARE,
     **dict.fromkeys(("rmse_session0_m", "rmse_session1_m", "rmse_last_m", "rmse_growth"), _MAYBE),
@@ -120,25 +120,25 @@ TABLES: Mapping[str, Table] = {
 def settings(axis: str) -> Mapping[str, Rule]:
     """The settings of a recipe, levels being of that axis."""
     return {
-        "compare_schema": Number(least=SCHEMA, most=SCHEMA, whole=True),
-        "slams": Many(of=_NAME), "scenes": Many(of=_NAME), "levels": Many(of=level_of(axis)),
-        "seeds": Many(of=_SEED), "seconds": Number(most=MAX_SECONDS),
-        "every": Number(least=1.0, most=1000.0, whole=True), "scanner": _NAME,
-        "scan_limit_s": Number(most=1e9), "lost_rule": Word(),
-        "machine": Named(fields={"processor": Word()}, others=Plain()),
+        "compare_schema": number(least=SCHEMA, most=SCHEMA, whole=True),
+        "slams": many(_NAME), "scenes": many(_NAME), "levels": many(level_of(axis)),
+        "seeds": many(_SEED), "seconds": number(most=MAX_SECONDS),
+        "every": number(least=1.0, most=1000.0, whole=True), "scanner": _NAME,
+        "scan_limit_s": number(most=1e9), "lost_rule": word(),
+        "machine": named({"processor": word()}, others=PLAIN),
     }  # fmt: skip
 
 
 LATER: Mapping[str, Rule] = {
-    "axis": Word(among=(*AXES, LEVEL)), "motion": _MAYBE_SHARE, "change": _MAYBE_SHARE,
-    "crowd": Word(optional=True), "odometry": _NAME, "sets": Plain(), "judge_maps": Truth(),
-    "sessions": Number(least=2.0, most=MOST_SESSIONS, whole=True, optional=True),
+    "axis": word(among=(*AXES, LEVEL)), "motion": _MAYBE_SHARE, "change": _MAYBE_SHARE,
+    "crowd": word(optional=True), "odometry": _NAME, "sets": PLAIN, "judge_maps": TRUTH,
+    "sessions": number(least=2.0, most=MOST_SESSIONS, whole=True, optional=True),
 }  # fmt: skip
 """Settings that recipes of before did not have."""
 RECIPE: Mapping[str, Rule] = {
-    "command": Word(among=("compare",)),
-    "settings": Named(fields={}),
-    "versions": Named(fields={}, others=Plain()),
+    "command": word(among=("compare",)),
+    "settings": named({}),
+    "versions": named({}, others=PLAIN),
 }
 """The recipe around them."""
 

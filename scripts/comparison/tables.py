@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
-from typing import Any
+from typing import Any, TypeVar
 
 from scripts.comparison.schema import FAILED
 from scripts.metrics.table import JUDGED, MEDIANS, METRICS, SHARES
 from slam.evaluation.statistics import median_interval, paired, quantile, share_interval
 
 Row = dict[str, Any]
+R = TypeVar("R", bound=Mapping[str, Any])
 
 
 def number(row: Row, metric: str) -> float | None:
@@ -26,7 +27,7 @@ def number(row: Row, metric: str) -> float | None:
 def levels(rows: Sequence[Row]) -> list[Row]:
     """Median, interval and quartiles of each metric; of losses the share."""
     out = []
-    for (scene, dynamism, slam), group in _grouped(rows, ("scene", "dynamism", "slam")).items():
+    for (scene, dynamism, slam), group in grouped(rows, ("scene", "dynamism", "slam")).items():
         for metric in (*SHARES, *MEDIANS):
             values = [v for v in (number(row, metric) for row in group) if v is not None]
             if values:
@@ -37,20 +38,28 @@ def levels(rows: Sequence[Row]) -> list[Row]:
 
 def _summary(values: list[float], is_share: bool) -> Row:
     if is_share:
-        low, high = share_interval(round(sum(values)), len(values))
-        middle: Row = {"statistic": "share", "value": sum(values) / len(values)}
-    else:
-        low, high = median_interval(values)
-        middle = {"statistic": "median", "value": quantile(values, 0.5)}
-        middle |= {"q25": quantile(values, 0.25), "q75": quantile(values, 0.75)}
-    return {"n": len(values), "low": low, "high": high, **middle}
+        return share_of(round(sum(values)), len(values))
+    return median_of(values) | {"q25": quantile(values, 0.25), "q75": quantile(values, 0.75)}
+
+
+def share_of(hits: int, n: int) -> Row:
+    """So many of ``n`` in the columns of a summary, with Wilson's 95 % interval."""
+    low, high = share_interval(hits, n)
+    return {"statistic": "share", "n": n, "value": hits / n, "low": low, "high": high}
+
+
+def median_of(values: Sequence[float]) -> Row:
+    """The median in the columns of a summary, with its 95 % bootstrap interval."""
+    low, high = median_interval(values)
+    value = quantile(values, 0.5)
+    return {"statistic": "median", "n": len(values), "value": value, "low": low, "high": high}
 
 
 def pairs(rows: Sequence[Row]) -> list[Row]:
     """Every two SLAMs on the runs where both have the number."""
     out = []
     slams = list(dict.fromkeys(row["slam"] for row in rows))
-    for (scene, dynamism), group in _grouped(rows, ("scene", "dynamism")).items():
+    for (scene, dynamism), group in grouped(rows, ("scene", "dynamism")).items():
         for metric in JUDGED:
             for slam_a, slam_b in combinations(slams, 2):
                 a, b = (by_seed(group, slam, metric) for slam in (slam_a, slam_b))
@@ -70,8 +79,9 @@ def by_seed(rows: Sequence[Row], slam: str, metric: str) -> dict[int, float]:
     return {seed: value for seed, value in pairs if value is not None}
 
 
-def _grouped(rows: Sequence[Row], keys: Sequence[str]) -> dict[tuple[Any, ...], list[Row]]:
-    groups: dict[tuple[Any, ...], list[Row]] = {}
+def grouped(rows: Iterable[R], keys: Sequence[str]) -> dict[tuple[Any, ...], list[R]]:
+    """Rows by what they have in these columns, in the order in which that comes."""
+    groups: dict[tuple[Any, ...], list[R]] = {}
     for row in rows:
         groups.setdefault(tuple(row[key] for key in keys), []).append(row)
     return groups

@@ -35,7 +35,7 @@ def keep_copy(map_file: Path, folder: Path, number: int) -> Path:
 def ages_of(copies: Sequence[int], number: int) -> Iterator[tuple[int, int]]:
     """(age, session after which the map was kept) for a session of that number, of ``AGES``.
 
-    A map that lies apart from a session is missing: the one before is older than its age says.
+    A map that is kept apart from a session is missing: the one before is older than its age says.
     """
     for age in AGES:
         before = [k for k in copies if k <= number - age]

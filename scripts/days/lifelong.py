@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import json
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -11,24 +13,29 @@ from typing import Any
 
 import numpy as np
 
+from scripts.comparison.entry import whole_result
 from scripts.comparison.maps import NEAR_M, Believed, StaticDistance
 from scripts.comparison.recording import Recording
 from scripts.comparison.sight import clearance, seen_empty
 from scripts.days import ages
-from scripts.days.sessions import Drive
+from scripts.days.sessions import Drive, loaded
 from scripts.days.truth import Still, stands_there, still_things
 from scripts.names import file_name
+from scripts.result_files import load
 from slam import se2
 from slam.days.evidence import Snapshot
 from slam.days.session import Session, keep
-from slam.errors import SlamFailedError
-from slam.frames import Float
+from slam.errors import LogFormatError, SlamFailedError
+from slam.files import write_text
+from slam.frames import NS_PER_S, Float
 from slam.guests import Limits, limited
-from slam.replay import Track
+from slam.replay import Replay, Track
 from slam.system import SlamSystem, create
 from slam.tracker.tracker import Tracker
 
 RIGHT_M, RIGHT_RAD = 0.5, 0.35  # of the true pose: the place that was found is the right one
+SCHEMA = 1  # of the file of a life
+_KEYS = {"rows": list, "ages": list, "failure": str | None}
 KNOWN_M = 0.3  # a start so near to a place that was seen is known
 COLUMNS = (
     "slam", "session", "time_of_day", "map", "start", "found_after_s", "place", "rmse_m", "worst_m",
@@ -51,6 +58,7 @@ class Building:
     before      the last session that was merged, where it was simulated
     limits      of a SLAM from outside, which then runs in a process of its own; None: here
     failures    what was said when it failed, in order
+    replays     folder for a page of each session (``scripts.live.replay``); None: no pages
     """
 
     name: str
@@ -63,9 +71,10 @@ class Building:
     before: Recording | None = None
     limits: Limits | None = None
     failures: list[str] = field(default_factory=list)
+    replays: Path | None = None
 
     def system(self) -> SlamSystem:
-        """The SLAM anew; ``SlamFailedError`` for one from outside that cannot start."""
+        """A new one of the SLAM; ``SlamFailedError`` for one from outside that cannot start."""
         return limited(self.name, self.limits)
 
 
@@ -88,11 +97,19 @@ def _has_days(system: SlamSystem) -> bool:
     return isinstance(system, Tracker)
 
 
-def rows(buildings: Sequence[Building], drives: Iterator[Drive]) -> Iterator[dict[str, Any]]:
-    """A row (``COLUMNS``) for each session and SLAM, as they are done."""
+def lived(
+    buildings: Sequence[Building], drives: Iterator[Drive]
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """A row (``COLUMNS``) for each session and SLAM, and those of the last session in older maps
+    (``ages.COLUMNS``).
+    """
+    rows, aged = [], []
     for drive in drives:
-        for building in buildings:
-            yield _anew(building, drive) if building.anew else _merged(building, drive)
+        rows += [_anew(one, drive) if one.anew else _merged(one, drive) for one in buildings]
+        last = drive
+    for building in buildings:
+        aged += [] if building.anew else list(_age_rows(building, last))
+    return rows, aged
 
 
 def _merged(building: Building, drive: Drive) -> dict[str, Any]:
@@ -139,7 +156,7 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
     return row
 
 
-def age_rows(building: Building, drive: Drive) -> Iterator[dict[str, Any]]:
+def _age_rows(building: Building, drive: Drive) -> Iterator[dict[str, Any]]:
     """Of that session in maps some sessions old (``ages.AGES``); none of them is written to."""
     kept = sorted(building.copies)
     for age, number in ages.ages_of(kept, drive.number):
@@ -186,10 +203,29 @@ def _anew(building: Building, drive: Drive) -> dict[str, Any]:
         return _head(building, drive, "anew") | {"place": "failed"}
 
 
+def _survive(building: Building, drive: Drive, track: Track) -> SlamFailedError | None:
+    """Let it see every frame, and make a page of that where one is wanted; what ended it."""
+    if building.replays is None:
+        return track.survive(drive.frames)
+    from scripts.live.replay import Recorder
+
+    truth = drive.frames[0].truth
+    seconds = (drive.frames[-1].stamp_ns - drive.frames[0].stamp_ns) / NS_PER_S
+    with Recorder.writing(
+        building.replays / f"{file_name(building.name)}-{drive.number:02}.html",
+        Replay({building.name: track}),
+        title=f"{building.name} · session {drive.number}, {drive.time_of_day}",
+        seconds=seconds,
+        T_world_map=None if truth is None or building.T_map_world is None
+        else se2.inverse(building.T_map_world),
+    ) as recorder:  # fmt: skip
+        return track.survive(recorder.noting(drive.frames))
+
+
 def _row(building: Building, drive: Drive, state: str, track: Track) -> dict[str, Any]:
     """Let it see every frame; the row so far, with ``place`` "failed" if it failed."""
     row = _head(building, drive, state)
-    failure: SlamFailedError | None = track.survive(drive.frames)
+    failure = _survive(building, drive, track)
     if failure is not None:
         building.failures.append(str(failure))
         return row | {"place": "failed", "map": "kept" if state == "kept" else state}
@@ -256,3 +292,31 @@ def _standing(recording: Recording) -> list[Still]:
         and stands_there(thing, recording.poses[-1, thing.row])
         and len(thing.points)
     ]
+
+
+def live(
+    path: Path, *, sessions: Sequence[str], slam: str, scan_limit_s: float = Limits.scan_s
+) -> None:
+    """A job: let ``slam`` live through the recordings ``sessions`` (beside ``path``'s folder), and
+    write its rows (``COLUMNS``, ``ages.COLUMNS``) to ``path`` as JSON.
+
+    Its maps are not kept. A SLAM from outside runs in a process of its own for each session; one
+    that fails, even at its start, is a row.
+    """
+    out = path.parent.parent
+    limits = Limits(scan_s=scan_limit_s, hidden=(whole_result(out),))
+    with tempfile.TemporaryDirectory() as folder:
+        (building,) = started([slam], Path(folder), limits)
+        rows, aged = lived([building], loaded([out / name for name in sessions]))
+    failure = building.failures[0] if building.failures else None
+    whole = {"schema": SCHEMA, "rows": rows, "ages": aged, "failure": failure}
+    write_text(path, json.dumps(whole, indent=1) + "\n")
+
+
+def read(path: Path) -> dict[str, Any]:
+    """What ``live`` wrote: "rows", "ages" and "failure"; ``LogFormatError`` for anything else."""
+    found = load(path, "rows of a building", SCHEMA)
+    wrong = [key for key, kind in _KEYS.items() if not isinstance(found.get(key), kind)]
+    if wrong or not found["rows"]:
+        raise LogFormatError(path, f"rows of a building without '{(wrong or ['rows'])[0]}'")
+    return found

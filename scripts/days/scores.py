@@ -16,8 +16,8 @@ from typing import Any
 from scripts.comparison import schema
 from scripts.comparison.schema import ANEW, DAYS, OVER_TIME
 from scripts.comparison.schema import OLD as AGES
+from scripts.comparison.tables import grouped, median_of, share_of
 from sim.world.times_of_day import DAY
-from slam.evaluation.statistics import median_interval, quantile, share_interval
 
 Row = Mapping[str, Any]
 SOON_S = 10.0  # within which a session is to be found
@@ -187,13 +187,10 @@ def levels(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
     Medians with their bootstrap interval; shares of all sessions with Wilson's. Both are of 95 %.
     """
-    groups: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
-        key = tuple(row[name] for name in ("scene", "motion", "change", "slam"))
-        groups.setdefault(key, []).append(row)
     out = []
-    for (scene, motion, change, slam), group in groups.items():
-        head = {"scene": scene, "motion": motion, "change": change, "slam": slam}
+    columns = ("scene", "motion", "change", "slam")
+    for key, group in grouped(rows, columns).items():
+        head = dict(zip(columns, key, strict=True))
         for score in SCORES:
             if summed := _share(score, group) if score.hits else _median(score, group):
                 out.append({**head, "metric": score.key, **summed})
@@ -204,16 +201,9 @@ def _share(score: Score, group: Sequence[Row]) -> dict[str, Any]:
     own = [row for row in group if row[score.hits] is not None]
     hits = sum(int(row[score.hits]) for row in own)
     n = sum(int(row[score.of]) for row in own) if score.of else len(own)
-    if not n:
-        return {}
-    low, high = share_interval(hits, n)
-    return {"statistic": "share", "n": n, "value": hits / n, "low": low, "high": high}
+    return share_of(hits, n) if n else {}
 
 
 def _median(score: Score, group: Sequence[Row]) -> dict[str, Any]:
     values = [float(row[score.key]) for row in group if row[score.key] is not None]
-    if not values:
-        return {}
-    low, high = median_interval(values)
-    value = quantile(values, 0.5)
-    return {"statistic": "median", "n": len(values), "value": value, "low": low, "high": high}
+    return median_of(values) if values else {}

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from scripts.checked import whole
 from scripts.comparison.recording import Recording, load, record
+from scripts.options import whole
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
 from slam.errors import LogFormatError, MissingPathError
@@ -40,7 +40,7 @@ def simulated(recipe: Recipe, sessions: int, first_seconds: float) -> Iterator[D
         wanted = replace(recipe, session=number, seconds=seconds)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "session.npz"
-            record(path, every=EVERY, **_words(wanted))
+            record(path, every=EVERY, **asdict(wanted))
             drive = load(path)
         yield _drive(number, drive.frames, drive)
 
@@ -50,10 +50,6 @@ def loaded(files: Sequence[Path]) -> Iterator[Drive]:
     for number, path in enumerate(files):
         drive = load(path)
         yield _drive(number, drive.frames, drive)
-
-
-def _words(recipe: Recipe) -> dict[str, object]:
-    return {name: getattr(recipe, name) for name in recipe.__dataclass_fields__}
 
 
 def _drive(number: int, frames: Sequence[Frame], recording: Recording | None = None) -> Drive:

@@ -9,13 +9,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich import box
 from rich.markup import escape
 from rich.table import Table
 
+from scripts.console import plain_table
 from scripts.days.ages import COLUMNS as AGE_COLUMNS
 from scripts.days.lifelong import COLUMNS
-from scripts.days.scores import first_words
+from scripts.days.scores import counts, first_words
 from sim.recording.tables import table
 from slam.files import write_text
 
@@ -47,10 +47,7 @@ def words(column: str, value: object) -> str:
 
 def printed(slam: str, rows: Sequence[Row]) -> Table:
     """One SLAM's sessions."""
-    found = Table(
-        title=escape(slam), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )  # fmt: skip
+    found = plain_table(slam)
     for heading in _PRINTED.values():
         found.add_column(heading, no_wrap=True)
     for row in rows:
@@ -70,15 +67,13 @@ def verdict(rows: Sequence[Row], failure: str | None = None) -> str:
     if all(row["map"] == "anew" for row in rows):
         return "cannot load a map: every session starts anew, in a frame of its own" + end
     later = [row for row in rows if row["map"] != "new"]
-    found = [row for row in later if row["found_after_s"] is not None]
-    soon = sum(row["found_after_s"] <= 10.0 for row in found)
-    wrong = sum(row["place"] == "wrong" for row in later)
+    of = counts(later)
     text = (
-        f"{len(found)} of {len(later)} sessions found, {soon} within 10 s, {wrong} at a wrong place"
+        f"{of['found']} of {of['to_find']} sessions found, {of['found_soon']} within 10 s, "
+        f"{of['wrong']} at a wrong place"
     )
-    unknown = sum(row["start"] == "unknown" for row in later)
-    if unknown:
-        text += f"; {unknown} began where no session before had been"
+    if of["known"] < of["to_find"]:
+        text += f"; {of['to_find'] - of['known']} began where no session before had been"
     measured = [row["rmse_m"] for row in rows if row["rmse_m"] is not None]
     if len(measured) > 1 and measured[0]:
         text += f"; error of the last session {measured[-1] / measured[0]:.2f} of the first's"
@@ -121,10 +116,14 @@ def ages_part(aged: Sequence[Row]) -> str:
         return ""
     number = aged[0]["session"]
     shown = [c for c in AGE_COLUMNS if c != "session"]
-    head = "| " + " | ".join(c.replace("_", " ") for c in shown) + " |\n"
-    rule = "|" + "---|" * len(shown) + "\n"
-    body = "".join("| " + " | ".join(words(c, row[c]) for c in shown) + " |\n" for row in aged)
-    return f"\n## Session {number} in a map some sessions old\n\n{head}{rule}{body}"
+    return f"\n## Session {number} in a map some sessions old\n\n{_markdown(shown, aged)}"
+
+
+def _markdown(columns: Sequence[str], rows: Sequence[Row]) -> str:
+    heads = [column.replace("_", " ") for column in columns]
+    cells = [[words(column, row[column]) for column in columns] for row in rows]
+    lines = ["| " + " | ".join(line) + " |\n" for line in (heads, *cells)]
+    return "".join([lines[0], "|" + "---|" * len(heads) + "\n", *lines[1:]])
 
 
 def words_exactly(value: object) -> str:
@@ -140,9 +139,6 @@ def page(
     parts = [f"# A building over {len({r['session'] for r in rows})} sessions\n\n{building}\n"]
     for slam in dict.fromkeys(row["slam"] for row in rows):
         own = [row for row in rows if row["slam"] == slam]
-        head = "| " + " | ".join(c.replace("_", " ") for c in _SHOWN) + " |\n"
-        rule = "|" + "---|" * len(_SHOWN) + "\n"
-        body = "".join("| " + " | ".join(words(c, row[c]) for c in _SHOWN) + " |\n" for row in own)
         said = verdict(own, (failures or {}).get(slam))
-        parts.append(f"\n## {slam}\n\n{said}\n\n{head}{rule}{body}")
+        parts.append(f"\n## {slam}\n\n{said}\n\n{_markdown(_SHOWN, own)}")
     return "".join(parts)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -45,12 +45,12 @@ class Trial:
 
     change: Change
     kind: str
-    rise_m: float
-    share: float
-    cured: bool
-    path_m: float
-    others_m: float
-    strip: Strip = field(repr=False)
+    rise_m: float = math.nan
+    share: float = math.nan
+    cured: bool = False
+    path_m: float = math.nan
+    others_m: float = math.nan
+    strip: Strip = field(default_factory=Strip, repr=False)
     failed: str = ""
     again: int = 0
 
@@ -189,13 +189,12 @@ def _try_all(found: Inquest, checkpoint: Checkpoint, note: Note) -> None:
         for change in _pairs(found):
             note(str(change), len(plan), len(plan))
             found.trials.append(_trial(found, checkpoint, "pair", change))
-    for noise in range(1, found.question.repeats + 1):
-        note(f"other noise {noise}", len(plan), len(plan))
-        again = _rise_again_m(found, checkpoint, Change(), noise)
-        found.recurs += again >= CURED * found.rise_m
+    limit_m = CURED * found.rise_m
+    found.recurs = sum(rise >= limit_m for rise in _again_m(found, checkpoint, Change(), note))
     singles = [t for t in found.trials if t.kind == "single" and t.cured]
     for trial in sorted(singles, key=lambda t: -t.share) or found.together[:REPEATED]:
-        _repeat(found, checkpoint, trial, note)
+        rises = _again_m(found, checkpoint, trial.change, note)
+        trial.again = sum(rise < limit_m for rise in rises)
 
 
 def _plan(found: Inquest) -> list[tuple[str, Change]]:
@@ -230,24 +229,17 @@ def _crowds(found: Inquest) -> list[str]:
 
 def _pairs(found: Inquest) -> list[Change]:
     likeliest = [suspect.name for suspect in found.suspects[:PAIRED]]
-    pairs = itertools.combinations(likeliest, 2)
-    holds = found.tape.holds
-    return [
-        change
-        for pair in pairs
-        for change in (Change(out=with_held(holds, pair)), Change(frozen=pair))
-    ]
+    changes = []
+    for pair in itertools.combinations(likeliest, 2):
+        changes += [Change(out=with_held(found.tape.holds, pair)), Change(frozen=pair)]
+    return changes
 
 
 def _trial(found: Inquest, checkpoint: Checkpoint, kind: str, change: Change) -> Trial:
     try:
         strip = checkpoint.rerun(change, found.last)
     except SlamFailedError as error:
-        none = math.nan
-        return Trial(
-            change=change, kind=kind, rise_m=none, share=none, cured=False, path_m=none,
-            others_m=none, strip=Strip(), failed=str(error),
-        )  # fmt: skip
+        return Trial(change=change, kind=kind, failed=str(error))
     rise = _rise_m(found, strip)
     path_m, others_m = _aside(found, change, strip)
     return Trial(
@@ -256,21 +248,15 @@ def _trial(found: Inquest, checkpoint: Checkpoint, kind: str, change: Change) ->
     )  # fmt: skip
 
 
-def _repeat(found: Inquest, checkpoint: Checkpoint, trial: Trial, note: Note) -> None:
-    """The same with other noise: does it cure again?"""
-    again = 0
+def _again_m(found: Inquest, checkpoint: Checkpoint, change: Change, note: Note) -> Iterator[float]:
+    """The rise with each other noise; NaN where the SLAM fails then: neither again nor cured."""
     for noise in range(1, found.question.repeats + 1):
-        note(f"{trial.change}, other noise {noise}", 1, 1)
-        again += _rise_again_m(found, checkpoint, trial.change, noise) < CURED * found.rise_m
-    trial.again = again
-
-
-def _rise_again_m(found: Inquest, checkpoint: Checkpoint, change: Change, noise: int) -> float:
-    """The same with other noise; NaN where the SLAM fails then, which is neither."""
-    try:
-        return _rise_m(found, checkpoint.rerun(change, found.last, noise=noise))
-    except SlamFailedError:
-        return math.nan
+        what = f"{change}, " if change != Change() else ""
+        note(f"{what}other noise {noise}", 1, 1)
+        try:
+            yield _rise_m(found, checkpoint.rerun(change, found.last, noise=noise))
+        except SlamFailedError:
+            yield math.nan
 
 
 def _rise_m(found: Inquest, strip: Strip) -> float:

@@ -9,12 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scripts.checked import whole
 from scripts.comparison.again import run_of, why_no_run
 from scripts.comparison.run_file import RunFile
 from scripts.names import file_name, is_run
+from scripts.options import admitted, whole
 from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
-from scripts.trust import admitted
 from sim.core.versions import check_world, world_of
 from sim.recording.recipe import Made, read_recipe
 from sim.recording.sums import check_vouched

@@ -98,8 +98,9 @@ class _Camera:
         span = range(rows[0], rows[-1] + 1)
         points = [strip.truth[row][:2] for row in span]
         points += [self._world(strip.believed[row])[:2] for row in span]
-        for name in _named(found):
-            points += [strip.poses[row][found.tape.names.index(name)][:2] for row in span]
+        for _, names in _labelled(found):
+            columns = [found.tape.names.index(name) for name in names]
+            points += [strip.poses[row][m][:2] for row in span for m in columns]
         low, high = np.min(points, axis=0), np.max(points, axis=0)
         most = SIDE_M[1] if found.moment is not None else math.inf  # the whole path of a good run
         side = min(max(float((high - low).max()) + 2.0, SIDE_M[0]), most)
@@ -218,13 +219,8 @@ def _write(
     draw.text(picture, words, at, LABEL_PX, color, bold=bold)
 
 
-def _named(found: Inquest) -> list[str]:
-    """Who the verdict names, or would have."""
-    return [name for _, names in _labelled(found) for name in names]
-
-
 def _labelled(found: Inquest) -> list[tuple[str, tuple[str, ...]]]:
-    """The same by the trials that name them, with the word for all of each."""
+    """Who the verdict names, or would have, trial by trial, with the word for all of each."""
     trials = [t for t in found.named or found.cures[:1] if t.kind != "all"]
     changes = [trial.change for trial in trials]
     return [(c.called or (c.out or c.frozen)[0], c.out or c.frozen) for c in changes]
@@ -239,7 +235,7 @@ def _title(found: Inquest, width: int) -> Picture:
     x = 14
     legend: list[tuple[str, draw.Color]] = [("truth", draw.GREEN), ("believed", draw.BLUE)]
     legend += [("scan, where it is believed to be", draw.RED)]
-    if _named(found):
+    if _labelled(found):
         legend += [("who is named (dashes: where it was when it is out)", CULPRIT)]
     for name, color in legend:
         cv2.line(picture, (x, 76), (x + 22, 76), color, 4, cv2.LINE_AA)
@@ -288,25 +284,19 @@ def _chart(found: Inquest, width: int) -> Picture:
 def _curve(ax: mpl.axes.Axes, found: Inquest, trial: Trial, times: Float, named: bool) -> None:
     rows = slice(found.first, found.first + len(trial.strip.frames))
     errors = trial.strip.errors_m(found.then)
+    label = str(trial.change)
+    style: dict[str, Any] = {"lw": 1.3, "ls": "-" if trial.change.out else "--"}
     if trial.kind == "all":
-        style: dict[str, Any] = {
-            "color": "#1f61be",
-            "ls": "--" if trial.change.out else "-.",
-            "lw": 1.3,
-        }
-        label = "all movers out" if trial.change.out else "all movers frozen"
-    elif trial.kind == "group" and not named:
-        style = {"color": "#b06a00", "lw": 1.3, "ls": "-" if trial.change.out else "--"}
-        label = str(trial.change)
+        style |= {"color": "#1f61be", "ls": "--" if trial.change.out else "-."}
+        label = who(trial)
     elif named:
         before = sum(line.get_gid() == "named" for line in ax.lines)
         color = draw.paler(CULPRIT, 0.3 * min(before, 2))  # one is told from the next
-        style = {"color": tuple(c / 255.0 for c in color), "lw": 2.2, "gid": "named"}
-        label = str(trial.change)
-        style["ls"] = "-" if trial.change.out else "--"
+        style |= {"color": tuple(c / 255.0 for c in color), "lw": 2.2, "gid": "named"}
+    elif trial.kind == "group":
+        style["color"] = "#b06a00"
     else:
         style = {"color": "#a8adb8", "lw": 0.9}
-        label = "others, one at a time"
-        if label in ax.get_legend_handles_labels()[1]:
-            label = "_"
+        others = "others, one at a time"
+        label = "_" if others in ax.get_legend_handles_labels()[1] else others
     ax.plot(times[rows], errors, label=label, **style)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from scripts.checked import whole
+from scripts.options import whole
 from slam.errors import InvalidValueError
 from slam.evaluation.divergence import Rule
 

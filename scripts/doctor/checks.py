@@ -28,8 +28,6 @@ LEAST_FREE_GB = 1.0  # in the working folder: a dataset of an hour, or the films
 EXTRAS = {  # what each is for; how to get them follows from their names
     "guests": "SLAMs of others to compare with",
     "yag": "YAG SLAM",
-    "live": "mobilia live",
-    "rerun": "render --rerun",
     "rl": "scripts.experiments.train_policy",
     "cluster": "--cluster",
 }
@@ -50,6 +48,15 @@ class Finding:
     state: State
     found: str
     how: str = ""
+
+
+def _usable(
+    what: str, there: object, found: str, how: str, lacking: State = "can do without"
+) -> Finding:
+    """``how`` to get it counts only where it is not ``there``."""
+    return Finding(
+        what=what, state="ok" if there else lacking, found=found, how="" if there else how
+    )
 
 
 def findings() -> list[Finding]:
@@ -74,13 +81,9 @@ def _installation() -> Iterator[Finding]:
     hidden = mobilia.hidden()
     if hidden:
         yield Finding(what="its packages", state="missing", found=hidden)
-    least = ".".join(map(str, LEAST_PYTHON))
-    old = sys.version_info < LEAST_PYTHON
-    yield Finding(
-        what="Python", state="missing" if old else "ok",
-        found=f"{platform.python_version()}, {sys.executable}",
-        how=f"Python {least} or newer" if old else "",
-    )  # fmt: skip
+    new = sys.version_info >= LEAST_PYTHON
+    how = f"Python {'.'.join(map(str, LEAST_PYTHON))} or newer"
+    yield _usable("Python", new, f"{platform.python_version()}, {sys.executable}", how, "missing")
 
 
 def required(extra: str | None = None) -> list[Requirement]:
@@ -122,25 +125,20 @@ def wrong_with(one: Requirement) -> str:
 
 
 def _packages() -> Iterator[Finding]:
-    needed = required()
-    for one in needed:
+    for one in required():
         wrong = wrong_with(one)
         found = wrong or metadata.version(one.name)
-        how = f"pip install '{one.name}{one.specifier}'" if wrong else ""
-        state: State = "missing" if wrong else "ok"
-        yield Finding(what=one.name, state=state, found=found, how=how)
+        how = f"pip install '{one.name}{one.specifier}'"
+        yield _usable(one.name, not wrong, found, how, "missing")
 
 
 def _drawing() -> Iterator[Finding]:
     from sim.view import gl
 
     found = gl.find()
-    yield Finding(
-        what="3D pictures (OpenGL)",
-        state="ok" if found.backend else "can do without",
-        found=found.backend or f"films have no 3D panel: {found.reason}",
-        how="" if found.backend else "apt-get install libegl1 libgl1-mesa-dri (Debian, Ubuntu)",
-    )
+    told = found.backend or f"films have no 3D panel: {found.reason}"
+    how = "apt-get install libegl1 libgl1-mesa-dri (Debian, Ubuntu)"
+    yield _usable("3D pictures (OpenGL)", found.backend, told, how)
     from scripts.film.encode import require_ffmpeg
 
     try:
@@ -159,25 +157,16 @@ def _machine() -> Iterator[Finding]:
     yield Finding(what="cores", state="ok", found=f"{cores()} for this process: --jobs {cores()}")
     folder = cache_folder()
     writable = folder is not None and os.access(_there(folder), os.W_OK)
-    yield Finding(
-        what="cache of compiled loops",
-        state="ok" if writable else "can do without",
-        found=str(folder) if writable else "cannot be written: each start compiles for a minute",
-        how="" if writable else "set NUMBA_CACHE_DIR to a folder that you may write",
-    )
+    told = str(folder) if writable else "cannot be written: each start compiles for a minute"
+    how = "set NUMBA_CACHE_DIR to a folder that you may write"
+    yield _usable("cache of compiled loops", writable, told, how)
     landlock = kernel_version()
-    yield Finding(
-        what="guests see no truth (Landlock)", state="ok" if landlock else "can do without",
-        found=_kept_off(landlock),
-        how="" if landlock else "Linux 5.13 or newer, with landlock in /sys/kernel/security/lsm",
-    )  # fmt: skip
+    how = "Linux 5.13 or newer, with landlock in /sys/kernel/security/lsm"
+    yield _usable("guests see no truth (Landlock)", landlock, _kept_off(landlock), how)
     free_gb = shutil.disk_usage(Path.cwd()).free / 1e9
+    how = "outputs go to --out: name a folder on another disk"
     enough = free_gb >= LEAST_FREE_GB
-    yield Finding(
-        what="disk, working folder", state="ok" if enough else "can do without",
-        found=f"{free_gb:.1f} GB free",
-        how="" if enough else "outputs go to --out: name a folder on another disk",
-    )  # fmt: skip
+    yield _usable("disk, working folder", enough, f"{free_gb:.1f} GB free", how)
 
 
 def _kept_off(landlock: int) -> str:
@@ -221,12 +210,7 @@ def _extras() -> Iterator[Finding]:
             found, how = f"{used_for}: {', '.join(lacking)}", f"pip install 'mobilia[{extra}]'"
         else:
             found, how = ", ".join(f"{o.name} {metadata.version(o.name)}" for o in wanted), ""
-        state: State = "can do without" if how else "ok"
-        yield Finding(what=f"[{extra}]", state=state, found=found, how=how)
+        yield _usable(f"[{extra}]", not how, found, how)
     for program, used_for in PROGRAMS.items():
         path = shutil.which(program)
-        yield Finding(
-            what=program, state="ok" if path else "can do without",
-            found=path or used_for,
-            how="" if path else "apt-get install mrpt-apps (Debian, Ubuntu)",
-        )  # fmt: skip
+        yield _usable(program, path, path or used_for, "apt-get install mrpt-apps (Debian, Ubuntu)")

@@ -13,16 +13,17 @@ beams still end there, as the edge of a shadow, which moves with the robot, is n
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
 
 import mujoco
 import numpy as np
 
+from scripts.experiments.shared import Column, Row
+from scripts.experiments.study import Study
 from sim.driving.pilot import Pilot
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation, n_frames
@@ -48,19 +49,6 @@ class Tally:
 
     seen: int = 0
     errors: list[float] = field(default_factory=list)
-
-    @property
-    def recall(self) -> float:
-        """Share found."""
-        return len(self.errors) / self.seen if self.seen else math.nan
-
-    def row(self, kind: str) -> str:
-        """One line."""
-        e = 1e3 * np.array(self.errors or [math.nan])
-        return (
-            f"{kind:16s} {self.seen:6d} chances  share {self.recall:.2f}  "
-            f"error median {np.median(e):5.1f} mm, 90 % {np.percentile(e, 90):5.1f} mm"
-        )
 
     def count(self, point: Float, found: Float) -> None:
         """One chance to have ``point`` among ``found`` (n, 2)."""
@@ -125,14 +113,15 @@ def visible(points_robot: Float, scan: Scan, around_m: float = 0.0) -> Float:
     return kept
 
 
-def recall(scene: str, *, seed: int, seconds: float, laser: Lms221Config) -> dict[str, Tally]:
-    """One tour of a scene."""
-    simulation = Simulation(scene, seed=seed, dynamism=0.0, laser=laser)
+def run(case: Row) -> Row:
+    """One tour of a scene: chances to find a thing of each kind, and errors, m, of those found."""
+    laser = Lms221Config(resolution_deg=case["degrees"])
+    simulation = Simulation(case["scene"], seed=case["seed"], dynamism=0.0, laser=laser)
     pilot, out = Pilot(simulation.world, None), {kind: Tally() for kind in (*KINDS, KNOWN, AGAIN)}
     world = truths(simulation)
     known = np.concatenate(list(world.values()))
     earlier: deque[Float] = deque(maxlen=LATER)
-    for k in range(n_frames(seconds, simulation.scan_period_s)):
+    for k in range(n_frames(case["seconds"], simulation.scan_period_s)):
         simulation.world.set_command(*pilot.command(simulation.scan_period_s))
         frame = simulation.observe()
         if k % EVERY or frame.scan is None or frame.truth is None:
@@ -149,31 +138,32 @@ def recall(scene: str, *, seed: int, seconds: float, laser: Lms221Config) -> dic
             for point in visible(se2.transform(T_robot_world, earlier[0]), frame.scan):
                 out[AGAIN].count(point, found)
         earlier.append(se2.transform(frame.truth, found))
-    return out
+    return {kind: asdict(tally) for kind, tally in out.items()}
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", nargs="+", default=["arena", "office"])
-    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
-    parser.add_argument("--seconds", type=float, default=30.0)
-    wanted = parser.parse_args(arguments)
-    lasers = {"0.5 degrees": Lms221Config(), "1 degree": Lms221Config(resolution_deg=1.0)}
-    for scene in wanted.scenes:
-        for name, laser in lasers.items():
-            print(f"{scene}, LMS-221 at {name}, within {REACH_M:g} m")
-            whole = {kind: Tally() for kind in (*KINDS, KNOWN, AGAIN)}
-            for seed in wanted.seeds:
-                one = recall(scene, seed=seed, seconds=wanted.seconds, laser=laser)
-                for kind, tally in one.items():
-                    whole[kind].seen += tally.seen
-                    whole[kind].errors += tally.errors
-            for kind, tally in whole.items():
-                if tally.seen:
-                    print("  " + tally.row(kind))
-    return 0
+def found(kind: str) -> Column:
+    """A column: chances, the share that was found, and how far off it was."""
+
+    def tell(rows: Sequence[Row]) -> str:
+        seen = sum(row[kind]["seen"] for row in rows)
+        e = 1e3 * np.array([error for row in rows for error in row[kind]["errors"]])
+        if not len(e):
+            return f"0 of {seen}"
+        middle, high = np.percentile(e, [50.0, 90.0])
+        return f"{len(e) / seen:.2f} of {seen}, {middle:.1f} mm ({high:.1f})"
+
+    return tell
+
+
+STUDY = Study(
+    name="corner_recall",
+    axes={"scene": ("arena", "office"), "degrees": (0.5, 1.0)},
+    run=run, lines=("scene", "degrees"),
+    columns={kind: found(kind) for kind in (*KINDS, KNOWN, AGAIN)},
+    told=f"Within {REACH_M:g} m; median and 90 % of the errors of those found.",
+    defaults={"seeds": 3, "first_seed": 0, "seconds": 30.0},
+)  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(STUDY.main())

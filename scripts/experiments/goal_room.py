@@ -15,6 +15,7 @@ from sim.gym.env import OMEGA_MAX_RADPS, V_MAX_MPS
 from sim.gym.memory import LidarMemory
 from sim.gym.wrappers import DynamismCurriculum
 
+SCENE = "arena"
 TOUCH_M, FADE_M = 0.3, 0.8  # m: nearness is 1 within the one, and 1/e the other beyond it
 GOAL_M = 8.0  # m, from here on a goal looks equally far
 SHARE = 0.5  # of the greatest command: what an action of 1 adds to the rule's
@@ -25,10 +26,7 @@ STAND_RAD = 0.9  # beyond this angle it turns on the spot
 BRAKE_M = 0.7  # m of free way from which on it slows down
 NEAR_M, NEAREST_M = 0.7, 0.5  # m from the robot's centre: where being near costs, and costs most
 NEAR_COST_PER_S = 0.4
-RADII_M = (
-    0.56,
-    0.33,
-)  # m: of a robot beside a chair's column, which is all of it that is seen, or a wall
+RADII_M = (0.56, 0.33)  # of a robot beside a chair's column, which is all that is seen, or a wall
 
 Step = tuple[Any, Any, bool, bool, dict[str, Any]]
 
@@ -131,11 +129,10 @@ def rule(ranges: Any, away_m: float, bearing: float) -> tuple[float, float]:
     return math.cos(heading) ** 2 * min(1.0, left / BRAKE_M), turn
 
 
-def bare_room(scene: str, pose_source: str, level: float, seconds: float = 30.0) -> Any:
+def bare_room(pose_source: str, level: float, seconds: float = 30.0) -> Any:
     """One room; its dynamism is drawn from 0 to ``level``."""
-    name = scene.title().replace("-", "")
     env = gymnasium.make(
-        f"mobilia/{name}Goal-v2",
+        f"mobilia/{SCENE.title()}Goal-v2",
         disable_env_checker=True,
         pose_source=pose_source,
         time_limit_s=seconds,
@@ -144,6 +141,6 @@ def bare_room(scene: str, pose_source: str, level: float, seconds: float = 30.0)
     return DynamismCurriculum(env, level)
 
 
-def room(scene: str, pose_source: str, level: float, seconds: float = 30.0) -> Any:
+def room(pose_source: str, level: float, seconds: float = 30.0) -> Any:
     """The same as the network sees it."""
-    return Senses(Residual(LidarMemory(bare_room(scene, pose_source, level, seconds))))
+    return Senses(Residual(LidarMemory(bare_room(pose_source, level, seconds))))

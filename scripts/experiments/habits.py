@@ -14,17 +14,20 @@ to choose anything.
 
 from __future__ import annotations
 
-import argparse
 import math
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes import build
-from scripts.experiments.measured import ended
+from scripts.experiments.measured import table
+from scripts.experiments.shared import Row
+from scripts.experiments.study import Study
 from sim.core.seeds import Seeds
 from sim.world.sessions import Days
 from sim.world.times_of_day import clock_s
@@ -128,19 +131,15 @@ def scores(
             yield from ((int(g), span, float(b), float(s)) for b, s, g, e in each if e)
 
 
-def table(scene: str, seeds: Sequence[int], change: float, crowd: str) -> dict[str, Float]:
-    """By predictor: (buildings, groups, spans + 1, 2) mean Brier and log scores, last span: all."""
-    found: dict[str, list[Float]] = {name: [] for name in PREDICTORS}
-    for seed in seeds:
-        known = truth(scene, seed, change, crowd)
-        seen = sightings(known, seed)
-        for name, make in PREDICTORS.items():
-            sums = np.zeros((len(GROUPS), len(SPANS_H) + 1, 3))
-            for group, span, b, s in scores(known, seen, make):
-                sums[group, [span, -1]] += (b, s, 1.0)
-            with np.errstate(invalid="ignore"):
-                found[name].append(sums[..., :2] / sums[..., 2:])
-    return {name: np.array(rows) for name, rows in found.items()}
+def run(case: Row) -> Row:
+    """Of one building: (groups, spans + 1, 2) mean Brier and log scores, last span: all."""
+    known = truth(case["scene"], case["seed"], case["change"], case["crowd"])
+    seen = sightings(known, case["seed"])
+    sums = np.zeros((len(GROUPS), len(SPANS_H) + 1, 3))
+    for group, span, b, s in scores(known, seen, PREDICTORS[case["predictor"]]):
+        sums[group, [span, -1]] += (b, s, 1.0)
+    with np.errstate(invalid="ignore"):
+        return {"scores": (sums[..., :2] / sums[..., 2:]).tolist()}
 
 
 def interval(values: Float) -> tuple[float, float, float]:
@@ -152,59 +151,42 @@ def interval(values: Float) -> tuple[float, float, float]:
     return float(values.mean()), low, high
 
 
-def lines(found: Mapping[str, Float]) -> Iterator[str]:
-    """The table, a row for each group, span and predictor."""
+def tell(rows: Sequence[Row]) -> str:
+    """A line for each group, span and predictor; ``not ahead`` where the gap to ours holds 0."""
+    found = {
+        name: np.array([row["scores"] for row in rows if row["predictor"] == name])
+        for name in dict.fromkeys(row["predictor"] for row in rows)
+    }
     spans = [f"{low:g} to {high:g} h" for low, high in SPANS_H] + ["all"]
-    yield "| places | ahead | predictor | Brier | 95 % | log score | habits less its | 95 % |"
-    yield "|---|---|---|---|---|---|---|---|"
-    for group, place in enumerate(GROUPS):
-        for span, ahead in enumerate(spans):
-            for name, rows in found.items():
-                b, low, high = interval(rows[:, group, span, 0])
-                if math.isnan(b):
-                    continue
-                s, _, _ = interval(rows[:, group, span, 1])
-                d, d_low, d_high = interval(
-                    found["habits"][:, group, span, 0] - rows[:, group, span, 0]
-                )
-                gap = "" if name == "habits" else f"{d:+.4f} | {d_low:+.4f} to {d_high:+.4f}"
-                yield (
-                    f"| {place} | {ahead} | {name} | {b:.4f} | {low:.4f} to {high:.4f} | {s:.3f} "
-                    f"| {gap or ' | '} |"
-                )
+    lines = []
+    for group, span, name in product(range(len(GROUPS)), range(len(spans)), found):
+        own = found[name][:, group, span]
+        b, low, high = interval(own[:, 0])
+        if math.isnan(b):
+            continue
+        gap, gap_low, gap_high = interval(found["habits"][:, group, span, 0] - own[:, 0])
+        beside = ["", "", ""]
+        if name != "habits":
+            beside = [f"{gap:+.4f}", f"{gap_low:+.4f} to {gap_high:+.4f}"]
+            beside.append("yes" if gap_high < 0.0 else "**not ahead**")
+        log = f"{interval(own[:, 1])[0]:.3f}"
+        brier_of = [f"{b:.4f}", f"{low:.4f} to {high:.4f}"]
+        lines.append([GROUPS[group], spans[span], name, *brier_of, log, *beside])
+    return table(
+        ("places", "ahead", "predictor", "Brier", "95 %", "log score", "habits less its", "95 %",
+         "better"), lines,
+    )  # fmt: skip
 
 
-def behind(found: Mapping[str, Float]) -> Iterator[str]:
-    """Where ours is not ahead: its Brier score is larger, or the interval of the gap holds 0."""
-    spans = [f"{low:g} to {high:g} h" for low, high in SPANS_H] + ["all"]
-    for group, place in enumerate(GROUPS):
-        for span, ahead in enumerate(spans):
-            for name, rows in found.items():
-                if name == "habits":
-                    continue
-                d, low, high = interval(
-                    found["habits"][:, group, span, 0] - rows[:, group, span, 0]
-                )
-                if not math.isnan(d) and high >= 0.0:
-                    gap = f"{d:+.4f} ({low:+.4f} to {high:+.4f})"
-                    yield f"not ahead of {name}: {place}, {ahead}: {gap}"
-
-
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--scene", default="random-rooms")
-    parser.add_argument("--seeds", type=int, default=12, help="buildings")
-    parser.add_argument("--first-seed", type=int, default=100)
-    parser.add_argument("--change", type=float, default=0.3)
-    parser.add_argument("--crowd", default="boards:3", help="of the scene; boards stand in it")
-    given = parser.parse_args()
-    seeds = range(given.first_seed, given.first_seed + given.seeds)
-    found = table(given.scene, seeds, given.change, given.crowd)
-    print(f"{given.scene}, change {given.change:g}, {given.seeds} buildings, seeds from {seeds[0]}")
-    for line in (*lines(found), *behind(found)):
-        print(line)
+STUDY = Study(
+    name="habits",
+    axes={"scene": ("random-rooms",), "change": (0.3,), "crowd": ("boards:3",),
+          "predictor": tuple(PREDICTORS)},
+    run=run, tell=tell,
+    told="{scene[0]}, change {change[0]:g}, {seeds} buildings from {first_seed}.",
+    defaults={"seeds": 12, "first_seed": 100},
+)  # fmt: skip
 
 
 if __name__ == "__main__":
-    raise SystemExit(ended(main))
+    sys.exit(STUDY.main())

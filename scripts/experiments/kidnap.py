@@ -15,25 +15,23 @@ place where it was then estimated to be counts as the right one.
 
 from __future__ import annotations
 
-import argparse
 import copy
-import json
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scripts.experiments.measured import ended
+from scripts.experiments.shared import Row
+from scripts.experiments.study import Study
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.simulation import stream
 from slam import SlamSystem, create, se2
-from slam.files import write_text
 from slam.frames import Float, Frame, Odometry, Scan
 from slam.frontend.odometry_sum import thinned
 from slam.logs import open_log
@@ -184,60 +182,50 @@ def kidnaps(
         yield follow(slam, frames, T_world_map, moved_m, seed)
 
 
-def all_kidnaps(wanted: argparse.Namespace) -> Iterator[Outcome]:
-    """Of a log, or of one scene for each seed."""
-    if wanted.log is not None:
-        slam = create(wanted.slam)
-        mapped = of_log(slam, wanted.log)
-        yield from kidnaps(slam, mapped, mapped, wanted.each, 0)
-        return
-    for seed in wanted.seeds:
-        of = (seed, wanted.seconds, wanted.dynamism)
-        how: dict[str, Any] = {"scene": wanted.scene, "every": wanted.every}
-        mapped, later = (recording(*of, again=again, **how) for again in (False, True))
-        slam = create(wanted.slam)
+def run(case: Row) -> Row:
+    """Of a log, or of one scene."""
+    slam = create(case["slam"])
+    if case["log"]:
+        later = mapped = of_log(slam, Path(case["log"]))
+    else:
+        mapped, later = (
+            recording(
+                case["seed"], case["seconds"], case["level"], again=again, scene=case["scene"],
+                every=case["every"],
+            )
+            for again in (False, True)
+        )  # fmt: skip
         for frame in mapped:
             slam.update(frame.without_truth())
-        yield from kidnaps(slam, mapped, later, wanted.each, seed)
+    found = kidnaps(slam, mapped, later, case["each"], case["seed"])
+    return {"kidnaps": [asdict(one) for one in found]}
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Print one line for each kidnap, then the summary."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--slam", default="shunting")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[100, 101, 102, 103, 104])
-    parser.add_argument("--each", type=int, default=6, help="kidnaps for each seed")
-    parser.add_argument("--seconds", type=float, default=90.0, help="of mapping, simulated")
-    parser.add_argument("--dynamism", type=float, default=0.5)
-    parser.add_argument("--scene", default="office")
-    parser.add_argument("--every", type=int, default=1, help="scans, of which one is seen")
-    parser.add_argument("--log", type=Path, help="a log to map in the place of a scene")
-    parser.add_argument("--json", type=Path, help="also write the outcomes here")
-    wanted = parser.parse_args(arguments)
-    outcomes: list[Outcome] = []
-    for one in all_kidnaps(wanted):
-        outcomes.append(one)
-        print(replace(one, spent_ms=()), flush=True)
-    soon = sum(o.detected is not None and o.detected <= DETECTED_WITHIN for o in outcomes)
-    times = sorted(o.recovered_s for o in outcomes if o.recovered_s is not None)
-    print(
-        f"{len(outcomes)} kidnaps: {soon} detected within {DETECTED_WITHIN} scans, "
-        f"{sum(o.right for o in outcomes)} at the right place after {AFTER_S:g} s, "
-        f"{sum(o.wrong for o in outcomes)} accepted at a wrong one; "
-        f"time to recover: median {np.median(times) if times else math.nan:.2f} s, "
-        f"worst {times[-1] if times else math.nan:.2f} s"
+def tell(rows: Sequence[Row]) -> str:
+    """A summary of all kidnaps."""
+    all_of = [one for row in rows for one in row["kidnaps"]]
+    soon = sum(o["detected"] is not None and o["detected"] <= DETECTED_WITHIN for o in all_of)
+    times = sorted(o["recovered_s"] for o in all_of if o["recovered_s"] is not None) or [math.nan]
+    spent = [ms for one in all_of for ms in one["spent_ms"]] or [math.nan]
+    p50, p99, p999 = np.percentile(spent, [50.0, 99.0, 99.9]).tolist()
+    return (
+        f"{len(all_of)} kidnaps: {soon} detected within {DETECTED_WITHIN} scans, "
+        f"{sum(o['right'] for o in all_of)} at the right place after {AFTER_S:g} s, "
+        f"{sum(o['wrong'] for o in all_of)} accepted at a wrong one; "
+        f"time to recover: median {np.median(times):.2f} s, worst {times[-1]:.2f} s\n"
+        f"{len(spent)} scans while lost, processor time: p50 {p50:.1f}, p99 {p99:.1f}, "
+        f"p99.9 {p999:.1f}, longest {max(spent):.1f} ms"
     )
-    spent = [ms for one in outcomes for ms in one.spent_ms]
-    if spent:
-        p50, p99, p999 = np.percentile(spent, [50.0, 99.0, 99.9]).tolist()
-        print(
-            f"{len(spent)} scans while lost, processor time: p50 {p50:.1f}, p99 {p99:.1f}, "
-            f"p99.9 {p999:.1f}, longest {max(spent):.1f} ms"
-        )
-    if wanted.json is not None:
-        write_text(wanted.json, json.dumps([asdict(o) for o in outcomes], indent=2) + "\n")
-    return 0
+
+
+STUDY = Study(
+    name="kidnap",
+    axes={"scene": ("office",), "level": (0.5,), "every": (1,), "each": (6,), "log": ("",),
+          "slam": ("shunting",)},
+    run=run, data=lambda case: [Path(case["log"])] if case["log"] else [], tell=tell,
+    defaults={"seeds": 5, "first_seed": 100, "seconds": 90.0},
+)  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(ended(main))
+    sys.exit(STUDY.main())

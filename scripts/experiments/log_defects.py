@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Does a SLAM come through logs as they are found? ``python -m scripts.experiments.log_defects``.
+"""Does a SLAM come through logs as they are found?
 
-Takes sound CARMEN logs, puts in one defect each that public logs have, reads them back and runs
-``--slam`` on them. Prints the error against the log's corrected poses beside that on the sound log,
-and what the reader warned of. A third of the way in, where the clock steps back, both sides are
-of one log: poses are compared scan by scan, in the order of the file.
-
-Exit status 1 where an error is more than a tenth off, or the reader did not say one line.
+``python -m scripts.experiments.log_defects --log LOG [LOG ...]``. Takes sound CARMEN logs, puts in
+one defect each that public logs have, reads them back and runs ``--slam`` on them. Told is the
+error against the log's corrected poses beside that on the sound log, and what the reader warned of.
+A third of the way in, where the clock steps back, both sides are of one log: poses are compared
+scan by scan, in the order of the file. All is well where the errors are alike and the reader said
+one line.
 """
 
 from __future__ import annotations
 
-import argparse
 import logging
 import sys
 import tempfile
@@ -21,7 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from scripts.console import console
+from scripts.experiments.shared import Row
+from scripts.experiments.study import Study
 from slam.evaluation import metrics
 from slam.frames import Float, Frame
 from slam.logs import open_log
@@ -105,40 +105,39 @@ def error_m(frames: Sequence[Frame], slam: str) -> float:
     return metrics.ate(*(Trajectory(stamps_ns=stamps, poses=p) for p in pairs), align="se2").value
 
 
-def table(log: Path, slam: str, most: int | None) -> bool:
-    """Print the rows of one log; whether all is well."""
-    lines = [line + "\n" for _, line in numbered_lines(log)]
+def run(case: Row) -> Row:
+    """The errors, m, of the sound and of the damaged log, and what was warned of."""
+    log, most = Path(case["log"]), case["scans"] or None
     frames, _ = read(log, most)
-    sound = error_m(frames, slam)
-    console.print(f"{log.name}: {len(frames)} scans, error {sound:.4f} m", soft_wrap=True)
-    well = True
+    lines = [line + "\n" for _, line in numbered_lines(log)]
     with tempfile.TemporaryDirectory() as folder:
-        for name, defect in DEFECTS.items():
-            path = Path(folder) / "damaged.log"
-            path.write_text("".join(defect(lines)))
-            damaged, warnings = read(path, most)
-            error = error_m(damaged, slam)
-            good = len(warnings) == 1 and abs(error - sound) <= max(WITHIN * sound, FLOOR_M)
-            well = well and good
-            console.print(
-                f"  {name:26} {len(damaged)} scans, error {error:.4f} m ({error / sound - 1:+.1%}) "
-                f"{'' if good else 'NOT WELL'}", soft_wrap=True, highlight=False
-            )  # fmt: skip
-            for words in warnings:
-                console.print(f"    {words.partition(' repaired: ')[2]}", soft_wrap=True)
-    return well
+        path = Path(folder) / "damaged.log"
+        path.write_text("".join(DEFECTS[case["defect"]](lines)))
+        damaged, warnings = read(path, most)
+    sound_m, found_m = (error_m(one, case["slam"]) for one in (frames, damaged))
+    alike = abs(found_m - sound_m) <= max(WITHIN * sound_m, FLOOR_M)
+    return {
+        "read": len(damaged), "sound_m": sound_m, "found_m": found_m,
+        "well": alike and len(warnings) == 1,
+        "warned": [words.partition(" repaired: ")[2] for words in warnings],
+    }  # fmt: skip
 
 
-def main(words: Sequence[str] | None = None) -> int:
-    """The exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("logs", nargs="+", type=Path, help="CARMEN logs with corrected poses")
-    parser.add_argument("--slam", default="shunting")
-    parser.add_argument("--scans", type=int, help="only so many of each")
-    options = parser.parse_args(words)
-    well = [table(log, options.slam, options.scans) for log in options.logs]
-    return 0 if all(well) else 1
+STUDY = Study(
+    name="log_defects",
+    axes={"log": ("intel-corrected.log.xz",), "defect": tuple(DEFECTS), "scans": (0,),
+          "slam": ("shunting",)},
+    run=run, data=lambda case: [Path(case["log"])], lines=("log", "defect", "slam"),
+    columns={
+        "scans": lambda rows: str(rows[0]["read"]),
+        "error, m": lambda rows: f"{rows[0]['found_m']:.4f}",
+        "to the sound log": lambda rows: f"{rows[0]['found_m'] / rows[0]['sound_m'] - 1:+.1%}",
+        "all well": lambda rows: "yes" if rows[0]["well"] else "**no**",
+        "the reader says": lambda rows: "; ".join(rows[0]["warned"]),
+    },
+    told="World {world}.", defaults={"seeds": 1, "first_seed": 0},
+)  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(STUDY.main())

@@ -13,10 +13,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from scripts.card.real import table
-from scripts.card.real.beside import between_that_mix, real_card
-from scripts.card.real.picture import draw
-from scripts.card.real.simulated import simulated
+from scripts.card import beside
+from scripts.card.real import real_card, simulated
 from scripts.marks import fill_page
 from sim.sensors.lidar.registry import scanner_of
 from slam.errors import MobiliaError
@@ -49,7 +47,7 @@ def our_cards(scanners: Mapping[str, str]) -> tuple[Cards, list[str]]:
     for name, scanner in scanners.items():
         made = simulated(scanner_of(scanner))
         cards[name] = measure(made.stream)
-        mix, beams = between_that_mix(made)
+        mix, beams = made.between_that_mix()
         share = f"{100.0 * mix / beams:.0f} %" if beams else "none"
         said.append(
             f"- `{scanner}`: of {beams} ranges between two sides, {share} are mixed pixels by the "
@@ -72,10 +70,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ours_one, said = our_cards(OURS_1_DEG)
         ours_half, said_half = our_cards(OURS_HALF_DEG)
         page = wanted.root / PAGE
-        fill_page(page, "one-degree", table.markdown(one, ours_one))
-        fill_page(page, "half-degree", table.markdown(half, ours_half))
+        fill_page(page, "one-degree", "\n".join(beside.markdown(one, ours_one)))
+        fill_page(page, "half-degree", "\n".join(beside.markdown(half, ours_half)))
         fill_page(page, "between", "\n".join([*said, *said_half]))
-        draw(wanted.root / PICTURE, {**one, **half}, {**ours_one, **ours_half})
+        beside.draw(wanted.root / PICTURE, {**one, **half}, {**ours_one, **ours_half})
     except MobiliaError as error:
         print(f"real_scanner: {error}", file=sys.stderr)
         return 2

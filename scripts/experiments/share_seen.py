@@ -13,12 +13,10 @@ by default (one beam a degree, 5 scans a second), so that it is quick.
 
 from __future__ import annotations
 
-import argparse
+import math
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -26,38 +24,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 import scenes
-from scripts import workers
-from scripts.experiments.measured import add_options, head, seeds_of, table
-from scripts.knobs import AXES, Axis
-from scripts.marks import fill_page
-from scripts.result_files import write
-from sim.core.versions import WORLD
+from scripts.experiments.shared import PERCENT, Column, Row, of
+from scripts.experiments.study import Study
+from scripts.options import Axis
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation, n_frames
 from sim.world.world import World
-from slam.errors import MobiliaError
 from slam.frames import NS_PER_S, BeamClass, Float, Frame
 
-PAGE, MARK = Path("docs/dynamism.md"), "share_seen"
 SCANNER = "scanner(fov_deg=180,beams=181,rate_hz=5,sigma_m=0.01)"
 MOVED_M = 0.1  # farther from where it was seen last, a thing stands elsewhere
 LEAST_BEAMS = 2  # that meet a thing, for it to be in view
 WARM_SCANS = 5  # before the processor's time counts: code is being loaded
-PERCENT = 100.0
-Row = dict[str, Any]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Case:
-    """One run; ``away_s`` out of view make a sighting one that counts for change."""
-
-    scene: str
-    level: float
-    seed: int
-    axis: str
-    seconds: float
-    scanner: str
-    away_s: float
 
 
 class Resightings:
@@ -93,13 +71,15 @@ class Resightings:
         return places
 
 
-def measure(case: Case) -> Row:
+def measure(case: Row) -> Row:
     """One run's row: shares of 1, m, s; ``real_time_factor`` is of this machine."""
-    settings: dict[str, Any] = Axis(name=case.axis).at(case.level)
-    simulation = Simulation(case.scene, seed=case.seed, laser=case.scanner, labels=True, **settings)
+    settings: dict[str, Any] = Axis(name=case["axis"]).at(case["level"])
+    simulation = Simulation(
+        case["scene"], seed=case["seed"], laser=case["scanner"], labels=True, **settings
+    )
     world, period_s = simulation.world, simulation.scan_period_s
-    pilot, resightings = Pilot(world), Resightings(world, case.away_s)
-    count, began_s = n_frames(case.seconds, period_s), 0.0
+    pilot, resightings = Pilot(world), Resightings(world, case["away"])
+    count, began_s = n_frames(case["seconds"], period_s), 0.0
     kinds, way = np.zeros((count, len(BeamClass)), dtype=np.int64), np.zeros((count, 2))
     for k in range(count):
         if k == min(WARM_SCANS, count - 1):
@@ -116,10 +96,9 @@ def measure(case: Case) -> Row:
     walked, blocked = (float(seconds.sum()) for seconds in world.people.walked_s())
     again = resightings.again
     return {
-        **asdict(case),
         **shares(kinds),
         "resightings": again,
-        "elsewhere": resightings.elsewhere / again if again else float("nan"),
+        "elsewhere": resightings.elsewhere / again if again else math.nan,
         "blocked": blocked / walked if walked > 0.0 else 0.0,
         "goals": pilot.driver.visited,
         "driven_m": float(np.sqrt((np.diff(way, axis=0) ** 2).sum(axis=1)).sum()),
@@ -137,111 +116,41 @@ def shares(kinds: NDArray[np.int64]) -> dict[str, float]:
         ("movable", (BeamClass.SEMI_STATIC, BeamClass.MOVING)),
     ):
         found = kinds[some][:, classes].sum(axis=1) / returns[some]
-        out[name] = float(found.mean()) if len(found) else float("nan")
-        out[f"{name}_p90"] = float(np.quantile(found, 0.9)) if len(found) else float("nan")
+        out[name] = float(found.mean()) if len(found) else math.nan
+        out[f"{name}_p90"] = float(np.quantile(found, 0.9)) if len(found) else math.nan
     return out
 
 
-def summary(rows: Sequence[Row]) -> list[Row]:
-    """A row for each scene and level: means over its seeds, of ``elsewhere`` over sightings."""
-    out = []
-    for scene, level in dict.fromkeys((row["scene"], row["level"]) for row in rows):
-        own = [row for row in rows if (row["scene"], row["level"]) == (scene, level)]
-        again = sum(row["resightings"] for row in own)
-        back = sum(row["elsewhere"] * row["resightings"] for row in own if row["resightings"])
-        means = ("moving", "moving_p90", "movable", "movable_p90", "blocked", "goals", "driven_m")
-        out.append(
-            {"scene": scene, "level": level, "seeds": len(own), "resightings": again}
-            | {"elsewhere": back / again if again else float("nan")}
-            | {key: float(np.mean([row[key] for row in own])) for key in means}
-            | {"real_time_factor": float(np.median([row["real_time_factor"] for row in own]))}
-        )
-    return out
+def pair(key: str) -> Column:
+    """A column: mean over the runs, and that of the 90th percentile, in percent."""
+    mean, high = (of(name, np.mean, PERCENT, "{:.1f}") for name in (key, f"{key}_p90"))
+    return lambda rows: f"{mean(rows)} ({high(rows)})"
 
 
-def markdown(rows: Sequence[Row], told: str) -> str:
-    """The table of the page, and in a line how it was made."""
-    heads = (
-        "scene", "level", "moving, % (p90)", "can move, % (p90)", "elsewhere, % (of)",
-        "people blocked, %", "goals", "driven, m",
-    )  # fmt: skip
-    lines = [
-        (
-            row["scene"], f"{row['level']:g}", _pair(row, "moving"), _pair(row, "movable"),
-            f"{_percent(row['elsewhere'])} ({row['resightings']})", _percent(row["blocked"]),
-            f"{row['goals']:.1f}", f"{row['driven_m']:.0f}",
-        )
-        for row in summary(rows)
-    ]  # fmt: skip
-    return f"{table(heads, lines)}\n\n{told}"
+def elsewhere(rows: Sequence[Row]) -> str:
+    """A column: of all sightings of the runs, in percent."""
+    again = sum(row["resightings"] for row in rows)
+    back = sum(row["elsewhere"] * row["resightings"] for row in rows if row["resightings"])
+    return f"{f'{PERCENT * back / again:.1f}' if again else '-'} ({again})"
 
 
-def _pair(row: Row, key: str) -> str:
-    return f"{_percent(row[key])} ({_percent(row[f'{key}_p90'])})"
-
-
-def _percent(share: float) -> str:
-    return "-" if np.isnan(share) else f"{PERCENT * share:.1f}"
-
-
-def cells(rows: Sequence[Row]) -> dict[str, Row]:
-    """By "scene level": numbers of the runs, seed by seed."""
-    numbers = (
-        "moving", "moving_p90", "movable", "movable_p90", "resightings", "elsewhere", "blocked",
-        "goals", "driven_m", "real_time_factor",
-    )  # fmt: skip
-    out: dict[str, Row] = {}
-    for row in rows:
-        cell = out.setdefault(f"{row['scene']} {row['level']:g}", {key: [] for key in numbers})
-        for key in numbers:
-            cell[key].append(row[key])
-    return out
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", nargs="+", default=scenes.names())
-    parser.add_argument("--levels", nargs="+", type=float, default=[0.0, 0.25, 0.5, 0.75, 1.0])
-    parser.add_argument("--axis", choices=AXES, default="dynamism")
-    parser.add_argument("--scanner", default=SCANNER)
-    parser.add_argument("--away", type=float, default=5.0, help="s out of view")
-    add_options(parser, "share_seen.json", PAGE)
-    parser.set_defaults(seeds=3)
-    return parser
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure, print the table, write the results and the page."""
-    wanted = _parser().parse_args(arguments)
-    told = (
-        f"World {WORLD}, axis {wanted.axis}, {wanted.seconds:g} s, "
-        f"{wanted.seeds} seeds from {wanted.first_seed}, "
-        f"`{wanted.scanner}`, out of view for {wanted.away:g} s or more."
-    )
-    cases = [
-        Case(
-            scene=scene, level=level, seed=seed, axis=wanted.axis, seconds=wanted.seconds,
-            scanner=wanted.scanner, away_s=wanted.away,
-        )
-        for scene, level, seed in product(wanted.scenes, wanted.levels, seeds_of(wanted))
-    ]  # fmt: skip
-    order = {(case.scene, case.level, case.seed): k for k, case in enumerate(cases)}
-    try:
-        first = head(wanted, MARK, arguments, "axis", "scanner", "away", "levels", "scenes")
-        rows = list(workers.each(measure, cases, jobs=wanted.jobs))
-        rows.sort(key=lambda row: order[row["scene"], row["level"], row["seed"]])
-        text = markdown(rows, told)
-        write(wanted.results, first, {"seen": cells(rows)})
-        if not wanted.no_page:
-            fill_page(wanted.page, MARK, text)
-    except (MobiliaError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 1
-    print(text)
-    for row in summary(rows):
-        print(f"{row['scene']} {row['level']:g}: {row['real_time_factor']:.1f} x real time")
-    return 0
+STUDY = Study(
+    name="share_seen",
+    axes={"scene": tuple(scenes.names()), "level": (0.0, 0.25, 0.5, 0.75, 1.0),
+          "axis": ("dynamism",), "scanner": (SCANNER,), "away": (5.0,)},
+    run=measure, lines=("scene", "level"),
+    columns={
+        "moving, % (p90)": pair("moving"), "can move, % (p90)": pair("movable"),
+        "elsewhere, % (of)": elsewhere,
+        "people blocked, %": of("blocked", np.mean, PERCENT, "{:.1f}"),
+        "goals": of("goals", np.mean, form="{:.1f}"),
+        "driven, m": of("driven_m", np.mean, form="{:.0f}"),
+    },
+    told="World {world}, axis {axis[0]}, {seconds:g} s, {seeds} seeds from {first_seed}, "
+    "`{scanner[0]}`, out of view for {away[0]:g} s or more.",
+    page=Path("docs/dynamism.md"), results=True, defaults={"seeds": 3},
+)  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(STUDY.main())

@@ -1,40 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the EKF was tuned: ``python -m scripts.experiments.tune_ekf points`` (or ``corners``).
+"""How the EKF was tuned: ``python -m scripts.experiments.tune_ekf --preset points`` (``corners``).
 
 One pass over the numbers, each in turn over a few values with the others as they are in the preset,
 on the training seeds 0 to 19 and nothing else; results are shown on seeds from 200 on. The score is
 the mean over the runs of log10(RMSE / 1 m): a factor counts the same wherever it happens, and a run
 that is lost counts, but not for everything. Seeds are paired: beside each value's change of the
 score stands in how many seeds (mean over their worlds) it was better and worse than the preset, and
-the two-sided probability of that by chance. Prints a Markdown table.
+the two-sided probability of that by chance.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-import scenes
-import sim
-import slam
-from scripts.comparison.plan import scripts_of, sources
-from scripts.jobs import Job, run_jobs
+from scripts.comparison.recording import Recording
+from scripts.experiments import shared
+from scripts.experiments.measured import table
+from scripts.experiments.shared import Row
+from scripts.experiments.study import Study
 from scripts.paper.runs import follow, sign_test, truth_of
-from sim.simulation import stream
 from slam import create
 from slam.ekf.slam import PRESETS
-from slam.errors import InvalidValueError, MobiliaError
+from slam.errors import InvalidValueError
 from slam.evaluation import metrics
 from slam.evaluation.points import PointWorld, PointWorldConfig
-from slam.frames import Float, Frame
-from slam.frontend.odometry_sum import thinned
+from slam.frames import Float
 
 TRAINING = range(20)
 WORLDS: dict[str, tuple[dict[str, Any], ...]] = {
@@ -45,7 +40,9 @@ WORLDS: dict[str, tuple[dict[str, Any], ...]] = {
         {"scene": "office", "dynamism": 0.5},
     ),
 }
+FROZEN = "preset"  # in the place of a knob: nothing is changed
 VALUES: dict[str, tuple[Any, ...]] = {
+    FROZEN: (0.0,),
     "individual_gate": (0.99, 0.999, 0.9999, 0.999999),
     "joint_gate": (0.95, 0.99, 0.999, 0.999999),
     "posterior_gate": (0.9, 0.95, 0.99, 0.9999),
@@ -55,108 +52,86 @@ VALUES: dict[str, tuple[Any, ...]] = {
     "memory_looks": (2.0, 4.0, 8.0, 16.0),
     "separation_m": (0.0, 0.15, 0.3),
 }
-SECONDS = 30.0
 
 
-def frames_of(preset: str, world: dict[str, Any], seed: int) -> list[Frame]:
-    """One run of one world."""
-    if preset == "points":
-        return list(PointWorld(PointWorldConfig(**world), seed=seed).stream())
-    room = {**world, "change": 0.0, "crowd": "none"}  # of world 1, as it was tuned
-    return thinned(list(stream(seed=seed, seconds=SECONDS, **room)), 5)
+def fits(case: Row) -> bool:
+    """Whether there is such a world, and such a value that the preset has not."""
+    if case["seed"] not in TRAINING:
+        raise InvalidValueError(f"seeds must lie in 0 to {TRAINING[-1]}, got {case['seed']}")
+    values = VALUES[case["knob"]]
+    there = case["world"] < len(WORLDS[case["preset"]]) and case["value"] < len(values)
+    frozen = getattr(PRESETS[case["preset"]](), case["knob"], None)
+    return bool(there and values[case["value"]] != frozen)
 
 
-def run_one(
-    path: Path, *, preset: str, world: int, seed: int, trials: list[dict[str, Any]]
-) -> None:
-    """log10 of the RMSE of every trial (changes of the preset) on one run."""
-    frames = frames_of(preset, WORLDS[preset][world], seed)
-    truth = truth_of(frames)
-    scores = []
-    for changes in trials:
-        track = follow(create("ekf", preset=preset, **changes), frames, "EKF")
-        scores.append(math.log10(max(metrics.ate(track.online(), truth).value, 1e-6)))
-    path.write_text(json.dumps(scores))
+def drive(case: Row) -> Row | None:
+    """A room of world 1, as it was tuned; points are made by the run."""
+    if case["preset"] == "points":
+        return None
+    world = dict(WORLDS["corners"][case["world"]])
+    options = {"crowd": "none", **({"walls": world.pop("walls")} if "walls" in world else {})}
+    level = world.pop("dynamism")
+    return shared.world_1({**case, **world, "level": level}, "full", every=5, options=options)
 
 
-def made_of(preset: str) -> tuple[Path, ...]:
-    """The code that a run depends on; rooms are simulated for corners only."""
-    called = (slam,) if preset == "points" else (slam, sim, scenes)
-    return (*sources(*called), *scripts_of(__file__, "scripts.experiments.tune_ekf"))
+def run(case: Row, recording: Recording | None = None) -> Row:
+    """log10 of the RMSE of one trial on one run."""
+    if recording is None:
+        config = PointWorldConfig(**WORLDS["points"][case["world"]])
+        frames = list(PointWorld(config, seed=case["seed"]).stream())
+    else:
+        frames = list(recording.frames)
+    knob = case["knob"]
+    changes = {} if knob == FROZEN else {knob: VALUES[knob][case["value"]]}
+    track = follow(create("ekf", preset=case["preset"], **changes), frames, "EKF")
+    ate = metrics.ate(track.online(), truth_of(frames)).value
+    return {"score": math.log10(max(ate, 1e-6))}
 
 
-def tune(
-    preset: str, seeds: Sequence[int], folder: Path, processes: int, knobs: Sequence[str]
-) -> list[tuple[dict[str, Any], Float]]:
-    """Of each trial its scores (seeds, worlds), the preset itself first."""
-    frozen = PRESETS[preset]()
-    trials: list[dict[str, Any]] = [{}]
-    for knob in knobs:
-        trials += [{knob: value} for value in VALUES[knob] if value != getattr(frozen, knob)]
-    worlds = range(len(WORLDS[preset]))
-    code = made_of(preset)
-    jobs = [
-        Job(
-            name=f"{preset}-{world}-seed-{seed}",
-            call=run_one,
-            arguments={"preset": preset, "world": world, "seed": seed, "trials": trials},
-            suffix=".json",
-            code=code,
-        )
-        for seed in seeds
-        for world in worlds
-    ]
-    files = run_jobs(jobs, folder, processes=processes, title=f"tuning the EKF for {preset}")
-    runs = np.array([json.loads(file.read_text()) for file in files.values()])
-    scores = runs.reshape(len(seeds), len(worlds), len(trials))
-    return [(changes, scores[:, :, k]) for k, changes in enumerate(trials)]
+def tell(rows: Sequence[Row]) -> str:
+    """Of each preset: each value's change of the score, paired over the seeds and by world."""
+    parts = []
+    for preset in dict.fromkeys(row["preset"] for row in rows):
+        own = [row for row in rows if row["preset"] == preset]
+        worlds = sorted({row["world"] for row in own})
+        names = [" ".join(str(v) for v in WORLDS[preset][k].values()) for k in worlds]
+        base, frozen, cells = _scores(own, FROZEN, 0), PRESETS[preset](), []
+        trials = dict.fromkeys((row["knob"], row["value"]) for row in own)
+        for knob, value in [trial for trial in trials if trial[0] != FROZEN]:
+            scores = _scores(own, knob, value)
+            change = scores - base
+            test = sign_test(scores.mean(axis=1).tolist(), base.mean(axis=1).tolist())
+            cells.append([
+                knob, f"{getattr(frozen, knob):g}", f"{VALUES[knob][value]:g}",
+                f"{change.mean():+.3f}", f"{test.wins} : {test.losses}", f"{test.p:.2g}",
+                *(f"{x:+.3f}" for x in change.mean(axis=0).tolist()),
+            ])  # fmt: skip
+        medians = 1e3 * 10 ** np.median(base, axis=0)
+        told = ", ".join(f"{m:.1f} mm ({n})" for m, n in zip(medians, names, strict=True))
+        parts += [
+            f"Preset {preset}, {len(base)} seeds: score {base.mean():+.3f}; median RMSE {told}.",
+            table(["knob", "frozen", "value", "change", "better : worse", "p", *names], cells),
+        ]
+    return "\n\n".join(parts)
 
 
-def table(preset: str, results: Sequence[tuple[dict[str, Any], Float]]) -> Iterator[str]:
-    """Lines of Markdown: each value's change of the score, paired over the seeds and by world."""
-    frozen, base = PRESETS[preset](), results[0][1]
-    worlds = [" ".join(str(v) for v in world.values()) for world in WORLDS[preset]]
-    medians = ", ".join(
-        f"{1e3 * 10**score:.1f} mm ({world})"
-        for score, world in zip(np.median(base, axis=0).tolist(), worlds, strict=True)
-    )
-    yield f"Preset {preset}, {len(base)} seeds: score {base.mean():+.3f}; median RMSE {medians}."
-    yield ""
-    yield f"| knob | frozen | value | change | better : worse | p | {' | '.join(worlds)} |"
-    yield "|---|---:|---:|---:|---:|---:|" + "---:|" * len(worlds)
-    for changes, scores in results[1:]:
-        ((knob, value),) = changes.items()
-        by_seed, change = base.mean(axis=1).tolist(), scores - base
-        test = sign_test(scores.mean(axis=1).tolist(), by_seed)
-        cells = [knob, f"{getattr(frozen, knob):g}", f"{value:g}", f"{change.mean():+.3f}"]
-        cells += [f"{test.wins} : {test.losses}", f"{test.p:.2g}"]
-        cells += [f"{x:+.3f}" for x in change.mean(axis=0).tolist()]
-        yield f"| {' | '.join(cells)} |"
+def _scores(rows: Sequence[Row], knob: str, value: int) -> Float:
+    """(seeds, worlds)."""
+    own = [row for row in rows if (row["knob"], row["value"]) == (knob, value)]
+    found = {(row["seed"], row["world"]): row["score"] for row in own}
+    seeds, worlds = (sorted({at[k] for at in found}) for k in (0, 1))
+    return np.array([[found[seed, world] for world in worlds] for seed in seeds])
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("preset", choices=sorted(WORLDS))
-    parser.add_argument("--seeds", type=int, default=len(TRAINING), help="the first so many")
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=Path("out/tune-ekf"))
-    parser.add_argument("--knobs", nargs="+", choices=list(VALUES), default=list(VALUES))
-    wanted = parser.parse_args(arguments)
-    try:
-        if not 1 <= wanted.seeds <= len(TRAINING):
-            raise InvalidValueError(
-                f"--seeds must lie in [1, {len(TRAINING)}], the training seeds, got {wanted.seeds}"
-            )
-        seeds = list(TRAINING)[: wanted.seeds]
-        results = tune(wanted.preset, seeds, wanted.out, wanted.jobs, wanted.knobs)
-        for line in table(wanted.preset, results):
-            print(line)
-    except MobiliaError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    return 0
+STUDY = Study(
+    name="tune_ekf",
+    axes={"preset": tuple(WORLDS), "world": (0, 1, 2, 3), "knob": tuple(VALUES),
+          "value": (0, 1, 2, 3)},
+    fits=fits, drive=drive, run=run, tell=tell,
+    told="Training seeds {first_seed} to 19 at most.",
+    defaults={"seeds": len(TRAINING), "first_seed": 0, "seconds": 30.0},
+)  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(STUDY.main())

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Is the stated uncertainty honest? A table and a figure.
-
-``python -m scripts.experiments.uncertainty``.
+"""Is the stated uncertainty honest? ``python -m scripts.experiments.uncertainty``.
 
 NEES / 3 of the online pose in the frame of the known start, and NIS / 3 of odometry's prior: both
 are 1 on average where a covariance is right. Over seeds nobody tuned on, in arena and office, with
@@ -12,209 +10,168 @@ the arena without its walls, with some or all of its chairs on the move.
 
 from __future__ import annotations
 
-import argparse
-import statistics
+import math
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scripts.experiments.accuracy import FULL_RATE_HZ, SCANNERS
-from scripts.experiments.measured import ended
-from scripts.experiments.parts import Part
+from scripts.comparison.recording import Recording
+from scripts.experiments import shared
+from scripts.experiments.shared import CM, Row, of
+from scripts.experiments.study import Study
+from scripts.figures import save, styled
 from scripts.metrics.judged import SETTLED_S, world_truth
 from scripts.paper.runs import follow
-from sim.core.dynamism import Dynamism
-from sim.simulation import stream
 from slam import create
 from slam.evaluation import metrics
-from slam.frames import Float, Frame
-from slam.frontend.odometry_sum import thinned
+from slam.frames import Float, Frame, Scan
 
 SCENES = ("arena", "office")
-DYNAMISM = 0.5
-WHOLE = Part(name="")
-PARTS = (
-    Part(name="1°, 8 m", every=2, range_m=8.0),
-    Part(name="2°", every=4),
-    Part(name="1°, 90° wide", every=2, fov_deg=90.0),
-    Part(name="4 m", range_m=4.0),
-)
 FEW = {f"no walls, {share:.0%} move": share for share in (0.3, 0.5, 1.0)}
-COLOURS = {"noise": "#1f61be", "full": "#ce2c3c"}
-NAMES = {"noise": "noise and rounding", "full": "all errors of the LMS-221"}
+WHOLE = "all"
+PARTS: dict[str, Row] = {  # of so many beams one; field of view, deg; farther returns are none, m
+    "1°, 8 m": {"every": 2, "range_m": 8.0},
+    "2°": {"every": 4},
+    "1°, 90° wide": {"every": 2, "fov_deg": 90.0},
+    "4 m": {"range_m": 4.0},
+}
+COLORS = {"noise": "#1f61be", "full": "#ce2c3c"}
+STATED = ("stated", "not stated")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Case:
-    """What is run: ``stride`` thins 37.5 Hz; ``stated``: with the odometry's own covariance;
-    ``part`` of the scanner."""
-
-    scene: str
-    scanner: str
-    stride: int = 8
-    stated: bool = True
-    part: Part = WHOLE
-
-    @property
-    def rate_hz(self) -> float:
-        """Scans a second."""
-        return FULL_RATE_HZ / self.stride
+def fits(case: Row) -> bool:
+    """Few things with noise alone; parts with every error; of the rest one thing at a time."""
+    usual = case["part"] == WHOLE and case["odometry"] == STATED[0] and case["every"] == 8
+    if case["scene"] in FEW:
+        return bool(usual and case["scanner"] == "noise")
+    odd = (case["part"] != WHOLE, case["odometry"] != STATED[0], case["every"] != 8)
+    return sum(odd) <= 1 and bool(case["part"] == WHOLE or case["scanner"] == "full")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Run:
-    """One seed: s since the start, NEES / 3 and NIS / 3 of frames (NaN where there is none), RMS
-    error of the settled frames, m."""
-
-    times: Float
-    nees: Float
-    nis: Float
-    rmse_m: float
-
-    def mean(self, name: str) -> float:
-        """Over the settled frames."""
-        values: Float = getattr(self, name)[self.times > SETTLED_S]
-        return float(np.nanmean(values))
+def drive(case: Row) -> Row:
+    """One drive, of world 1."""
+    few: Row = {"scene": "arena", "options": {"crowd": "none", "walls": "none"}}
+    few = few | {"moving_share": FEW[case["scene"]]} if case["scene"] in FEW else {}
+    return shared.world_1({**case, "level": 0.5}, scanner=case["scanner"], **few)
 
 
-def run(name: str, frames: list[Frame], case: Case) -> Run:
-    """Let the SLAM see the frames as the case wants them."""
-    frames = thinned(frames, case.stride)
-    if not case.stated:
-        frames = [
-            replace(f, odometry=replace(f.odometry, increment_covariance=None)) for f in frames
-        ]
-    if case.part is not WHOLE:
-        frames = case.part.of(frames)
-    track, truth = follow(create(name), frames, name), world_truth(frames)
+def poorer(scan: Scan, every: int = 1, fov_deg: float = 360.0, range_m: float = math.inf) -> Scan:
+    """What is left of a scan."""
+    spec = scan.spec
+    chosen = np.arange(0, spec.n_beams, every)
+    middle = 0.5 * (spec.angles[0] + spec.angles[-1])
+    chosen = chosen[np.abs(spec.angles[chosen] - middle) <= 0.5 * math.radians(fov_deg) + 1e-9]
+    less = replace(
+        spec,
+        n_beams=len(chosen),
+        angle_min=float(spec.angles[chosen[0]]),
+        angle_increment=spec.angle_increment * every,
+        range_max=min(range_m, spec.range_max),
+        beam_time_offsets=spec.beam_time_offsets[chosen],
+    )
+    ranges = scan.ranges[chosen]
+    ranges[ranges > less.range_max] = np.inf
+    return Scan(stamp_ns=scan.stamp_ns, ranges=ranges, spec=less)
+
+
+def seen(frame: Frame, case: Row) -> Frame:
+    """A frame as the case wants it."""
+    if case["odometry"] != STATED[0]:
+        frame = replace(frame, odometry=replace(frame.odometry, increment_covariance=None))
+    if case["part"] != WHOLE:
+        assert frame.scan is not None
+        frame = replace(frame, scan=poorer(frame.scan, **PARTS[case["part"]]), labels=None)
+    return frame
+
+
+def run(case: Row, recording: Recording) -> Row:
+    """RMS error of the settled frames, m; NEES / 3 and NIS / 3, and their means over these."""
+    frames = [seen(frame, case) for frame in shared.kept(recording.frames, case["every"])]
+    track, truth = follow(create("shunting"), frames, "shunting"), world_truth(frames)
     online = track.online()
-    nees = metrics.nees(online, track.covariances(), truth).values
     nis = [e.diagnostics.get("nis") for e in track.estimates]
     times = (online.stamps_ns - online.stamps_ns[0]) * 1e-9
-    off = metrics.pose_errors(online, truth).errors[times > SETTLED_S, :2]
-    return Run(
-        times=times,
-        nees=nees / 3.0,
-        nis=np.array([np.nan if value is None else value for value in nis]) / 3.0,
-        rmse_m=float(np.sqrt((off * off).sum(axis=1).mean())),
-    )
+    late = times > SETTLED_S
+    both = {
+        "nees": metrics.nees(online, track.covariances(), truth).values / 3.0,
+        "nis": np.array([np.nan if value is None else value for value in nis]) / 3.0,
+    }
+    off = metrics.pose_errors(online, truth).errors[late, :2]
+    row = {f"mean_{name}": float(np.nanmean(values[late])) for name, values in both.items()}
+    row["rmse_m"] = float(np.sqrt((off * off).sum(axis=1).mean()))
+    return row | {"times": times.tolist(), **{k: v.tolist() for k, v in both.items()}}
 
 
-def cases(scene: str, scanner: str) -> Iterator[Case]:
-    """All that is run on one recording."""
-    yield Case(scene=scene, scanner=scanner)
-    if scene in FEW:
-        return
-    yield Case(scene=scene, scanner=scanner, stated=False)
-    yield Case(scene=scene, scanner=scanner, stride=1)
-    if scanner == "full":
-        for part in PARTS:
-            yield Case(scene=scene, scanner=scanner, part=part)
-
-
-def recorded(scene: str, scanner: str, seed: int, seconds: float) -> list[Frame]:
-    """One drive."""
-    settings: dict[str, Any] = {"dynamism": Dynamism.world_1(DYNAMISM), "seconds": seconds}
-    if scene in FEW:
-        settings |= {"walls": "none", "moving_share": FEW[scene]}
-    name = "arena" if scene in FEW else scene
-    return list(stream(name, seed=seed, laser=SCANNERS[scanner], **settings))
-
-
-def measured(name: str, seeds: list[int], seconds: float) -> dict[Case, list[Run]]:
-    """All runs; prints a line for each case when its seeds are done."""
-    found: dict[Case, list[Run]] = {}
-    worlds = [(scene, scanner) for scene in SCENES for scanner in SCANNERS]
-    for scene, scanner in [*worlds, *((scene, "noise") for scene in FEW)]:
-        for seed in seeds:
-            frames = recorded(scene, scanner, seed, seconds)
-            for case in cases(scene, scanner):
-                found.setdefault(case, []).append(run(name, frames, case))
-        for case in cases(scene, scanner):
-            print(line(case, found[case]), flush=True)
-    return found
-
-
-def line(case: Case, runs: list[Run]) -> str:
-    """One row of the table: mean over all frames of all seeds, and the runs' own means."""
-    parts = [
-        f"{case.scene:20s} {case.scanner:5s} {case.part.name:12s} {case.rate_hz:4.1f} Hz "
-        f"{'stated' if case.stated else 'none':6s} "
-        f"median RMSE {100.0 * statistics.median(one.rmse_m for one in runs):5.2f} cm"
-    ]
-    for name in ("nees", "nis"):
-        means = np.array([one.mean(name) for one in runs])
-        parts.append(
-            f"{name.upper()}/3 mean {means.mean():5.2f}  median run {np.median(means):5.2f} "
-            f"({means.min():.2f} .. {means.max():.2f})"
-        )
-    return "  ".join(parts)
-
-
-def draw(found: dict[Case, list[Run]]) -> Figure:
-    """NEES above, NIS below, a column for each scene."""
-    figure = Figure(figsize=(11.0, 6.6), layout="constrained")
+@styled()
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """NEES above, NIS below, a column for each scene: of the whole scanner at 4.7 Hz."""
+    figure = Figure(figsize=(11.0, 6.6))
     axes = figure.subplots(2, len(SCENES), sharex=True, sharey="row", squeeze=False)
     for column, scene in enumerate(SCENES):
-        for scanner in SCANNERS:
-            colour, name = COLOURS[scanner], NAMES[scanner]
-            _band(axes[0, column], found[Case(scene=scene, scanner=scanner)], "nees", colour, name)
-            for stated, style in ((True, "-"), (False, ":")):
-                runs = found[Case(scene=scene, scanner=scanner, stated=stated)]
-                label = f"{name}, covariance {'stated' if stated else 'not stated'}"
-                _mean(axes[1, column], runs, colour, style, label)
-        axes[0, column].set_title(f"{scene}, dynamism {DYNAMISM:g}, {FULL_RATE_HZ / 8:.1f} Hz")
+        for scanner, color in COLORS.items():
+            for stated, style in zip(STATED, ("-", ":"), strict=True):
+                wanted = {"scene": scene, "scanner": scanner, "odometry": stated, "part": WHOLE,
+                          "every": 8}  # fmt: skip
+                own = [row for row in rows if wanted.items() <= row.items()]
+                if not own:
+                    continue
+                times, nees, nis = (_stacked(own, name) for name in ("times", "nees", "nis"))
+                if stated == STATED[0]:
+                    low, middle, high = np.nanquantile(nees, (0.1, 0.5, 0.9), axis=0)
+                    axes[0, column].fill_between(times[0], low, high, color=color, alpha=0.15, lw=0)
+                    axes[0, column].plot(times[0], middle, color=color, label=scanner)
+                edges = np.arange(0.0, times[0, -1], SETTLED_S)
+                spans = [(times[0] > a) & (times[0] <= a + SETTLED_S) for a in edges]
+                means = [np.nanmean(nis[:, span]) for span in spans]
+                label = f"{scanner}, covariance {stated}"
+                axes[1, column].plot(
+                    edges + 0.5 * SETTLED_S, means, style, color=color, label=label
+                )
+        axes[0, column].set_title(f"{scene}, dynamism 0.5, 4.7 Hz")
         axes[1, column].set_xlabel("s")
     axes[0, 0].set_ylabel("NEES / 3 of the pose\nmedian of the runs, 10 to 90 %")
     axes[1, 0].set_ylabel("NIS / 3 of the odometry prior\nmean of the runs over 5 s")
     for ax in axes.ravel().tolist():
         ax.axhspan(0.5, 2.0, color="#168c5a", alpha=0.12, lw=0)
-        ax.axhline(1.0, color="#168c5a", lw=0.8)
         ax.set_yscale("log")
-        ax.grid(alpha=0.25)
     for row in (0, 1):
-        axes[row, 0].legend(fontsize=7, loc="upper right")
-    axes[0, 0].set_ylim(0.01, 20.0)
-    axes[1, 0].set_ylim(0.1, 10.0)
-    return figure
+        if axes[row, 0].get_legend_handles_labels()[0]:
+            axes[row, 0].legend(fontsize=7, loc="upper right")
+    save(figure, path)
 
 
-def _band(ax: Axes, runs: list[Run], name: str, colour: str, label: str) -> None:
-    shortest = min(len(one.times) for one in runs)
-    values = np.array([getattr(one, name)[1:shortest] for one in runs])
-    times = runs[0].times[1:shortest]
-    low, middle, high = np.nanquantile(values, (0.1, 0.5, 0.9), axis=0)
-    ax.fill_between(times, low, high, color=colour, alpha=0.15, lw=0)
-    ax.plot(times, middle, color=colour, lw=1.2, label=label)
+def _stacked(rows: Sequence[Row], name: str) -> Float:
+    """(runs, frames) without the first frame, as long as the shortest run."""
+    shortest = min(len(row[name]) for row in rows)
+    return np.array([row[name][1:shortest] for row in rows], dtype=np.float64)
 
 
-def _mean(ax: Axes, runs: list[Run], colour: str, style: str, label: str) -> None:
-    edges = np.arange(0.0, runs[0].times[-1], SETTLED_S)
-    means = [
-        np.nanmean([np.nanmean(r.nis[(r.times > a) & (r.times <= a + SETTLED_S)]) for r in runs])
-        for a in edges
-    ]
-    ax.plot(edges + 0.5 * SETTLED_S, means, style, color=colour, lw=1.4, label=label)
+def spread(key: str) -> shared.Column:
+    """A column: mean, median and range over the runs."""
+
+    def tell(rows: Sequence[Row]) -> str:
+        runs = [row[key] for row in rows]
+        middle = f"{np.mean(runs):.2f}, {np.median(runs):.2f}"
+        return f"{middle} ({min(runs):.2f} to {max(runs):.2f})"
+
+    return tell
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Print the table, write the figure."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--slam", default="shunting")
-    parser.add_argument("--seeds", type=int, nargs="+", default=list(range(100, 110)))
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--out", type=Path, default=Path("docs/pictures/uncertainty.png"))
-    wanted = parser.parse_args(arguments)
-    found = measured(wanted.slam, wanted.seeds, wanted.seconds)
-    draw(found).savefig(wanted.out, dpi=100)
-    return 0
+STUDY = Study(
+    name="uncertainty",
+    axes={"scene": (*SCENES, *FEW), "scanner": tuple(COLORS), "every": (8, 1), "odometry": STATED,
+          "part": (WHOLE, *PARTS)},
+    drive=drive, fits=fits, run=run, lines=("scene", "scanner", "part", "every", "odometry"),
+    columns={"RMSE, cm": of("rmse_m", scale=CM), "NEES / 3": spread("mean_nees"),
+             "NIS / 3": spread("mean_nis")},
+    brief=lambda row: {k: v for k, v in row.items() if not isinstance(v, list)},
+    draw=draw, picture=Path("docs/pictures/uncertainty.png"), defaults={"first_seed": 100},
+)  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(ended(main))
+    sys.exit(STUDY.main())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where scans may have changed a map: what a film draws anew."""
+"""Where scans may have changed a map: what a film draws again."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ TEAL: Color = (0, 150, 158)  # semi-static
 MAGENTA: Color = (222, 0, 128)  # moving
 VIOLET: Color = (140, 84, 206)  # a mixed pixel
 GRAY: Color = (164, 168, 176)  # no return
+_TRACKS: tuple[Color, ...] = (RED, BLUE, (122, 63, 176))
 
 
 @lru_cache(maxsize=8)
@@ -116,3 +118,10 @@ def polyline(image: Picture, pixels: NDArray[Any], color: Color, thickness: int 
     if len(pixels) >= 2:
         fixed = np.round(np.asarray(pixels) * 16.0).astype(np.int32)
         cv2.polylines(image, [fixed], False, color, thickness, cv2.LINE_AA, shift=4)
+
+
+def colors_of(names: Sequence[str]) -> dict[str, Color]:
+    """A colour for each track; odometry is always orange."""
+    rest = [name for name in names if name != "odometry"]
+    found = {name: _TRACKS[k % len(_TRACKS)] for k, name in enumerate(rest)}
+    return {**found, "odometry": ORANGE}

@@ -13,8 +13,8 @@ from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.show import Show
 from scripts.film.view import LogStage, Stage
 from scripts.names import is_run
+from scripts.options import admitted
 from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
-from scripts.trust import admitted
 from sim.core.versions import check_world, world_of
 from sim.recording.sums import check_vouched
 from slam.errors import (

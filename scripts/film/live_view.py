@@ -10,12 +10,14 @@ from scripts.film.draw import Picture
 from scripts.film.layout import Layout
 from scripts.film.scan_pane import beam_colors, beam_ends, silent_ends
 from scripts.film.view import Bounds
-from sim.events import KIDNAP, EventWatch
+from sim.events import KIDNAP, Event, EventWatch
 from sim.moments import Moment
 from sim.simulation import Simulation
 from sim.view import gl
 from sim.view.mapview import MapView
+from sim.view.parts import Placed
 from sim.view.pictures import CameraPicture
+from sim.world.world import World
 from slam import se2
 from slam.frames import Frame
 
@@ -28,6 +30,8 @@ class LiveStage:
     """
 
     lanes: Sequence[str]
+    world: World
+    placed: Placed
     labelled = True
 
     def __init__(
@@ -43,12 +47,15 @@ class LiveStage:
         self._camera: CameraPicture | None = None
         self._map: MapView | None = None
         self._moment: Moment | None = None
+        self.world, self.placed = simulation.world, Placed.of(simulation.world)
 
     def frames(self) -> Iterator[Frame]:
         """The frames of a run; the stage shows the moment of the one given last."""
         self._watch = EventWatch(self._simulation.world)
+        before = Placed.of(self.world)
         for moment in self._moments():
             self._moment = moment
+            self.placed, before = before, Placed.of(self.world)
             self._watch.note(moment)
             yield moment.frame
 
@@ -102,6 +109,10 @@ class LiveStage:
             for e in self._watch.events()
             if e.kind != KIDNAP
         ]
+
+    def events(self) -> Sequence[Event]:
+        """What has happened so far."""
+        return self._watch.events()
 
     def kidnaps(self) -> Sequence[float]:
         """Moments when the robot was put elsewhere, s."""

@@ -22,7 +22,7 @@ SIGMAS = 3.0  # of the ellipses
 MAX_TRAIL = 1500  # points of a trail as drawn
 FOLLOW_M = 9.0  # around the path, in a view that follows it
 STEP_M = 4.0  # such a view grows in steps: a sliding picture is hard to watch
-STEP_SHARE = 0.1  # of a large view: so that it is drawn anew a few dozen times, however large
+STEP_SHARE = 0.1  # of a large view: so that it is drawn again a few dozen times, however large
 
 
 def _activity_colors() -> Picture:

@@ -2,7 +2,7 @@
 """A growing map as small pictures of its parts, coarser as more of it is seen at once.
 
 What a film needs of a map is as large as the film, however large the map is: tiles hold the
-largest value of several cells each, and only those that changed are made anew.
+largest value of several cells each, and only those that changed are made again.
 """
 
 from __future__ import annotations

@@ -34,8 +34,7 @@ from slam.system import MapsInParts, MovingMap
 
 SEEN_EVERY_NS = 200_000_000  # the areas of neighbouring scans overlap
 MOST_MAPS = 60  # whole ones, of a log
-FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn anew
-_OTHERS: tuple[Color, ...] = (draw.RED, draw.BLUE, (122, 63, 176))
+FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn again
 
 
 @dataclass(eq=False, kw_only=True)
@@ -75,10 +74,7 @@ class Show:
 
     def color(self, name: str) -> Color:
         """The colour a track is drawn in."""
-        if name in ("odometry", "truth"):
-            return draw.ORANGE if name == "odometry" else draw.GREEN
-        others = [other for other in self.replay.tracks if other != "odometry"]
-        return _OTHERS[others.index(name) % len(_OTHERS)]
+        return draw.GREEN if name == "truth" else draw.colors_of(list(self.replay.tracks))[name]
 
     def named(self) -> list[tuple[str, Color]]:
         """Whose colour is which: the tracks, then the truth where there is one."""
@@ -160,7 +156,7 @@ class Show:
         return se2.between(first, frame.truth)
 
     def _follow_map(self) -> None:
-        """Lay out anew what was seen, where closed loops have moved the map (docs/loops.md)."""
+        """Lay out again what was seen, where closed loops have moved the map (docs/loops.md)."""
         system = self.track().system
         if not isinstance(system, MovingMap):
             return

@@ -4,13 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from scripts.film.chart import Bar
 from scripts.film.draw import Picture
 from scripts.film.layout import Layout
 from scripts.film.scan_pane import RobotScan
 from slam.frames import Frame
+
+if TYPE_CHECKING:  # logs are filmed without the simulator
+    from sim.events import Event
+    from sim.view.parts import Placed
+    from sim.world.world import World
 
 Bounds = tuple[float, float, float, float]
 
@@ -22,7 +27,16 @@ class Stage(Protocol):
     camera    whether there is a 3D view
     labelled  whether beams say what they hit
     lanes     kinds of events that can be
+    world     that is simulated, None for a log;   placed  where its parts were at the scan's start
     """
+
+    @property
+    def world(self) -> World | None:
+        """As above."""
+
+    @property
+    def placed(self) -> Placed | None:
+        """As above."""
 
     @property
     def bounds(self) -> Bounds | None:
@@ -52,6 +66,9 @@ class Stage(Protocol):
     def bars(self) -> Sequence[Bar]:
         """What has happened so far."""
 
+    def events(self) -> Sequence[Event]:
+        """The same in the simulator's words, with when the robot was put elsewhere."""
+
     def kidnaps(self) -> Sequence[float]:
         """Moments when the robot was put elsewhere, s."""
 
@@ -62,6 +79,7 @@ class LogStage:
     bounds: Bounds | None = None
     camera = False
     lanes: Sequence[str] = ()
+    world = placed = None
 
     def __init__(self, *, labelled: bool = False) -> None:
         self.labelled = labelled
@@ -85,5 +103,9 @@ class LogStage:
         return ()
 
     def kidnaps(self) -> Sequence[float]:
+        """Nobody noted them."""
+        return ()
+
+    def events(self) -> Sequence[Event]:
         """Nobody noted them."""
         return ()

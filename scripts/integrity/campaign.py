@@ -5,7 +5,7 @@
 
 Every way to be lost (``ways.WAYS``) gets so many losses of each SLAM. The way "log" takes part
 with ``--logs``, a folder of logs or logs themselves. Each case is a small file in ``--folder``: the
-same command again goes on where it was stopped, and does anew what another version of the code has
+same command again goes on where it was stopped, and does again what another version of the code has
 done. ``--no-run`` sums up what is there. Writes ``docs/results/integrity.json`` and the tables of
 ``docs/integrity.md``. What is counted: ``counting``.
 """
@@ -13,26 +13,37 @@ done. ``--no-run`` sums up what is there. Writes ``docs/results/integrity.json``
 from __future__ import annotations
 
 import argparse
+import json
 import sys
-import time
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from scripts import workers
-from scripts.checked import whole
 from scripts.experiments.measured import add_run_options, ended, head
-from scripts.integrity.settling import settle, settled
+from scripts.integrity import losses
 from scripts.integrity.tables import ALL, markdown, summary
 from scripts.integrity.ways import WAYS, Case, cases
+from scripts.jobs import Job, run_jobs
 from scripts.marks import fill_page
-from scripts.result_files import write
+from scripts.names import file_name
+from scripts.options import whole
+from scripts.output import configs_of
+from scripts.result_files import ROOT, write
 from slam.errors import InvalidValueError
 
 PAGE, MARK = Path("docs/integrity.md"), "campaign"
 LOGS = (".log", ".clf", ".log.gz", ".log.xz")
-SAID_S = 60.0  # between two lines on how far it is
+PLANE = tuple(
+    ROOT / "scripts" / "integrity" / f"{name}.py"
+    for name in ("driving", "geometry", "kinds", "layouts", "movers", "plane", "things")
+)
+CODE = (
+    ROOT / "slam", *PLANE, ROOT / "scripts" / "metrics",
+    *(ROOT / "scripts" / "integrity" / f"{name}.py" for name in ("counting", "losses", "ways")),
+    *(ROOT / "scripts" / "experiments" / f"{name}.py" for name in ("kidnap", "honesty")),
+)  # fmt: skip
+"""What a case depends on."""
 
 
 def logs_in(places: Sequence[Path]) -> list[Path]:
@@ -47,29 +58,29 @@ def logs_in(places: Sequence[Path]) -> list[Path]:
     return found
 
 
-def _settle_all(missing: Sequence[Case], folder: Path, jobs: int) -> None:
-    began = said = time.monotonic()
-    call = partial(settle, folder=folder)
-    for done, case in enumerate(workers.each(call, missing, jobs=jobs), start=1):
-        if time.monotonic() - said > SAID_S or done == len(missing):
-            said = time.monotonic()
-            left_s = (said - began) / done * (len(missing) - done)
-            print(f"{done} of {len(missing)}, {case.way}; {left_s / 60.0:.0f} min left", flush=True)
+def job(case: Case) -> Job:
+    """The file of a case."""
+    return Job(
+        name=f"{file_name(case.slam)}-{case.way}-{case.number:06d}",
+        call=losses.settle,
+        arguments={"case": asdict(case), "config": configs_of([case.slam])},
+        suffix=".json",
+        code=(*CODE, *([Path(case.log)] if case.log else [])),
+    )
 
 
-def _rows(
-    plan: Sequence[Case], folder: Path
-) -> Iterator[tuple[tuple[str, str], dict[str, Any]]]:  # fmt: skip
-    """A sum for each SLAM and way, then of all its ways."""
-    for slam in dict.fromkeys(case.slam for case in plan):
-        every: list[dict[str, Any]] = []
-        for way in dict.fromkeys(case.way for case in plan):
-            wanted = [case for case in plan if (case.slam, case.way) == (slam, way)]
-            found = [row for row in (settled(case, folder) for case in wanted) if row]
-            if found:
-                yield (slam, way), summary(found)
-            every += found
-        yield (slam, ALL), summary(every)
+def _rows(plan: Sequence[Case], files: Sequence[Path]) -> dict[tuple[str, str], dict[str, Any]]:
+    """A sum for each SLAM and way, then of all its ways; ``files`` of the cases, or nowhere."""
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for case, file in zip(plan, files, strict=True):
+        every = found.setdefault((case.slam, ALL), [])
+        if file.exists():
+            row = json.loads(file.read_text(encoding="utf-8"))
+            every.append(row)
+            found.setdefault((case.slam, case.way), []).append(row)
+    ways = [*dict.fromkeys(case.way for case in plan), ALL]
+    order = [(slam, way) for slam in dict.fromkeys(case.slam for case in plan) for way in ways]
+    return {key: summary(found[key]) for key in order if key in found}
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -97,10 +108,10 @@ def campaign(arguments: Sequence[str] | None = None) -> int:
     )  # fmt: skip
     wanted.seeds = max((case.number for case in plan), default=-1) + 1
     first = head(wanted, MARK, arguments, "slams", "ways", "losses", package="scripts.integrity")
+    jobs = [job(case) for case in plan]
     if not wanted.no_run:
-        missing = [case for case in plan if settled(case, wanted.folder) is None]
-        _settle_all(missing, wanted.folder, wanted.jobs)
-    rows = dict(_rows(plan, wanted.folder))
+        run_jobs(jobs, wanted.folder, processes=wanted.jobs, title="losing robots")
+    rows = _rows(plan, [wanted.folder / one.file_name() for one in jobs])
     text = markdown(rows)
     print(text)
     write(wanted.results, first, {"found": {f"{slam} {way}": r for (slam, way), r in rows.items()}})

@@ -12,6 +12,7 @@ The words are those of the Stanford diagram of aviation, for each scan:
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -61,10 +62,7 @@ class Moments:
 
     def since(self, k: int) -> Moments:
         """Scan ``k`` and those after it."""
-        return Moments(
-            seconds=self.seconds[k:], off=self.off[k:], turned=self.turned[k:],
-            trusted=self.trusted[k:], told=self.told[k:],
-        )  # fmt: skip
+        return Moments(**{name: values[k:] for name, values in vars(self).items()})
 
     def after_alert(self) -> Moments:
         """Without the first ``ALERT_S``, and the first scan at least."""
@@ -146,16 +144,15 @@ def most_of_time(events: int, hours: float) -> float:
 
 def binned(milliseconds: Sequence[float] | Float) -> dict[str, int]:
     """How many of these lie in each bin; ``PER_OCTAVE`` bins for each doubling."""
-    where = [round(PER_OCTAVE * math.log2(max(float(ms), 1e-6))) for ms in milliseconds]
-    return {str(at): where.count(at) for at in sorted(set(where))}
+    where = np.rint(PER_OCTAVE * np.log2(np.maximum(milliseconds, 1e-6))).astype(np.int64)
+    return {str(at): count for at, count in sorted(Counter(where.tolist()).items())}
 
 
-def pooled(bins: Sequence[Mapping[str, int]]) -> dict[int, int]:
+def pooled(bins: Sequence[Mapping[str, int]]) -> Counter[int]:
     """The sum of several."""
-    out: dict[int, int] = {}
+    out: Counter[int] = Counter()
     for one in bins:
-        for at, count in one.items():
-            out[int(at)] = out.get(int(at), 0) + count
+        out.update({int(at): count for at, count in one.items()})
     return out
 
 

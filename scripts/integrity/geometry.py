@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Distances, sight and beams in the plane: kernels over walls, pillars, and discs."""
+"""Distances, sight and beams in the plane: kernels over walls, pillars, and discs.
+
+A segment is anything with x0, y0, x1, y1 at its places 0 to 3, a disc with x, y, radius, in m.
+"""
 
 from __future__ import annotations
 
@@ -9,139 +12,110 @@ from slam._jit import inner, njit
 from slam.frames import Float
 
 FAR = 1e30
+Segment = Float | tuple[float, float, float, float]
 
 
 @inner
-def point_to_segment2(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+def point_to_segment2(px: float, py: float, segment: Segment) -> float:
     """Squared distance of a point from a segment, m^2."""
-    dx, dy = bx - ax, by - ay
+    dx, dy = segment[2] - segment[0], segment[3] - segment[1]
     length2 = dx * dx + dy * dy
     t = 0.0
     if length2 > 0.0:
-        t = min(1.0, max(0.0, ((px - ax) * dx + (py - ay) * dy) / length2))
-    ex, ey = px - ax - t * dx, py - ay - t * dy
-    return ex * ex + ey * ey
+        t = min(1.0, max(0.0, ((px - segment[0]) * dx + (py - segment[1]) * dy) / length2))
+    ex, ey = px - segment[0] - t * dx, py - segment[1] - t * dy
+    squared: float = ex * ex + ey * ey
+    return squared
 
 
 @inner
-def crossing(  # noqa: PLR0913 (kernel)
-    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
-) -> bool:
-    """Whether the segments a-b and c-d have a point in common (parallel ones do not)."""
-    ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
+def meeting(ox: float, oy: float, ux: float, uy: float, segment: Segment) -> tuple[float, float]:
+    """Where a line from o along u meets that of a segment: in lengths of u, and of the segment.
+
+    -1, -1 where they are parallel.
+    """
+    vx, vy = segment[2] - segment[0], segment[3] - segment[1]
     det = ux * vy - uy * vx
     if det == 0.0:
-        return False
-    s = ((cx - ax) * vy - (cy - ay) * vx) / det
-    t = ((cx - ax) * uy - (cy - ay) * ux) / det
+        return -1.0, -1.0
+    wx, wy = segment[0] - ox, segment[1] - oy
+    return (wx * vy - wy * vx) / det, (wx * uy - wy * ux) / det
+
+
+@inner
+def crossing(a: Segment, b: Segment) -> bool:
+    """Whether two segments have a point in common (parallel ones do not)."""
+    s, t = meeting(a[0], a[1], a[2] - a[0], a[3] - a[1], b)
     return 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0
 
 
 @inner
-def segments2(  # noqa: PLR0913 (kernel)
-    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
-) -> float:
+def segments2(a: Segment, b: Segment) -> float:
     """Squared distance of two segments, m^2."""
-    if crossing(ax, ay, bx, by, cx, cy, dx, dy):
+    if crossing(a, b):
         return 0.0
-    first = min(
-        point_to_segment2(ax, ay, cx, cy, dx, dy), point_to_segment2(bx, by, cx, cy, dx, dy)
-    )
-    second = min(
-        point_to_segment2(cx, cy, ax, ay, bx, by), point_to_segment2(dx, dy, ax, ay, bx, by)
-    )
+    first = min(point_to_segment2(a[0], a[1], b), point_to_segment2(a[2], a[3], b))
+    second = min(point_to_segment2(b[0], b[1], a), point_to_segment2(b[2], b[3], a))
     return min(first, second)
 
 
 @inner
 def sees(ax: float, ay: float, bx: float, by: float, walls: Float) -> bool:
     """Whether no wall stands between two points."""
-    for k in range(walls.shape[0]):
-        if crossing(ax, ay, bx, by, walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3]):
+    for k in range(walls.shape[0]):  # noqa: SIM110 (kernel)
+        if crossing((ax, ay, bx, by), walls[k]):
             return False
     return True
 
 
 @inner
-def clear_of_building(  # noqa: PLR0913 (kernel)
-    ax: float, ay: float, bx: float, by: float, radius: float, walls: Float, pillars: Float
-) -> bool:
+def clear_of_building(segment: Segment, radius: float, walls: Float, pillars: Float) -> bool:
     """Whether a segment with a radius (m) touches no wall and no pillar."""
     for k in range(walls.shape[0]):
-        x0, y0, x1, y1 = walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3]
-        if segments2(ax, ay, bx, by, x0, y0, x1, y1) < radius * radius:
+        if segments2(segment, walls[k]) < radius * radius:
             return False
     for k in range(pillars.shape[0]):
         reach = radius + pillars[k, 2]
-        if point_to_segment2(pillars[k, 0], pillars[k, 1], ax, ay, bx, by) < reach * reach:
+        if point_to_segment2(pillars[k, 0], pillars[k, 1], segment) < reach * reach:
             return False
     return True
 
 
 @inner
-def to_segment(  # noqa: PLR0913 (kernel)
-    ox: float, oy: float, ux: float, uy: float, ax: float, ay: float, bx: float, by: float
-) -> float:
-    """Distance along a beam of unit direction u to a segment, m; ``FAR`` where it misses."""
-    vx, vy = bx - ax, by - ay
-    det = ux * vy - uy * vx
-    if det == 0.0:
-        return FAR
-    wx, wy = ax - ox, ay - oy
-    along = (wx * vy - wy * vx) / det
-    share = (wx * uy - wy * ux) / det
-    if along > 0.0 and 0.0 <= share <= 1.0:
-        return along
-    return FAR
-
-
-@inner
-def to_disc(  # noqa: PLR0913 (kernel)
-    ox: float, oy: float, ux: float, uy: float, cx: float, cy: float, radius: float
-) -> float:
+def to_disc(ox: float, oy: float, ux: float, uy: float, disc: Float) -> float:
     """Distance along a beam of unit direction u to a disc, m; ``FAR`` where it misses.
 
     A beam from within a disc does not see it.
     """
-    wx, wy = cx - ox, cy - oy
+    wx, wy = disc[0] - ox, disc[1] - oy
     along = wx * ux + wy * uy
     off = wx * uy - wy * ux
-    inside = radius * radius - off * off
+    inside = disc[2] * disc[2] - off * off
     if along <= 0.0 or inside <= 0.0:
         return FAR
-    first = along - math.sqrt(inside)
+    first: float = along - math.sqrt(inside)
     return first if first > 0.0 else FAR
 
 
 @njit
-def first_hits(  # noqa: PLR0913 (kernel)
-    pose: Float,
-    angles: Float,
-    segments: Float,
-    of_segment: Float,
-    discs: Float,
-    of_disc: Float,
-    ranges: Float,
-    hit: Float,
+def first_hits(
+    pose: Float, angles: Float, segments: Float, discs: Float, ranges: Float, hit: Float
 ) -> None:
     """Fill ``ranges`` (n,) m and ``hit`` (n,): what the first thing of each beam is, -2 for none.
 
-    ``of_segment`` (s,) and ``of_disc`` (d,) say whose each segment and each disc is: -1 of the
+    The last column of ``segments`` (s, 5) and ``discs`` (d, 4) says whose each is: -1 of the
     building, else a number of a thing.
     """
-    ox, oy = pose[0], pose[1]
     for n in range(angles.shape[0]):
         a = pose[2] + angles[n]
         ux, uy = math.cos(a), math.sin(a)
         best, what = FAR, -2.0
         for k in range(segments.shape[0]):
-            d = to_segment(
-                ox, oy, ux, uy, segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
-            )
-            if d < best:
-                best, what = d, of_segment[k]
+            along, share = meeting(pose[0], pose[1], ux, uy, segments[k])
+            if 0.0 < along < best and 0.0 <= share <= 1.0:
+                best, what = along, segments[k, 4]
         for k in range(discs.shape[0]):
-            d = to_disc(ox, oy, ux, uy, discs[k, 0], discs[k, 1], discs[k, 2])
-            if d < best:
-                best, what = d, of_disc[k]
+            along = to_disc(pose[0], pose[1], ux, uy, discs[k])
+            if along < best:
+                best, what = along, discs[k, 3]
         ranges[n], hit[n] = best, what

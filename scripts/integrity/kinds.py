@@ -14,6 +14,12 @@ LAYOUTS = ("flat", "halfturn", "corridor", "hall", "office")
 ODOMETRIES = ("fifth", "biased", "stated", "good")
 PARTS = ("layout", "chairs", "boards", "people", "odometry", "lidar", "driving")
 MOST_SECONDS = 3600.0
+LIMITS = {
+    "chairs": (0, 200), "boards": (0, 200), "people": (0, 200), "beams": (2, 4000),
+    "fov_deg": (1.0, 360.0), "rate_hz": (0.1, 100.0), "moved_every_s": (1.0, math.inf),
+    "dropouts": (0.0, 1.0), "escort": (0.0, 1.0), "hug": (0.0, 1.0),
+}  # fmt: skip
+NAMED = {"layout": (*LAYOUTS, "bare"), "odometry": ODOMETRIES}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,25 +58,14 @@ class Kind:
     odometry: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("chairs", "boards", "people"):
-            _within(name, getattr(self, name), 0, 200)
-        _within("beams", self.beams, 2, 4000)
-        _within("fov_deg", self.fov_deg, 1.0, 360.0)
-        _within("rate_hz", self.rate_hz, 0.1, 100.0)
-        _within("moved_every_s", self.moved_every_s, 1.0, math.inf)
-        for name in ("dropouts", "escort", "hug"):
-            _within(name, getattr(self, name), 0.0, 1.0)
-        for name, known in (("layout", (*LAYOUTS, "bare", "")), ("odometry", (*ODOMETRIES, ""))):
-            if getattr(self, name) not in known:
-                raise UnknownNameError(
-                    f"{name} must be one of {', '.join(filter(None, known))}, "
-                    f"got {getattr(self, name)!r}"
-                )
-
-
-def _within(name: str, value: float, low: float, high: float) -> None:
-    if not low <= value <= high:
-        raise InvalidValueError(f"Kind.{name} must be {low:g} to {high:g}, got {value}")
+        for name, (low, high) in LIMITS.items():
+            if not low <= getattr(self, name) <= high:
+                given = getattr(self, name)
+                raise InvalidValueError(f"Kind.{name} must be {low:g} to {high:g}, got {given}")
+        for name, known in NAMED.items():
+            if getattr(self, name) not in ("", *known):
+                given = getattr(self, name)
+                raise UnknownNameError(f"{name} must be one of {', '.join(known)}, got {given!r}")
 
 
 KINDS = {

@@ -32,10 +32,7 @@ from slam.tracker.matching.whole_search import WholeSearch
 
 RIGHT_M, RIGHT_RAD = 0.15, 0.1  # a place nearer than both is right
 WRONG_M, WRONG_RAD = 0.5, 0.3  # one farther by either is wrong; what lies between has no label
-SURE_M, SURE_RAD = (
-    0.05,
-    0.03,
-)  # the SLAM moved as the robot, so far at most off, or no scan is asked
+SURE_M, SURE_RAD = 0.05, 0.03  # off from scan to scan at most; else no scan is asked
 SURE_S = 2.0  # all that time
 MAPPED_S, EVERY_S = 15.0, 3.0  # before the first scan that is asked, and between two
 BESIDE_M, BESIDE_RAD, BESIDE = (1.0, 5.0), 1.0, 2  # places beside the true one, a scan
@@ -72,7 +69,10 @@ class Labelled:
 
 def labelled(name: str, stream: Sequence[Frame], other: Sequence[Frame]) -> Labelled:
     """Of a stream with truth; ``other``, made in other rooms, gives the scans with no place."""
-    return _Collector(name, stream, other).run()
+    one = _Collector(name, stream, other)
+    with _noted() as shares:
+        one.run(shares)
+    return one.out
 
 
 def off(pose: Float, truth: Float) -> tuple[float, float]:
@@ -86,50 +86,42 @@ class _Collector:
 
     def __init__(self, name: str, stream: Sequence[Frame], other: Sequence[Frame]) -> None:
         self._stream, self._other = stream, other
-        self._out = Labelled(stream=name)
+        self.out = Labelled(stream=name)
         self._rng = np.random.default_rng(len(stream))
         self._slam = ShuntingSlam()
         self._coarse = coarse(self._slam.config.tracking.relocalise)
-        self._sure = _Sure(self._world(stream[0]))
+        self._sure = _Sure(_world(stream[0]))
 
-    def run(self) -> Labelled:
-        stream, slam, out = self._stream, self._slam, self._out
-        count = len(stream)
+    def run(self, shares: list[float]) -> None:
+        """``shares`` gets what goes on of the usual match at each scan."""
+        stream, count = self._stream, len(self._stream)
         pushes = self._rng.integers(int(0.3 * count), int(0.9 * count), PUSHES).tolist()
         kidnaps = self._rng.integers(int(0.4 * count), int(0.9 * count), CARRIED).tolist()
         asked_s = MAPPED_S
-        with _noted() as shares:
-            for k, frame in enumerate(stream):
-                seconds = (frame.stamp_ns - stream[0].stamp_ns) / NS_PER_S
-                if self._sure.of(seconds):
-                    if seconds >= asked_s:
-                        asked_s = seconds + EVERY_S
-                        self._ask(frame, self._other[k % len(self._other)])
-                    if k in pushes:
-                        self._push(k, turned=pushes.index(k) % 2 == 1)
-                    if k in kidnaps:
-                        self._carry(k, shares)
-                shares.clear()
-                pose = slam.update(frame.without_truth()).T_map_robot
-                right = self._sure.follows(seconds, pose, self._world(frame))
-                if right and shares and seconds >= 1.0:
-                    out.going.append(shares[0])
-        return out
-
-    @staticmethod
-    def _world(frame: Frame) -> Float:
-        assert frame.truth is not None
-        return frame.truth
+        for k, frame in enumerate(stream):
+            seconds = (frame.stamp_ns - stream[0].stamp_ns) / NS_PER_S
+            if self._sure.of(seconds):
+                if seconds >= asked_s:
+                    asked_s = seconds + EVERY_S
+                    self._ask(frame, self._other[k % len(self._other)])
+                if k in pushes:
+                    self._push(k, turned=pushes.index(k) % 2 == 1)
+                if k in kidnaps:
+                    self._carry(k, shares)
+            shares.clear()
+            pose = self._slam.update(frame.without_truth()).T_map_robot
+            right = self._sure.follows(seconds, pose, _world(frame))
+            if right and shares and seconds >= 1.0:
+                self.out.going.append(shares[0])
 
     def _truth(self, frame: Frame) -> Float:
         """In the map, as it is around the pose before."""
-        return self._sure.T_map(self._world(frame))
+        return self._sure.T_map(_world(frame))
 
     def _ask(self, frame: Frame, foreign: Frame) -> None:
         observations, truth = self._observed(frame), self._truth(frame)
-        out, rng = self._out, self._rng
-        at = self._matched(observations, truth)
-        known_m, through_m = self._evidence(observations, at)
+        out, rng = self.out, self._rng
+        known_m, through_m = self._evidence(observations, self._matched(observations, truth))
         out.pairs.append((known_m, through_m, True))
         for _ in range(BESIDE):
             way, far = rng.uniform(0.0, math.tau), rng.uniform(*BESIDE_M)
@@ -146,8 +138,7 @@ class _Collector:
         if known_m >= KNOWN_M:
             out.reached.append(any(right for _, _, right in group))
         others = self._observed(foreign)
-        places = [(*self._evidence(others, at), False) for at in self._searched(others)]
-        out.none.append(places)
+        out.none.append([(*self._evidence(others, at), False) for at in self._searched(others)])
 
     def _observed(self, frame: Frame) -> Observations:
         twist = frame.odometry.twist
@@ -195,17 +186,22 @@ class _Collector:
             slipped = place.prior > episode.carried_there and place.waited == 0
             right = _near(place.match, truth)
             if slipped and {led, right} == {True, False}:
-                self._out.slips.append((place.gain_m, place.prior, right is True))
+                self.out.slips.append((place.gain_m, place.prior, right is True))
 
     def _carry(self, k: int, shares: list[float]) -> None:
         """What goes on of the usual match where a copy is put elsewhere."""
-        before = list(self._stream[:k])
-        for start in targets(before, list(self._stream), 1, 1):
+        whole = list(self._stream)
+        for start in targets(whole[:k], whole, 1, 1):
             slam = copy.deepcopy(self._slam)
             shares.clear()
-            for frame in kidnapped(before, list(self._stream), start, 1):
+            for frame in kidnapped(whole[:k], whole, start, 1):
                 slam.update(frame.without_truth())
-            self._out.carried.extend(shares[:1])
+            self.out.carried.extend(shares[:1])
+
+
+def _world(frame: Frame) -> Float:
+    assert frame.truth is not None
+    return frame.truth
 
 
 def _near(match: Match, truth: Float) -> bool | None:

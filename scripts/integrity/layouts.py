@@ -7,7 +7,6 @@ A way is an edge between two nodes; the robot drives along edges only, and they 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,13 +65,11 @@ class _Plan:
         return [first, second, third, self.node(x0, y1, third, first)]
 
     def done(self) -> Layout:
-        return Layout(
-            np.array(self.walls, dtype=float).reshape(-1, 4),
-            np.array(self.pillars, dtype=float).reshape(-1, 3),
-            np.array(self.rooms, dtype=float).reshape(-1, 4),
-            np.array(self.nodes, dtype=float).reshape(-1, 2),
-            np.array(self.edges, dtype=np.int64).reshape(-1, 2),
+        widths = ((self.walls, 4), (self.pillars, 3), (self.rooms, 4), (self.nodes, 2))
+        walls, pillars, rooms, nodes = (
+            np.array(rows, dtype=float).reshape(-1, width) for rows, width in widths
         )
+        return Layout(walls, pillars, rooms, nodes, np.array(self.edges, dtype=np.int64))
 
 
 def _along(rng: np.random.Generator, length: float, depth: float, up: int, down: int) -> Layout:
@@ -210,10 +207,7 @@ def office(rng: np.random.Generator) -> Layout:
     return plan.done()
 
 
-_MAKERS: dict[str, Callable[[np.random.Generator], Layout]] = {
-    "flat": flat, "halfturn": halfturn, "corridor": corridor, "hall": hall, "office": office,
-    "bare": bare,
-}  # fmt: skip
+_MAKERS = {one.__name__: one for one in (flat, halfturn, corridor, hall, office, bare)}
 
 
 def layout(name: str, rng: np.random.Generator) -> Layout:

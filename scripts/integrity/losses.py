@@ -6,20 +6,21 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scripts.experiments import honesty
 from scripts.experiments.kidnap import AFTER_S, kidnapped, scans_after, targets
+from scripts.experiments.pushes import BACK_DEG, BACK_M, KINDS, push
 from scripts.integrity.counting import Moments, binned, stretches
 from scripts.integrity.plane import frames
 from scripts.integrity.ways import EACH, WAYS, Case
 from scripts.metrics.judged import Judged, world_truth
+from scripts.result_files import write
 from slam import se2
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Float, Frame, Stream
 from slam.logs import open_log
 from slam.replay import Track
@@ -33,49 +34,62 @@ Row = dict[str, Any]
 
 @dataclass(eq=False)
 class Tally:
-    """What a case comes to: the drive itself, and each loss."""
+    """What a case comes to: the drive itself, each loss, and why it ended before its end."""
 
     drive: Row = field(default_factory=dict)
     losses: list[Row] = field(default_factory=list)
     failed: str = ""
 
-    def row(self) -> Row:
-        """As written to a file."""
-        return {"drive": self.drive, "losses": self.losses, "failed": self.failed}
+
+def settle(path: Path, *, case: Row, config: Row) -> None:
+    """Write what a case comes to. ``config`` is that of its SLAM: part of what made the file."""
+    write(path, {"case": case, "config": config, **run(Case(**case))}, {})
 
 
 def run(case: Case) -> Row:
     """Raises ``InvalidValueError`` for a SLAM to which this cannot be done."""
-    system = create(case.slam)
+    system, tally = create(case.slam), Tally()
     refuse_at_the_end(system, case.slam, "a loss")
-    event = WAYS[case.way].event
-    if event == "log":
-        return _in_log(case, system).row()
-    return {"": _stream, "kidnap": _carried, "push": _pushed}[event](case, system).row()
+    event = {"": _streamed, "kidnap": _carried, "push": _pushed, "log": _in_log}
+    try:
+        event[WAYS[case.way].event](tally, case, system)
+    except SlamFailedError as error:
+        tally.failed = str(error)
+    return asdict(tally)
 
 
-def _stream(case: Case, system: SlamSystem) -> Tally:
+def _streamed(tally: Tally, case: Case, system: SlamSystem) -> None:
     """The whole stream is the loss."""
-    stream, track = frames(case.spec), Track(case.slam, system)
-    error = track.survive(stream)
-    if error is not None:
-        return Tally(failed=str(error))
-    drive, run_ = _drive(track, stream)
-    return Tally(drive, [{"event": ""} | _loss(run_, trusted_before=True)])
+    stream = frames(case.spec)
+    tally.drive, run_ = _drive(_survived(Track(case.slam, system), stream), stream)
+    tally.losses.append({"event": ""} | _loss(run_, trusted_before=True))
 
 
-def _carried(case: Case, system: SlamSystem) -> Tally:
+def _carried(tally: Tally, case: Case, system: SlamSystem) -> None:
     """Kidnaps to where it stands at moments of another tour through the same building."""
     mapped, later = frames(case.spec), frames(replace(case.spec, again=1))
-    track = Track(case.slam, system)
-    error = track.survive(mapped)
-    if error is not None:
-        return Tally(failed=str(error))
-    drive, run_ = _drive(track, mapped)
-    tally = Tally(drive)
+    track = _survived(Track(case.slam, system), mapped)
+    tally.drive, run_ = _drive(track, mapped)
     if run_.right()[-1]:
         _kidnap(tally, track, mapped, later)
-    return tally
+
+
+def _in_log(tally: Tally, case: Case, system: SlamSystem) -> None:
+    """Kidnaps in a log: the places where the first pass saw it count as the true ones."""
+    rng = np.random.default_rng([case.first_seed, case.number])
+    log = open_log(Path(case.log))
+    if isinstance(log, Stream) and not log.metadata.odometry:
+        raise InvalidValueError(f"{case.log} has no odometry, which a carried robot must have")
+    stream = [frame for frame in log if frame.scan is not None]
+    stream = stream[: max(round(rng.uniform(*LOG_SHARES) * len(stream)), 2)]
+    track = _survived(Track(case.slam, system), stream)
+    places = [estimate.T_map_robot for estimate in track.estimates]
+    if isinstance(system, MovingMap):
+        places = list(system.poses_in_map())
+    places[0] = np.zeros(3)  # the first pose is the map's frame, in which the others are told
+    mapped = [replace(frame, truth=place) for frame, place in zip(stream, places, strict=True)]
+    tally.drive = _spent(track, STEADY)
+    _kidnap(tally, track, mapped, mapped)
 
 
 def _kidnap(tally: Tally, track: Track, mapped: list[Frame], later: list[Frame]) -> None:
@@ -85,15 +99,12 @@ def _kidnap(tally: Tally, track: Track, mapped: list[Frame], later: list[Frame])
         after = list(kidnapped(mapped, later, start, scans))
         moved = se2.between(_truth(mapped[-1]), _truth(after[0]))
         then = _followed(track, len(mapped), after, np.zeros(3))
-        if isinstance(then, str):
-            tally.failed = then
-            return
         run_ = _moments(then, [*mapped, *after]).since(len(mapped))
         loss = {"event": "kidnap", "moved_m": math.hypot(*moved[:2].tolist())}
         tally.losses.append(loss | _event(run_, run_) | _spent(then, len(mapped)))
 
 
-def _pushed(case: Case, system: SlamSystem) -> Tally:
+def _pushed(tally: Tally, case: Case, system: SlamSystem) -> None:
     """Pushes at drawn moments, of each kind in turn."""
     if not hasattr(system, "displace"):
         raise InvalidValueError(f"SLAM '{case.slam}' cannot be pushed: it has no displace()")
@@ -105,49 +116,21 @@ def _pushed(case: Case, system: SlamSystem) -> Tally:
     for k, frame in enumerate(stream):
         if k in moments:
             kept[k] = copy.deepcopy(track)
-        error = track.survive([frame])
-        if error is not None:
-            return Tally(failed=str(error))
-    drive, run_ = _drive(track, stream)
-    tally, right = Tally(drive), run_.right()
-    scans = round(AFTER_S * case.spec.settings.rate_hz)
+        _survived(track, [frame])
+    tally.drive, run_ = _drive(track, stream)
+    right, scans = run_.right(), round(AFTER_S * case.spec.settings.rate_hz)
     for k, before in kept.items():
-        kind = honesty.KINDS[moments[k] % len(honesty.KINDS)]
-        by, end = honesty.push(kind, rng), k + scans
+        kind = KINDS[moments[k] % len(KINDS)]
+        by, end = push(kind, rng), k + scans
         then = _followed(before, k, stream[k:end], by)
-        if isinstance(then, str):
-            return replace(tally, failed=then)
         if right[k - 1]:
             unpushed = [
                 replace(frame, truth=estimate.T_map_robot)
                 for frame, estimate in zip(stream[:end], track.estimates, strict=False)
             ]
             run_, beside = (_moments(then, truth).since(k) for truth in (stream[:end], unpushed))
-            loss = _event(run_, beside, honesty.BACK_M, math.radians(honesty.BACK_DEG))
+            loss = _event(run_, beside, BACK_M, math.radians(BACK_DEG))
             tally.losses.append({"event": f"push {kind}"} | loss | _spent(then, k))
-    return tally
-
-
-def _in_log(case: Case, system: SlamSystem) -> Tally:
-    """Kidnaps in a log: the places where the first pass saw it count as the true ones."""
-    rng = np.random.default_rng([case.first_seed, case.number])
-    log = open_log(Path(case.log))
-    if isinstance(log, Stream) and not log.metadata.odometry:
-        raise InvalidValueError(f"{case.log} has no odometry, which a carried robot must have")
-    stream = [frame for frame in log if frame.scan is not None]
-    stream = stream[: max(round(rng.uniform(*LOG_SHARES) * len(stream)), 2)]
-    track = Track(case.slam, system)
-    error = track.survive(stream)
-    if error is not None:
-        return Tally(failed=str(error))
-    places = [estimate.T_map_robot for estimate in track.estimates]
-    if isinstance(system, MovingMap):
-        places = list(system.poses_in_map())
-    places[0] = np.zeros(3)  # the first pose is the map's frame, in which the others are told
-    mapped = [replace(frame, truth=place) for frame, place in zip(stream, places, strict=True)]
-    tally = Tally(_spent(track, STEADY))
-    _kidnap(tally, track, mapped, mapped)
-    return tally
 
 
 def _truth(frame: Frame) -> Float:
@@ -155,17 +138,20 @@ def _truth(frame: Frame) -> Float:
     return frame.truth
 
 
-def _followed(track: Track, k: int, after: Sequence[Frame], by: Float) -> Track | str:
-    """A copy of ``track`` up to scan ``k``, displaced by ``by``, that saw ``after`` too.
+def _survived(track: Track, stream: Sequence[Frame]) -> Track:
+    """``track``, which has seen ``stream`` too; ``SlamFailedError`` where it fails."""
+    error = track.survive(stream)
+    if error is not None:
+        raise error
+    return track
 
-    Why it failed, where it did.
-    """
+
+def _followed(track: Track, k: int, after: Sequence[Frame], by: Float) -> Track:
+    """A copy of ``track`` up to scan ``k``, displaced by ``by``, that saw ``after`` too."""
     system = copy.deepcopy(track.system)
     if by.any():
         system.displace(by)  # type: ignore[attr-defined]
-    then = Track(track.name, system, track.estimates[:k], track.durations_s[:k])
-    error = then.survive(after)
-    return then if error is None else str(error)
+    return _survived(Track(track.name, system, track.estimates[:k], track.durations_s[:k]), after)
 
 
 def _moments(track: Track, stream: Sequence[Frame]) -> Moments:

@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,16 +27,40 @@ from scripts.integrity.labelled import WRONG_RAD, off
 from scripts.integrity.plane import StreamSpec, frames
 from scripts.integrity.ways import DECIDABLE, EACH, MAPPED_S, WAYS
 from slam import se2
+from slam.evaluation.statistics import central_interval
 from slam.frames import Float, Frame
 from slam.shunting import ShuntingSlam
 
 TESTED = ("boards", "herd", "crowd", "outdated", "kidnap", "kidnap-crowd", "kidnap-moved")
 EDGES = (0.0, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0)
-RESAMPLED, SURE = 1000, 0.95
+RESAMPLED = 1000
 FEW = 100  # scans or hypotheses: a bin with fewer says little
 TITLES = {"scans": "the pose", "hypotheses": "hypotheses"}
+MOTION, NEARBY, ELSEWHERE, UNKNOWN = range(4)
 Said = list[tuple[float, bool]]
 """What is believed at which probability, and whether it is right."""
+
+
+class Hypothesis(NamedTuple):
+    """``what`` of ``MOTION`` to ``UNKNOWN``, at ``p``; its pose, where it has one."""
+
+    what: int
+    p: float
+    T_map_robot: Float | None = None
+
+
+def believed(slam: ShuntingSlam) -> list[Hypothesis]:
+    """All hypotheses at the latest scan; nothing while there is but one."""
+    belief = slam._belief
+    episode = belief._episode
+    if episode is None:
+        return []
+    found = []
+    for place, p in zip(episode.places.followed, belief._weighed.places, strict=True):
+        what = NEARBY if place.prior > episode.carried_there else ELSEWHERE
+        found.append(Hypothesis(what, p, place.match.T_map_robot))
+    motion = Hypothesis(MOTION, belief._weighed.followed, episode.match.T_map_robot)
+    return [motion, *found, Hypothesis(UNKNOWN, belief._weighed.unknown)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,38 +125,33 @@ def _follow(slam: ShuntingSlam, stream: Iterable[Frame], start: Float, out: Test
     """The last error, m."""
     error = math.inf
     for frame in stream:
-        pose, p_lost = _updated(slam, frame)
+        estimate = slam.update(frame.without_truth())
         assert frame.truth is not None
         truth = se2.between(start, frame.truth)
-        error, _ = off(pose, truth)
-        out.scans.append((1.0 - p_lost, error < ALERT_M))
+        error, _ = off(estimate.T_map_robot, truth)
+        out.scans.append((1.0 - float(estimate.diagnostics["p_lost"]), error < ALERT_M))
         out.hypotheses.extend(weighed(slam, truth))
     return error
 
 
-def _updated(slam: ShuntingSlam, frame: Frame) -> tuple[Float, float]:
-    estimate = slam.update(frame.without_truth())
-    return estimate.T_map_robot, float(estimate.diagnostics["p_lost"])
-
-
 def weighed(slam: ShuntingSlam, truth: Float) -> Said:
     """What the belief makes of each hypothesis at the latest scan; nothing while it has but one."""
-    belief = slam._belief
-    episode = belief._episode
-    if episode is None:
-        return []
-    shares = belief._weighed
-    group, said = shares.followed, []
-    for place, p in zip(episode.places.followed, shares.places, strict=True):
-        if place.prior > episode.carried_there:
-            group += p
+    group, where, said, unknown = 0.0, None, [], 0.0
+    for what, p, pose in believed(slam):
+        if what == ELSEWHERE:
+            said.append((p, _is_there(pose, truth)))
+        elif what == UNKNOWN:
+            unknown = p
         else:
-            said.append((p, _is_there(place.match.T_map_robot, truth)))
-    said.append((group, _is_there(episode.match.T_map_robot, truth)))
-    return [*said, (shares.unknown, not any(right for _, right in said))]
+            group, where = group + p, pose if what == MOTION else where
+    if where is None:
+        return []
+    said.append((group, _is_there(where, truth)))
+    return [*said, (unknown, not any(right for _, right in said))]
 
 
-def _is_there(pose: Float, truth: Float) -> bool:
+def _is_there(pose: Float | None, truth: Float) -> bool:
+    assert pose is not None
     m, rad = off(pose, truth)
     return m < ALERT_M and rad < WRONG_RAD
 
@@ -141,8 +161,7 @@ def curve(streams: Sequence[Said], edges: Sequence[float] = EDGES) -> list[Bin]:
     count = len(edges) - 1
     sums = np.zeros((len(streams), 3, count))  # n, p, right
     for k, said in enumerate(streams):
-        p = np.array([one for one, _ in said], dtype=np.float64)
-        right = np.array([is_ for _, is_ in said], dtype=np.float64)
+        p, right = np.array(said, dtype=np.float64).reshape(-1, 2).T
         at = np.clip(np.searchsorted(edges, p, side="right") - 1, 0, count - 1)
         for row, weights in enumerate((np.ones_like(p), p, right)):
             sums[k, row] = np.bincount(at, weights, count)
@@ -153,8 +172,7 @@ def curve(streams: Sequence[Said], edges: Sequence[float] = EDGES) -> list[Bin]:
     bins = []
     for k in np.flatnonzero(total[0]).tolist():
         some = again[again[:, 0, k] > 0.0]
-        shares = some[:, 2, k] / some[:, 0, k]
-        low, high = np.quantile(shares, [0.5 - SURE / 2.0, 0.5 + SURE / 2.0]).tolist()
+        low, high = central_interval((some[:, 2, k] / some[:, 0, k]).tolist())
         n, p, right = total[:, k].tolist()
         bins.append(
             Bin(low=edges[k], high=edges[k + 1], n=round(n), mean=p / n, right=right / n,
@@ -208,10 +226,9 @@ def picture(curves: dict[str, list[Bin]], path: Path) -> None:
 
 def _panel(ax: Axes, bins: Sequence[Bin]) -> None:
     at = np.arange(len(bins))
-    right = np.array([one.right for one in bins])
     ends = np.array([one.ends for one in bins])
     ax.vlines(at, ends[:, 0], ends[:, 1], color=COLORS["shunting"], lw=4, alpha=0.35, label="95 %")
-    ax.plot(at, right, "o", color=COLORS["shunting"], label="share right")
+    ax.plot(at, [one.right for one in bins], "o", color=COLORS["shunting"], label="share right")
     means = [one.mean for one in bins]
     ax.hlines(means, at - 0.35, at + 0.35, color=COLORS["truth"], lw=2, label="mean p believed")
     for k, one in enumerate(bins):

@@ -3,23 +3,21 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
+from typing import Any
 
-from scripts import workers
 from scripts.comparison.recording import load
-from scripts.experiments.recorded import make_missing
-from scripts.experiments.verdict_tracks import Stream
-from scripts.integrity import labelled as labelling
+from scripts.experiments.recorded import Stream, make_missing
+from scripts.integrity.campaign import PLANE
 from scripts.integrity.labelled import Labelled, labelled
 from scripts.integrity.plane import KINDS, StreamSpec, frames
-from scripts.integrity.settling import code
 from scripts.integrity.ways import DECIDABLE
-from slam.files import make_folder, write_text
+from scripts.jobs import Job, run_jobs
+from scripts.result_files import ROOT
+from slam.files import write_text
 from slam.frames import Frame
 from slam.logs import open_log
 from slam.shunting import ShuntingSlam
@@ -32,6 +30,10 @@ PLANES = ("chairs16", "pass6", "crowd6", "moved30", "wide270", "poor")
 LEVEL = 1.0  # of the tracks
 SECONDS = 150.0  # of a stream of the plane
 MOST_SCANS = 2000  # of a log
+CODE = (
+    ROOT / "slam", *PLANE, ROOT / "scripts" / "integrity" / "labelled.py",
+    ROOT / "scripts" / "experiments" / "kidnap.py",
+)  # fmt: skip
 Source = Stream | StreamSpec | Path
 """A track, a stream of the plane, or the log of a real robot."""
 
@@ -65,12 +67,10 @@ def frames_of(source: Source, folder: Path) -> Sequence[Frame]:
 
 def sources(names: Sequence[str], seeds: Sequence[int]) -> list[Source]:
     """The training streams of these tracks and kinds of the plane."""
-    tracks = [name for name in TRACKS if name in names]
-    planes = [name for name in PLANES if name in names]
     out: list[Source] = []
     for seed in seeds:
-        out += [Stream(track=track, level=LEVEL, seed=seed) for track in tracks]
-        out += [_plane(kind, seed) for kind in planes]
+        out += [Stream(track=one, level=LEVEL, seed=seed) for one in TRACKS if one in names]
+        out += [_plane(kind, seed) for kind in PLANES if kind in names]
     return out
 
 
@@ -94,37 +94,36 @@ def with_others(all_: Sequence[Source]) -> list[tuple[Source, Source]]:
 def collected(all_: Sequence[Source], folder: Path, jobs: int) -> list[Labelled]:
     """The labelled scans of all, in order; those of the same code are kept in ``folder``."""
     make_missing([one for one in all_ if isinstance(one, Stream)], folder, jobs)
-    make_folder(folder)
-    pairs = with_others(all_)
-    missing = [pair for pair in pairs if _kept(pair, folder) is None]
-    for one in workers.each(partial(_collect, folder=folder), missing, jobs=jobs):
-        print(f"labelled {name_of(one)}", flush=True)
-    kept = [_kept(pair, folder) for pair in pairs]
-    return [one for one in kept if one is not None]
+    wanted = [
+        Job(
+            name=name_of(own),
+            call=label,
+            arguments={"own": _told(own), "other": _told(other), "folder": str(folder)},
+            suffix=".json",
+            code=(*CODE, *(one for one in (own, other) if isinstance(one, Path))),
+        )
+        for own, other in with_others(all_)
+    ]
+    files = run_jobs(wanted, folder, processes=jobs, title="labelling scans")
+    return [Labelled(**json.loads(files[one.name].read_text())) for one in wanted]
 
 
-def _collect(pair: tuple[Source, Source], folder: Path) -> Source:
-    own, other = (frames_of(source, folder) for source in pair)
-    row = {"digest": _digest(pair), **asdict(labelled(name_of(pair[0]), own, other))}
-    write_text(_path(pair, folder), json.dumps(row) + "\n")
-    return pair[0]
+def label(path: Path, *, own: dict[str, Any], other: dict[str, Any], folder: str) -> None:
+    """Write the labelled scans of a source; ``other`` gives the scans with no place."""
+    one = _source(own)
+    streams = [frames_of(source, Path(folder)) for source in (one, _source(other))]
+    write_text(path, json.dumps(asdict(labelled(name_of(one), *streams))) + "\n")
 
 
-def _kept(pair: tuple[Source, Source], folder: Path) -> Labelled | None:
-    try:
-        row = json.loads(_path(pair, folder).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    if not isinstance(row, dict) or row.pop("digest", "") != _digest(pair):
-        return None
-    return Labelled(**row)
+def _told(source: Source) -> dict[str, Any]:
+    """As JSON has it: ``_source`` makes it again."""
+    if isinstance(source, Path):
+        return {"log": str(source)}
+    return {"track" if isinstance(source, Stream) else "plane": asdict(source)}
 
 
-def _path(pair: tuple[Source, Source], folder: Path) -> Path:
-    return folder / f"{name_of(pair[0])}.json"
-
-
-def _digest(pair: tuple[Source, Source]) -> str:
-    own = Path(labelling.__file__).read_bytes()
-    words = [code(), hashlib.sha256(own).hexdigest(), *(repr(one) for one in pair)]
-    return hashlib.sha256(json.dumps(words).encode()).hexdigest()
+def _source(told: dict[str, Any]) -> Source:
+    ((what, of),) = told.items()
+    if what == "log":
+        return Path(of)
+    return Stream(**of) if what == "track" else StreamSpec(**of)

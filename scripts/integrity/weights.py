@@ -18,16 +18,17 @@ from numpy.typing import NDArray
 
 from scripts.integrity.labelled import Labelled
 from slam.errors import InvalidValueError
+from slam.evaluation.statistics import central_interval
 from slam.frames import Float
 from slam.tracker.belief.config import BeliefConfig
 
 JOINT = ("confirmed", "confirmed_m", "through_per_m", "outdated", "changed_per_m", "place")
-FREE = ("confirmed_share", "linear_m")  # may be fitted with them
+FIXED = ("confirmed_share", "linear_m")  # of the evidence, too; set by hand
 ALONE = ("nearby_per_m", "searched", "broken")
 SCANS = 500.0  # that all labels together count, against the prior of ``SPREAD``
 SPREAD = 3.0  # deviation of the logarithm of a weight about its start: keeps what no scan tells
 LOW, HIGH = 1e-3, 1e3  # of a weight
-RESAMPLED, SURE = 100, 0.95
+RESAMPLED = 100
 STARTS = (1.0, 0.5, 2.0)  # times the first
 Values = dict[str, float]
 
@@ -51,12 +52,11 @@ class Places:
     def of(cls, scans: Sequence[tuple[int, Sequence[tuple[float, float, bool]]]]) -> Places:
         """Of (stream, places) of each scan."""
         width = max((len(places) for _, places in scans), default=0)
-        table = np.zeros((3, len(scans), width))
-        there = np.zeros((len(scans), width), dtype=np.bool_)
-        for n, (_, places) in enumerate(scans):
-            table[:, n, : len(places)] = np.array(places, dtype=np.float64).reshape(-1, 3).T
-            there[n, : len(places)] = True
-        known, through, right = table
+        table = np.full((len(scans), width, 3), np.nan)
+        for row, (_, places) in zip(table, scans, strict=True):
+            row[: len(places)] = np.array(places, dtype=np.float64).reshape(-1, 3)
+        there = ~np.isnan(table[..., 0])
+        known, through, right = np.moveaxis(np.nan_to_num(table), 2, 0)
         streams = np.array([stream for stream, _ in scans], dtype=np.int64)
         return cls(known, through, there, right > 0.5, streams)
 
@@ -93,11 +93,12 @@ def evidence(values: Values, known: Float, through: Float) -> Float:
     chance = values["confirmed_m"] + values["confirmed_share"] * through
     one_view = np.minimum(known, values["linear_m"])
     more = np.log1p(one_view / chance) + (known - one_view) / (chance + one_view)
-    denied = values["through_per_m"] * through
     beyond = through - values["outdated"] / values["through_per_m"]
     denied = np.where(
-        beyond > 0.0, values["outdated"] + values["changed_per_m"] * beyond, denied
-    )  # fmt: skip
+        beyond > 0.0,
+        values["outdated"] + values["changed_per_m"] * beyond,
+        values["through_per_m"] * through,
+    )
     return np.asarray(values["confirmed"] * more - denied)
 
 
@@ -123,30 +124,35 @@ def _mean(values: Float, weights: Float) -> float:
 
 
 def fit(
-    scans: Scans, start: Values, free: Sequence[str] = JOINT, counts: Float | None = None,
-    tries: Sequence[float] = STARTS,
-) -> Values:  # fmt: skip
-    """The likeliest values of the settings ``free``; the others stay as in ``start``.
+    scans: Scans, start: Values, counts: Float | None = None, tries: Sequence[float] = STARTS
+) -> Values:
+    """The likeliest values of the settings ``JOINT``; the others stay as in ``start``.
 
     counts  (streams,) how often each stream counts; once where there are none
     tries   begin at so many times ``start``
     """
     often = np.ones(scans.streams) if counts is None else counts
-    centre = np.log([start[name] for name in free])
+    first = np.array([start[name] for name in JOINT])
 
     def values(logs: Float) -> Values:
-        return start | dict(zip(free, np.exp(logs).tolist(), strict=True))
+        return start | dict(zip(JOINT, np.exp(logs).tolist(), strict=True))
 
-    def loss(logs: Float) -> float:
-        shy = 0.5 * float((((logs - centre) / SPREAD) ** 2).sum())
-        return shy - SCANS * likelihood(values(logs), scans, often)
+    return values(_least(lambda logs: -likelihood(values(logs), scans, often), first, tries))
 
-    bounds = [(math.log(LOW), math.log(HIGH))] * len(free)
+
+def _least(loss: Callable[[Float], float], start: Float, tries: Sequence[float]) -> Float:
+    """Logarithms of weights at the least mean loss, with the prior of ``SPREAD``."""
+    centre = np.log(start)
+
+    def shy(logs: Float) -> float:
+        return 0.5 * float((((logs - centre) / SPREAD) ** 2).sum()) + SCANS * loss(logs)
+
+    bounds = [(math.log(LOW), math.log(HIGH))] * len(start)
     ends = [
-        scipy.optimize.minimize(loss, centre + math.log(k), method="L-BFGS-B", bounds=bounds)
+        scipy.optimize.minimize(shy, centre + math.log(k), method="L-BFGS-B", bounds=bounds)
         for k in tries
     ]
-    return values(min(ends, key=lambda end: float(end.fun)).x)
+    return np.asarray(min(ends, key=lambda end: float(end.fun)).x)
 
 
 def nearby(slips: Sequence[tuple[float, float, bool]], start: float) -> float:
@@ -160,17 +166,14 @@ def nearby(slips: Sequence[tuple[float, float, bool]], start: float) -> float:
         return start
     weights = np.where(right, 0.5 / right.sum(), 0.5 / (~right).sum())
 
-    def loss(log: Float) -> float:
-        nats = math.exp(float(log[0])) * gains + priors
-        said = (weights * np.logaddexp(0.0, np.where(right, -nats, nats))).sum()
-        return 2.0 * SCANS * float(said) + 0.5 * float((log[0] - math.log(start)) / SPREAD) ** 2
+    def loss(logs: Float) -> float:
+        nats = math.exp(float(logs[0])) * gains + priors
+        return 2.0 * float((weights * np.logaddexp(0.0, np.where(right, -nats, nats))).sum())
 
-    bounds = [(math.log(LOW), math.log(HIGH))]
-    end = scipy.optimize.minimize(loss, [math.log(start)], method="L-BFGS-B", bounds=bounds)
-    return math.exp(float(end.x[0]))
+    return math.exp(float(_least(loss, np.array([start]), (1.0,))[0]))
 
 
-def log_odds(hits: int, n: int) -> float:
+def _log_odds(hits: int, n: int) -> float:
     """Of a share, half a hit and half a miss beside (Jeffreys)."""
     return math.log((hits + 0.5) / (n - hits + 0.5))
 
@@ -182,44 +185,23 @@ def alone(many: Sequence[Labelled], start: BeliefConfig) -> Values:
     gone = sum(share < start.breaks for share in going)
     return {
         "nearby_per_m": nearby([slip for one in many for slip in one.slips], start.nearby_per_m),
-        "searched": log_odds(sum(reached), len(reached)),
+        "searched": _log_odds(sum(reached), len(reached)),
         "broken": -math.log((gone + 0.5) / (len(going) + 1.0)),
     }
 
 
-def quantiles(shares: Sequence[float], at: Sequence[float]) -> list[float]:
-    """Of what goes on; NaN of nothing."""
-    return np.quantile(shares, at).tolist() if len(shares) else [math.nan] * len(at)
-
-
-def intervals(
-    make: Callable[[NDArray[np.int64]], Values], streams: int, resampled: int = RESAMPLED
-) -> dict[str, tuple[float, float]]:
-    """Of what ``make`` makes of streams (n,) drawn with replacement."""
-    rng, drawn = np.random.default_rng(0), []
-    for _ in range(resampled):
-        drawn.append(make(rng.integers(streams, size=streams)))
-    out = {}
-    for name in drawn[0] if drawn else ():
-        values = [values[name] for values in drawn]
-        low, high = np.quantile(values, [0.5 - SURE / 2.0, 0.5 + SURE / 2.0]).tolist()
-        out[name] = (low, high)
-    return out
-
-
 def fitted(
-    many: Sequence[Labelled], start: BeliefConfig, free: Sequence[str] = JOINT,
-    resampled: int = RESAMPLED,
-) -> dict[str, tuple[float, float, float]]:  # fmt: skip
+    many: Sequence[Labelled], start: BeliefConfig, resampled: int = RESAMPLED
+) -> dict[str, tuple[float, float, float]]:
     """Value and interval of every setting that is fitted, by its name."""
-    scans, first = Scans.of(many), {name: float(getattr(start, name)) for name in JOINT + FREE}
-    best = fit(scans, first, free)
-
-    def again(streams: NDArray[np.int64]) -> Values:
+    scans, first = Scans.of(many), {name: float(getattr(start, name)) for name in JOINT + FIXED}
+    best, rng, again = fit(scans, first), np.random.default_rng(0), []
+    for _ in range(resampled):
+        streams = rng.integers(len(many), size=len(many))
         counts = np.bincount(streams, minlength=len(many)).astype(np.float64)
-        joint = fit(scans, best, free, counts, tries=(1.0,))
-        return {n: joint[n] for n in free} | alone([many[k] for k in streams], start)
-
-    values = {name: best[name] for name in free} | alone(many, start)
-    ends = intervals(again, len(many), resampled)
-    return {name: (value, *ends.get(name, (math.nan, math.nan))) for name, value in values.items()}
+        again.append(fit(scans, best, counts, (1.0,)) | alone([many[k] for k in streams], start))
+    values = {name: best[name] for name in JOINT} | alone(many, start)
+    return {
+        name: (value, *central_interval([one[name] for one in again]))
+        for name, value in values.items()
+    }

@@ -11,9 +11,8 @@ from sim.driving.pilot import Pilot
 from sim.moments import Moment, observed
 from sim.simulation import Simulation, n_frames
 from sim.world import hands
-from slam import se2
 from slam.errors import InvalidValueError
-from slam.frames import NS_PER_S, Float
+from slam.frames import NS_PER_S
 
 HOLD_NS = NS_PER_S  # a twist holds so long, then the robot stands: its sender may be gone
 REACH_M = 1.0  # of a click: what is farther from it was not meant
@@ -23,13 +22,11 @@ class Hands:
     """Carries out requests on a simulation's world and steers its robot.
 
     client_drives  whether a client does, from its first twist until it gives the robot back
-    T_world_map    (3,) of the map, for places given in it; known after the first frame
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self.simulation = simulation
         self.client_drives = False
-        self.T_world_map: Float | None = None
         self._twist, self._asked_ns = Drive(v=0.0, omega=0.0), -HOLD_NS
 
     def moments(self, seconds: float) -> Iterator[Moment]:
@@ -88,12 +85,14 @@ class Hands:
 
     def _touch(self, request: Touch) -> str:
         world = self.simulation.world
-        x, y, _ = self._in_world((request.x, request.y, 0.0), request.frame)
         doors, things = world.doors.names, hands.pushable(world)
-        name, apart = hands.nearest(world, [*things, *doors], x, y)
+        name, apart = request.name, 0.0
+        if name not in (*doors, *things):
+            name, apart = hands.nearest(world, [*things, *doors], request.x, request.y)
         if apart > REACH_M:
             raise InvalidValueError(
-                f"nothing to push or to open within {REACH_M:g} m of ({x:.2f}, {y:.2f})"
+                f"nothing to push or to open within {REACH_M:g} m of "
+                f"({request.x:.2f}, {request.y:.2f})"
             )
         if name in doors:
             return self._door(MoveDoor(opened=True, name=name))
@@ -101,17 +100,6 @@ class Hands:
 
     def _kidnap(self, request: Kidnap) -> str:
         world = self.simulation.world
-        if request.pose is None:
-            pose = hands.free_goal(world, request.goal)
-        else:
-            pose = self._in_world(request.pose, request.frame)
+        pose = request.pose or hands.free_goal(world, request.goal)
         hands.carry(world, pose)
         return f"the robot is carried to ({pose[0]:.2f}, {pose[1]:.2f})"
-
-    def _in_world(self, pose: tuple[float, float, float], frame: str) -> tuple[float, float, float]:
-        if frame in ("", "world"):
-            return pose
-        if frame != "map" or self.T_world_map is None:
-            raise InvalidValueError(f"places must be in 'world' or 'map', got '{frame:.40}'")
-        x, y, yaw = se2.compose(self.T_world_map, list(pose)).tolist()
-        return x, y, yaw

@@ -4,44 +4,53 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from scripts.film.footage import of_log
+from scripts.film.footage import KNOBS, of_log, of_simulation, title_of
 from scripts.live.hands import Hands
-from scripts.live.session import Room, Session, stamps_of
-from sim.simulation import Simulation, n_frames
-from slam.errors import NeedsLabelsError
-from slam.frames import Stream
-from slam.oracle import Oracle
-from slam.replay import Replay, systems_named
-
-Opened = tuple[Session, tuple[int, int]]
-"""A session, and first and last stamp of its time line, ns."""
+from scripts.live.requests import Anew
+from scripts.live.session import Session
+from sim.simulation import Simulation
 
 
-def of_scene(slams: Sequence[str], settings: Mapping[str, Any], seconds: float) -> Opened:
-    """A world that lives for ``seconds``; ``settings`` as ``Simulation`` takes them."""
-    simulation = Simulation(**settings, labels=True)
-    room = Room(Hands(simulation))
-    stream = Stream(
-        metadata=simulation.metadata(),
-        frames=lambda: room.frames(seconds),
-        length=n_frames(seconds, simulation.scan_period_s),
-    )
-    return Session(stream, Replay.of(systems_named(slams)), room), stamps_of(0, seconds)
+@dataclass(frozen=True, kw_only=True)
+class Opener:
+    """Makes sessions, each from its start.
 
-
-def of_file(slams: Sequence[str], path: Path) -> Opened:
-    """A log or a bag.
-
-    Raises ``NeedsLabelsError`` for an oracle on one without labels, ``LogFormatError`` for a file
-    that cannot be read.
+    slams     by name, the first of them shown
+    path      of a log or a bag, None for a scene
+    settings  of the scene, as ``Simulation`` takes them;   seconds  that it lives
     """
-    footage = of_log(path)
-    replay = Replay.of(systems_named(slams))
-    for name, track in replay.tracks.items():
-        if isinstance(track.system, Oracle) and not footage.stage.labelled:
-            raise NeedsLabelsError(f"{name}: {footage.title} has no labels to take returns out by")
-    first = next(iter(footage.stream))
-    return Session(footage.stream, replay), stamps_of(first.stamp_ns, footage.duration_s)
+
+    slams: Sequence[str]
+    path: Path | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    def anew(self, request: Anew) -> Opener:
+        """The same with what a page has asked for."""
+        slams = [request.slam or self.slams[0], *self.slams[1:]]
+        asked = {k: getattr(request, k) for k in KNOBS if getattr(request, k) is not None}
+        settings = {**self.settings, **asked} if self.path is None else self.settings
+        return replace(self, slams=list(dict.fromkeys(slams)), settings=settings)
+
+    def open(self) -> Session:
+        """A session at its start.
+
+        Raises ``NeedsLabelsError`` for an oracle on a log without labels, ``LogFormatError`` for a
+        file that cannot be read.
+        """
+        hands = None
+        if self.path is None:
+            simulation = Simulation(**self.settings, labels=True)
+            hands = Hands(simulation)
+            moments = partial(hands.moments, self.seconds)
+            footage = of_simulation(
+                simulation, moments, seconds=self.seconds, title=title_of(self.settings), view=None
+            )
+        else:
+            footage = of_log(self.path)
+        return Session(footage, footage.show(self.slams).replay, hands)

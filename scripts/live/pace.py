@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 
 LATE_S = 0.25  # behind by more than that it goes on from here instead of running after
-SENT_HZ = 20.0  # moments sent a second at most
+SENT_HZ = 40.0  # moments sent a second at most
 
 
 class Pace:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from scripts.live import FASTEST, SLOWEST
 from scripts.live.requests import OnView, Run, Seek, Speed, Step
-from scripts.live.session import Shown
+from sim.view.moment import Shown
 from slam.errors import InvalidValueError, MobiliaError
 
 KEPT_S = 60.0  # of the run, to look back

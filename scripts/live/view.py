@@ -1,96 +1,102 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The loop of a live view: takes requests, makes moments at their pace and sends them."""
+"""The loop of a live view: takes requests, makes moments at their pace and draws them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from scripts import interrupt
-from scripts.live import server
-from scripts.live.gate import Gate, new_token
+from scripts.live.drawn import Drawn, look_at
 from scripts.live.inbox import MOST_WAITING, Inbox
+from scripts.live.opened import Opener
 from scripts.live.pace import Pace
+from scripts.live.page import CROWDS, Page
 from scripts.live.playback import Playback
-from scripts.live.publisher import Publisher
-from scripts.live.requests import Drive, OnView, OnWorld, Seek
-from scripts.live.sdk import Sdk
-from scripts.live.session import Said, Session, Shown
+from scripts.live.requests import (
+    Anew,
+    Click,
+    Drive,
+    Kidnap,
+    OnView,
+    OnWorld,
+    Request,
+    Seek,
+    Speed,
+    Touch,
+)
+from scripts.live.served import Served
+from sim.view.moment import Shown
 from slam.errors import InvalidValueError, MobiliaError
 
 IDLE_S = 0.05  # between two looks at the inbox while nothing moves
-REFUSED = "mobilia-refused"  # id of the status: a new one takes the place of the one before
 
 
 class View:
-    """A session served at an address; everything but the SDK's callbacks runs in one thread.
+    """A session as a page; everything but viser's callbacks runs in one thread.
 
-    session  what is served
-    port     where it listens, also where 0 was asked for
+    session  what is shown;   playback  which moment of it
     """
 
     def __init__(
-        self, sdk: Sdk, session: Session, playback: Playback,
-        address: tuple[str, int], shown_ns: tuple[int, int], origins: Sequence[str] = (),
+        self, opener: Opener, address: tuple[str, int], origins: Sequence[str] = (), *,
+        playing: bool = True, speed: float = 1.0,
     ) -> None:  # fmt: skip
-        self._sdk, self.session, self._playback = sdk, session, playback
-        self._inbox, self._pace = Inbox(), Pace()
-        self._publisher = Publisher(sdk, session)
-        listener = server.Listener(sdk, self._inbox, shown_ns[0])
-        listener.parameters = self._parameters
-        listener.state = self._state
-        self._first_ns = shown_ns[0]
-        self._server, behind = server.start(sdk, self._publisher, listener, self._inbox, shown_ns)
-        token = new_token(address[0])
-        try:
-            self._gate = Gate(address, behind, origins=origins, token=token)
-        except InvalidValueError:
-            self._server.stop()
-            raise
-        session.speed = playback.speed
+        self._opener, self._inbox, self._pace = opener, Inbox(), Pace()
+        self.session = opener.open()
+        self.served = Served(address, self.session.footage.title, origins)
+        settings = opener.settings
+        self._page = Page(
+            self.served.gui, self.served.scene, self._inbox,
+            {
+                "room": opener.path is None, "slam": opener.slams[0],
+                "crowd": settings.get("crowd", CROWDS[0]),
+                **{k: settings.get(k, settings.get("dynamism", 0.5)) for k in ("motion", "change")},
+            },
+        )  # fmt: skip
+        self._begin(playing=playing, speed=speed)
+        look_at(self.served.camera, self._drawn.bounds)
+
+    def _begin(self, *, playing: bool, speed: float) -> None:
+        """Show the session from its start."""
+        footage, scene = self.session.footage, self.served.scene
+        scene.reset()
+        scene.set_up_direction("+z")
+        self._drawn = Drawn(scene, self.session.moments, footage.stage.world)
+        self.playback = Playback(self.session.run(), playing=playing, speed=speed)
         self._due: Shown | None = None
         self._told_end = False
-
-    @property
-    def port(self) -> int:
-        """As above."""
-        return self._gate.port
-
-    @property
-    def token(self) -> str:
-        """What the address must hold, where others can reach it; else empty."""
-        return self._gate.rules.token
+        self._at(Speed(factor=speed))
 
     def close(self) -> None:
         """Stop listening."""
-        self._gate.close()
-        self._server.stop()
+        self.served.close()
 
     def turn(self) -> None:
-        """Once round: what clients ask for, then the next moment when it is due."""
+        """Once round: what pages ask for, then the next moment when it is due."""
         interrupt.check()
-        playback = self._playback
         for _ in range(MOST_WAITING):  # all that wait, lest twists grow old where scans are slow
             if not self._wait(0.0):
                 break
-        self._tell_refused()
+        self._tell()
+        playback = self.playback
         if self._due is None and not playback.resting:
             self._due = playback.advance()
-        self._tell_end()
         if self._due is None:
             self._wait(IDLE_S)
-            if self._publisher.asked and playback.shown is not None:
-                self._send(playback.shown)
             return
         shown = self._due
         if self._wait(self._wait_s(shown)) and (self._due is None or self._wait_s(shown) > 0.0):
             return  # it may have been done away with; a stream of requests does not hold it up
         self._due = None
-        if self._pace.to_send() or not playback.playing or self._publisher.asked or shown.said:
-            self._send(shown)
+        if self._pace.to_send() or not playback.playing or shown.said:
+            self._show(shown)
+
+    def _show(self, shown: Shown) -> None:
+        self._drawn.draw(shown)
+        self._page.show(shown, self.playback, self.session)
 
     def _wait_s(self, due: Shown) -> float:
-        playback = self._playback
+        playback = self.playback
         return self._pace.wait_s(due.seconds, playback.speed) if playback.playing else 0.0
 
     def _wait(self, seconds: float) -> bool:
@@ -99,77 +105,74 @@ class View:
         if asked is None:
             return False
         try:
-            request = asked.request
-            done = self._on_view(request) if isinstance(request, OnView) else self._touch(request)
+            done = self._do(asked.request)
         except MobiliaError as error:
             asked.answer.set_exception(error)
         else:
             asked.answer.set_result(done)
         return True
 
-    def _on_view(self, request: OnView) -> str:
-        playback, seeks = self._playback, isinstance(request, Seek)
-        done = playback.do(request)
-        self.session.speed = playback.speed
+    def _do(self, request: Request) -> str:
+        if isinstance(request, OnView):
+            return self._at(request)
+        if isinstance(request, Anew):
+            return self._anew(request)
+        return self._touch(self._hit(request) if isinstance(request, Click) else request)
+
+    def _at(self, request: OnView) -> str:
+        done = self.playback.do(request)
+        self.session.moments.every = self.playback.speed
         self._pace.restart()
-        if seeks:
+        if isinstance(request, Seek):
             self._due = None
-            if playback.shown is not None:
-                self._send(playback.shown)
-        self._server.broadcast_playback_state(self._state(None, seeks))
-        self._tell_parameters()
+        if self.playback.shown is not None:
+            self._show(self.playback.shown)
         return done
+
+    def _anew(self, request: Anew) -> str:
+        opener = self._opener.anew(request)
+        session = opener.open()  # before anything is given up: it may be refused
+        self._opener, self.session = opener, session
+        self._page.restart()
+        self._page.say(f"from the start: {session.footage.title} · {', '.join(opener.slams)}")
+        self._begin(playing=self.playback.playing, speed=self.playback.speed)
+        return "from the start"
+
+    def _hit(self, click: Click) -> OnWorld:
+        """What a click means: the part that its ray meets first, or the floor there."""
+        parts = self._drawn.parts
+        found = None if parts is None else parts.hit(click.origin, click.direction)
+        if found is None:
+            raise InvalidValueError("nothing is there")
+        name, (x, y, _) = found[0], found[1].tolist()
+        if click.carry:
+            return Kidnap(pose=(x, y, 0.0))
+        return Touch(x=x, y=y, name=name)
 
     def _touch(self, request: OnWorld) -> str:
         """Do something to the world, which stands between two scans."""
-        room, playback = self.session.room, self._playback
-        if room is None:
+        hands, playback = self.session.hands, self.playback
+        if hands is None:
             raise InvalidValueError("this is a log: nothing in it can be moved")
         if playback.ended:
             raise InvalidValueError("the run has ended: nothing moves any more")
         if playback.looks_back:
-            raise InvalidValueError("an earlier moment is shown: seek to the present first")
-        drove = room.hands.client_drives
-        done = room.hands.do(request)
-        if room.hands.client_drives != drove:
-            self._tell_parameters()
-        if room.hands.client_drives != drove or not isinstance(request, Drive):
-            self.session.pending.append(Said(text=f"client: {done}"))
+            raise InvalidValueError("an earlier moment is shown: go back to now first")
+        drove = hands.client_drives
+        done = hands.do(request)
+        if hands.client_drives != drove or not isinstance(request, Drive):
+            self._page.say(f"you: {done}")
+        if playback.shown is not None:
+            self._page.show(playback.shown, playback, self.session)
         return done
 
-    def _state(self, request_id: str | None, did_seek: bool) -> Any:
-        sdk, playback = self._sdk, self._playback
-        return server.playback_state(sdk, playback, self._first_ns, request_id, did_seek)
-
-    def _send(self, shown: Shown) -> None:
-        self._server.broadcast_time(shown.stamp_ns)
-        self._publisher.send(shown, self._playback)
-
-    def _parameters(self) -> dict[str, Any]:
-        room = self.session.room
-        found: dict[str, Any] = {"speed": self._playback.speed, "playing": self._playback.playing}
-        if room is not None:
-            found["driver"] = "client" if room.hands.client_drives else "tour"
-        return found
-
-    def _tell_parameters(self) -> None:
-        make = self._sdk.websocket.Parameter
-        values = [make(name, value=value) for name, value in self._parameters().items()]
-        self._server.publish_parameter_values(values)
-
-    def _tell_refused(self) -> None:
+    def _tell(self) -> None:
+        """What was refused, and that the run has ended."""
         said = self._inbox.refused()
         if said is not None:
-            levels = self._sdk.websocket.StatusLevel
-            self._server.publish_status(said, levels.Warning, REFUSED)
-
-    def _tell_end(self) -> None:
-        playback = self._playback
-        if not playback.ended or self._told_end:
-            return
-        self._told_end = True
-        levels = self._sdk.websocket.StatusLevel
-        why = playback.why or "the run has ended; its last minute can be looked at"
-        level = levels.Error if playback.why else levels.Info
-        self._server.publish_status(why[:300], level, "mobilia-end")
-        self._server.broadcast_playback_state(self._state(None, False))
+            self._page.say(said)
+        if self.playback.ended and not self._told_end:
+            self._told_end = True
+            self._page.say(
+                self.playback.why or "the run has ended; its last minute can be looked at"
+            )

@@ -18,7 +18,7 @@ from slam.replay import Track
 from slam.system import Estimate
 from slam.trajectory import Trajectory
 
-SILENT_M = 0.1  # m; a larger error that the SLAM denies is a silent failure
+SILENT_M = 0.1  # m; a larger error that the SLAM does not admit is a silent failure
 SILENT_SIGMAS = 3.0  # of its own covariance; an error within them is admitted
 DUE_S = 2.0  # s of such an error, after which the SLAM has to admit it
 SETTLED_S = 5.0  # NEES counts after this: before, the covariance is that of the known first pose
@@ -135,7 +135,7 @@ class Judged:
         if self.covariances is None:
             raise InvalidValueError("this metric needs a run with covariances")
         off, P = self.pairs.errors[:, :2], self.covariances[:, :2, :2]
-        # e' P^-1 e > 9 by the adjugate: true of a P that is singular and denies the error, too
+        # e' P^-1 e > 9 by the adjugate: true of a P that is singular and too small, too
         scaled = (
             P[:, 1, 1] * off[:, 0] ** 2
             - 2.0 * P[:, 0, 1] * off[:, 0] * off[:, 1]

@@ -20,7 +20,6 @@ from scripts.paper.census import Census, paired
 from scripts.paper.park_scores import over_graph
 from scripts.paper.runs import Run
 from slam import se2
-from slam.evaluation.metrics import fit_se2
 from slam.frames import Float
 from slam.logs.victoria_park import GpsTrack
 from slam.trajectory import Trajectory
@@ -68,7 +67,7 @@ class Surveyor:
                 rows, columns = paired(se2.transform(T, points), self.trunks, gate)
                 if len(rows) < FEWEST:
                     break
-                T = fit_se2(points[rows], self.trunks[columns])
+                T = se2.fit(points[rows], self.trunks[columns])
             pairs = len(paired(se2.transform(T, points), self.trunks, GATE_M)[0])
             if pairs > best.pairs:
                 best = Laid(T_graph_map=T, pairs=pairs)

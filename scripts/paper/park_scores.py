@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from scripts.paper.runs import statistics
 from slam import se2
-from slam.evaluation.metrics import fit_se2
 from slam.frames import Float
 from slam.logs.victoria_park import GpsTrack
 from slam.trajectory import Trajectory
@@ -49,17 +48,17 @@ def first_fit(track: Trajectory, gps: GpsTrack) -> Float:
     here = at_fixes(track, gps)
     steps = np.hypot(*np.diff(here, axis=0).T)
     first = good_fixes(gps) & (np.concatenate([[0.0], np.cumsum(steps)]) < FIRST_M)
-    return fit_se2(here[first], gps.points[first])
+    return se2.fit(here[first], gps.points[first])
 
 
 def shape_fit(track: Trajectory, gps: GpsTrack) -> Float:
     """T_gps_map from all good fixes, those beyond three times the median left out."""
     here, good = at_fixes(track, gps), good_fixes(gps)
-    T = fit_se2(here[good], gps.points[good])
+    T = se2.fit(here[good], gps.points[good])
     for _ in range(30):
         away = np.hypot(*(se2.transform(T, here) - gps.points).T)
         kept = good & (away < 3.0 * np.median(away[good]))
-        T = fit_se2(here[kept], gps.points[kept])
+        T = se2.fit(here[kept], gps.points[kept])
     return T
 
 

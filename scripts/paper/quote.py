@@ -3,8 +3,8 @@
 
 Between ``<!-- landmarks -->`` and ``<!-- /landmarks -->`` (and so on) the page of the folder that
 has these marks gets what the experiment's ``summary.md`` says. The figures become small PNGs in
-``../pictures/paper``. Between the marks of ``all`` stands what all took together. The text of an
-experiment that was not run stays.
+``../pictures/paper``, long tables become CSV files in ``../results``. Between the marks of ``all``
+stands what all took together. The text of an experiment that was not run stays.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from pathlib import Path
 
 from PIL import Image
 
-from scripts.marks import filled
+from scripts.marks import filled, with_tables_apart
 from scripts.paper import EXPERIMENTS
 from slam.errors import InvalidValueError
 from slam.files import write_bytes, write_text
 
-PICTURES = "../pictures/paper"
+PICTURES, RESULTS = "../pictures/paper", "../results"
 MOST_BYTES = 150_000
 _PICTURE = re.compile(r"\]\(([\w-]+\.png)\)")
 
 
 def quote(results: Path, folder: Path) -> list[str]:
-    """Fill in the pages of the folder; return the names of the experiments that they quote anew.
+    """Fill in the pages of the folder; return the names of the experiments that were filled in.
 
     Raises ``InvalidValueError`` where an experiment's marks do not stand once on just one page.
     """
@@ -42,6 +42,7 @@ def quote(results: Path, folder: Path) -> list[str]:
         found[name] = _PICTURE.findall(told)
         told = _PICTURE.sub(rf"]({PICTURES}/{name}-\1)", told)
         page = _page_of(name, texts, folder)
+        told = with_tables_apart(told, f"paper_{name}", folder / RESULTS, folder)
         texts[page] = filled(texts[page], name, told, page)
     for name, files in found.items():
         _take_pictures(results / name, files, folder / PICTURES, name)

@@ -3,23 +3,29 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
+import inspect
 import json
 import math
 import time
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import scenes
+import sim
+import slam
+from scripts.imports import with_imports
 from scripts.jobs import Job
 from scripts.metrics.judged import Judged, world_truth
 from scripts.metrics.table import METRICS
-from scripts.paper.depends import depends_on
 from slam import se2
 from slam.archives import read_arrays
 from slam.errors import InvalidValueError, LogFormatError
@@ -33,6 +39,16 @@ QUANTITIES = ("x", "y", "θ")
 FIRST_SEED = 200  # of the simulated runs: nothing was tuned or tested on it and those after it
 SEEDS, QUICK_SEEDS = 20, 1
 _CPU = "cpu_s"  # its name in a run's file
+_SCRIPTS = Path(__file__).parents[1]
+# Of what the runs' modules import: these make pages of runs, and no run depends on them.
+_PAGES = frozenset({
+    "comparison", "console", "figures", "imports", "interrupt", "jobs", "machine", "options",
+    "output", "report", "workers",
+})  # fmt: skip
+_PARK = frozenset({
+    "features_trees", "features_segments", "aa3_gpsx", "rfs_measurements", "rfs_inputs", "rfs_gps",
+    "graph_known_association",
+})  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,6 +121,31 @@ def job(name: str, call: Any, /, **arguments: Any) -> Job:
         arguments={"call": f"{call.__module__}:{call.__qualname__}", **arguments},
         code=depends_on(call, arguments),
     )
+
+
+def depends_on(call: Callable[..., None], arguments: Mapping[str, Any]) -> tuple[Path, ...]:
+    """Files and folders: the SLAMs, the module of ``call`` with the scripts that it imports; with
+    a ``scene`` the simulator and the rooms; with ``data`` the files of the dataset."""
+    packages = (slam, sim, scenes) if "scene" in arguments else (slam,)
+    folders = [Path(str(package.__file__)).parent for package in packages]
+    data = park_files(Path(arguments["data"])) if "data" in arguments else []
+    return (*folders, *_own(Path(inspect.getfile(call)), call.__module__), *data)
+
+
+@cache
+def _own(file: Path, module: str) -> tuple[Path, ...]:
+    imported = (path for path in with_imports(file, module) if _SCRIPTS in path.parents)
+    return tuple(sorted({file.resolve(), *(p for p in imported if p.stem not in _PAGES)}))
+
+
+def park_files(folder: Path) -> list[Path]:
+    """Those files of the folder that are of the Victoria Park dataset, sorted."""
+    return sorted(path for path in folder.iterdir() if path.name.partition(".")[0] in _PARK)
+
+
+def checksums(folder: Path) -> dict[str, str]:
+    """SHA-256 of each of ``park_files``."""
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in park_files(folder)}
 
 
 def timed(path: Path, *, call: str, **arguments: Any) -> None:

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from scripts.figures import styled
-from scripts.paper.comparison import paper_table
+from scripts.paper.comparison import TABLE_1, paper_table
 from scripts.paper.map_figures import active, legend_below, map_panels, window_about, window_over
-from scripts.paper.paper_numbers import TABLE_1
 from scripts.paper.park_landmarks import GATE_M, NEAR_M, landmark_numbers
 from scripts.paper.park_runs import SYSTEMS, read, run_graph, run_one
 from scripts.paper.park_scores import (

@@ -12,13 +12,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from scripts.experiments.measured import ended
 from scripts.marks import filled, names
-from scripts.quotes.results import RESULTS, ROOT
 from scripts.quotes.texts import texts
-from slam.errors import InvalidValueError, MobiliaError
+from scripts.result_files import RESULTS, ROOT
+from slam.errors import InvalidValueError
 from slam.files import write_text
 
-PAGES = ("README.md", "docs/comparing.md", "docs/comparison.md", "docs/films.md")
+PAGES = ("README.md", "docs/comparing.md", "docs/films.md")
 
 
 def quoted(text: str, told: dict[str, str], page: object) -> tuple[str, list[str]]:
@@ -43,24 +44,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--results", type=Path, default=RESULTS)
     parser.add_argument("--root", type=Path, default=ROOT, help="folder of the pages")
     wanted = parser.parse_args(arguments)
-    different = False
-    try:
-        told = texts(wanted.results)
-        for name in PAGES:
-            page = wanted.root / name
-            text, differ = quoted(page.read_text(encoding="utf-8"), told, name)
-            different = different or bool(differ)
-            if differ:
-                print(f"{name}: {'differs' if wanted.check else 'anew'}: {', '.join(differ)}")
-                if not wanted.check:
-                    write_text(page, text)
-    except (MobiliaError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 1
+    different, told = False, texts(wanted.results)
+    for name in PAGES:
+        page = wanted.root / name
+        text, differ = quoted(page.read_text(encoding="utf-8"), told, name)
+        different = different or bool(differ)
+        if differ:
+            print(f"{name}: {'differs' if wanted.check else 'anew'}: {', '.join(differ)}")
+            if not wanted.check:
+                write_text(page, text)
     if not different:
         print("the pages say what the results say")
     return 1 if wanted.check and different else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(main))

@@ -18,9 +18,9 @@ from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 from typing import Any
 
+from scripts.experiments.measured import ended
 from scripts.machine import machine, versions
-from scripts.quotes.results import RESULTS, SCHEMA, commit, write
-from slam.errors import MobiliaError
+from scripts.result_files import RESULTS, SCHEMA, commit, write
 
 REPEATS = 3
 SCENE, SEED, DYNAMISM = "office", 100, 0.5
@@ -50,51 +50,48 @@ def _spent() -> tuple[float, float]:
     return own.ru_utime + own.ru_stime, others.ru_utime + others.ru_stime
 
 
-def film(folder: Path, repeats: int) -> dict[str, dict[str, Any]]:
+Costs = dict[str, dict[str, Any]]
+
+
+def _row(s: float, of: str, seeds: list[int], repeats: int) -> dict[str, Any]:
+    return {"s": s, "of": of, "seeds": seeds, "repeats": repeats}
+
+
+def film(folder: Path, repeats: int) -> Costs:
     """Of a second of film, with simulation and SLAM: a long film less a short one."""
     run = folder / "run"
     called([
         "run", "shunting", "--scene", SCENE, "--dynamism", str(DYNAMISM), "--seed", str(SEED),
         "--seconds", str(LONG_S + 1.0), "--no-film", "--out", str(run),
     ])  # fmt: skip
-    rows = {}
+    rows, told = {}, f"a second of film: {LONG_S:g} s less {SHORT_S:g} s"
     for name, how in (("with 3D", []), ("without 3D", ["--no-3d"])):
         words = ["render", str(run), "--out", str(folder / "film.mp4"), *how, "--to"]
         called([*words, str(SHORT_S)])
         short = [called([*words, str(SHORT_S)]) for _ in range(repeats)]
         long = [called([*words, str(LONG_S)]) for _ in range(repeats)]
         for k, of in enumerate(("film", "encoder")):
-            rows[f"{of}, {name}"] = {
-                "s": (min(t[k] for t in long) - min(t[k] for t in short)) / (LONG_S - SHORT_S),
-                "of": f"a second of film: {LONG_S:g} s less {SHORT_S:g} s",
-                "seeds": [SEED],
-                "repeats": repeats,
-            }
+            s = (min(t[k] for t in long) - min(t[k] for t in short)) / (LONG_S - SHORT_S)
+            rows[f"{of}, {name}"] = _row(s, told, [SEED], repeats)
     return rows
 
 
-def demo(folder: Path, repeats: int) -> dict[str, dict[str, Any]]:
+def demo(folder: Path, repeats: int) -> Costs:
     """Of ``mobilia demo``, compiled code kept from before."""
     words = ["demo", "--overwrite", "--out", str(folder / "demo")]
     spent = min(sum(called(words)) for _ in range(repeats))
-    return {"demo": {"s": spent, "of": "mobilia demo", "seeds": [0], "repeats": repeats}}
+    return {"demo": _row(spent, "mobilia demo", [0], repeats)}
 
 
-def compared(folder: Path, repeats: int) -> dict[str, dict[str, Any]]:
+def compared(folder: Path, repeats: int) -> Costs:
     """Of a run of a comparison with the four SLAMs of ``docs/comparing.md``."""
     words = [
         "compare", "--slam", "shunting", "ekf", "occupancy", "odometry", "--scene", "arena",
         "office", "--dynamism", str(DYNAMISM), "--seeds", "2", "--out",
     ]  # fmt: skip
     spent = min(sum(called([*words, str(folder / f"compare{k}")])) for k in range(repeats))
-    return {
-        "comparison": {
-            "s": spent / 4.0,
-            "of": "a run of a minute with its four SLAMs: arena and office, two seeds, by 4",
-            "seeds": [SEED, SEED + 1],
-            "repeats": repeats,
-        }
-    }
+    told = "a run of a minute with its four SLAMs: arena and office, two seeds, by 4"
+    return {"comparison": _row(spent / 4.0, told, [SEED, SEED + 1], repeats)}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -103,27 +100,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--repeats", type=int, default=REPEATS)
     parser.add_argument("--out", type=Path, default=RESULTS / "costs.json")
     wanted = parser.parse_args(arguments)
-    try:
-        head = {
-            "schema": SCHEMA,
-            "command": "python -m scripts.quotes.costs",
-            "commit": commit(),
-            "machine": machine(),
-            "versions": versions(),
-            "what": "s of processor time, the least of the repeats",
-        }
-        rows: dict[str, dict[str, Any]] = {}
-        with tempfile.TemporaryDirectory() as folder:
-            for measure in (film, demo, compared):
-                rows |= measure(Path(folder), wanted.repeats)
-        write(wanted.out, head, {"costs": rows})
-    except MobiliaError as error:
-        print(error, file=sys.stderr)
-        return 1
+    head = {
+        "schema": SCHEMA,
+        "command": "python -m scripts.quotes.costs",
+        "commit": commit(),
+        "machine": machine(),
+        "versions": versions(),
+        "what": "s of processor time, the least of the repeats",
+    }
+    rows: Costs = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for measure in (film, demo, compared):
+            rows |= measure(Path(folder), wanted.repeats)
+    write(wanted.out, head, {"costs": rows})
     for name, row in rows.items():
         print(f"{name}: {row['s']:.3f} s of processor time, {row['of']}")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(main))

@@ -2,7 +2,7 @@
 """A comparison's folder as a results file: ``python -m scripts.quotes.distil out/compare``.
 
 Writes ``docs/results/comparison.json``, or what ``--out`` names, with the metrics that pages quote.
-A folder that the code here would make anew is refused: then the results would name a commit that
+A folder that the code here would make again is refused: then the results would name a commit that
 did not make them.
 """
 
@@ -19,9 +19,10 @@ from scripts.comparison.folder import Compared, read
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.tables import by_seed
 from scripts.experiments.dynamism_curve import Curve
+from scripts.experiments.measured import ended
 from scripts.metrics.table import METRICS
-from scripts.quotes.results import RESULTS, SCHEMA, commit, write
-from slam.errors import InvalidValueError, MobiliaError
+from scripts.result_files import RESULTS, SCHEMA, commit, write
+from slam.errors import InvalidValueError
 from slam.evaluation.statistics import paired, quantile
 
 OURS = "shunting"
@@ -33,6 +34,8 @@ QUOTED = (
 )  # fmt: skip
 OTHER = ("moving_share_of_returns",)
 CORRELATED = ("ate_unaligned_m", "ate_se2_m", "lost", "moving_share_of_returns")
+HEAD = ("scenes", "slams", "levels", "seeds", "seconds", "every", "scanner")
+COLUMN_OF = {"levels": "dynamism"}
 PLANNED = ("slams", "scenes", "levels", "seeds", "seconds", "every", "scanner", "scan_limit_s")
 
 
@@ -45,13 +48,7 @@ def distil(compared: Compared, command: str) -> tuple[dict[str, Any], dict[str, 
         "commit": commit(*CODE),
         "machine": settings["machine"],
         "versions": compared.recipe["versions"],
-        "scenes": settings["scenes"],
-        "slams": settings["slams"],
-        "dynamism": settings["levels"],
-        "seeds": settings["seeds"],
-        "seconds": settings["seconds"],
-        "every": settings["every"],
-        "scanner": settings["scanner"],
+        **{COLUMN_OF.get(key, key): settings[key] for key in HEAD},
         "columns": {
             "levels": "for each dynamism: median (lost: share), low and high of its 95 % interval",
             "paired": f"for each dynamism: median of {OURS} less the other, run by run, low and "
@@ -142,7 +139,7 @@ def _correlations(compared: Compared) -> dict[str, float]:
 
 
 def refuse_of_other_code(compared: Compared) -> None:
-    """Raise ``InvalidValueError`` where the code here would make a part of it anew."""
+    """Raise ``InvalidValueError`` where the code here would make a part of it again."""
     settings: Row = compared.recipe["settings"]
     planned: dict[str, Any] = {
         key: tuple(settings[key]) if isinstance(settings[key], list) else settings[key]
@@ -165,16 +162,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--command", required=True, help="that made it, as the page prints it")
     parser.add_argument("--out", type=Path, default=RESULTS / "comparison.json")
     wanted = parser.parse_args(arguments)
-    try:
-        compared = read(wanted.folder)
-        refuse_of_other_code(compared)
-        write(wanted.out, *distil(compared, wanted.command))
-    except MobiliaError as error:
-        print(error, file=sys.stderr)
-        return 1
+    compared = read(wanted.folder)
+    refuse_of_other_code(compared)
+    write(wanted.out, *distil(compared, wanted.command))
     print(f"wrote {wanted.out}")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(ended(main))

@@ -1,22 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The results of comparisons, as the pages quote them."""
+"""The results of comparisons, and their numbers and verdicts as the pages say them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from scripts.result_files import RESULTS, ROOT, SCHEMA, commit, load, write
+from scripts.metrics.table import METRICS
+from scripts.result_files import load
 from slam.errors import LogFormatError
 
-__all__ = [
-    "RESULTS", "ROOT", "SCHEMA", "Comparison", "Interval", "Pair", "commit", "load", "write",
-]  # fmt: skip
-
-Cell = list[Any]
+VERDICTS = {1: "better", -1: "**beaten**", 0: "no clear difference"}
 
 
 @dataclass(frozen=True)
@@ -36,6 +34,11 @@ class Pair(Interval):
     ties: int
     losses: int
 
+    @property
+    def won(self) -> str:
+        """``9 of 10``."""
+        return f"{self.wins} of {self.wins + self.ties + self.losses}"
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -48,30 +51,13 @@ class Comparison:
         """All of it."""
         return load(self.path)
 
-    @property
-    def scenes(self) -> list[str]:
-        """In the order of the command."""
-        return list(self.data["scenes"])
-
-    @property
-    def slams(self) -> list[str]:
-        """In the order of the command."""
-        return list(self.data["slams"])
-
-    @property
-    def dynamisms(self) -> list[float]:
-        """The levels, ascending."""
-        return list(self.data["dynamism"])
-
     def levels(self, scene: str, slam: str, metric: str) -> list[Interval | None]:
         """One for each level, None where there is none."""
-        cells = self._row("levels", scene, slam, metric)
-        return [None if cell is None else Interval(*map(_number, cell)) for cell in cells]
+        return [cell and _interval(cell) for cell in self._row("levels", scene, slam, metric)]
 
     def pairs(self, scene: str, rival: str, metric: str) -> list[Pair | None]:
         """Shunting less ``rival``, one for each level, None where there is none."""
-        cells = self._row("paired", scene, rival, metric)
-        return [None if cell is None else _pair(cell) for cell in cells]
+        return [cell and _pair(cell) for cell in self._row("paired", scene, rival, metric)]
 
     def over_levels(self, scene: str, rival: str, metric: str) -> Pair:
         """The same of one number for each seed: its median difference over the levels."""
@@ -92,7 +78,55 @@ def _number(cell: Any) -> float:
     return math.nan if cell is None else float(cell)
 
 
-def _pair(cell: Cell) -> Pair:
+def _interval(cell: list[Any]) -> Interval:
+    return Interval(*map(_number, cell))
+
+
+def _pair(cell: list[Any]) -> Pair:
     value, low, high = map(_number, cell[:3])
     wins, ties, losses = map(int, cell[3:])
     return Pair(value, low, high, wins, ties, losses)
+
+
+def shown(value: float, places: int) -> str:
+    """``2.3``, ``−0.7``; ∞ for what never ends, – for no number."""
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "∞" if value > 0.0 else "−∞"
+    digits = f"{abs(value):.{places}f}"
+    if float(digits) == 0.0:
+        return digits
+    return ("−" if value < 0.0 else "") + digits
+
+
+def interval(of: Interval | None, metric: str, places: int) -> str:
+    """``1.8 [1.5, 2.0]`` in the metric's handy unit; – where there is none."""
+    if of is None:
+        return "–"
+    factor = METRICS[metric].factor
+    value, low, high = (shown(factor * n, places) for n in (of.value, of.low, of.high))
+    return f"{value} [{low}, {high}]"
+
+
+def verdict(pair: Pair | None, metric: str) -> int:
+    """1 where shunting is better, -1 where it is beaten, 0 where the interval holds zero."""
+    if pair is None or not (pair.low > 0.0 or pair.high < 0.0):
+        return 0
+    return 1 if (pair.high < 0.0) == bool(METRICS[metric].less_is_better) else -1
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def made(data: dict[str, Any], seeds: Sequence[int]) -> str:
+    """Commit, seeds and machine of a results file."""
+    ran = f"seeds {seeds[0]} to {seeds[-1]}" if len(seeds) > 1 else f"seed {seeds[0]}"
+    machine = data["machine"]
+    return (
+        f"commit {data['commit'][:7]}, {ran}, {machine['processor']} with {machine['cores']} "
+        f"cores, Python {machine['python']}"
+    )

@@ -8,9 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from scripts.metrics.table import METRICS
-from scripts.quotes.results import Comparison, Interval, load
-from scripts.quotes.words import VERDICTS, interval, made, shown, table, verdict, verdicts
+from scripts.quotes.results import (
+    VERDICTS,
+    Comparison,
+    Interval,
+    interval,
+    made,
+    shown,
+    table,
+    verdict,
+)  # fmt: skip
 from scripts.report.words import listed
+from scripts.result_files import load
 
 ATE, ALIGNED, LOST = "ate_unaligned_m", "ate_se2_m", "lost"
 MOVING = "moving_share_of_returns"
@@ -36,14 +45,11 @@ def texts(results: Path) -> dict[str, str]:
         "readme.demo": f"{costs['costs']['demo']['s']:.0f} s of processor time",
         "comparing.made": _wrapped(comparing_made(full)),
         "comparing.errors": errors(full),
-        "comparing.lost": _wrapped(lost(full)),
         "comparing.differences": differences(full),
-        "comparing.verdicts": listing(full),
         "comparing.grid": _wrapped(comparing_grid(full)),
         "comparing.scanners": scanners(full, noise),
         "comparing.maps": maps(full),
         "comparing.cost": _wrapped(comparing_cost(full, costs)),
-        "comparison.tie": _wrapped(tie(full, noise)),
     }
 
 
@@ -63,17 +69,17 @@ def _span(values: list[float], factor: float, places: int) -> str:
 
 def errors(of: Comparison) -> str:
     """Median error with its interval, a table for each scene."""
-    head = [f"dynamism {level:g}" for level in of.dynamisms]
+    head = [f"dynamism {level:g}" for level in of.data["dynamism"]]
     tables = []
-    for scene in of.scenes:
+    for scene in of.data["scenes"]:
         shares = [f"{100.0 * share:.1f}" for share in _medians(of, scene, OURS, MOVING)]
         rho = shown(of.rank_correlation(scene, OURS, MOVING), 1)
         rows = [["returns from what moves, %", *shares, rho, ""]]
-        for slam in of.slams:
+        for slam in of.data["slams"]:
             places = 0 if slam == NULL else 1
             cells = [interval(level, ATE, places) for level in of.levels(scene, slam, ATE)]
             gone = sum(_lost(of, scene, slam))
-            runs = len(of.dynamisms) * len(of.data["seeds"])
+            runs = len(of.data["dynamism"]) * len(of.data["seeds"])
             rho = shown(of.rank_correlation(scene, slam, ATE), 1)
             rows.append([f"`{slam}`", *cells, rho, f"{gone} of {runs}"])
         tables.append(table([scene, *head, "rank correlation", "runs lost"], rows))
@@ -85,30 +91,11 @@ def _lost(of: Comparison, scene: str, slam: str) -> list[int]:
     return [round(share * len(of.data["seeds"])) for share in _medians(of, scene, slam, LOST)]
 
 
-def lost(of: Comparison) -> str:
-    """Who lost how many runs, where."""
-    runs, said, never = len(of.data["seeds"]), [], []
-    for slam in of.slams:
-        if not any(sum(_lost(of, scene, slam)) for scene in of.scenes):
-            never.append(f"`{slam}`")
-            continue
-        for scene in of.scenes:
-            counts = _lost(of, scene, slam)
-            at = [(n, level) for n, level in zip(counts, of.dynamisms, strict=True) if n]
-            if len(at) == len(counts):
-                said.append(f"`{slam}` {min(counts)} to {max(counts)} at each level in the {scene}")
-            elif at:
-                where = listed([f"{n} at {level:g}" for n, level in at])
-                said.append(f"`{slam}` {where} in the {scene}")
-    none = f" None of {listed(never)}." if never else ""
-    return f"Lost runs, of {runs} at a level: {'; '.join(said) or 'none'}.{none}"
-
-
 def differences(of: Comparison) -> str:
     """Error of shunting less the others', run by run; bold where the interval excludes zero."""
-    head = ["cm", *(f"dynamism {level:g}" for level in of.dynamisms), "over all levels"]
+    head = ["cm", *(f"dynamism {level:g}" for level in of.data["dynamism"]), "over all levels"]
     rows = []
-    for scene in of.scenes:
+    for scene in of.data["scenes"]:
         for rival in _rivals(of):
             pairs = [*of.pairs(scene, rival, ATE), of.over_levels(scene, rival, ATE)]
             places = 0 if rival == NULL else 2
@@ -121,36 +108,21 @@ def differences(of: Comparison) -> str:
 
 
 def _rivals(of: Comparison) -> list[str]:
-    return [slam for slam in of.slams if slam != OURS]
-
-
-def listing(of: Comparison) -> str:
-    """Who wins where, in words: position error."""
-    lines = []
-    for scene in of.scenes:
-        for rival in _rivals(of):
-            said = verdicts(of.pairs(scene, rival, ATE), of.dynamisms, ATE)
-            over = of.over_levels(scene, rival, ATE)
-            word = VERDICTS[verdict(over, ATE)]
-            lines.append(
-                f"- {scene}, against `{rival}`: {said}; over all levels {word}, nearer on "
-                f"{over.wins} of {over.wins + over.ties + over.losses} seeds."
-            )
-    return "\n".join(lines)
+    return [slam for slam in of.data["slams"] if slam != OURS]
 
 
 def scanners(full: Comparison, noise: Comparison) -> str:
     """Shunting and the ordinary grid, with every error of the scanner and with noise only."""
     head = ["", "`shunting`, cm", "`occupancy`, cm", "difference over all levels, cm", "seeds won"]
     rows = []
-    for scene in full.scenes:
+    for scene in full.data["scenes"]:
         for name, of in (("noise only", noise), ("every error", full)):
             over = of.over_levels(scene, GRID, ATE)
             rows.append([
                 f"{scene}, {name}",
                 *(_span(_medians(of, scene, slam), 100.0, 2) for slam in (OURS, GRID)),
                 interval(over, ATE, 2),
-                f"{over.wins} of {over.wins + over.ties + over.losses}",
+                over.won,
             ])  # fmt: skip
     return table(head, rows)
 
@@ -159,7 +131,7 @@ def maps(of: Comparison) -> str:
     """Medians of both maps over the levels, and the difference with its interval."""
     head = ["", "`shunting`", "`occupancy`", "difference over all levels", "verdict"]
     rows = []
-    for scene in of.scenes:
+    for scene in of.data["scenes"]:
         for metric, (name, places) in MAPS.items():
             if f"{scene} {OURS} {metric}" not in of.data["levels"]:
                 continue
@@ -187,13 +159,13 @@ def comparing_made(of: Comparison) -> str:
 
 def comparing_cost(of: Comparison, costs: dict[str, Any]) -> str:
     """Of the whole comparison."""
-    runs = len(of.scenes) * len(of.dynamisms) * len(of.data["seeds"])
+    runs = len(of.data["scenes"]) * len(of.data["dynamism"]) * len(of.data["seeds"])
     row = costs["costs"]["comparison"]
     each = row["s"]
     return (
         f"A run with its four SLAMs takes {each:.0f} s of processor time "
         f"({made(costs, row['seeds'])}); the whole comparison, {runs} simulations and "
-        f"{runs * len(of.slams)} runs, about {round(runs * each / 60.0)} minutes."
+        f"{runs * len(of.data['slams'])} runs, about {round(runs * each / 60.0)} minutes."
     )
 
 
@@ -213,7 +185,7 @@ def _factors(of: Comparison) -> str:
     """How many times as far off the grid is, over scenes and levels."""
     ratios = [
         theirs / ours
-        for scene in of.scenes
+        for scene in of.data["scenes"]
         for ours, theirs in zip(
             _medians(of, scene, OURS), _medians(of, scene, GRID), strict=True
         )
@@ -224,7 +196,7 @@ def _factors(of: Comparison) -> str:
 def _against_grid(of: Comparison, metric: str = ATE) -> str:
     """``in the arena the two tie (−0.22 cm, 95 % interval [−0.40, 0.01])``, scene by scene."""
     said = []
-    for scene in of.scenes:
+    for scene in of.data["scenes"]:
         over = of.over_levels(scene, GRID, metric)
         word = {1: "`shunting` is nearer", -1: "**`occupancy` is nearer**", 0: "the two tie"}
         said.append(f"in the {scene} {word[verdict(over, metric)]} ({_cm(over)})")
@@ -244,28 +216,10 @@ def _cm(pair: Interval) -> str:
     return f"{value} cm, 95 % interval [{low}, {high}]"
 
 
-def tie(full: Comparison, noise: Comparison) -> str:
-    """Beside the table of the scanner with noise only."""
-    highest = [
-        f"{_cm(pair)} in the {scene}"
-        for scene in full.scenes
-        if (pair := full.pairs(scene, GRID, ATE)[-1]) is not None
-    ]
-    return (
-        "**The factors over the ordinary grid (`occupancy`) in this table are for a scanner with "
-        "noise only.** With every error of the LMS-221, on the same seeds at dynamism "
-        f"{full.dynamisms[0]:g} to {full.dynamisms[-1]:g}: {_against_grid(full)}. With noise only: "
-        f"{_against_grid(noise)}; the grid is then {_factors(noise)} times as far off, with every "
-        f"error {_factors(full)} times. These are differences of `shunting` less `occupancy` over "
-        f"all levels; at dynamism {full.dynamisms[-1]:g} alone, with every error, "
-        f"{listed(highest)} ({made(full.data, full.data['seeds'])}; [results](results))."
-    )
-
-
 def readme_comparison(full: Comparison, noise: Comparison) -> str:
     """Under the picture of the README."""
-    said = []
-    for scene in full.scenes:
+    said, least, most = [], full.data["dynamism"][0], full.data["dynamism"][-1]
+    for scene in full.data["scenes"]:
         ends = []
         for slam in (OURS, GRID, EKF):
             medians = _medians(full, scene, slam)
@@ -273,7 +227,7 @@ def readme_comparison(full: Comparison, noise: Comparison) -> str:
         said.append(f"in the {scene} {', '.join(ends)}")
     return (
         f"With every error of the scanner, the median position error in cm at dynamism "
-        f"{full.dynamisms[0]:g} and {full.dynamisms[-1]:g} is {'; '.join(said)}. Against an "
+        f"{least:g} and {most:g} is {'; '.join(said)}. Against an "
         "ordinary grid with the same matcher (`occupancy`), over all levels: "
         f"{_against_grid(full)}. With a scanner whose only error is noise, the grid "
         f"is {_factors(noise)} times as far off. Who wins where, and where `shunting` does not: "

@@ -19,6 +19,7 @@ from slam.evaluation.statistics import paired, share_interval
 from slam.variants import ORACLE, oracle_of
 
 Row = dict[str, Any]
+MOST_SEEDS = 50  # that anybody would run
 ODOMETRY = "odometry"  # the control that looks at nothing
 _ATE = "ate_unaligned_m"
 _WORDS = {
@@ -80,11 +81,6 @@ class Standing:
     axis: str
     levels: tuple[Level, ...]
     own_oracle: bool = False
-
-    @property
-    def runs(self) -> int:
-        """At a level, at the fewest."""
-        return min(level.subject.runs for level in self.levels)
 
     def place(self, levels: Sequence[float]) -> str:
         """Such as "dynamism 0.5 and 1"."""
@@ -151,56 +147,78 @@ def against(rows: Sequence[Row], a: str, b: str) -> int:
 
 
 def answer(of: Standing) -> str:
-    """One sentence in backticks and plain words; it claims nothing of fewer than ``LEAST_RUNS``."""
-    if of.runs < LEAST_RUNS:
-        return (
-            f"Too few runs to tell: `{of.subject}` has {of.runs} at a level, and it takes "
-            f"{LEAST_RUNS} (`--seeds {LEAST_RUNS}`)."
-        )
-    said = [f"`{of.subject}` {_loss(of)}", _first_level(of), _too_easy(of), _unfair(of)]
+    """What was seen, what may be concluded from so many runs, and what would decide more."""
+    said = [f"`{of.subject}` {_seen(of)}", _concluded(of), _first_level(of), _too_easy(of),
+            _unfair(of), _to_decide(of)]  # fmt: skip
     return "; ".join(part for part in said if part) + "."
 
 
-def _loss(of: Standing) -> str:
-    """Where it is lost half of the time."""
-    at = [level for level in of.levels if level.subject.half]
-    if not at:
-        return _rarely(of)
-    failed = sum(level.subject.failed for level in at)
-    lost = sum(level.subject.lost for level in at)
-    verb = "fails" if failed == lost else "fails or is lost" if failed else "is lost"
-    verb += " half of the time"
-    levels, first = [level.at for level in at], at[0]
-    if len(of.levels) == 1:
-        return f"{verb} at {of.place(levels)} in {of.scene} ({first.subject})"
-    if len(at) == len(of.levels):
-        return f"{verb} at every level in {of.scene} ({first.subject} at {of.place(levels[:1])})"
-    if at == list(of.levels[-len(at) :]):
-        where = "at" if len(at) == 1 else "from"
-        on = "" if len(at) == 1 else " on"
-        return f"{verb} {where} {of.place(levels[:1])}{on} in {of.scene} ({first.subject} there)"
-    fine = [level.at for level in of.levels if not level.subject.half and level.at > first.at]
-    return (
-        f"{verb} at {of.place(levels)} in {of.scene} ({first.subject} at {first.at:g}), but not at "
-        + listed([f"{level:g}" for level in fine])
-    )
-
-
-def _rarely(of: Standing) -> str:
-    """Of a SLAM that is lost half of the time nowhere."""
-    top = of.levels[-1].at
+def _seen(of: Standing) -> str:
+    """In how many runs it was lost, level by level, and between which levels that begins."""
     counts = [level.subject for level in of.levels]
-    if not any(one.lost for one in counts):
-        span = f"up to {of.place([top])}" if len(counts) > 1 else f"at {of.place([top])}"
-        return f"is never lost in {of.scene} {span} ({_each(counts)})"
-    most = of.levels[counts.index(_worst(counts))]
-    verb = "fails or is lost" if any(one.failed for one in counts) else "is lost"
-    verb += " in fewer than half of the runs"
+    lost, runs = sum(one.lost for one in counts), sum(one.runs for one in counts)
+    failed_ = sum(one.failed for one in counts)
+    verb = "failed" if 0 < failed_ == lost else "failed or was lost" if failed_ else "was lost"
+    top = f"{of.axis} {of.levels[-1].at:g}"
+    if not lost:
+        span = f"up to {top}" if len(counts) > 1 else f"at {top}"
+        return f"was lost in none of {runs} runs in {of.scene}, {span}"
+    if lost == runs:
+        already = f", already at {of.axis} {of.levels[0].at:g}" if len(counts) > 1 else f" at {top}"
+        return f"{verb} in {lost} of {runs} runs in {of.scene}{already}"
     if len(counts) == 1:
-        return f"{verb} at {of.place([top])} in {of.scene} ({most.subject})"
-    return (
-        f"{verb} at every level in {of.scene} (at the most {most.subject} at {of.place([most.at])})"
-    )
+        return f"{verb} in {counts[0].lost} of {runs} runs in {of.scene} at {top}"
+    each = [f"{one.lost} of {one.runs} at {level.at:g}"
+            for one, level in zip(counts, of.levels, strict=True)]  # fmt: skip
+    return f"{verb} in {of.scene} in {listed(each)} ({of.axis})"
+
+
+def _concluded(of: Standing) -> str:
+    """The bracket of levels, and what share of such runs at its ends is lost, 95 %."""
+    holds = [level for level in of.levels if not level.subject.half]
+    lost = [level for level in of.levels if level.subject.half]
+    first = lost[0] if lost else of.levels[-1]
+    low, high = share_interval(first.subject.lost, first.subject.runs)
+    where = "" if len(of.levels) == 1 else f" at {first.at:g}"
+    if not lost:
+        worst = max(reversed(of.levels), key=lambda level: level.subject.lost)
+        low, high = share_interval(worst.subject.lost, worst.subject.runs)
+        where = "" if len(of.levels) == 1 else f" at {worst.at:g}"
+        return f"so at most {100.0 * high:.0f} % of such runs are lost{where} (95 %)"
+    sure = f"so at least {100.0 * low:.0f} % of such runs are lost{where} (95 %)"
+    before = [level for level in holds if level.at < first.at]
+    if before and all(level.subject.half for level in of.levels if level.at >= first.at):
+        return f"it holds at {before[-1].at:g} and is lost at {first.at:g}, {sure}"
+    return sure
+
+
+def _to_decide(of: Standing) -> str:
+    """How many seeds would tell on which side of one half it is, at the ends of the bracket."""
+    lost = [level for level in of.levels if level.subject.half]
+    before = [level for level in of.levels if not lost or level.at < lost[0].at]
+    open_ = [level for level in (*before[-1:], *lost[:1]) if _is_open(level.subject)]
+    if not open_:
+        return ""
+    wanted = [_seeds_to_tell(level.subject) for level in open_]
+    at = "" if len(of.levels) == 1 else " at " + listed([f"{level.at:g}" for level in open_])
+    if not all(wanted):
+        return f"that is too near to one half{at} for {MOST_SEEDS} seeds to tell"
+    return f"`--seeds {max(wanted)}` would tell whether more than half are lost{at}"
+
+
+def _is_open(seen: Lost) -> bool:
+    low, high = share_interval(seen.lost, seen.runs)
+    return low <= 0.5 <= high
+
+
+def _seeds_to_tell(seen: Lost) -> int:
+    """Least runs of that share lost whose interval is on one side of one half; where there are none
+    up to ``MOST_SEEDS``, 0, or of very few runs ``LEAST_RUNS``: the share itself may be another.
+    """
+    for runs in range(seen.runs + 1, MOST_SEEDS + 1):
+        if not _is_open(Lost(lost=round(seen.lost / max(seen.runs, 1) * runs), runs=runs)):
+            return runs
+    return LEAST_RUNS if seen.runs < LEAST_RUNS else 0
 
 
 def _first_level(of: Standing) -> str:

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Degradation curves: a metric against the level, a line with its interval for each SLAM."""
+"""Degradation curves: a number against the level, a line with its intervals for each SLAM."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from scripts.closed_loop.folder import Driven
+from scripts.comparison.csv_files import Row
 from scripts.comparison.tables import number
 from scripts.figures import log_axis
 from scripts.metrics.row import Metric
@@ -16,46 +19,93 @@ from scripts.report import style
 from scripts.report.study import LEAST_RUNS, Study
 
 WIDTH, HEIGHT = 4.0, 2.8  # inches
+SUCCESS = ("success", "success_low", "success_high")
+PRECISION = ("precision_m", "precision_m_low", "precision_m_high")
+_OF = {SUCCESS: ("goals",), PRECISION: ("reached", "wrong")}  # whose sum each is of
+Lines = Mapping[str, Sequence[style.Point]]
+"""By SLAM, its points at the levels."""
 
 
 def curve(study: Study, scene: str, key: str) -> str:
     """The SVG of one scene and metric: medians (shares), 95 % intervals, single runs as dots."""
     metric = METRICS[key]
+    lines = {slam: _points(study, scene, slam, metric) for slam in study.slams}
     figure = style.new_figure(WIDTH, HEIGHT)
     with style.styled():
         ax = figure.subplots()
-        for slam in study.slams:
-            _line(ax, study, scene, slam, metric)
-        _axes(ax, study, metric)
+        if metric.key != "lost":
+            _runs(ax, study, scene, metric)
+        _draw(ax, lines, study.levels, study.axis, study.slams)
+        _y_axis(ax, metric)
     return style.svg(figure, f"{metric.name} against {study.axis} in {scene}")
 
 
-def _line(ax: Axes, study: Study, scene: str, slam: str, metric: Metric) -> None:
-    color = style.color(slam, study.slams)
-    at = style.apart(slam, study.slams, study.levels)
-    points = []
-    for level in study.levels:
-        row = study.level(scene, level, slam, metric.key)
-        if row is not None:
-            value, low, high = (_times(row[k], metric.factor) for k in ("value", "low", "high"))
-            if row["n"] < LEAST_RUNS:  # too few for an interval
-                low = high = math.nan
-            points.append((level + at, value, low, high))
-        if metric.key != "lost":
+def of_drive(drive: Driven, slams: Sequence[str]) -> list[tuple[str, str]]:
+    """(name, SVG) of goals reached and of precision against the level; ``slams`` give colours."""
+    return [
+        ("goals reached", _of_drive(drive, slams, SUCCESS, "goals truly reached, %")),
+        ("precision", _of_drive(drive, slams, PRECISION, "distance from the goal, cm")),
+    ]
+
+
+def _of_drive(drive: Driven, slams: Sequence[str], keys: tuple[str, str, str], label: str) -> str:
+    lines = {
+        slam: [_point(row, keys, 100.0, few=few_goals(row, keys)) for row in drive.of(slam)]
+        for slam in drive.slams
+    }
+    figure = style.new_figure(WIDTH, HEIGHT)
+    with style.styled():
+        ax = figure.subplots()
+        _draw(ax, lines, drive.levels, drive.axis, slams)
+        ax.set_ylabel(label)
+        ax.set_ylim(0.0, 103.0 if keys == SUCCESS else None)
+        ax.yaxis.set_major_locator(MaxNLocator(5))
+    return style.svg(figure, f"{label} against {drive.axis} in {drive.scene}")
+
+
+def few_goals(row: Row, keys: tuple[str, str, str]) -> bool:
+    """Whether it is of too few goals for an interval."""
+    return sum(float(row[column]) for column in _OF[keys]) < LEAST_RUNS
+
+
+def _draw(ax: Axes, lines: Lines, levels: Sequence[float], axis: str, slams: Sequence[str]) -> None:
+    """Each SLAM's line a little beside the level, in its colour and mark among ``slams``."""
+    for slam, points in lines.items():
+        aside = style.apart(slam, list(lines), levels)
+        moved = [(at + aside, value, low, high) for at, value, low, high in points]
+        style.line(ax, moved, style.color(slam, slams), style.marker(slam, slams))
+    style.level_axis(ax, levels, axis)
+
+
+def _points(study: Study, scene: str, slam: str, metric: Metric) -> list[style.Point]:
+    rows = (study.level(scene, level, slam, metric.key) for level in study.levels)
+    keys = ("value", "low", "high")
+    return [
+        _point({**row, "dynamism": level}, keys, metric.factor, few=row["n"] < LEAST_RUNS)
+        for level, row in zip(study.levels, rows, strict=True)
+        if row is not None
+    ]
+
+
+def _point(row: Row, keys: tuple[str, str, str], factor: float, *, few: bool) -> style.Point:
+    """Level, value and the ends of its interval, which one of too few has not."""
+    value, low, high = (math.nan if row[k] is None else row[k] * factor for k in keys)
+    return row["dynamism"], value, *((math.nan, math.nan) if few else (low, high))
+
+
+def _runs(ax: Axes, study: Study, scene: str, metric: Metric) -> None:
+    """Single runs as dots."""
+    for slam in study.slams:
+        aside = style.apart(slam, study.slams, study.levels)
+        for level in study.levels:
             values = [number(run, metric.key) for run in study.runs(scene, level, slam)]
             shown = [v * metric.factor for v in values if v is not None and math.isfinite(v)]
-            ax.plot([level + at] * len(shown), shown, ".", color=color, ms=3.4, alpha=0.4, mew=0,
-                    zorder=1)  # fmt: skip
-    style.line(ax, points, color, style.marker(slam, study.slams))
+            ax.plot([level + aside] * len(shown), shown, ".", color=style.color(slam, study.slams),
+                    ms=3.4, alpha=0.4, mew=0, zorder=1)  # fmt: skip
 
 
-def _times(value: float | None, factor: float) -> float:
-    return math.nan if value is None else value * factor
-
-
-def _axes(ax: Axes, study: Study, metric: Metric) -> None:
+def _y_axis(ax: Axes, metric: Metric) -> None:
     ax.set_ylabel(metric.heading)
-    style.level_axis(ax, study.levels, study.axis)
     if metric.key == "nees_over_3":
         ax.axhline(1.0, color=style.TRUTH, lw=1.0, ls="--", zorder=0)
         style.remark(ax, 1.0, "honest", style.TRUTH)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,7 @@ from scripts.closed_loop.folder import Driven
 from scripts.comparison.plan import Run
 from scripts.comparison.schema import LATER, settings
 from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, of_section
-from scripts.report import answer, closed, curves, pictures, style, tables, words
-from scripts.report.days import days
+from scripts.report import answer, closed, curves, pictures, score_tables, style, tables, words
 from scripts.report.study import LEAST_RUNS, Study
 from sim.recording.sums import add_to_sums
 from slam.files import write_text
@@ -43,7 +42,7 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
     return _template().render(
         study=study,
         marks={slam: (style.glyph(slam, slams), style.color(slam, slams)) for slam in slams},
-        drives=[(drive, closed.curves(drive, slams), closed.table(drive)) for drive in drives],
+        drives=[(drive, curves.of_drive(drive, slams), closed.table(drive)) for drive in drives],
         css=TEMPLATE.with_name("page.css").read_text(encoding="utf-8"),
         settings=study.compared.settings,
         answers=answers(study),
@@ -57,7 +56,7 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
         honesty=_levels(study, of_section("honesty")),
         costs=tables.costs(study, of_section("costs")),
         maps=_levels(study, of_section("maps")),
-        days=days(study),
+        days=_days(study),
         scenes=scenes,
         numbers=_levels(study, of_section("errors")),
         measures=[metric for metric in EXPLAINED if study.has(metric.key)],
@@ -142,6 +141,24 @@ def _levels(study: Study, keys: Iterable[str]) -> list[tuple[str, list[tables.Ta
     found = [METRICS[key] for key in keys]
     groups = [(scene, tables.of_levels(study, scene, found)) for scene in study.scenes]
     return [(scene, made) for scene, made in groups if made]
+
+
+def _days(study: Study) -> list[tuple[str, list[str], tables.Table]]:
+    """Of the buildings of each scene and level: where, a sentence a SLAM, and the table."""
+    return [
+        (score_tables.where(group), score_tables.sentences(own), _scores(own))
+        for group, own in score_tables.groups(study.compared.ages).items()
+    ]
+
+
+def _scores(rows: Sequence[Mapping[str, Any]]) -> tables.Table:
+    names = score_tables.slams_of(rows)
+    lines = [
+        [tables.Cell(text=heading), *(tables.Cell(text=text, small=small) for text, small in cells)]
+        for heading, cells in score_tables.table(rows)
+    ]
+    caption = score_tables.size(rows)
+    return tables.Table(caption=caption, head=["score", *names], rows=lines, slams=names)
 
 
 def _scene(study: Study, scene: str) -> dict[str, Any]:

@@ -7,11 +7,12 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from rich import box
 from rich.markup import escape
 from rich.table import Table
 
 from scripts.comparison.schema import ANEW
+from scripts.comparison.tables import grouped
+from scripts.console import plain_table
 from scripts.days.scores import SCORES, Row, Score, first_words, levels
 from scripts.metrics.row import digits
 from scripts.report.answer import percent
@@ -26,17 +27,13 @@ _PRINTED = (
     "ghost_rate_late", "recall_early", "recall_late", "ms_per_scan_early", "ms_per_scan_late",
     "failed_share",
 )  # fmt: skip
-Group = tuple[str, float, float]  # scene, motion, change
+Group = tuple[Any, ...]  # scene, motion, change
 Cells = list[tuple[str, str]]  # text and small print of each SLAM
 
 
 def groups(rows: Sequence[Row]) -> dict[Group, list[Row]]:
     """Rows of buildings by scene, motion and change."""
-    found: dict[Group, list[Row]] = {}
-    for row in rows:
-        key = str(row["scene"]), float(row["motion"]), float(row["change"])
-        found.setdefault(key, []).append(row)
-    return found
+    return grouped(rows, ("scene", "motion", "change"))
 
 
 def where(group: Group) -> str:
@@ -91,10 +88,7 @@ def _cell(score: Score, row: Row | None) -> tuple[str, str]:
 
 def printed(group: Group, rows: Sequence[Row]) -> Table:
     """Of one group for the terminal: a column for each SLAM."""
-    found = Table(
-        title=escape(f"{where(group)}: {size(rows)}"), title_justify="left", box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0), pad_edge=False,
-    )  # fmt: skip
+    found = plain_table(f"{where(group)}: {size(rows)}")
     found.add_column("")
     for name in slams_of(rows):
         found.add_column(escape(name), justify="right", overflow="fold")

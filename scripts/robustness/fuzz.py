@@ -4,8 +4,8 @@
 ``python -m scripts.robustness.fuzz --seconds 60`` and ``--cases 500 --seed 0``.
 
 ``--cases`` calls ``update`` of every SLAM, ``step``, ``reset`` and the constructors of environments
-with odd arguments (``scripts.robustness.fuzz_calls``) so many times each, in a child process with
-a limit on time, and prints what came of it. ``--seconds`` damages files at random and reads them:
+with odd arguments (``scripts.robustness.fuzz_calls``) so many times each, with a limit on time, and
+prints what came of it. ``--seconds`` damages files at random and reads them:
 
 Bags (MCAP packed and plain, sqlite3, ROS 1), CARMEN logs and recipes. A reader may succeed or raise
 one of our errors; anything else, or more than ten seconds for one file, is a finding. The damaged
@@ -31,8 +31,6 @@ from pathlib import Path
 from types import FrameType
 
 import numpy as np
-from joblib.externals.loky import ProcessPoolExecutor
-from joblib.externals.loky.process_executor import TerminatedWorkerError
 from rich.table import Table
 from rosbags.rosbag1 import Writer as WriterOfRos1
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -137,17 +135,17 @@ def damaged(data: bytes, rng: np.random.Generator) -> bytes:
     return bytes(out)
 
 
-class Hang(Exception):
+class Hang(BaseException):
     """A reader that does not come back."""
 
 
 @contextmanager
-def _alarm() -> Iterator[None]:
+def _alarm(limit_s: int) -> Iterator[None]:
     def ring(_signal: int, _frame: FrameType | None) -> None:
-        raise Hang(f"no answer within {HANG_S} s")
+        raise Hang(f"no answer within {limit_s} s")
 
     before = signal.signal(signal.SIGALRM, ring)
-    signal.alarm(HANG_S)
+    signal.alarm(limit_s)
     try:
         yield
     finally:
@@ -160,7 +158,7 @@ def attack(sample: Sample, folder: Path, rng: np.random.Generator) -> tuple[str,
     path = folder / sample.name
     path.write_bytes(damaged(sample.data, rng))
     try:
-        with _alarm():
+        with _alarm(HANG_S):
             sample.read(path)
     except MobiliaError as error:
         if sample.name.split(".")[0] not in str(error):
@@ -177,58 +175,27 @@ def _limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, resource.RLIM_INFINITY))
 
 
-class _Runner:
-    """A worker that runs cases; one that hangs or dies is replaced."""
-
-    def __init__(self, seed: int) -> None:
-        self._seed = seed
-        self._pool: ProcessPoolExecutor | None = None
-
-    def run(self, group: str, number: int) -> Tally:
-        """One case; a finding where the worker hangs or ends."""
-        if self._pool is None:
-            self._pool = ProcessPoolExecutor(1, initializer=_limit_memory)
-        case = self._pool.submit(fuzz_calls.run, group, number, self._seed)
-        try:
-            tally: Tally = case.result(CASE_S)
-            return tally
-        except TimeoutError:
-            found = f"no end within {CASE_S} s"
-        except TerminatedWorkerError as error:
-            found = f"the process ended: {' '.join(str(error).split())}"[:300]
-        self.close()
-        return Tally(findings=[found])
-
-    def close(self) -> None:
-        """End the worker."""
-        if self._pool is not None:
-            self._pool.shutdown(kill_workers=True)
-            self._pool = None
-
-
 def call(cases: int, seed: int) -> int:
     """Run so many cases of each group; the number of findings. Prints a table."""
-    table = Table("target", "cases", "answered", "refused", "warnings", "findings")
-    runner, findings = _Runner(seed), 0
-    try:
-        for group, (_, names) in GROUPS.items():
-            whole = {name: Tally() for name in names}
-            for number in range(cases):
-                name = names[number % len(names)]
-                tally = runner.run(group, number)
-                whole[name].add(tally)
-                for words in tally.findings:
-                    console.print(f"{group} {name}, case {number}: {words}", markup=False)
-            for k, (name, tally) in enumerate(whole.items()):
-                n = len(range(k, cases, len(names)))
-                counts = (n, tally.answered, tally.refused, tally.warned.total())
-                found = len(tally.findings)
-                table.add_row(f"{group} {name}", *map(str, counts), str(found))
-                findings += found
-                for words, count in tally.warned.items():
-                    console.print(f"{group} {name}: {count} x {words}", markup=False)
-    finally:
-        runner.close()
+    table, findings = Table("target", "cases", "answered", "refused", "warnings", "findings"), 0
+    for group, (_, names) in GROUPS.items():
+        whole, counts = {name: Tally() for name in names}, Counter[str]()
+        for number in range(cases):
+            name = names[number % len(names)]
+            counts[name] += 1
+            tally = Tally()
+            try:
+                with _alarm(CASE_S):
+                    tally = fuzz_calls.run(group, number, seed)
+            except Hang as error:
+                tally.findings.append(str(error))
+            whole[name].add(tally)
+            for words in tally.findings:
+                console.print(f"{group} {name}, case {number}: {words}", markup=False)
+        for name, tally in whole.items():
+            found = (counts[name], tally.answered, tally.refused, tally.warned.total())
+            table.add_row(f"{group} {name}", *map(str, found), str(len(tally.findings)))
+            findings += len(tally.findings)
     console.print(table)
     return findings
 
@@ -241,9 +208,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--keep", type=Path, default=Path("out/fuzz"), help="where findings go")
     parser.add_argument("--cases", type=int, help="of odd calls, instead of damaged files")
     wanted = parser.parse_args(arguments)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, resource.RLIM_INFINITY))
     if wanted.cases is not None:
         return 1 if call(wanted.cases, wanted.seed) else 0
-    _limit_memory()
     outcomes: Counter[tuple[str, str]] = Counter()
     findings = 0
     with tempfile.TemporaryDirectory() as scratch:

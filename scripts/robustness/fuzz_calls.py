@@ -23,11 +23,9 @@ from sim.gym.env import MobiliaEnv
 from sim.gym.vector import MobiliaVectorEnv
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from slam.errors import MobiliaError
-from slam.guests.pipe import guarded
 from slam.system import SlamSystem, create
 
 SLAMS = ("odometry", "shunting", "shunting-features", "occupancy", "ekf", "kiss-icp", "karto")
-PIPED = "pipe"  # odometry in a process of its own
 NOT_NUMBERS: tuple[Any, ...] = (
     None, "", "a", "1", b"x", [], {}, (), [1], [1, 2, 3, 4], {"x": 1}, object(), np.nan, math.inf,
     -math.inf, True, False, 5, -1, 0, 3.5, 2**31, 2**70, -(2**70), 1e9, 1e300, -1e300, 1 + 2j,
@@ -70,7 +68,7 @@ class Tally:
 
 @cache
 def _slam(name: str) -> SlamSystem:
-    return guarded("odometry") if name == PIPED else create(name)
+    return create(name)
 
 
 def update(tally: Tally, name: str, rng: np.random.Generator) -> None:
@@ -185,7 +183,7 @@ def construct(tally: Tally, name: str, rng: np.random.Generator) -> None:
 
 
 GROUPS: dict[str, tuple[Callable[[Tally, str, np.random.Generator], None], tuple[str, ...]]] = {
-    "update": (update, (*SLAMS, PIPED)),
+    "update": (update, SLAMS),
     "step": (step, ("single", "vector")),
     "reset": (reset, ("single", "vector")),
     "make": (construct, ("single", "vector")),

@@ -3,24 +3,21 @@
 
 from __future__ import annotations
 
+import math
 import resource
 import sys
 import time
 from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
-from rich.markup import escape
-
-from scripts.console import console
+from scripts.comparison.memory import forget_peak, reading_kb
 from slam.frames import Frame, Stream
 from slam.replay import Replay
 
 _UNIT = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss, bytes
-_STATUS, _RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 # What a run consists of: the log read or the room simulated, the SLAMs, files of the map, pictures,
 # film, and what else happens at a scan.
 INPUT, SLAM, MAP, PICTURES, FILM, REST = "input", "slam", "map", "pictures", "film", "rest"
@@ -121,24 +118,19 @@ class Costs:
         self._spent_s[name] += seconds
 
 
-def say(block: dict[str, Any]) -> None:
+def in_words(block: dict[str, Any]) -> str:
     """One line."""
-    words = (
+    return (
         f"Processor time: {block['slam_s']:.0f} s of SLAM, {block['pictures_s']:.0f} s of film and "
         f"pictures; memory at most {block['memory_mb']} MB."
     )
-    console.print(escape(words), highlight=False, soft_wrap=True)
 
 
 def _peak() -> int:
     """The most memory since it was asked last, bytes; where no kernel says so, since the start."""
-    with suppress(OSError):
-        most = next(
-            (line for line in _STATUS.read_text().splitlines() if line.startswith("VmHWM")), ""
-        )
-        _RESET.write_text("5")  # proc(5): the peak is what is held now
-        if most:
-            return int(most.split()[1]) * 1024
+    most_kb = reading_kb("VmHWM")
+    if forget_peak() and not math.isnan(most_kb):
+        return int(most_kb) * 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _UNIT
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
@@ -16,17 +16,19 @@ import imageio.v2 as imageio
 from rich.markup import escape
 
 from scripts import figures
-from scripts.console import console, note, working
+from scripts.console import note, say, working
 from scripts.film import FPS
 from scripts.film.encode import Pace, film, require_ffmpeg
 from scripts.film.render import shoot, watched
 from scripts.film.show import Show
+from scripts.live.replay import Recorder
 from scripts.machine import machine
 from scripts.names import file_name
 from scripts.output import whole_folder, write_recipe
 from scripts.single_run import score
-from scripts.single_run.costs import FILM, MAP, PICTURES, SLAM, Costs, say
+from scripts.single_run.costs import FILM, MAP, PICTURES, SLAM, Costs, in_words
 from scripts.single_run.small_maps import Drawn, drawn, for_file
+from slam.errors import InvalidValueError
 from slam.files import write_text
 from slam.frames import EPOCH, Stream
 from slam.maps import write_map
@@ -48,6 +50,24 @@ class Outputs:
     costs: Costs | None = None  # what reading has cost; None: counted from here on
 
 
+Writer = Callable[[Path, Show], None]
+_files: dict[str, Writer] = {}
+
+
+def run_file(name: str) -> Callable[[Writer], Writer]:
+    """Register a function that writes the file ``name`` of every run.
+
+    It gets the path to write to, and the ``Show`` after the last frame.
+    """
+
+    def decorate(write: Writer) -> Writer:
+        if Path(name).name != name or _files.setdefault(name, write) is not write:
+            raise InvalidValueError(f"a file of a run must have a name of its own, got '{name}'")
+        return write
+
+    return decorate
+
+
 def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
     """Replay ``stream``, write everything into ``outputs.folder``, print the table.
 
@@ -66,11 +86,14 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         show.pace = outputs.pace or Pace.within_a_minute(show.duration_s, outputs.film_fps)
         pace, path = show.pace, folder / "film.mp4"
         reel = film(path, pace.fps, preset=pace.preset) if outputs.film else nullcontext()
+        recorder = Recorder.of(folder / "replay.html", show) if outputs.film else nullcontext()
         started = time.perf_counter()
-        with costs.beside(FILM), reel as opened, costs.scans():
+        with costs.beside(FILM), reel as opened, recorder as recording, costs.scans():
             frames = shoot(costs.reading(stream), show, opened, partial(costs.stage, FILM))
-            for _ in watched(frames, stream, show.title):
-                pass
+            for frame in watched(frames, stream, show.title):
+                if recording is not None:
+                    with costs.stage(FILM):
+                        recording.note(frame, show.stage.placed)
         wall_s = time.perf_counter() - started
         with costs.stage(SLAM), working("closing loops, scoring"):
             results = score.results(replay, wall_s, machine())
@@ -81,11 +104,13 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
             _draw(folder, show, in_pictures)
             if opened is not None and opened.last is not None:
                 imageio.imwrite(folder / "poster.png", opened.last)
+        for name, write in _files.items():
+            write(folder / name, show)
         results["cost"] = costs.block(replay)
         write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
         write_recipe(folder, outputs.command, outputs.settings)
     score.print_table(results, show.title)
-    say(results["cost"])
+    say(in_words(results["cost"]), highlight=False)
     _tell(outputs)
     return results
 
@@ -134,7 +159,14 @@ def _draw(folder: Path, show: Show, found: Drawn | None) -> None:
         figures.changes_picture(folder / "changes.png", found.map, found.changes, own)
 
 
-_WORTH_OPENING = ("film.mp4", "map.png", "changes.png", "trajectories.png", "errors.png")
+_WORTH_OPENING = (
+    "replay.html",
+    "film.mp4",
+    "map.png",
+    "changes.png",
+    "trajectories.png",
+    "errors.png",
+)
 
 
 def _tell(outputs: Outputs) -> None:
@@ -147,4 +179,4 @@ def _tell(outputs: Outputs) -> None:
         others.append("map.npz for the SLAM's load()")
     first = escape(str(outputs.folder / there[0]))
     then = f", then {', '.join(there[1:])} beside it" if there[1:] else ""
-    console.print(f"Open [bold]{first}[/bold] first{then}; {', '.join(others)}.", soft_wrap=True)
+    say(f"Open [bold]{first}[/bold] first{then}; {', '.join(others)}.")

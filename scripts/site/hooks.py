@@ -43,7 +43,7 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
 
 
 def _results() -> str:
-    names = sorted(path.name for path in (ROOT / "docs" / "results").glob("*.json"))
+    names = sorted(path.name for path in (ROOT / "docs" / "results").glob("*.*"))
     rows = "".join(f"- [{name}](results/{name})\n" for name in names)
     return f"# Measured results\n\nThe files that the pages quote.\n\n{rows}"
 

@@ -11,11 +11,9 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from scripts.console import console, note
-from scripts.many import named
+from scripts.console import console, note, say
 from scripts.names import check
-from scripts.process_options import Cluster, Jobs
-from scripts.set_option import Set
+from scripts.options import Cluster, Jobs, Set, named
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
@@ -126,7 +124,7 @@ def _seal(path: Path, seeds: int | None) -> None:
     drawn = sealed.drawn(SEEDS if seeds is None else seeds)
     sealed.write(path, drawn)
     console.print(f"{escape(str(path))}: {len(drawn.seeds)} seeds. Keep it; publish this hash:")
-    console.print(drawn.sha256, soft_wrap=True)
+    say(drawn.sha256)
 
 
 def _opened(path: Path, train: bool) -> SealedSeeds:
@@ -163,14 +161,13 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
     for failure in board.failures():
         note(failure)
     for line in board.said():
-        console.print(escape(line), soft_wrap=True)
+        say(escape(line))
     if board.days_page:
         _tell_days(out)
     more = ", days.csv, days.json" if board.days_page else ""
-    console.print(
+    say(
         f"{escape(str(out))}: leaderboard.md, leaderboard.csv, leaderboard.json{more} "
-        f"({spent_s:.0f} s)",
-        soft_wrap=True,
+        f"({spent_s:.0f} s)"
     )
 
 
@@ -181,4 +178,4 @@ def _tell_days(out: Path) -> None:
     for group, rows in score_tables.groups(read(out / NAMES[1])).items():
         console.print(f"Over days, {score_tables.where(group)}, {score_tables.size(rows)}:")
         for line in score_tables.sentences(rows):
-            console.print(escape(line), soft_wrap=True)
+            say(escape(line))

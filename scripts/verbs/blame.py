@@ -9,16 +9,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from scripts.console import console
-from scripts.debugger.options import At, Horizon, Lead, Repeats, Threshold, Top, Who, Within
+from scripts.console import console, say
 from scripts.debugger.question import Question
-from scripts.knobs import Change, CrowdOption, Held, Motion
-from scripts.many import named
 from scripts.names import check, file_name, run_name
-from scripts.output_options import Overwrite
-from scripts.scanner_option import Scanner
-from scripts.tour_options import DynamismLevel, Seconds, Seed
-from scripts.trust import Trust
+from scripts.options import (
+    Change,
+    CrowdOption,
+    DynamismLevel,
+    Held,
+    Motion,
+    Overwrite,
+    Scanner,
+    Seconds,
+    Seed,
+    Trust,
+    named,
+)
 from slam.errors import InvalidValueError
 from slam.evaluation.divergence import Rule
 
@@ -49,14 +55,31 @@ def blame(
         list[str] | None, typer.Option(help="Option of the scene: NAME=VALUE, e.g. n_chairs=6.")
     ] = None,
     every: Annotated[int, typer.Option(help="The SLAM gets one scan in so many.")] = 1,
-    threshold: Threshold = Rule.threshold_m,
-    within: Within = Rule.within_s,
-    at: At = None,
-    lead: Lead = Question.lead_s,
-    horizon: Horizon = Question.horizon_s,
-    top: Top = Question.top,
-    who: Who = None,
-    repeats: Repeats = Question.repeats,
+    threshold: Annotated[
+        float, typer.Option(help="Rise of the error that counts as a divergence, m.")
+    ] = Rule.threshold_m,
+    within: Annotated[float, typer.Option(help="Time within which it rises, s.")] = Rule.within_s,
+    at: Annotated[
+        float | None, typer.Option(help="Examine this time instead of searching, s.")
+    ] = None,
+    lead: Annotated[
+        float, typer.Option(help="Time from the checkpoint to the divergence, s.")
+    ] = Question.lead_s,
+    horizon: Annotated[
+        float, typer.Option(help="Time from the divergence to the end of the re-runs, s.")
+    ] = Question.horizon_s,
+    top: Annotated[
+        int, typer.Option(help="Try only this many of the likeliest; 0: all observed.")
+    ] = Question.top,
+    who: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Try only these: a mover, a group (escorts, chairs) or a pattern (group[0-3])."
+        ),
+    ] = None,
+    repeats: Annotated[
+        int, typer.Option(help="Repeats of original and cure with other noise.")
+    ] = Question.repeats,
     out: Annotated[Path | None, typer.Option(help="Folder; default out/blame-...")] = None,
     overwrite: Overwrite = False,
     trust: Trust = False,
@@ -86,7 +109,7 @@ def blame(
         case, name = case_of(run, slam, every, trust), run_name(run)
     else:
         held = Held(motion=motion, change=change, crowd=crowd)
-        world = {"scene": scene, "dynamism": dynamism, **held.given(), "seed": seed}
+        world = held.world(scene, dynamism, seed)
         settings, name = _world(world, option or [], scanner), f"{scene}-{seed}"
         case = Case(settings=settings, seconds=seconds, slam=slam or "shunting", every=every)
     if at is not None and not 0.0 <= at <= case.seconds:
@@ -113,14 +136,14 @@ def _tell(found: Inquest, folder: Path) -> None:
         console.print(table(found))
     else:
         console.print(escape(says[0]), style="bold")
-    console.print(escape(says[1]), highlight=False, soft_wrap=True)
+    say(escape(says[1]), highlight=False)
     if found.trials:
-        console.print(
+        say(
             f"Held fixed: {FIXED}. The robot's path differs by at most {_path_m(found):.3f} m; "
             "'others' is how far other movers ended from where they did.",
-            highlight=False, soft_wrap=True,
-        )  # fmt: skip
-    console.print(f"Open [bold]{escape(str(folder / 'blame.png'))}[/bold].", soft_wrap=True)
+            highlight=False,
+        )
+    say(f"Open [bold]{escape(str(folder / 'blame.png'))}[/bold].")
 
 
 def _path_m(found: Inquest) -> float:

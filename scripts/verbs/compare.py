@@ -10,17 +10,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from scripts.checked import whole
-from scripts.console import console, fact
-from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels
-from scripts.levels import axis_levels
-from scripts.many import named
+from scripts.console import console, fact, say
 from scripts.names import check
-from scripts.oracle_option import Oracles, with_oracles
-from scripts.process_options import Cluster, Jobs
-from scripts.scanner_option import Scanner, every_of
-from scripts.set_option import Set
-from slam.guests.limits import Limits
+from scripts.options import (
+    ChangeLevels,
+    Cluster,
+    CrowdOption,
+    Jobs,
+    MotionLevels,
+    Oracles,
+    Scanner,
+    Set,
+    axis_levels,
+    every_of,
+    named,
+    whole,
+    with_oracles,
+)
+from slam.guests import Limits
 
 if TYPE_CHECKING:
     from scripts.comparison.plan import Plan
@@ -100,17 +107,14 @@ def compare(
     started = time.perf_counter()
     ways: dict[str, Any] = {"jobs": jobs, "cluster": cluster}
     if sessions is not None:
-        from scripts.days.make import beside
+        from scripts.days.buildings import beside
 
         ways["more"] = beside(plan)
     rows = carry_out(plan, out, **ways)
     spent_s = time.perf_counter() - started
     tell(plan, rows)
     more = tell_ages(out) if sessions is not None else ""
-    console.print(
-        f"{escape(str(out))}: runs.csv, levels.csv, paired.csv, runs/{more} ({spent_s:.0f} s)",
-        soft_wrap=True,
-    )
+    say(f"{escape(str(out))}: runs.csv, levels.csv, paired.csv, runs/{more} ({spent_s:.0f} s)")
 
 
 def tell(plan: Plan, rows: list[dict[str, Any]]) -> None:

@@ -89,6 +89,7 @@ def _print_crowds(as_json: bool) -> None:
 
 def _print_dynamism(as_json: bool) -> None:
     """The dynamism curves: each rate of motion, and change, at five levels."""
+    from scripts.result_files import finite
     from sim.core.dynamism import CURVES as OF_MOTION
     from sim.core.dynamism import Rate
 
@@ -98,7 +99,7 @@ def _print_dynamism(as_json: bool) -> None:
     if as_json:
         words = [
             {"field": rate.field, "meaning": rate.meaning, "unit": rate.unit,
-             "values": dict(zip(map(str, LEVELS), map(_finite, values), strict=True))}
+             "values": dict(zip(map(str, LEVELS), map(finite, values), strict=True))}
             for rate, values in rows
         ]  # fmt: skip
         print(json.dumps({"rates": words}, indent=1, ensure_ascii=False))
@@ -114,11 +115,6 @@ def _print_dynamism(as_json: bool) -> None:
         cells = [f"{value:.3g}" for value in values]
         table.add_row(rate.field, rate.meaning, *cells, "" if rate.unit == "1" else rate.unit)
     console.print(table)
-
-
-def _finite(value: float) -> float | None:
-    """Strict JSON has no infinity."""
-    return value if math.isfinite(value) else None
 
 
 def _trees(what: str) -> tuple[Settings, Settings]:

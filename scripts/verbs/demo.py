@@ -8,11 +8,19 @@ from typing import Annotated
 
 import typer
 
-from scripts.knobs import Change, CrowdOption, Held, Motion
 from scripts.names import check
-from scripts.output_options import Overwrite
-from scripts.scanner_option import Scanner
-from scripts.tour_options import DynamismLevel, ScanHeight, Seconds, Seed
+from scripts.options import (
+    Change,
+    CrowdOption,
+    DynamismLevel,
+    Held,
+    Motion,
+    Overwrite,
+    ScanHeight,
+    Scanner,
+    Seconds,
+    Seed,
+)
 
 FILM_FPS = 15.0  # the whole demo is to last a minute on two cores
 
@@ -40,10 +48,12 @@ def demo(
     nothing changes out of sight, unless --crowd and --change say so.
     """
     check(["shunting"], scene)
-    from scripts.single_run.live import on_scene, tour
+    from scripts.single_run.run import on_scene
     from scripts.single_run.session import Outputs
 
     outputs = Outputs(folder=out, command="demo", overwrite=overwrite, film=film, film_fps=FILM_FPS)
     held = Held(motion=motion, change=change, crowd=crowd)
-    settings = tour(scene, seconds, dynamism, seed, scan_height, scanner, held)
+    settings = held.world(scene, dynamism, seed) | {
+        "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
+    }  # fmt: skip
     on_scene(["shunting"], settings, outputs)

@@ -9,7 +9,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from scripts.console import console, working
+from scripts.console import console, say, working
 from slam.errors import MobiliaError
 
 if TYPE_CHECKING:
@@ -45,9 +45,9 @@ def doctor(
 
 def _print(finding: Finding) -> None:
     told = f"{_MARKS[finding.state]} {escape(f'{finding.what:<24}')} {escape(finding.found)}"
-    console.print(told, highlight=False, soft_wrap=True)
+    say(told, highlight=False)
     if finding.how:
-        console.print(f"    to get it: {escape(finding.how)}", highlight=False, soft_wrap=True)
+        say(f"    to get it: {escape(finding.how)}", highlight=False)
 
 
 def _print_sizes() -> None:
@@ -62,4 +62,4 @@ def _print_sizes() -> None:
     console.print(table)
     parts = [f"{group} {mb:.0f} MB" for group, mb in totals(found).items()]
     whole = sum(size.megabytes for size in found)
-    console.print(escape(f"{whole:.0f} MB in all: {', '.join(parts)}"), soft_wrap=True)
+    say(escape(f"{whole:.0f} MB in all: {', '.join(parts)}"))

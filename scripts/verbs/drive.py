@@ -10,15 +10,20 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from scripts.checked import whole
-from scripts.console import console
-from scripts.knobs import ChangeLevels, CrowdOption, MotionLevels
-from scripts.levels import axis_levels
-from scripts.many import named
+from scripts.console import console, say
 from scripts.names import check
-from scripts.process_options import Jobs
-from scripts.scanner_option import Scanner, every_of
-from scripts.set_option import Set
+from scripts.options import (
+    ChangeLevels,
+    CrowdOption,
+    Jobs,
+    MotionLevels,
+    Scanner,
+    Set,
+    axis_levels,
+    every_of,
+    named,
+    whole,
+)
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
@@ -81,10 +86,9 @@ def drive(
     started = time.perf_counter()
     rows = carry_out(plan, out, jobs=jobs)
     console.print(success_table(plan, rows))
-    console.print(
+    say(
         f"{escape(str(out))}: closed_loop.png, paths.png, goals.csv, runs.csv, levels.csv "
-        f"({time.perf_counter() - started:.0f} s)",
-        soft_wrap=True,
+        f"({time.perf_counter() - started:.0f} s)"
     )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from scripts.console import console, working
+from scripts.console import say, working
 from scripts.names import check
 from slam.errors import InvalidValueError
 from slam.files import replacing
@@ -64,7 +64,7 @@ def export(
     with working(f"writing {to}"):
         written = writers[to](target, stream)
     for path in written:
-        console.print(escape(str(path)), soft_wrap=True)
+        say(escape(str(path)))
 
 
 def _beside(log: Path) -> Path:

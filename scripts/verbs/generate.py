@@ -10,12 +10,19 @@ import typer
 from rich.markup import escape
 
 from scenes import registry
-from scripts.console import console
-from scripts.knobs import Change, CrowdOption, Held, Motion, options_with
-from scripts.levels import sweep
+from scripts.console import console, say
 from scripts.names import check
-from scripts.process_options import Cluster, Jobs
-from scripts.scanner_option import Scanner
+from scripts.options import (
+    Change,
+    Cluster,
+    CrowdOption,
+    Held,
+    Jobs,
+    Motion,
+    Scanner,
+    options_with,
+    sweep,
+)
 from slam.errors import InvalidValueError
 
 
@@ -71,7 +78,7 @@ def generate(
     levels = sweep(dynamism_sweep) if dynamism_sweep else (dynamism,)
     check([], *scene)
     from scripts import workers
-    from scripts.dataset.make import carry_out
+    from scripts.dataset import carry_out
     from sim.recording.dataset import Plan
     from sim.recording.recipe import Recipe
     from sim.recording.splits import split_of
@@ -93,4 +100,4 @@ def generate(
     for name in scene:  # a wrong name is told, and a module found, before anything starts
         registry.find(name)
     console.print(carry_out(plan, out, jobs=jobs, cluster=cluster))
-    console.print(f"{escape(str(out))}: check it with [bold]mobilia verify[/bold]", soft_wrap=True)
+    say(f"{escape(str(out))}: check it with [bold]mobilia verify[/bold]")

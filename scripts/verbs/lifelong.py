@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from scripts.console import console, note, working
-from scripts.knobs import CrowdOption, Motion, options_with
+from scripts.console import console, note, say, working
 from scripts.names import check
-from scripts.output_options import Overwrite
-from scripts.scanner_option import Scanner
+from scripts.options import CrowdOption, Motion, Overwrite, Scanner, options_with
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -60,7 +58,7 @@ def lifelong(
         raise InvalidValueError("--slam must name at least one SLAM")
     check(names, *([scene] if scene else []))
     from scripts.days import sessions as days
-    from scripts.days.plan import FIRST
+    from scripts.days.buildings import FIRST
     from sim.recording.recipe import MAX_SECONDS, Recipe
 
     if folder is not None:
@@ -106,22 +104,21 @@ def _write(
     path = out or Path("out") / "lifelong"
     with whole_folder(path, overwrite=overwrite, command="lifelong", settings=settings) as folder:
         buildings = life.started(names, folder)
+        (folder / "replays").mkdir()
+        for building in buildings:
+            building.replays = folder / "replays"
         kept: dict[int, Drive] = {}
-        rows = []
         with working("living through the sessions"):
-            for row in life.rows(buildings, _noted(drives, kept)):
-                rows.append(row)
+            rows, aged = life.lived(buildings, _noted(drives, kept))
         living = next((b for b in buildings if not b.anew), None)
         changes = ("", None) if living is None else changes_page(folder, living, kept)
-        last = kept[max(kept)]
-        aged = [row for b in buildings if not b.anew for row in life.age_rows(b, last)]
         failures = {b.name: b.failures[0] for b in buildings if b.failures}
         tables.write(folder, rows, settings, changes, aged, failures)
         write_recipe(folder, "lifelong", settings)
     for name in names:
         own = [row for row in rows if row["slam"] == name]
         console.print(tables.printed(name, own))
-        console.print(escape(tables.verdict(own, failures.get(name))), soft_wrap=True)
+        say(escape(tables.verdict(own, failures.get(name))))
     note(f"open {escape(str(path / 'lifelong.md'))} first")
 
 

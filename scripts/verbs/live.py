@@ -1,27 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mobilia live``: a running world or a log in a viewer, to watch, to steer and to disturb."""
+"""``mobilia live``: a running world or a log as a page, to watch, to steer and to disturb."""
 
 from __future__ import annotations
 
+import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
-from scripts.console import console, note
-from scripts.knobs import Change, CrowdOption, Held, Motion
+from scripts.console import note, say
 from scripts.live import FASTEST, SLOWEST
 from scripts.names import check
-from scripts.scanner_option import Scanner
+from scripts.options import Change, CrowdOption, DynamismLevel, Held, Motion, Scanner, Set
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
-    from scripts.live.opened import Opened
+    from scripts.live.opened import Opener
 
-PORT = 8765  # where Foxglove looks first
-LAYOUT = Path(__file__).parents[1] / "live" / "layout.json"
+PORT = 8765
 
 
 def live(
@@ -35,9 +34,7 @@ def live(
     log: Annotated[Path | None, typer.Option(help="Instead of a scene: a log.")] = None,
     bag: Annotated[Path | None, typer.Option(help="Instead of a scene: a bag of ROS.")] = None,
     seconds: Annotated[float, typer.Option(help="How long the scene lives, s.")] = 3600.0,
-    dynamism: Annotated[
-        float, typer.Option(help="How much the room moves: 0 nothing, 1 most.")
-    ] = 0.5,
+    dynamism: DynamismLevel = 0.5,
     motion: Motion = None,
     change: Change = None,
     crowd: CrowdOption = None,
@@ -53,15 +50,14 @@ def live(
         list[str] | None,
         typer.Option(help="A web page that may connect: https://host[:port]; repeatable."),
     ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="[SLAM.]PATH=VALUE, see mobilia config SLAM; repeatable."),
-    ] = None,
+    browser: Annotated[
+        bool, typer.Option("--open", help="Open the page in this machine's browser, too.")
+    ] = False,
+    set_: Set = None,
 ) -> None:
-    """Serve a running world over the Foxglove WebSocket: watch it, drive in it, push its chairs.
+    """Open a page with a running world: watch it, drive in it, push its chairs.
 
-    Open Foxglove or Lichtblick, connect to ws://127.0.0.1:8765 and import the layout that is named
-    when this starts. Ctrl-C ends it. Nothing is written.
+    Any browser shows it, at http://127.0.0.1:8765. Ctrl-C ends it. Nothing is written.
 
     [bold]mobilia live office --slam shunting[/bold]
 
@@ -74,18 +70,16 @@ def live(
         raise InvalidValueError(f"--speed must lie in [{SLOWEST:g}, {FASTEST:g}], got {speed:g}")
     slams = list(with_set(slam or ["shunting"], set_ or []))
     check(slams, scene)
-    from scripts.live import gate, opened, sdk
+    from scripts.live import gate, opened, served
 
-    origins = [gate.origin_of(text) for text in allow_origin or []]
-
-    found = sdk.require()
-    if path is not None:
-        served = opened.of_file(slams, path)
-    else:
-        held = Held(motion=motion, change=change, crowd=crowd)
-        world = {"scene": scene, "dynamism": dynamism, **held.given(), "seed": seed}
-        served = opened.of_scene(slams, {**world, "laser": scanner}, seconds)
-    _serve(found, served, (host, port), origins, playing=not paused, speed=speed)
+    allowed = [gate.origin_of(text) for text in allow_origin or []]
+    served.require()
+    held = Held(motion=motion, change=change, crowd=crowd)
+    world = {**held.world(scene, dynamism, seed), "laser": scanner}
+    opener = opened.Opener(
+        slams=slams, path=path, settings=world if path is None else {}, seconds=seconds
+    )
+    _serve(opener, (host, port), allowed, playing=not paused, speed=speed, browser=browser)
 
 
 def _file(scene: str | None, log: Path | None, bag: Path | None) -> Path | None:
@@ -97,30 +91,23 @@ def _file(scene: str | None, log: Path | None, bag: Path | None) -> Path | None:
 
 
 def _serve(
-    found: object, served: Opened, address: tuple[str, int], origins: list[str], *,
-    playing: bool, speed: float,
+    opener: Opener, address: tuple[str, int], origins: list[str], *, playing: bool, speed: float,
+    browser: bool = False,
 ) -> None:  # fmt: skip
-    from scripts.live.playback import Playback
-    from scripts.live.sdk import Sdk
     from scripts.live.view import View
 
-    assert isinstance(found, Sdk)
-    session, shown_ns = served
-    playback = Playback(session.run(), playing=playing, speed=speed)
-    view = View(found, session, playback, address, shown_ns, origins)
+    view = View(opener, address, origins, playing=playing, speed=speed)
     try:
-        host = address[0]
-        if view.token:
+        host, token = address[0], view.served.token
+        if token:
             note(
                 f"--host {host}: whoever has the address below can watch, drive the robot and "
                 "move things. There is no encryption."
             )
-        path = f"/{view.token}" if view.token else ""
-        console.print(
-            f"Serving at [bold]ws://{escape(host)}:{view.port}{path}[/bold]; layout: "
-            f"{escape(str(LAYOUT))}. Ctrl-C ends it.",
-            soft_wrap=True,
-        )
+        url = f"http://{host}:{view.served.port}/{token}"
+        say(f"Open [bold]{escape(url)}[/bold] in a browser. Ctrl-C ends it.")
+        if browser:
+            webbrowser.open(url)
         while True:
             view.turn()
     finally:

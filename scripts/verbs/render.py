@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mobilia render``: a film, a strip or a Rerun recording of a run, an episode or a log."""
+"""``mobilia render``: a film, a strip or a page to turn of a run, an episode or a log."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from scripts.console import console, note
+from scripts.console import note, say
 from scripts.film import FPS
 from scripts.names import check, run_name
-from scripts.trust import Trust, admitted
+from scripts.options import Trust, admitted
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -48,8 +48,8 @@ def render(
     at: Annotated[
         str, typer.Option(help="Moments of the strip, s: 3,12.5,40. Default: six, evenly spaced.")
     ] = "",
-    rerun: Annotated[
-        Path | None, typer.Option(help="Also a recording for the Rerun viewer (.rrd).")
+    replay: Annotated[
+        Path | None, typer.Option(help="Also a page to turn and to scrub, for any browser (.html).")
     ] = None,
     view: Annotated[
         str, typer.Option(help="View of the 3D camera: follow, top or persp.")
@@ -69,20 +69,20 @@ def render(
 ) -> None:
     """Film a run: 3D view, scan by what each beam hit, map, errors, events.
 
-    Needs no screen. With [bold]--strip[/bold] or [bold]--rerun[/bold] and no [bold]--out[/bold],
+    Needs no screen. With [bold]--strip[/bold] or [bold]--replay[/bold] and no [bold]--out[/bold],
     only these are made.
 
     [bold]mobilia render out/demo --strip strip.png --out film.mp4[/bold]
     """
     if view not in VIEWS:
         raise InvalidValueError(f"--view must be one of {', '.join(VIEWS)}, got '{view}'")
-    if out is None and strip_to is None and rerun is None:
+    if out is None and strip_to is None and replay is None:
         out = Path("out") / f"{run_name(run)}.mp4"
     if at and strip_to is None:
         raise InvalidValueError("--at names the moments of --strip, which is missing")
     moments = _moments(at)
     check([slam] if slam else [])
-    _check_outputs(out, strip_to, rerun)
+    _check_outputs(out, strip_to, replay)
     from scripts.film.encode import size_of
     from scripts.film.footage import open_run
     from scripts.film.strips import evenly
@@ -101,7 +101,7 @@ def render(
             note(f"the film has no 3D panel: {footage.no_camera}")
         if strip_to is not None and not moments:
             moments = evenly(STRIP_PICTURES, pace.from_s, min(pace.to_s, footage.duration_s))
-        _render(footage, show, out, strip_to, moments, rerun)
+        _render(footage, show, out, strip_to, moments, replay)
 
 
 def _render(
@@ -110,36 +110,35 @@ def _render(
     out: Path | None,
     strip_to: Path | None,
     moments: list[float],
-    rerun: Path | None,
+    replay: Path | None,
 ) -> None:
     from scripts.film.encode import film
     from scripts.film.render import Snapshots, shoot, watched
-    from scripts.film.rerun_log import RerunLog
     from scripts.film.strips import strip
+    from scripts.live.replay import Recorder
 
     started = time.perf_counter()
     with ExitStack() as stack:
         reel = stack.enter_context(film(out, show.pace.fps)) if out is not None else None
-        log = stack.enter_context(RerunLog.writing(rerun, show)) if rerun is not None else None
+        recorder = stack.enter_context(Recorder.of(replay, show)) if replay is not None else None
         snapshots = Snapshots(show, moments, show.vignette)
         for frame in watched(shoot(footage.stream, show, reel), footage.stream, show.title):
             snapshots.note(frame)
-            if log is not None:
-                log.note(frame)
+            if recorder is not None:
+                recorder.note(frame, footage.stage.placed)
         if strip_to is not None:
             columns = min(3, len(moments))
             strip(snapshots.finish(), moments, strip_to, columns=columns, legend=show.legend())
     wall_s = time.perf_counter() - started
     if reel is not None and out is not None:
         long_s = reel.frames / show.pace.fps
-        console.print(
+        say(
             f"Wrote [bold]{escape(str(out))}[/bold]: {reel.frames} pictures, {long_s:.1f} s, made "
-            f"in {wall_s:.1f} s ({long_s / wall_s:.1f} × real time).",
-            soft_wrap=True,
+            f"in {wall_s:.1f} s ({long_s / wall_s:.1f} × real time)."
         )
-    for path in (strip_to, rerun):
+    for path in (strip_to, replay):
         if path is not None:
-            console.print(f"Wrote [bold]{escape(str(path))}[/bold].", soft_wrap=True)
+            say(f"Wrote [bold]{escape(str(path))}[/bold].")
 
 
 def _pace(
@@ -166,7 +165,7 @@ def _pace(
     )
 
 
-def _check_outputs(out: Path | None, strip_to: Path | None, rerun: Path | None) -> None:
+def _check_outputs(out: Path | None, strip_to: Path | None, replay: Path | None) -> None:
     """Writers choose formats by the suffix, as do those who open the file; what they need is there.
 
     Raises ``InvalidValueError`` for another suffix, ``MissingDependencyError`` without a writer.
@@ -174,17 +173,14 @@ def _check_outputs(out: Path | None, strip_to: Path | None, rerun: Path | None) 
     for option, path, suffix in (
         ("--out", out, ".mp4"),
         ("--strip", strip_to, ".png"),
-        ("--rerun", rerun, ".rrd"),
+        ("--replay", replay, ".html"),
     ):
         if path is not None and path.suffix.lower() != suffix:
             raise InvalidValueError(f"{option} must be a file that ends in {suffix}, got '{path}'")
-    from scripts.film.encode import require_ffmpeg
-    from scripts.film.rerun_log import RerunLog
-
     if out is not None:
+        from scripts.film.encode import require_ffmpeg
+
         require_ffmpeg()
-    if rerun is not None:
-        RerunLog.require()
 
 
 def _moments(words: str) -> list[float]:

@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
-from scripts.console import console, fact, working
+from scripts.console import fact, say, working
+
+if TYPE_CHECKING:
+    from scripts.report.study import Study
 
 
 def report(
@@ -24,6 +27,10 @@ def report(
         str | None,
         typer.Option(help="SLAM that the page is about; default the one named first."),
     ] = None,
+    replays: Annotated[
+        bool,
+        typer.Option("--replays", help="Also DIR/replays: the subject's worst run of each scene."),
+    ] = False,
 ) -> None:
     """Write DIR/report.html: one page, self-contained, that opens from disk and prints.
 
@@ -34,8 +41,7 @@ def report(
     from scripts.closed_loop.folder import driven, drives_in
     from scripts.report import page
     from scripts.report.answer import failed
-    from scripts.report.study import study
-    from scripts.report.wanted import check_comparison
+    from scripts.report.study import check_comparison, study
 
     check_comparison(folder)
     found = [*(drive or []), *drives_in(folder)]
@@ -47,9 +53,33 @@ def report(
     for line in page.answers(about):
         fact(line)
     for line in page.blame_worst(about):
-        console.print(f"What misled it: [bold]{escape(line)}[/bold]", highlight=False,
-                      soft_wrap=True)  # fmt: skip
-    console.print(
-        f"Open [bold]{escape(str(path))}[/bold] ({path.stat().st_size / 1e6:.1f} MB).",
-        soft_wrap=True,
-    )
+        say(f"What misled it: [bold]{escape(line)}[/bold]", highlight=False)
+    if replays:
+        with working("replaying the worst runs"):
+            made = _replays(about)
+        say(f"Wrote [bold]{escape(', '.join(made))}[/bold].")
+    say(f"Open [bold]{escape(str(path))}[/bold] ({path.stat().st_size / 1e6:.1f} MB).")
+
+
+def _replays(about: Study) -> list[str]:
+    """Pages of the subject's worst run in each scene, made again from its recipe."""
+    from scripts.comparison.plan import Run
+    from scripts.film.footage import of_compared
+    from scripts.film.render import shoot
+    from scripts.live.replay import Recorder
+
+    made = []
+    for scene in about.scenes:
+        row = about.worst(scene, about.subject)[0]
+        run = Run(scene=scene, dynamism=row["dynamism"], seed=int(row["seed"]), axis=about.axis)
+        path = about.compared.folder / "runs" / f"{run.name}.npz"
+        out = about.compared.folder / "replays" / f"{path.stem}.html"
+        out.parent.mkdir(exist_ok=True)
+        with of_compared(path, view=None) as footage:
+            show = footage.show([about.subject])
+            show.filmed = False
+            with Recorder.of(out, show) as recorder:
+                for frame in shoot(footage.stream, show, None):
+                    recorder.note(frame, footage.stage.placed)
+        made.append(str(out))
+    return made

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from scripts.console import console, note
+from scripts.console import note, say
 from scripts.paper import EXPERIMENTS
 from slam.errors import UnknownNameError
 from slam.files import write_text
@@ -45,8 +45,8 @@ def reproduce(
     [bold]mobilia reproduce landmarks[/bold]
     """
     names, started = _named(what), time.perf_counter()
+    from scripts.paper.report import total
     from scripts.paper.runs import Plan
-    from scripts.paper.times import total
 
     plan = Plan(out=out, seeds=seeds, quick=quick, data=data, processes=jobs or os.cpu_count() or 1)
     left_out = "all" in what and plan.data is None
@@ -55,11 +55,11 @@ def reproduce(
     for name in names:
         experiment(name)(plan)
         page = escape(str(plan.out / name / "README.md"))
-        console.print(f"[bold]{name}[/bold]: open {page}", soft_wrap=True)
+        say(f"[bold]{name}[/bold]: open {page}")
     if "all" in what:
         told = total(plan, names, time.perf_counter() - started)
         write_text(plan.out / "summary.md", told + "\n")
-        console.print(escape(told), soft_wrap=True)
+        say(escape(told))
     if left_out:
         note("victoria-park is left out: pass --data with the folder of the dataset")
 

@@ -8,14 +8,24 @@ from typing import Annotated
 
 import typer
 
-from scripts.knobs import Change, CrowdOption, Held, Motion
-from scripts.log_options import Strict, TextFormat
 from scripts.names import check, run_name
-from scripts.oracle_option import Oracles, with_oracles
-from scripts.output_options import Overwrite
-from scripts.scanner_option import Scanner
-from scripts.set_option import Set
-from scripts.tour_options import DynamismLevel, ScanHeight, Seconds, Seed
+from scripts.options import (
+    Change,
+    CrowdOption,
+    DynamismLevel,
+    Held,
+    Motion,
+    Oracles,
+    Overwrite,
+    ScanHeight,
+    Scanner,
+    Seconds,
+    Seed,
+    Set,
+    Strict,
+    TextFormat,
+    with_oracles,
+)
 from slam.errors import InvalidValueError
 
 
@@ -79,17 +89,19 @@ def run(
     check(slams, scene)
     if scene is not None:
         _without_a_log(strict=strict or text_format is not None, maps=bool(map_in or map_out or at))
-        from scripts.single_run.live import on_scene, tour
+        from scripts.single_run.run import on_scene
         from scripts.single_run.session import Outputs
 
         folder = out or Path("out") / f"run-{scene.replace(':', '-')}"
         outputs = Outputs(folder=folder, command="run", overwrite=overwrite, film=film)
         held = Held(motion=motion, change=change, crowd=crowd)
-        settings = tour(scene, seconds, dynamism, seed, scan_height, scanner, held)
+        settings = held.world(scene, dynamism, seed) | {
+            "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
+        }  # fmt: skip
         on_scene(slams, settings, outputs)
     elif log is not None:
         from scripts.days.one import Maps
-        from scripts.single_run.recorded import Log, on_log
+        from scripts.single_run.run import Log, on_log
 
         maps = Maps(map_in=map_in, map_out=map_out, at=at)
         folder = out or Path("out") / f"run-{run_name(log)}"

@@ -4,19 +4,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-from rich.markup import escape
-from rich.table import Table
 
 from scripts.console import console, note, working
-from scripts.log_options import Strict, TextFormat
+from scripts.options import Strict, TextFormat
 from slam.errors import MobiliaError
-from slam.files import write_text
-
-if TYPE_CHECKING:
-    from scripts.card.rows import Row
 
 
 def sensor_card(
@@ -53,49 +47,41 @@ def beside_sheet(scanner: str, out: Path | None) -> None:
 
     Raises ``MobiliaError`` where the scanner departs from its data sheet.
     """
-    from scripts.card import rows, stated  # mujoco: only once the environment is known good
+    from scripts.card import page, rows, stated  # mujoco: only once the environment is known good
     from sim.sensors.lidar.registry import DEFAULT, describe
 
     with working("measuring"):
         measured = rows.rows() if scanner == DEFAULT else stated.rows_of(scanner)
-    console.print(_table(f"{describe(scanner)} (simulated)", measured))
+    cells = [row.cells() for row in measured]
+    console.print(page.printed(f"{describe(scanner)} (simulated)", page.HEADINGS, cells))
     if out is not None:
-        _write_card(out, scanner, measured)
+        _write_card(out, scanner, page.page(scanner, measured))
     broken = [row.what for row in measured if not row.kept]
     if broken:
         raise MobiliaError(f"the scanner departs from its data sheet: {'; '.join(broken)}")
 
 
-def _table(title: str, rows: list[Row]) -> Table:
-    headings = ("", "what", "data sheet", "measured", "source")
-    table = Table(*headings, title=escape(title), title_justify="left")
-    for row in rows:
-        mark = "[green]✓[/green]" if row.kept else "[red]✗[/red]"
-        table.add_row(mark, row.what, row.datasheet, row.measured, row.source)
-    return table
-
-
-def _write_card(out: Path, scanner: str, rows: list[Row]) -> None:
+def _write_card(out: Path, scanner: str, lines: list[str]) -> None:
     """The page of one scanner; that of the LMS-221 has figures."""
-    from scripts.card import page, stated
+    from scripts.card import page
     from sim.sensors.lidar.registry import DEFAULT
 
-    if scanner == DEFAULT:
-        with working("drawing the page"):
-            page.write_card(out, rows)
-        note(f"wrote {out / 'sensor_card.md'} and its pictures")
-    else:
-        out.mkdir(parents=True, exist_ok=True)
-        write_text(out / f"sensor_card_{scanner}.md", stated.page(scanner, rows))
-        note(f"wrote {out / f'sensor_card_{scanner}.md'}")
+    if scanner != DEFAULT:
+        note(f"wrote {page.write(out, f'sensor_card_{scanner}', lines)}")
+        return
+    with working("drawing the page"):
+        from scripts.card import pictures
+
+        pictures.draw(out / "pictures")
+    note(f"wrote {page.write(out, 'sensor_card', lines)} and its pictures")
 
 
 def beside_log(
     logs: list[Path], scanner: str, out: Path | None, *, text_format: Path | None, strict: bool
 ) -> None:
     """Print the two cards side by side; with ``out``, also write them as real_scanner_log.md."""
-    from scripts.card.real import table
-    from scripts.card.real.beside import like, real_card, simulated_card
+    from scripts.card import beside, page
+    from scripts.card.real import like, real_card, simulated_card
     from sim.sensors.lidar.registry import scanner_of
 
     scanner_of(scanner)  # an unknown name is said before anything is read
@@ -105,14 +91,10 @@ def beside_log(
     with working("simulating and measuring"):
         ours = {name: simulated_card(name)}
     title = "value (95 % interval, whole stretches drawn again); ≠: the intervals do not meet"
-    shown = Table(*map(escape, table.headings(real, ours)), title=title, title_justify="left")
-    for line in table.lines(real, ours):
-        shown.add_row(*table.cells(line))
-    console.print(shown)
-    for what, card in {**real, **ours}.items():
-        note(f"{what}: {table.amount(card)}")
+    console.print(page.printed(title, beside.headings(real, ours), beside.rows(real, ours)))
+    for what, card in (real | ours).items():
+        note(f"{what}: {beside.amount(card)}")
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        text = f"# {', '.join(log.name for log in logs)} beside {name}\n\n"
-        write_text(out / "real_scanner_log.md", f"{text}{table.markdown(real, ours)}\n")
-        note(f"wrote {out / 'real_scanner_log.md'}")
+        head = f"# {', '.join(log.name for log in logs)} beside {name}"
+        lines = [head, "", *beside.markdown(real, ours)]
+        note(f"wrote {page.write(out, 'real_scanner_log', lines)}")

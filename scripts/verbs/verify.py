@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scripts import interrupt
-from scripts.console import console, fail, plain, progress, working
-from scripts.trust import Trust, admitted
+from scripts.console import console, fail, plain, progress, say, working
+from scripts.options import Trust, admitted
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def verify(
         ),
     ],
     regenerate_: Annotated[
-        int, typer.Option("--regenerate", help="Simulate this many episodes anew and compare.")
+        int, typer.Option("--regenerate", help="Simulate this many episodes again and compare.")
     ] = 0,
     rerun: Annotated[
         int,
@@ -118,18 +118,17 @@ def _by_chance(count: int) -> int:
 
 def _check_sealed(given: Submission, path: Path) -> None:
     from scripts.benchmark import sealed, submission
-    from scripts.benchmark.tracks import LEVELS, TRACKS
+    from scripts.benchmark.tracks import LEVELS
 
     opened = sealed.read(path)
     wanted = opened.seeds[: len(given.seeds)]
     if given.seeds_of != submission.SEALED or given.seeds != wanted:
         raise InvalidValueError(f"the seeds of {given.name!r} are not those of {path}")
-    console.print(f"its seeds were sealed as {opened.sha256}", soft_wrap=True)
+    say(f"its seeds were sealed as {opened.sha256}")
     seconds = "as long as the tracks say" if given.seconds is None else f"{given.seconds:g} s"
-    console.print(
+    say(
         f"it has {len(given.seeds)} of {len(opened.seeds)} sealed seeds, {len(given.levels)} of "
-        f"{len(LEVELS)} levels, {len(given.runs)} of {len(TRACKS)} tracks, runs {seconds}",
-        soft_wrap=True,
+        f"{len(LEVELS)} levels, {len(given.runs)} of {len(opened.tracks)} tracks, runs {seconds}"
     )
 
 
@@ -143,7 +142,7 @@ def _judgement(again: int, rerun: int) -> str:
 
 
 def _made_again(episodes: list[Path], trust: bool) -> list[Finding]:
-    """A finding for each episode, simulated anew."""
+    """A finding for each episode, simulated again."""
     from sim.recording.recipe import RECIPE, read_recipe
     from sim.recording.verify import regenerate
 
@@ -195,6 +194,4 @@ def _words(finding: Finding) -> str:
 def _tell(finding: Finding) -> None:
     color = _COLORS.get(finding.verdict, "yellow")
     why = f": {plain(finding.why)}" if finding.why else ""
-    console.print(
-        f"[{color}]{finding.verdict}[/{color}] {plain(finding.episode)}{why}", soft_wrap=True
-    )
+    say(f"[{color}]{finding.verdict}[/{color}] {plain(finding.episode)}{why}")

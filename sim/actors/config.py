@@ -241,7 +241,7 @@ class ChairConfig(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class DriverConfig(Settings):
-    """How the robot's driver scores a command, and when it plans anew."""
+    """How the robot's driver scores a command, and when it plans again."""
 
     step_s: float = _fixed(0.15, "s", "of the rollout; 14 of them")
     look_ahead_m: float = _fixed(0.35, "m", "where the cost-to-go is asked for as well")

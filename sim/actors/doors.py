@@ -22,15 +22,19 @@ from numpy.typing import NDArray
 
 from scenes.kinds import joint_of_door
 from sim.actors.config import ACTORS
+from sim.actors.people.columns import PASSAGE
 from sim.core.bodies import Bodies
 from sim.core.draws import between, waiting
+from sim.core.state import Record, Records, flat, record
 from slam._jit import njit
 
 Float = NDArray[np.float64]
 
-# columns of the schedule, (m, 5): next event s, end of the present one s, its angle rad, until
-# when the door is kept open for someone s, and when the cabin behind it comes s (inf: uncalled)
-NEXT, UNTIL, ANGLE, KEPT, COMES = 0, 1, 2, 3, 4
+# next event s, end of the present one s, its angle rad, until when the door is kept open for
+# someone s, and when the cabin behind it comes s (inf: uncalled)
+SCHEDULE = record(np.float64, "next until angle kept comes")
+# N m/rad, N m s/rad, N m, kg m2, rad, most rad/s, sort; of a leaf that slides N, kg and m
+CLOSER = record(np.float64, "stiffness damping friction inertia rest rate sort")
 SWINGS, SLIDES, LIFT = 0.0, 1.0, 2.0  # sorts of door
 # the numbers, as the kernels see them
 _D = ACTORS.doors
@@ -56,16 +60,12 @@ def robot_asks(robot: Float, middle: Float) -> bool:
 
 
 @njit
-def torque_to(target: float, q: float, qd: float, closer: Float) -> float:
-    """N m that turns the leaf to ``target`` at a hand's pace.
-
-    closer  (7,) stiffness N m/rad, damping N m s/rad, friction N m, inertia kg m2, rest rad, most
-            rate rad/s, sort; the same with N, kg and m for a leaf that slides
-    """
-    rate = min(max(RATE_GAIN * (target - q), -closer[5]), closer[5])
-    friction = math.copysign(closer[2], rate) if abs(rate) > 0.02 else 0.0
-    push = closer[0] * (q - closer[4]) + closer[1] * rate + friction
-    torque = push + TORQUE_GAIN * closer[3] * (rate - qd)
+def torque_to(target: float, q: float, qd: float, closer: Record) -> float:
+    """N m that turns the leaf to ``target`` at a hand's pace; N for one that slides."""
+    rate = min(max(RATE_GAIN * (target - q), -closer.rate), closer.rate)
+    friction = math.copysign(closer.friction, rate) if abs(rate) > 0.02 else 0.0
+    push = closer.stiffness * (q - closer.rest) + closer.damping * rate + friction
+    torque = push + TORQUE_GAIN * closer.inertia * (rate - qd)
     return float(min(max(torque, -TORQUE_MAX), TORQUE_MAX) + 0.0)
 
 
@@ -73,51 +73,50 @@ class Leaves(NamedTuple):
     """The doors of a model, m of them.
 
     rates      (m,) events that nobody in sight causes, 1/s
-    addresses  (m, 2) in qpos and dof; middles (m, 2) m; closers (m, 7); limits (m, 2) rad
-    passage    (m, 3) of ``sim.actors.people.right_of_way``: columns 1 asked for by a person, 2 a
-               person is in the way
-    schedule   (m, 5) in the columns named above; draws (m,) generators
+    addresses  (m, 2) in qpos and dof; middles (m, 2) m; closers (m,); limits (m, 2) rad
+    passage    (m,) of ``sim.actors.people.columns``: what people want
+    schedule   (m,); draws (m,) generators
     """
 
     rates: Float
     addresses: NDArray[np.int64]
     middles: Float
-    closers: Float
+    closers: Records
     limits: Float
-    passage: Float
-    schedule: Float
+    passage: Records
+    schedule: Records
     draws: NDArray[np.uint64]
 
 
 @njit
-def kept_open(time: float, lift: bool, asked: bool, inside: bool, q: float, row: Float) -> bool:
+def kept_open(time: float, lift: bool, asked: bool, inside: bool, q: float, row: Record) -> bool:
     """Whether a sliding door is to stand open now; ``row`` of the schedule is brought up to date.
 
     A lift that is shut comes some time after it was called, from within or without.
     """
     if not lift:
         if asked or inside:
-            row[KEPT] = time + SLIDE_HELD_S
-        return bool(time < row[KEPT])
-    if time >= row[COMES]:
-        row[KEPT], row[COMES] = time + LIFT_HELD_S, math.inf
-    elif asked and time >= row[KEPT] and q < SHUT_M and row[COMES] == math.inf:
-        row[COMES] = time + LIFT_S
+            row.kept = time + SLIDE_HELD_S
+        return bool(time < row.kept)
+    if time >= row.comes:
+        row.kept, row.comes = time + LIFT_HELD_S, math.inf
+    elif asked and time >= row.kept and q < SHUT_M and row.comes == math.inf:
+        row.comes = time + LIFT_S
     elif (asked or inside) and q >= SHUT_M:
-        row[KEPT] = max(row[KEPT], time + SLIDE_HELD_S)
-    return bool(time < row[KEPT])
+        row.kept = max(row.kept, time + SLIDE_HELD_S)
+    return bool(time < row.kept)
 
 
 @njit
-def slide_on(time: float, lift: bool, q: float, qd: float, row: Float) -> tuple[float, bool]:
+def slide_on(time: float, lift: bool, q: float, qd: float, row: Record) -> tuple[float, bool]:
     """Where a sliding door that nobody needs is driven to, and whether it is driven at all.
 
     A leaf that is stopped by something on its way opens again.
     """
-    if time < row[UNTIL] and not lift:
-        return row[ANGLE], True
-    if time > max(row[KEPT], row[UNTIL]) + SLIDE_STARTS_S and q > STOPPED_M and abs(qd) < STILL_MPS:
-        row[KEPT] = time + SLIDE_HELD_S
+    if time < row.until and not lift:
+        return row.angle, True
+    if time > max(row.kept, row.until) + SLIDE_STARTS_S and q > STOPPED_M and abs(qd) < STILL_MPS:
+        row.kept = time + SLIDE_HELD_S
     return -SHUT_M, q > SHUT_M
 
 
@@ -134,30 +133,30 @@ def swing(time: float, robot: Float, leaves: Leaves, physics: tuple[Float, Float
         at, dof = addresses[d]
         row, closer = schedule[d], closers[d]
         low, high = limits[d]
-        if time >= row[NEXT]:  # always three draws
-            row[NEXT] = time + waiting(draws, d, rates[d])
-            row[ANGLE] = between(draws, d, low, high)
-            row[UNTIL] = time + between(draws, d, EVENT_LEAST_S, EVENT_MOST_S)
-        if closer[6] != SWINGS:
-            asked = passage[d, 1] > 0.0 or robot_asks(robot, middles[d])
-            lift, inside = closer[6] == LIFT, passage[d, 2] > 0.0
+        if time >= row.next:  # always three draws
+            row.next = time + waiting(draws, d, rates[d])
+            row.angle = between(draws, d, low, high)
+            row.until = time + between(draws, d, EVENT_LEAST_S, EVENT_MOST_S)
+        if closer.sort != SWINGS:
+            asked = passage[d].asked > 0.0 or robot_asks(robot, middles[d])
+            lift, inside = closer.sort == LIFT, passage[d].inside > 0.0
             target, driven = SLIDE_OPENED * high, True
             if not kept_open(time, lift, asked, inside, qpos[at], row):
                 target, driven = slide_on(time, lift, qpos[at], qvel[dof], row)
             qfrc[dof] = torque_to(target, qpos[at], qvel[dof], closer) if driven else 0.0
             continue
         if (
-            passage[d, 1] > 0.0
+            passage[d].asked > 0.0
             or robot_asks(robot, middles[d])
-            or (passage[d, 2] > 0.0 and time < row[KEPT])
+            or (passage[d].inside > 0.0 and time < row.kept)
         ):
-            row[KEPT] = time + HELD_S
-        if time < row[KEPT]:
-            disturbed = time < row[UNTIL] or closer[4] < PASSABLE or qpos[at] < PASSABLE
-            target = min(max(OPENED, closer[4]), high)
-        elif time < row[UNTIL]:
+            row.kept = time + HELD_S
+        if time < row.kept:
+            disturbed = time < row.until or closer.rest < PASSABLE or qpos[at] < PASSABLE
+            target = min(max(OPENED, closer.rest), high)
+        elif time < row.until:
             # an angle is not forced upon someone who stands in the doorway
-            disturbed, target = True, qpos[at] if passage[d, 2] > 0.0 else row[ANGLE]
+            disturbed, target = True, qpos[at] if passage[d].inside > 0.0 else row.angle
         else:
             disturbed, target = False, 0.0
         qfrc[dof] = torque_to(target, qpos[at], qvel[dof], closer) if disturbed else 0.0
@@ -181,9 +180,9 @@ class Doors:
         """``rate``: events of each door that nobody in sight causes, 1/s."""
         self.names = list(names)
         m = len(self.names)
-        self.passage = np.zeros((m, 3))
-        self.schedule = np.full((m, 5), -math.inf)
-        self.schedule[:, COMES] = math.inf
+        self.passage = np.zeros(m, PASSAGE)
+        self.schedule = np.full(m, -math.inf, SCHEDULE)
+        self.schedule["comes"] = math.inf
         self._draws = counters.copy()
         qpos, dof = bodies.addresses(self.names)
         self.addresses = np.column_stack([qpos, dof])
@@ -192,17 +191,16 @@ class Doors:
         heading = self.hinges[:, 2].tolist()
         self.along = np.array([[math.cos(a), math.sin(a)] for a in heading]).reshape(m, 2)
         self.middles = self.hinges[:, :2] + 0.5 * self.widths[:, None] * self.along
-        self._closers, self._limits = np.zeros((m, 7)), np.zeros((m, 2))
+        self._closers, self._limits = np.zeros(m, CLOSER), np.zeros((m, 2))
         kinds = {mover.name: mover.kind for mover in bodies.scene.movers}
         for d, name in enumerate(self.names):
             joint = model.joint(f"{name}/{joint_of_door(kinds[name])}")
-            self._closers[d, :5], self._limits[d] = _closer(model, joint)
-            self._closers[d, 5:] = (
-                (RATE_MAX, SWINGS)
-                if kinds[name] == "door"
-                else (SLIDE_MAX, LIFT if kinds[name] == "door_lift" else SLIDES)
-            )
-            self.schedule[d, NEXT] = waiting(self._draws, d, rate)
+            pace = RATE_MAX, SWINGS
+            if kinds[name] != "door":
+                pace = SLIDE_MAX, LIFT if kinds[name] == "door_lift" else SLIDES
+            closer, self._limits[d] = _closer(model, joint)
+            self._closers[d] = *closer, *pace
+            self.schedule["next"][d] = waiting(self._draws, d, rate)
         self.leaves = Leaves(
             np.full(m, rate), self.addresses, self.middles, self._closers, self._limits,
             self.passage, self.schedule, self._draws,
@@ -226,17 +224,21 @@ class Doors:
                     closed,
                 )
                 continue
-            rest = REST_STEP * round(float(self._closers[d, 4]) / REST_STEP)
+            rest = REST_STEP * round(float(self._closers["rest"][d]) / REST_STEP)
             yaw, half = closed + sign * rest, 0.5 * float(self.widths[d])
             boxes[d] = x + half * math.cos(yaw), y + half * math.sin(yaw), half, 0.03, yaw
         return boxes
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""
-        return {"passage": self.passage, "schedule": self.schedule, "draws": self._draws}
+        return {
+            "passage": flat(self.passage),
+            "schedule": flat(self.schedule),
+            "draws": self._draws,
+        }
 
 
-def _closer(model: mujoco.MjModel, joint: object) -> tuple[Float, Float]:
+def _closer(model: mujoco.MjModel, joint: object) -> tuple[tuple[float, ...], Float]:
     """(stiffness, damping, friction, inertia, rest) and (low, high) of a hinge."""
     j = joint.id  # type: ignore[attr-defined]
     dof, at = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
@@ -249,4 +251,4 @@ def _closer(model: mujoco.MjModel, joint: object) -> tuple[Float, Float]:
         model.dof_M0[dof],
         rest,
     )
-    return np.array(values, dtype=np.float64), np.array([low, high], dtype=np.float64)
+    return values, np.array([low, high], dtype=np.float64)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scenes.scene import Scene
 from sim.actors.config import ACTORS
 from sim.core.bodies import Bodies
+from sim.core.state import Records, record
 from slam._jit import njit
 
 Float = NDArray[np.float64]
@@ -25,20 +26,21 @@ Int = NDArray[np.int64]
 _H = ACTORS.holding
 STIFFNESS, DAMPING = _H.stiffness, _H.damping
 FORCE_MAX, TORQUE_MAX, LOST = _H.force_max, _H.torque_max, _H.lost_m
-QA, VA, QB, VB, DROPPED = range(5)  # columns of ``Held.at``
+# First qpos and dof of the holder, then of what is held, -1: an empty hand; first dof of what has
+# just been put down, or -1.
+HANDS = record(np.int64, "qa va qb vb dropped")
 
 
 class Held(NamedTuple):
     """h holds.
 
-    at      (h, 5) first qpos and dof of the holder, then of what is held, -1: an empty hand; first
-            dof of what has just been put down, or -1
+    at      (h,) of ``HANDS``
     pose    (h, 3) of what is held in the holder's frame: x m, y m, yaw rad
     hinged  (h,) whether it turns freely about the middle of the holder
     bodies  (h, 2) mass kg and yaw inertia kg m2 of what is held
     """
 
-    at: Int
+    at: Records
     pose: Float
     hinged: NDArray[np.bool_]
     bodies: Float
@@ -48,16 +50,17 @@ class Held(NamedTuple):
 def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:
     """Write the forces of all hands into ``qfrc``."""
     for k in range(len(held.at)):
-        for axis in range(3 if held.at[k, DROPPED] >= 0 else 0):
-            qfrc[held.at[k, DROPPED] + axis] = 0.0
-            qfrc[held.at[k, VA] + axis] = 0.0
-        held.at[k, DROPPED] = -1
-        if held.at[k, QB] >= 0:
-            for axis in range(3):
-                qfrc[held.at[k, VA] + axis] = 0.0
-                qfrc[held.at[k, VB] + axis] = 0.0
+        hand = held.at[k]
+        for axis in range(3 if hand.dropped >= 0 else 0):
+            qfrc[hand.dropped + axis] = 0.0
+            qfrc[hand.va + axis] = 0.0
+        hand.dropped = -1
+        for axis in range(3 if hand.qb >= 0 else 0):
+            qfrc[hand.va + axis] = 0.0
+            qfrc[hand.vb + axis] = 0.0
     for k in range(len(held.at)):
-        qa, va, qb, vb, _ = held.at[k]
+        hand = held.at[k]
+        qa, va, qb, vb = hand.qa, hand.va, hand.qb, hand.vb
         if qb < 0:
             continue
         c, s = math.cos(qpos[qa + 2]), math.sin(qpos[qa + 2])
@@ -93,15 +96,15 @@ def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:
 def hands(model: mujoco.MjModel, bodies: Bodies, scene: Scene, cleaners: list[str]) -> Held:
     """The holds of a scene, then the empty hands of those who take chairs along."""
     n = len(scene.holds) + len(cleaners)
-    at, pose = np.full((n, 5), -1, dtype=np.int64), np.zeros((n, 3))
+    at, pose = np.full(n, -1, HANDS), np.zeros((n, 3))
     hinged, inertia = np.zeros(n, dtype=np.bool_), np.ones((n, 2))
     for k, each in enumerate(scene.holds):
         qpos, dof = bodies.addresses([each.holder, each.held])
-        at[k, :DROPPED] = qpos[0], dof[0], qpos[1], dof[1]
+        at[k] = qpos[0], dof[0], qpos[1], dof[1], -1
         pose[k], hinged[k] = each.pose, each.hinged
         body = model.body(f"{each.held}/base")
         inertia[k] = body.mass[0], body.inertia[2]
     for k, name in enumerate(cleaners):
         qpos, dof = bodies.addresses([name])
-        at[len(scene.holds) + k, :2] = qpos[0], dof[0]
+        at[len(scene.holds) + k] = qpos[0], dof[0], -1, -1, -1
     return Held(at, pose, hinged, inertia)

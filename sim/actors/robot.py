@@ -17,8 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.core.checks import check_types
+from sim.core.state import Record, record
 from slam._jit import njit
 from slam.errors import InvalidValueError
+
+# Twist that is asked for and that the ramp has reached, m/s, rad/s; m rolled by each wheel; their
+# speeds, m/s.
+STATE = record(np.float64, "asked_v asked_omega v omega rolled_left rolled_right left right")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,32 +56,32 @@ def toward(value: float, target: float, step: float) -> float:
 
 
 @njit
-def ramp(state: NDArray[np.float64], limits: NDArray[np.float64]) -> None:
+def ramp(drive: Record, limits: NDArray[np.float64]) -> None:
     """One tick of the ramp, and the wheel speeds that follow; ``limits`` as ``Drive.limits``."""
     speed_step, turn_step, half = limits
-    state[2] = toward(state[2], state[0], speed_step)
-    state[3] = toward(state[3], state[1], turn_step)
-    state[6], state[7] = state[2] - half * state[3], state[2] + half * state[3]
+    drive.v = toward(drive.v, drive.asked_v, speed_step)
+    drive.omega = toward(drive.omega, drive.asked_omega, turn_step)
+    drive.left, drive.right = drive.v - half * drive.omega, drive.v + half * drive.omega
 
 
 @njit
-def roll(state: NDArray[np.float64], duration: float) -> None:
+def roll(drive: Record, duration: float) -> None:
     """Let the wheels turn at their present speed."""
-    state[4] += state[6] * duration
-    state[5] += state[7] * duration
+    drive.rolled_left += drive.left * duration
+    drive.rolled_right += drive.right * duration
 
 
 class Drive:
     """Ramp and wheels of the body ``robot/base``, moved on by ``sim.world.substeps``.
 
-    state   (8,) commanded v, omega; ramped v, omega; travel left, right m; speed left, right m/s
+    state   (1,) of ``STATE``
     tyres   (2,) actuators left, right, which take the wheels' surface speeds
     limits  (3,) change of v and omega in a tick of ``tick`` s at most, half the track m
     """
 
     def __init__(self, model: mujoco.MjModel, config: DriveConfig, tick: float) -> None:
         self.config = config
-        self.state = np.zeros(8)
+        self.state = np.zeros(1, STATE)
         names = ("robot/tyre_l", "robot/tyre_r")
         self.tyres = np.array([model.actuator(name).id for name in names], dtype=np.int64)
         self.limits = np.array([config.accel * tick, config.alpha * tick, 0.5 * config.track])
@@ -86,10 +91,15 @@ class Drive:
         if not (math.isfinite(v) and math.isfinite(omega)):
             raise InvalidValueError(f"the drive command must be finite, got v={v}, omega={omega}")
         c = self.config
-        self.state[0] = min(max(v, -c.v_max), c.v_max)
-        self.state[1] = min(max(omega, -c.omega_max), c.omega_max)
+        self.state["asked_v"] = min(max(v, -c.v_max), c.v_max)
+        self.state["asked_omega"] = min(max(omega, -c.omega_max), c.omega_max)
 
     @property
     def travel_m(self) -> NDArray[np.float64]:
         """(2,) m rolled by the left and the right wheel since the start, backwards negative."""
-        return self.state[4:6].copy()
+        return np.concatenate([self.state["rolled_left"], self.state["rolled_right"]])
+
+    def halt(self) -> None:
+        """Wheels and ramp stand still; the command stays."""
+        for name in ("v", "omega", "left", "right"):
+            self.state[name] = 0.0

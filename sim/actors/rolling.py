@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from sim.actors.config import ACTORS
 from sim.core.draws import between, uniform
+from sim.core.state import Records, flat, record
 from slam._jit import njit
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
 
-# columns of the state, (n, 5): number of the turn (-1: none yet), heading rad, speed m/s, spin
-# rad/s, for how long held up s
-TURN, HEADING, SPEED, SPIN, STUCK = 0, 1, 2, 3, 4
+# number of the turn, heading rad, speed m/s, spin rad/s, for how long held up s
+STATE = record(np.float64, "turn heading speed spin stuck")
 _C = ACTORS.chairs
 TURN_S, BRAKE_S, PATIENCE_S = _C.turn_s, _C.brake_s, _C.patience_s
 SPEEDS, SPIN_MAX = (_C.slowest_mps, _C.fastest_mps), _C.spin_max
@@ -40,7 +40,7 @@ class Rolled(NamedTuple):
 
     share     how many of them at once
     ranks     (n,) place of each chair in the order of turns
-    counters  (n,) generators; state (n, 5) in the columns named above
+    counters  (n,) generators; state (n,)
     bodies    (n, 4) mass kg, yaw inertia kg m2, friction of slides N, of yaw N m
     dofs      (n,) first of each one's three
     """
@@ -48,7 +48,7 @@ class Rolled(NamedTuple):
     share: int
     ranks: NDArray[np.int64]
     counters: NDArray[np.uint64]
-    state: Float
+    state: Records
     bodies: Float
     dofs: NDArray[np.int64]
 
@@ -66,25 +66,25 @@ def roll(time: float, tick: float, rolled: Rolled, qvel: Float, qfrc: Float) -> 
         since = time - TURN_S * ranks[i] / share
         turn = math.floor(since / cycle)
         phase = since - turn * cycle
-        if turn != row[TURN]:
-            row[TURN] = turn
-            row[HEADING] = between(counters, i, -math.pi, math.pi)
-            row[SPEED] = between(counters, i, SPEEDS[0], SPEEDS[1])
-            row[SPIN] = between(counters, i, -SPIN_MAX, SPIN_MAX)
-            row[STUCK] = 0.0
+        if turn != row.turn:
+            row.turn = turn
+            row.heading = between(counters, i, -math.pi, math.pi)
+            row.speed = between(counters, i, SPEEDS[0], SPEEDS[1])
+            row.spin = between(counters, i, -SPIN_MAX, SPIN_MAX)
+            row.stuck = 0.0
         if phase >= TURN_S:
             for k in range(3):
                 qfrc[dof + k] = 0.0
             continue
         speed = math.sqrt(qvel[dof] * qvel[dof] + qvel[dof + 1] * qvel[dof + 1])
-        row[STUCK] = row[STUCK] + tick if speed < 0.3 * row[SPEED] else 0.0
-        if row[STUCK] > PATIENCE_S:
-            row[HEADING], row[STUCK] = row[HEADING] + GOLDEN, 0.0
-        go = row[SPEED] if phase < TURN_S - BRAKE_S else 0.0
+        row.stuck = row.stuck + tick if speed < 0.3 * row.speed else 0.0
+        if row.stuck > PATIENCE_S:
+            row.heading, row.stuck = row.heading + GOLDEN, 0.0
+        go = row.speed if phase < TURN_S - BRAKE_S else 0.0
         wanted = (
-            go * math.cos(row[HEADING]),
-            go * math.sin(row[HEADING]),
-            row[SPIN] if go > 0.0 else 0.0,
+            go * math.cos(row.heading),
+            go * math.sin(row.heading),
+            row.spin if go > 0.0 else 0.0,
         )
         for k in range(3):
             mass = bodies[i, 0] if k < 2 else bodies[i, 1]
@@ -110,7 +110,7 @@ class Rolling:
         self.names = tuple(names)
         n = len(self.names)
         self.counters = counters[:n].copy()
-        self.state = np.full((n, 5), -math.inf)
+        self.state = np.full(n, -math.inf, STATE)
         dofs, bodies = inertia_of(model, self.names)
         luck = [uniform(self.counters, i) for i in range(n)]
         ranks = np.empty(n, dtype=np.int64)
@@ -119,7 +119,7 @@ class Rolling:
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""
-        return {"counters": self.counters, "state": self.state}
+        return {"counters": self.counters, "state": flat(self.state)}
 
 
 def inertia_of(model: mujoco.MjModel, names: Sequence[str]) -> tuple[NDArray[np.int64], Float]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scenes.kinds import joint_of_door
 from sim.core.checks import numbers
 from sim.core.flow import box_clearance
+from sim.core.state import Records
 from slam._jit import njit
 from slam.errors import InvalidValueError
 
@@ -53,10 +54,10 @@ def _poses(
 
 
 @njit
-def _read_robot(qpos: Float, at: int, wheels: Float, pose: Float, travel: Float) -> None:
+def _read_robot(qpos: Float, at: int, drive: Records, pose: Float, travel: Float) -> None:
     for k in range(3):
         pose[k] = qpos[at + k]
-    travel[0], travel[1] = wheels[4], wheels[5]
+    travel[0], travel[1] = drive[0].rolled_left, drive[0].rolled_right
 
 
 class Bodies:
@@ -165,9 +166,9 @@ class Bodies:
         if self.clearance(data) < 0.0:
             raise InvalidValueError(f"start {(x, y)} does not lie on free floor")
 
-    def read_robot(self, data: mujoco.MjData, wheels: Float, pose: Float, travel: Float) -> None:
-        """``robot_pose`` into ``pose``, and entries 4 and 5 of the drive's state to ``travel``."""
-        _read_robot(data.qpos, self._robot_at, wheels, pose, travel)
+    def read_robot(self, data: mujoco.MjData, drive: Records, pose: Float, travel: Float) -> None:
+        """``robot_pose`` into ``pose``, and what the wheels of the drive rolled to ``travel``."""
+        _read_robot(data.qpos, self._robot_at, drive, pose, travel)
 
     def poses(self, data: mujoco.MjData) -> Float:
         """(n, 3) pose of each mover; a door at its hinge, heading along the leaf.

@@ -13,6 +13,11 @@ from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError
 
+Records = NDArray[Any]
+"""(n,) rows of a table whose columns have names (``record``)."""
+Record = Any
+"""One of them."""
+
 MOST_AXES = 8  # of an array; ours have up to three
 _MAGIC = b"mobilia-world-1\n"
 
@@ -74,3 +79,14 @@ def restore_random(rng: np.random.Generator, words: Mapping[str, Any]) -> None:
         rng.bit_generator.state = dict(words)
     except (ValueError, TypeError, KeyError) as error:
         raise InvalidValueError(f"this state of a generator does not fit: {error}") from error
+
+
+def record(number: type, names: str) -> np.dtype[Any]:
+    """A row whose columns have names: ``table[i].name`` in kernels, else ``table["name"][i]``."""
+    return np.dtype([(name, number) for name in names.split()])
+
+
+def flat(records: Records) -> NDArray[Any]:
+    """The same numbers (n, columns), live, as they are saved."""
+    numbers: NDArray[Any] = records.view(records.dtype[0])
+    return numbers.reshape(len(records), len(records.dtype.names or ()))

@@ -56,8 +56,8 @@ def world_of(path: Path, recipe: Mapping[str, Any]) -> int:
     return version
 
 
-def check_world(path: Path, version: int) -> None:
-    """Raise ``WorldVersionError`` that names the file unless this world can be made again here."""
+def check_world(path: Path | str, version: int) -> None:
+    """Raise ``WorldVersionError`` that names the file, or what else it is, of another world."""
     why = not_this_world(version)
     if why:
         raise WorldVersionError(f"{path}: cannot be made again, {why}")

@@ -225,7 +225,7 @@ class Driver:
         """Plan on this layout from now on (a door has opened, say).
 
         What must not be touched is still the first layout, or ``walls`` of the same extent, and the
-        discs of each ``command``. ``afresh`` False: a plan that is made anew all the time is no
+        discs of each ``command``. ``afresh`` False: a plan that is made again all the time is no
         progress by itself.
         """
         self._grid = grid

@@ -89,7 +89,7 @@ class Pilot:
         return _surroundings(poses, before, self._kinds, sizes, here, sight, dt)
 
     def _replan(self, poses: Float) -> None:
-        """Plan anew when a leaf stands elsewhere by more than about 20 degrees."""
+        """Plan again when a leaf stands elsewhere by more than about 20 degrees."""
         if self.world.time_ns - self._planned_ns < REPLAN_S * NS_PER_S:
             return
         self._planned_ns = self.world.time_ns

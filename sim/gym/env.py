@@ -11,19 +11,17 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from scenes.scan_plane import SCAN_HEIGHT
+from scenes import SCAN_HEIGHT
 from sim.core.checks import number, one_of, switch, whole
 from sim.core.contacts import Contact
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
-from sim.gym.actions import clipped
 from sim.gym.goals import GOAL_RADIUS_M, Goal, Ground, goal_of
 from sim.gym.observation import Observation, observed, space_of
-from sim.gym.options import checked_seed, episode
+from sim.gym.options import checked_seed, checked_settings, clipped, episode
 from sim.gym.pose_source import PoseSource
 from sim.gym.rendering import MODES, Rendering
 from sim.gym.reward import REWARDS, Task
-from sim.gym.settings import checked_settings
 from sim.sensors.lidar.device import ScanResult
 from sim.sensors.lidar.registry import ScannerConfig
 from sim.simulation import Simulation
@@ -136,7 +134,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     The number is that of the world (``sim.core.versions``).
     v2: two axes, motion and change, and crowds; dynamism d of v1 is ``Dynamism.world_1(d)`` with
     ``crowd="none"``.
-    v1: the table of ``sim.core.dynamism`` was set anew; the same seed gives another world than in
+    v1: the table of ``sim.core.dynamism`` was set again; the same seed gives another world than in
     v0. v0: first version; making it raises ``WorldVersionError``.
     """
 
@@ -206,7 +204,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Build the scene anew and take a first scan standing still."""
+        """Build the scene again and take a first scan standing still."""
         plan = episode(self._settings, options, self._goal)
         super().reset(seed=checked_seed(seed))
         own = Seeds(int(self.np_random.integers(2**31)), **plan.seeds)

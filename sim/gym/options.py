@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one episode may have different: the ``options`` of ``reset``, checked by name."""
+"""What an environment takes, checked by name: arguments, the options of a reset, actions."""
 
 from __future__ import annotations
 
@@ -10,19 +10,43 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenes.crowd import crowd_of
-from sim.core.checks import numbers
+from scenes.registry import check_name
+from scenes.scene import HIGHEST, LOWEST, within
+from sim.core.checks import instance, numbers, switch
 from sim.core.dynamism import Dynamism
 from sim.gym.goals import Goal, goal_of
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.sensors.lidar.registry import ScannerConfig, scanner_of
+from sim.sensors.odometry.config import preset
 from slam.errors import InvalidValueError
 
 OPTIONS = (
     "goal", "start", "seeds", "scene", "n_chairs", "n_people", "dynamism", "motion", "change",
     "crowd", "moving_share", "rates", "scan_height_m", "resolution_deg", "noise_std_m", "laser",
 )  # fmt: skip
+
+
+def checked_settings(**settings: Any) -> dict[str, Any]:
+    """``settings`` of a ``Simulation`` with the scanner looked up and the crowd in full.
+
+    Raises ``InvalidValueError`` or ``UnknownNameError`` by the name of the argument.
+    """
+    scene, odometry, crowd = (settings[name] for name in ("scene", "odometry", "crowd"))
+    instance("scene", scene, str)
+    check_name(scene)
+    Dynamism.of(settings["dynamism"], motion=settings["motion"], change=settings["change"])
+    instance("odometry", odometry, str)
+    preset(odometry)
+    within("scan_height_m", settings["scan_height_m"], LOWEST, HIGHEST)
+    switch("labels", settings["labels"])
+    return {
+        **settings,
+        "crowd": crowd if crowd is None else str(crowd_of(crowd)),
+        "laser": scanner_of(settings["laser"]),
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,3 +163,33 @@ def _laser(laser: ScannerConfig, given: Mapping[str, Any]) -> ScannerConfig:
             f"'{chosen.scanner().name}': give a whole scanner as option laser"
         )
     return replace(chosen, **changes)
+
+
+def clipped(action: Any) -> tuple[float, float]:
+    """Forward speed and turn rate, each in [-1, 1]: finite numbers beyond are clipped.
+
+    Raises ``InvalidValueError`` for what is not two numbers (words, objects and switches are none),
+    and for NaN and infinities alike.
+    """
+    v, omega = map(float, _numbers(action, (2,), "an action is two").tolist())
+    return min(max(v, -1.0), 1.0), min(max(omega, -1.0), 1.0)
+
+
+def of_rooms(actions: Any, n: int) -> NDArray[Any]:
+    """(n, 2) finite numbers, one action for each of ``n`` rooms; else ``InvalidValueError``."""
+    return _numbers(actions, (n, 2), f"actions are ({n}, 2)")
+
+
+def _numbers(value: Any, shape: tuple[int, ...], words: str) -> NDArray[Any]:
+    array = array_of(value)
+    if array.shape != shape or array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+        raise InvalidValueError(f"{words} finite numbers in [-1, 1], got {value!r:.200}")
+    return array
+
+
+def array_of(value: Any) -> NDArray[Any]:
+    """``np.asarray``; an empty array for what none can hold."""
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError, OverflowError):  # ragged, for instance
+        return np.zeros(0)

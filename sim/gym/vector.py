@@ -21,10 +21,9 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from sim.core.checks import switch, whole
-from sim.gym.actions import array_of, of_rooms
 from sim.gym.env import MobiliaEnv, ResetNeededError
 from sim.gym.observation import Observation
-from sim.gym.options import checked_seed
+from sim.gym.options import array_of, checked_seed, of_rooms
 from slam.errors import InvalidValueError
 
 MOST_ENVS = 4096  # each holds a physics model of its own

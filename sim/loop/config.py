@@ -21,7 +21,7 @@ class LoopConfig:
     tolerance_m  it truly has when it truly is this near
     patience_s   a goal is given up after this long without believed progress
     limit_s      and after this long in any case
-    replan_s     a way is planned anew this often, round what is seen standing in it
+    replan_s     a way is planned again this often, round what is seen standing in it
     near_m       a person whose rim comes this near the robot's, without a touch, is a near miss
     """
 

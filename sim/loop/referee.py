@@ -31,11 +31,6 @@ class Tally:
     near_misses: int = 0
     touched: list[str] = field(default_factory=list)
 
-    @property
-    def collisions(self) -> int:
-        """Of both sorts."""
-        return self.by_robot + self.by_others
-
 
 class Referee:
     """Watches a world, one scan at a time."""

@@ -24,7 +24,7 @@ from rosbags.interfaces import (
 )
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from scenes.scan_plane import SCAN_HEIGHT
+from scenes import SCAN_HEIGHT
 from scenes.scene import Mover
 from sim.moments import Moment
 from sim.recording import messages as ros

@@ -247,7 +247,7 @@ def check_dataset(path: Path) -> list[Finding]:
         files = (PLAN, *(name for name in FILES if name in listed))
     for name in files:
         if name != PLAN and not os.path.lexists(path / name):
-            why = f"{path / name} is missing: 'mobilia generate' as before writes it anew"
+            why = f"{path / name} is missing: 'mobilia generate' as before writes it again"
             found.append(Fault(kind="incomplete", name=name, why=why))
     episodes = [check_hashes(path / name, recipe) for name, recipe in planned.items()]
     if listed:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 from scenes import build
@@ -48,22 +49,6 @@ class Thing:
     pose: Pose | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Difference:
-    """What became of a thing from one session to a later one.
-
-    change  "stayed", "moved", "gone" (``after`` is None) or "new" (``before`` is None)
-    """
-
-    first: int
-    second: int
-    name: str
-    kind: str
-    change: str
-    before: Pose | None
-    after: Pose | None
-
-
 def days_of(recipe: Recipe) -> Days:
     """The building of a recipe that has a session."""
     seeds = Seeds(recipe.seed)
@@ -77,14 +62,9 @@ def things(days: Days, sessions: int) -> list[Thing]:
     kinds = {m.name: m.kind for m in days.scene.movers}
     for session in range(sessions):
         poses = _poses(days.scene, days.arrangement(session))
+        time = time_of(session).name
         found += [
-            Thing(
-                session=session,
-                time_of_day=time_of(session).name,
-                name=name,
-                kind=kinds[name],
-                pose=pose,
-            )
+            Thing(session=session, time_of_day=time, name=name, kind=kinds[name], pose=pose)
             for name, pose in poses.items()
         ]
     return found
@@ -98,30 +78,22 @@ def _poses(scene: Scene, arrangement: Arrangement) -> dict[str, Pose | None]:
     return poses
 
 
-def differences(known: Sequence[Thing]) -> Iterator[Difference]:
-    """What changed between any two sessions; what is out in both is left out."""
+def _differences(known: Sequence[Thing]) -> Iterator[tuple[object, ...]]:
+    """Rows of what became of things between any two sessions; what is out in both is left out."""
     sessions: dict[int, dict[str, Thing]] = {}
     for thing in known:
         sessions.setdefault(thing.session, {})[thing.name] = thing
-    for first in sorted(sessions):
-        for second in sorted(s for s in sessions if s > first):
-            for name, thing in sessions[first].items():
-                later = sessions[second].get(name)
-                before, after = thing.pose, None if later is None else later.pose
-                if before is None and after is None:
-                    continue
-                yield Difference(
-                    first=first,
-                    second=second,
-                    name=name,
-                    kind=thing.kind,
-                    change=_change(before, after),
-                    before=before,
-                    after=after,
-                )
+    for first, second in combinations(sorted(sessions), 2):
+        for name, thing in sessions[first].items():
+            later = sessions[second].get(name)
+            before, after = thing.pose, None if later is None else later.pose
+            if before is not None or after is not None:
+                poses = (*pose_words(before), *pose_words(after))
+                yield first, second, name, thing.kind, _change(before, after), *poses
 
 
 def _change(before: Pose | None, after: Pose | None) -> str:
+    """One of "stayed", "moved", "gone" or "new"."""
     if before is None or after is None:
         return "new" if before is None else "gone"
     turned = abs(math.remainder(after[2] - before[2], math.tau))
@@ -135,11 +107,7 @@ def write_days(folder: Path, recipe: Recipe, sessions: int) -> None:
     known = things(days, sessions)
     rows = [(t.session, t.time_of_day, t.name, t.kind, *pose_words(t.pose)) for t in known]
     write_text(folder / THINGS, table(THING_COLUMNS, rows))
-    changed = [
-        (d.first, d.second, d.name, d.kind, d.change, *pose_words(d.before), *pose_words(d.after))
-        for d in differences(known)
-    ]
-    write_text(folder / CHANGES, table(CHANGE_COLUMNS, changed))
+    write_text(folder / CHANGES, table(CHANGE_COLUMNS, _differences(known)))
     write_map(folder / "map", days.scene.static_map)
 
 

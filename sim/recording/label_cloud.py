@@ -61,11 +61,9 @@ class LabelsMessage:
             height=1,
             width=n,
             fields=fields,
-            is_bigendian=False,
             point_step=POINT.itemsize,
             row_step=n * POINT.itemsize,
             data=data,
-            is_dense=False,
         )
         self._template = Template(self.KIND, prototype)
         self._points: NDArray[np.void] = self._template.view(data).view(POINT)

@@ -14,7 +14,6 @@ neighbours are a mirror turn apart. Hence ``/scan_turn``.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -114,21 +113,6 @@ class ScanMessage:
         return stamp_ns, self._template.stamp(stamp_ns)
 
 
-def pose_message(numbers: Float) -> object:
-    """A geometry_msgs/Pose of x, y, z (m) and a quaternion (x, y, z, w)."""
-    x, y, z, qx, qy, qz, qw = numbers.tolist()
-    return message(
-        "geometry_msgs/msg/Pose",
-        position=message("geometry_msgs/msg/Point", x=x, y=y, z=z),
-        orientation=message("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
-    )
-
-
-def _vector(numbers: Sequence[float]) -> object:
-    x, y, z = numbers
-    return message("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
-
-
 def fill_pose(view: Float, pose: Float, z: float = 0.0) -> None:
     """Write a planar pose (x m, y m, theta rad), ``z`` m up, as the seven numbers of a Pose."""
     x, y, theta = pose.tolist()
@@ -149,30 +133,17 @@ class OdometryMessage:
 
     def __init__(self) -> None:
         marks = Marks()
-        pose, twist = marks(7), marks(6)
-        spread, twist_spread = marks(36), marks(36)
-        rates = twist.tolist()
-        prototype = message(
+        pose, twist = marks(7 + 36), marks(6 + 36)
+        self._template = Template(
             self.KIND,
-            header=header(ODOM),
-            child_frame_id=FOOTPRINT,
-            pose=message(
-                "geometry_msgs/msg/PoseWithCovariance", pose=pose_message(pose), covariance=spread
-            ),
-            twist=message(
-                "geometry_msgs/msg/TwistWithCovariance",
-                twist=message(
-                    "geometry_msgs/msg/Twist", linear=_vector(rates[:3]), angular=_vector(rates[3:])
-                ),
-                covariance=twist_spread,
+            message(
+                self.KIND, header=header(ODOM), child_frame_id=FOOTPRINT, pose=pose, twist=twist
             ),
         )
-        self._template = Template(self.KIND, prototype)
-        self._pose, self._twist = self._template.view(pose), self._template.view(twist)
-        self._spread = self._template.view(spread)
-        self._twist_spread = self._template.view(twist_spread)
-        for view in (self._twist, self._spread, self._twist_spread):
-            view[:] = 0.0
+        view, rates = self._template.view(pose), self._template.view(twist)
+        view[:], rates[:] = 0.0, 0.0
+        self._pose, self._spread = view[:7], view[7:]
+        self._twist, self._twist_spread = rates[:6], rates[6:]
 
     def __call__(self, odometry: Odometry, accumulated: Float | None, dt: float) -> bytearray:
         """``accumulated`` (3, 3) in the odom frame; ``dt`` s since the frame before, 0 at first."""
@@ -195,16 +166,12 @@ class IncrementMessage:
     KIND = "geometry_msgs/msg/PoseWithCovarianceStamped"
 
     def __init__(self) -> None:
-        marks = Marks()
-        pose, spread = marks(7), marks(36)
-        inner = message(
-            "geometry_msgs/msg/PoseWithCovariance", pose=pose_message(pose), covariance=spread
-        )
-        self._template = Template(
-            self.KIND, message(self.KIND, header=header(FOOTPRINT), pose=inner)
-        )
-        self._pose, self._spread = self._template.view(pose), self._template.view(spread)
-        self._spread[:] = 0.0
+        marks = Marks()(7 + 36)
+        prototype = message(self.KIND, header=header(FOOTPRINT), pose=marks)
+        self._template = Template(self.KIND, prototype)
+        view = self._template.view(marks)
+        view[:] = 0.0
+        self._pose, self._spread = view[:7], view[7:]
 
     def __call__(self, stamp_ns: int, T_previous_robot: Float, covariance: Float) -> bytearray:
         """The covariance (3, 3) is in the previous robot frame."""
@@ -223,7 +190,15 @@ class TransformMessage:
 
     def __init__(self, *links: tuple[str, str, float]) -> None:
         numbers = Marks()(7 * len(links)).reshape(-1, 7)
-        stamped = [_link(parent, child, numbers[k]) for k, (parent, child, _) in enumerate(links)]
+        stamped = [
+            message(
+                "geometry_msgs/msg/TransformStamped",
+                header=header(parent),
+                child_frame_id=child,
+                transform=row,
+            )
+            for row, (parent, child, _) in zip(numbers, links, strict=True)
+        ]
         self._template = Template(self.KIND, message(self.KIND, transforms=stamped))
         self._numbers = [self._template.view(row) for row in numbers]
         self._heights = [height for _, _, height in links]
@@ -235,21 +210,6 @@ class TransformMessage:
         return self._template.stamp(stamp_ns)
 
 
-def _link(parent: str, child: str, numbers: Float) -> object:
-    x, y, z, qx, qy, qz, qw = numbers.tolist()
-    transform = message(
-        "geometry_msgs/msg/Transform",
-        translation=_vector((x, y, z)),
-        rotation=message("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
-    )
-    return message(
-        "geometry_msgs/msg/TransformStamped",
-        header=header(parent),
-        child_frame_id=child,
-        transform=transform,
-    )
-
-
 class TruthMessage:
     """geometry_msgs/PoseStamped of the robot in the world."""
 
@@ -257,7 +217,7 @@ class TruthMessage:
 
     def __init__(self) -> None:
         numbers = Marks()(7)
-        prototype = message(self.KIND, header=header(WORLD), pose=pose_message(numbers))
+        prototype = message(self.KIND, header=header(WORLD), pose=numbers)
         self._template = Template(self.KIND, prototype)
         self._pose = self._template.view(numbers)
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.recording.messages import MAP, fill_pose, pose_message
-from sim.recording.template import Marks, Template, header, marked_time, message
+from sim.recording.messages import MAP, fill_pose
+from sim.recording.template import Template, header, marked_time, message
 from slam.estimate import Raster
 from slam.frames import NS_PER_S, Float
 
@@ -41,7 +41,7 @@ class BeganMessage:
     def __call__(self, stamp_ns: int) -> bytearray:
         """``header.stamp`` is the bag's time, ``time_ref`` that of the simulation."""
         seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
-        time = message("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
+        time = {"sec": seconds, "nanosec": nanoseconds}
         prototype = message(self.KIND, header=header(""), time_ref=time, source=self.SOURCE)
         return Template(self.KIND, prototype).stamp(stamp_ns)
 
@@ -59,14 +59,13 @@ class MapMessage:
         self._prototype = message(
             self.KIND,
             header=header(MAP),
-            info=message(
-                "nav_msgs/msg/MapMetaData",
-                map_load_time=marked_time(),
-                resolution=raster.resolution_m,
-                width=width,
-                height=height,
-                origin=pose_message(origin),
-            ),
+            info={
+                "map_load_time": marked_time(),
+                "resolution": raster.resolution_m,
+                "width": width,
+                "height": height,
+                "origin": origin,
+            },
             data=np.rint(100.0 * known).astype(np.int8).ravel(),
         )
 
@@ -82,13 +81,9 @@ class StartMessage:
 
     def __call__(self, stamp_ns: int, T_map_robot: Float) -> bytearray:
         """As RViz sends it for a click on the map."""
-        marks = Marks()(7)
-        spread = np.zeros(36)
+        pose = np.zeros(7 + 36)
+        fill_pose(pose[:7], T_map_robot)
         for place, variance in _START_VARIANCES.items():
-            spread[place] = variance
-        inner = message(
-            "geometry_msgs/msg/PoseWithCovariance", pose=pose_message(marks), covariance=spread
-        )
-        template = Template(self.KIND, message(self.KIND, header=header(MAP), pose=inner))
-        fill_pose(template.view(marks), T_map_robot)
-        return template.stamp(stamp_ns)
+            pose[7 + place] = variance
+        prototype = message(self.KIND, header=header(MAP), pose=pose)
+        return Template(self.KIND, prototype).stamp(stamp_ns)

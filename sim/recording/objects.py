@@ -69,46 +69,19 @@ class ObjectsMessage:
 
 
 def _marker(mover: Mover, row: int, pose: Float, color: NDArray[np.float32]) -> object:
-    x, y, z, qx, qy, qz, qw = pose.tolist()
-    r, g, b, a = color.tolist()
     door, row_of = mover.group == "door", kind_of(mover.kind)
     height, half = row_of.height_m, row_of.half_length_m
     wide, deep = 2.0 * (half + mover.radius), 2.0 * mover.radius
     if door:
         wide, deep = mover.radius, LEAF_M
-    none = np.zeros(0, dtype=np.uint8)
     return message(
         "visualization_msgs/msg/Marker",
         header=header(WORLD),
         ns=mover.kind,
         id=row,
         type=_CUBE if door or half > 0.0 else _CYLINDER,
-        action=0,
-        pose=message(
-            "geometry_msgs/msg/Pose",
-            position=message("geometry_msgs/msg/Point", x=x, y=y, z=z),
-            orientation=message("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
-        ),
-        scale=message("geometry_msgs/msg/Vector3", x=wide, y=deep, z=height),
-        color=message("std_msgs/msg/ColorRGBA", r=r, g=g, b=b, a=a),
-        lifetime=message("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
-        frame_locked=False,
-        points=[],
-        colors=[],
-        texture_resource="",
-        texture=message(
-            "sensor_msgs/msg/CompressedImage",
-            header=message(
-                "std_msgs/msg/Header",
-                stamp=message("builtin_interfaces/msg/Time", sec=0, nanosec=0),
-                frame_id="",
-            ),
-            format="",
-            data=none,
-        ),
-        uv_coordinates=[],
+        pose=pose,
+        scale={"x": wide, "y": deep, "z": height},
+        color=color,
         text=mover.name,
-        mesh_resource="",
-        mesh_file=message("visualization_msgs/msg/MeshFile", filename="", data=none),
-        mesh_use_embedded_materials=False,
     )

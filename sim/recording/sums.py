@@ -78,7 +78,7 @@ def write_sums(folder: Path, ours: Sequence[str] = ("*",), *, over: Path | None 
 
 
 def add_to_sums(path: Path) -> None:
-    """List a file anew in its folder's SHA256SUMS, where there is one."""
+    """List a file again in its folder's SHA256SUMS, where there is one."""
     if (path.parent / SUMS).exists():
         sums = read_sums(path.parent) | {path.name: sha256(path)}
         write_text(path.parent / SUMS, text_of(sums))

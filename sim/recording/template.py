@@ -8,10 +8,13 @@ of every later message go. The layout stays the library's business.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
 from slam.frames import NS_PER_S
@@ -24,9 +27,34 @@ EPOCH_NS = 1_700_000_000 * NS_PER_S
 STORE = get_typestore(Stores.ROS2_HUMBLE)  # the types used here are the same in later ones
 
 
-def message(kind: str, **fields: Any) -> Any:
-    """A message by type name and fields: ``message("geometry_msgs/msg/Point", x=1.0, ...)``."""
-    return STORE.types[kind](**fields)
+def message(kind: str, **given: Any) -> Any:
+    """A message by type name and fields: ``message("geometry_msgs/msg/Point", x=1.0)``.
+
+    Fields that are not given are 0, False, "" or empty. A part that is a message may be given as a
+    mapping of its fields, or as an array of all its numbers in their order: x, y, z and quaternion.
+    """
+    parts = {name: _part(how, given.pop(name, None)) for name, how in STORE.fielddefs[kind][1]}
+    return STORE.types[kind](**parts, **given)
+
+
+def _part(how: Any, given: Any) -> Any:
+    """One field; the library says ``how`` it is: its sort, and its type, or item and size."""
+    sort, what = how
+    if isinstance(given, np.ndarray) and sort == Nodetype.NAME:
+        given = iter(given.tolist())
+    if isinstance(given, Iterator):  # numbers in a row: some of them are its own
+        if sort == Nodetype.NAME:
+            return message(what, **{name: given for name, _ in STORE.fielddefs[what][1]})
+        return next(given) if sort == Nodetype.BASE else np.array([*islice(given, what[1])])
+    if sort == Nodetype.NAME:
+        fields = {} if given is None else given
+        return message(what, **fields) if isinstance(fields, Mapping) else fields
+    if given is not None:
+        return given
+    if sort == Nodetype.BASE:
+        return "" if what[0] == "string" else np.zeros((), what[0]).item()
+    (item, name), size = what
+    return np.zeros(size, name[0]) if item == Nodetype.BASE and name[0] != "string" else []
 
 
 def header(frame_id: str) -> Any:

@@ -158,7 +158,7 @@ def messages_sha256(folder: Path) -> str:
 
 
 def regenerate(folder: Path, *, trust: bool = False) -> Finding:
-    """Simulate the episode anew and compare.
+    """Simulate the episode again and compare.
 
     A difference on another CPU or with other versions is no damage: NumPy, MuJoCo and zstd promise
     the same bits on one machine and one version only. Then the verdict says what is different. An
@@ -169,11 +169,7 @@ def regenerate(folder: Path, *, trust: bool = False) -> Finding:
            ``UntrustedNameError``
     """
     made = read_recipe(folder / RECIPE)
-    why = not_this_world(made.world)
-    if why:
-        return Finding(episode=folder.name, verdict="other world", why=f"not made again: {why}")
-    why = other_format(made)
-    if why:
+    if why := not_this_world(made.world) or other_format(made):
         return Finding(episode=folder.name, verdict="other world", why=f"not made again: {why}")
     wanted, here = made.result.get("topics", []), topics.names()
     if wanted != here:
@@ -203,16 +199,13 @@ def other_format(made: Made) -> str:
 
 def _difference(episode: str, made: Made, messages: str) -> Finding:
     elsewhere = made.elsewhere()
+    why = f"other CPU or version: {elsewhere}"
     if messages == made.result.get("messages_sha256"):
-        why = "packed otherwise" + (f": other CPU or version: {elsewhere}" if elsewhere else "")
+        why = f"packed otherwise: {why}" if elsewhere else "packed otherwise"
         return Finding(episode=episode, verdict="same messages", why=why)
-    if elsewhere:
-        return Finding(episode=episode, verdict="differs", why=f"other CPU or version: {elsewhere}")
-    return Finding(
-        episode=episode,
-        verdict="differs",
-        why="on the same CPU and versions: its recipe does not make it (changed code?)",
-    )
+    if not elsewhere:
+        why = "on the same CPU and versions: its recipe does not make it (changed code?)"
+    return Finding(episode=episode, verdict="differs", why=why)
 
 
 def _scratch() -> tempfile.TemporaryDirectory[str]:

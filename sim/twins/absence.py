@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 from scenes.groups import with_held
 from scenes.kinds import is_door, joint_of_door
 from sim.actors.doors import OPENED
-from sim.actors.holding import QB, VA, VB
 from sim.actors.people import columns, gait
 from sim.sensors.lidar.candidates import HULL_GROUP
 from sim.sensors.lidar.device import LaserScanner
@@ -150,18 +149,18 @@ def _let_go(world: World, out: Sequence[str]) -> None:
     """Open the hands of those who are out, and the hands on what is out; no force stays."""
     people, (_, dofs) = world.people, world.bodies.addresses(out)
     held, task, qfrc = people.table.held, people.crowd.task, world.data.qfrc_applied
-    gone = np.isin(held.at[:, VA], dofs) | np.isin(held.at[:, VB], dofs)
-    for k in np.flatnonzero(gone & (held.at[:, QB] >= 0)):
-        for first in (held.at[k, VA], held.at[k, VB]):
+    gone = np.isin(held.at["va"], dofs) | np.isin(held.at["vb"], dofs)
+    for k in np.flatnonzero(gone & (held.at["qb"] >= 0)):
+        for first in (held.at["va"][k], held.at["vb"][k]):
             qfrc[first : first + 3] = 0.0
-        held.at[k, [QB, VB]] = -1
+        held.at["qb"][k] = held.at["vb"][k] = -1
     discs = people.table.at.discs[:, 1]
     rows = np.flatnonzero(np.isin(discs, dofs))
-    empty = np.isin(task[:, columns.HELD], rows) | np.isin(discs[: len(task)], dofs)
-    for i in np.flatnonzero(empty & (task[:, columns.HELD] >= 0)):
-        task[i, columns.HELD] = -1
-        if task[i, columns.WALKING] == columns.TO_CHAIR or task[i, columns.HAND] >= 0:
-            task[i, columns.WALKING] = columns.STANDS
+    empty = np.isin(task["held"], rows) | np.isin(discs[: len(task)], dofs)
+    for i in np.flatnonzero(empty & (task["held"] >= 0)):
+        task["held"][i] = -1
+        if task["walking"][i] == columns.TO_CHAIR or task["hand"][i] >= 0:
+            task["walking"][i] = columns.STANDS
 
 
 def _left_behind(world: World, out: Sequence[str]) -> list[str]:
@@ -174,11 +173,11 @@ def _free_seat(world: World, name: str) -> None:
     """Who sits on it, or is about to, stands there."""
     at, task = world.people.table.at, world.people.crowd.task
     rows = np.flatnonzero(at.discs[:, 0] == _qpos_of(world, name)[0])
-    sitters = np.flatnonzero(np.isin(task[:, columns.SEAT], rows))
-    task[sitters, columns.SEAT] = -1
-    walking = task[sitters, columns.WALKING] == columns.WALKS
-    task[sitters[~walking], columns.WALKING] = columns.STANDS
-    world.people.crowd.state[sitters, columns.SIT] = 0.0
+    sitters = np.flatnonzero(np.isin(task["seat"], rows))
+    task["seat"][sitters] = -1
+    walking = task["walking"][sitters] == columns.WALKS
+    task["walking"][sitters[~walking]] = columns.STANDS
+    world.people.crowd.state["sit"][sitters] = 0.0
 
 
 def _halt(world: World, name: str, *, seated: bool) -> None:
@@ -187,13 +186,13 @@ def _halt(world: World, name: str, *, seated: bool) -> None:
         return
     i, crowd = world.people.names.index(name), world.people.crowd
     state, task = crowd.state[i], crowd.task[i]
-    if not (seated and task[columns.WALKING] == columns.SEATED):
-        task[columns.WALKING] = columns.STANDS
-        if not seated or state[columns.SIT] == 0.0:
-            task[columns.SEAT] = -1
-            state[columns.SIT] = 0.0
-    state[[columns.STAY_UNTIL, columns.LOOK_UNTIL]] = math.inf
-    state[[columns.VX, columns.VY, columns.BLOCKED]] = 0.0
+    if not (seated and task["walking"] == columns.SEATED):
+        task["walking"] = columns.STANDS
+        if not seated or state["sit"] == 0.0:
+            task["seat"] = -1
+            state["sit"] = 0.0
+    state["stay_until"] = state["look_until"] = math.inf
+    state["vx"] = state["vy"] = state["blocked"] = 0.0
 
 
 def _joints(world: World, name: str) -> list[int]:

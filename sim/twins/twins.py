@@ -33,9 +33,9 @@ from sim.driving.drive import TourConfig
 from sim.moments import Moment, toured
 from sim.sensors.lidar.device import LaserScanner
 from sim.sensors.odometry.encoders import WheelOdometry
-from sim.sensors.scan_timing import ScanTiming
 from sim.simulation import Simulation
 from sim.twins.room import Drive, TwinRoom
+from sim.world.sweep import ScanTiming
 from sim.world.world import World
 from slam._jit import njit
 from slam.errors import InvalidValueError
@@ -66,7 +66,7 @@ class Twins:
     settings  as for ``Simulation``, without ``kidnap_every_s`` and ``session``
 
     Where no crowd is given it is the scene's without escorts: at rest about the robot, they would
-    stand in its way. The drive is remembered (1 to 2 KB a scan), frames are simulated anew at each
+    stand in its way. The drive is remembered (1 to 2 KB a scan), frames are simulated again at each
     ``moments``.
     Raises ``InvalidValueError`` when every tour crosses a mover, naming those of the last one, and
     for ``kidnap_every_s`` and ``session``, which a replayed path cannot have.

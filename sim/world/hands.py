@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scenes.assembly import hulls, moved
 from scenes.kinds import kind_of
 from sim.actors.chairs import IMPULSE_MAX, Shoves
-from sim.actors.doors import ANGLE, KEPT, SWINGS, UNTIL
+from sim.actors.doors import SWINGS
 from sim.core.flow import box_clearance
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from sim.world.world import World
@@ -84,11 +84,11 @@ def hold_door(world: World, name: str, *, opened: bool, seconds: float) -> None:
         known = ", ".join(doors.names) or "none"
         raise UnknownNameError(f"there is no door '{name:.80}' here, doors: {known}")
     d = doors.names.index(name)
-    row, sort, until = doors.schedule[d], float(doors.leaves.closers[d, 6]), _now_s(world) + seconds
-    row[KEPT] = until if opened else -math.inf
-    row[UNTIL] = -math.inf
-    if not opened and sort == SWINGS:
-        row[UNTIL], row[ANGLE] = until, float(doors.leaves.limits[d, 0])
+    row, until = doors.schedule[d], _now_s(world) + seconds
+    row["kept"] = until if opened else -math.inf
+    row["until"] = -math.inf
+    if not opened and doors.leaves.closers[d]["sort"] == SWINGS:
+        row["until"], row["angle"] = until, float(doors.leaves.limits[d, 0])
 
 
 def carry(world: World, pose: Sequence[float]) -> None:

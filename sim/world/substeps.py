@@ -28,6 +28,7 @@ from sim.actors.rolling import roll as roll_chairs
 from sim.core.contacts import Touches, collect
 from sim.core.engine import Engine, call
 from sim.core.flow import Field
+from sim.core.state import Records
 from sim.sensors.lidar.windows import Noted, note
 from slam._jit import njit
 
@@ -52,14 +53,14 @@ class Robot(NamedTuple):
     at         first qpos and first dof
     push       ``qfrc_constraint``: anything but 0 at the robot's dofs is a touch
     touches    where these are collected
-    drive      (8,) state, see ``sim.actors.robot.Drive``; tyres  (2,) actuators left, right
+    drive      (1,) state, see ``sim.actors.robot``; tyres  (2,) actuators left, right
     limits     (3,) largest change of speed m/s and turn rate rad/s in a tick, half the track m
     """
 
     at: tuple[int, int]
     push: Float
     touches: Touches
-    drive: Float
+    drive: Records
     tyres: NDArray[np.int64]
     limits: Float
 
@@ -196,16 +197,16 @@ def _advance(  # noqa: C901, PLR0913 (kernel)
 
     clock  (1,) substeps made since the start
     """
-    people, step = actors.people, 1.0 / SUBSTEPS_PER_S
+    people, drive, step = actors.people, robot.drive[0], 1.0 / SUBSTEPS_PER_S
     for row in range(first, last):
         if not (resumed and row == first):
             if clock[0] % SUBSTEPS_PER_TICK == 0:
-                ramp(robot.drive, robot.limits)
-                physics.ctrl[robot.tyres[0]] = robot.drive[6]
-                physics.ctrl[robot.tyres[1]] = robot.drive[7]
+                ramp(drive, robot.limits)
+                physics.ctrl[robot.tyres[0]] = drive.left
+                physics.ctrl[robot.tyres[1]] = drive.right
             call(engine.step2, engine.model, engine.data)
             clock[0] += 1
-            roll(robot.drive, step)
+            roll(drive, step)
             if people.alive:
                 hold(people.held, physics.qpos, physics.qvel, physics.qfrc)
             pin(physics, actors.pinned)
@@ -225,7 +226,8 @@ def _advance(  # noqa: C901, PLR0913 (kernel)
         call(engine.step1, engine.model, engine.data)
         for k in range(3):
             watch.path[row + 1, k] = physics.qpos[robot.at[0] + k]
-        watch.travel[row + 1, 0], watch.travel[row + 1, 1] = robot.drive[4], robot.drive[5]
+        watch.travel[row + 1, 0] = drive.rolled_left
+        watch.travel[row + 1, 1] = drive.rolled_right
         if watch.marks[row + 1]:
             note(watch.scanner)
     return last

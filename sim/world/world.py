@@ -246,7 +246,7 @@ class World:
         if self.bodies.robot is None:
             raise InvalidValueError(f"scene '{self.scene.name}' has no robot")
         self.bodies.put(self.data, [self.bodies.robot], np.array([pose], dtype=np.float64))
-        self._drive.state[[2, 3, 6, 7]] = 0.0  # ramp and wheels; the command stays
+        self._drive.halt()
 
     def robot_pose(self) -> Float:
         """(3,) ``T_world_robot``: x m, y m, heading rad (not wrapped)."""
@@ -305,14 +305,10 @@ class World:
         moving = np.append(self.movers_moving(), False)
         return moving[self.bodies.mover_of_body]
 
-    def is_moving(self, body: int) -> bool:
-        """Whether body ``body`` of the model moves right now."""
-        return bool(self.moving_bodies()[body])
-
     # -- state ------------------------------------------------------------------------------
 
     def _actor_arrays(self) -> dict[str, NDArray[Any]]:
-        arrays: dict[str, NDArray[Any]] = {"drive": self._drive.state}
+        arrays: dict[str, NDArray[Any]] = {"drive": state.flat(self._drive.state).ravel()}
         parts = {kind: shoves.arrays() for kind, shoves in self._shoves.items()}
         parts |= {"doors": self._doors.arrays(), "people": self.people.arrays()}
         if self._rearranging is not None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.days.config import AgreementConfig, DaysConfig
 from slam.days.evidence import SessionGrid, Snapshot
-from slam.days.history import History
+from slam.days.history import History, dense
 from slam.frames import Float, Frame
 
 
@@ -51,12 +51,9 @@ class Past:
         cells, values = history.table()
         self._low, self._standing = np.zeros(2, np.int64), np.full((0, 0), np.nan, np.float32)
         if len(cells):
-            mean = np.nanmean(values, axis=0)
-            self._low = cells.min(axis=0).astype(np.int64) - self.config.slack
-            width, height = (cells.max(axis=0) + self.config.slack - self._low + 1).tolist()
-            self._standing = np.full((height, width), np.nan, np.float32)
-            at = cells - self._low
-            self._standing[at[:, 1], at[:, 0]] = mean
+            low, (image,) = dense(cells, np.nanmean(values, axis=0))
+            self._low = low - self.config.slack
+            self._standing = np.pad(image, self.config.slack, constant_values=np.nan)
         self._near = _highest_near(self._standing, self.config.slack)
 
     @property

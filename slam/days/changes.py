@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from slam.days.config import ChangeConfig, DaysConfig
 from slam.days.evidence import Snapshot
-from slam.days.history import dense
+from slam.days.history import History, dense
 from slam.frames import Float
 
 KINDS = ("appeared", "gone", "moved", "door")
@@ -79,7 +79,8 @@ def between(
     config = config or DaysConfig().change
     if not len(before.cells) or not len(after.cells):
         return []
-    low, old, new = _together(before, after)
+    cells, shares = History(cell_m=cell_m, sessions=(before, after)).table()
+    low, (old, new) = dense(cells, shares)
     gone = _pieces(old, new, low, cell_m, config)
     come = _pieces(new, old, low, cell_m, config)
     found = [*_doors(gone, come, config), *_moved(gone, come, config)]
@@ -95,21 +96,6 @@ def between(
             for p in rest
         ]
     return sorted(found, key=lambda c: (-c.confidence, c.at))
-
-
-def _together(
-    before: Snapshot, after: Snapshot
-) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
-    """Corner, and both shares as images, NaN where unseen."""
-    cells, inverse = np.unique(
-        np.concatenate([before.cells, after.cells]), axis=0, return_inverse=True
-    )
-    values = np.full((2, len(cells)), np.nan, np.float32)
-    n = len(before.cells)
-    values[0, inverse.ravel()[:n]] = before.standing
-    values[1, inverse.ravel()[n:]] = after.standing
-    low, images = dense(cells, values)
-    return low, images[0], images[1]
 
 
 def _pieces(

@@ -46,7 +46,7 @@ class AgreementConfig(Settings):
     stands: float = number(0.5, "share", "of a session's looks: something stands", high=1.0)
     empty: float = number(0.2, "share", "most of the looks, around it too: nothing", high=1.0)
     slack: int = number(2, "places", "that an edge may be off by", high=10)
-    known: int = number(120, "places", "that always stand and were looked at: it has a say", low=1)
+    known: int = number(120, "places", "that always stand, looked at: fewer decide nothing", low=1)
     more: float = number(
         0.045, "share", "that disagrees at any other place than where it began", high=1.0
     )

@@ -77,7 +77,7 @@ class PersistenceFilter(Sightings):
     shortest_s, longest_s  of standing, by the prior
 
     What has gone does not come back in the filter. So a place where it says "gone" and something
-    is seen again begins anew; one where nothing was seen so far has the share of such places.
+    is seen again begins again; one where nothing was seen so far has the share of such places.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rival: EKF-SLAM on point landmarks, joint compatibility, landmarks that come and go."""
+"""EKF-SLAM to compare with: point landmarks, joint compatibility, landmarks that come and go."""
 
 from slam.ekf.config import EkfConfig
 from slam.ekf.slam import EkfSlam

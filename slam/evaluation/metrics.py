@@ -92,7 +92,6 @@ class Nees:
     mean: float
     n_used: int
     alignment: Alignment = "none"
-    degrees_of_freedom: int = 3
 
 
 def associate(estimate: Trajectory, truth: Trajectory) -> tuple[Trajectory, Trajectory]:
@@ -132,7 +131,7 @@ def pose_errors(
     truth_map = _moved(T_map_world, truth.poses)
     estimate_map = estimate.poses
     if align == "se2":
-        estimate_map = _moved(fit_se2(estimate_map[:, :2], truth_map[:, :2]), estimate_map)
+        estimate_map = _moved(se2.fit(estimate_map[:, :2], truth_map[:, :2]), estimate_map)
     errors = estimate_map - truth_map
     errors[:, 2] = se2.wrap_array(errors[:, 2])
     return PoseErrors(
@@ -142,23 +141,6 @@ def pose_errors(
         truth=frozen("PoseErrors", "truth", truth_map, (None, 3)),
         alignment=align,
     )
-
-
-def fit_se2(points_b: ArrayLike, points_a: ArrayLike) -> Float:
-    """``T_a_b`` with least sum |points_a - T_a_b points_b|^2; points (n, 2) m, pair by pair.
-
-    (Umeyama 1991 without scale; in the plane the rotation is an arctangent.) The rotation is zero
-    where the points do not determine one.
-    """
-    b = np.asarray(points_b, dtype=np.float64)
-    a = np.asarray(points_a, dtype=np.float64)
-    mean_b, mean_a = b.mean(axis=0), a.mean(axis=0)
-    db, da = b - mean_b, a - mean_a
-    cosine = float((db * da).sum())
-    sine = float((db[:, 0] * da[:, 1] - db[:, 1] * da[:, 0]).sum())
-    theta = math.atan2(sine, cosine)
-    x, y = mean_a - se2.transform([0.0, 0.0, theta], mean_b)
-    return np.array([x, y, theta])
 
 
 def ate(estimate: Trajectory, truth: Trajectory, *, align: Alignment = "none") -> Metric:

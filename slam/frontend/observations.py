@@ -62,7 +62,7 @@ class Observations:
     view          what is seen to be empty
     T_robot_laser (3,) origin of ``view``
     sensor_sigma_m  standard deviation of a range: the scanner's own, or that of the config
-    votes         (n,) in [0, 1] on what is young in the map, see ``tracker.standing``; None: all 1
+    votes         (n,) weights in [0, 1] on what is young in the map (``tracker.standing``); None: 1
     in_view       share of the returns whose places scans of the last seconds had in view
     """
 
@@ -85,11 +85,11 @@ class Observations:
 
     @cached_property
     def mean_vote(self) -> float:
-        """Mean of the votes, 1 where nothing is known of them."""
+        """Mean weight of the returns, 1 where nothing is known of them."""
         return float(self.votes.mean()) if self.votes is not None and len(self.votes) else 1.0
 
     def with_votes(self, votes: Float | None, in_view: float | None = None) -> Observations:
-        """The same with other votes, and ``in_view`` unless None: ``replace`` at a quarter of its
+        """The same with other weights, and ``in_view`` unless None: ``replace`` at a quarter of its
         time.
         """
         other = object.__new__(type(self))

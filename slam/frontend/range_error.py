@@ -25,6 +25,8 @@ from slam.frontend.deskew import end_points
 from slam.frontend.polar import polar
 from slam.frontend.range_error_config import RangeErrorConfig
 
+DIGITS = 6  # of m that a correction has: those beyond follow the processor's linear algebra
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sights:
@@ -164,14 +166,14 @@ class RangeError:
     def at(self, ranges: Float, coefficients: Float | None = None) -> Float:
         """(n,) m by which ranges are off, but for the incidence; ``coefficients``: others."""
         by = self.coefficients if coefficients is None else coefficients
-        off: Float = hats(ranges, self.knots, self.config.knot_m) @ by[:-1]
+        off: Float = np.round(hats(ranges, self.knots, self.config.knot_m) @ by[:-1], DIGITS)
         return off
 
     def sigma_m(self, ranges: Float) -> Float:
         """(n,) m, standard deviation of ``at``: the prior's where nothing was learnt."""
         shares = hats(ranges, self.knots, self.config.knot_m)
         variances = ((shares @ self.covariance[:-1, :-1]) * shares).sum(axis=1)
-        out: Float = np.sqrt(np.maximum(variances, 0.0))
+        out: Float = np.round(np.sqrt(np.maximum(variances, 0.0)), DIGITS)
         return out
 
     def differ_m(self, one: Float, other: Float) -> float:

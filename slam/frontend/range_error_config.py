@@ -52,7 +52,7 @@ class RangeErrorConfig(Settings):
         5.0, "nat", "log of the odds for an error, from which on it is taken off", high=1e3
     )
     redraw_by_m: float = number(
-        0.002, "m", "change of the error, r.m.s., for which the map is drawn anew", low=1e-5
+        0.002, "m", "change of the error, r.m.s., for which the map is drawn again", low=1e-5
     )
     redraw_m: float = number(
         45.0, "m", "driven, up to which that is done; longer runs have loops", high=1e5

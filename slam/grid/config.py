@@ -30,7 +30,7 @@ class GridConfig(Settings):
 class OccupancyConfig(TrackerConfig):
     """As ``TrackerConfig``, of whose map only ``cell_m`` counts here, and the grid's own.
 
-    Every return votes: the grid stays what it is elsewhere.
+    Every return has full weight: the grid stays what it is elsewhere.
     """
 
     standing: StandingConfig = field(default=ALL_VOTE)

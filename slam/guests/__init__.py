@@ -7,8 +7,7 @@ pipe. ``Guest``, the base of those in Python, is imported when first asked for: 
 
 from typing import TYPE_CHECKING, Any
 
-from slam.guests.limits import Limits
-from slam.guests.pipe import PipeSlam, guarded, limited
+from slam.guests.pipe import Limits, PipeSlam, guarded, limited
 
 if TYPE_CHECKING:
     from slam.guests.guest import Guest

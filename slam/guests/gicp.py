@@ -8,7 +8,6 @@ It is made for 3D scanners: scans are stacked in three layers, and the pose foun
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -17,12 +16,9 @@ from slam import se2
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, needed
-from slam.guests.kept import nearest
-from slam.guests.layers import flattened, lifted, stacked
+from slam.guests.layers import flattened, lifted, moved_on, nearest, stacked
 from slam.system import register
 
-KEEP_M = 0.2  # m, a scan is kept after so much way; as for Karto
-KEEP_RAD = math.radians(10.0)  # or turn; as for Karto
 CELL_M = 0.05  # m; one point in each such cell
 APART_M = 0.1  # m between the three layers
 NEIGHBOURS = 10  # points that a covariance is of; its default for pre-processing
@@ -58,14 +54,13 @@ class SmallGicpSlam(Guest):
             )
             pose = flattened(result.T_target_source)
             share = result.num_inliers / max(source.size(), 1)
-        moved = se2.between(self._places[-1], pose) if self._kept else np.full(3, np.inf)
-        if math.hypot(float(moved[0]), float(moved[1])) > KEEP_M or abs(moved[2]) > KEEP_RAD:
+        if not self._kept or moved_on(self._places[-1], pose):
             self._kept.append(se2.transform(pose, points_robot))
             self._places.append(pose)
         return pose, {"inliers": float(share)}
 
     def _goal(self, pose: Float) -> Any:
-        """Cloud and tree of the kept scans nearby, made anew when these change."""
+        """Cloud and tree of the kept scans nearby, made again when these change."""
         near = sorted(nearest(self._places, pose))
         if tuple(near) != self._near:
             self._near = tuple(near)

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A guard process (``guard``) as seen from mobilia: how it is told and what it says."""
+"""A guard process (``guard``) as seen from mobilia: how it is told, what it says, how it ends."""
 
 from __future__ import annotations
 
 import errno
 import marshal
 import os
+import selectors
 import signal
 import socket
 import subprocess
 import sys
+import time
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -19,6 +21,7 @@ from pathlib import Path
 _SCRIPT = Path(__file__).with_name("guard.py")
 _BEGIN_S = 60.0  # for the guard's start, on a machine that is busy
 _DISMISS_S = 5.0  # for its end: it gives up earlier by itself
+_CHUNK = 1 << 16
 MARK = "MOBILIA_COMMAND"  # variable that worker processes of one command have in common
 
 
@@ -57,6 +60,10 @@ class Guard:
                 start_new_session=True,  # what interrupts us at a terminal does not end it
             )
             if_it_fails.pop_all()
+        streams = (self.process.stdin, self.process.stdout, self.process.stderr)
+        self._streams = [stream for stream in streams if stream is not None]
+        for stream in self._streams:
+            os.set_blocking(stream.fileno(), False)
         self._status = ""
         try:
             seen = None if rules is None else [(os.fsencode(path), may) for path, may in rules]
@@ -87,29 +94,91 @@ class Guard:
         word, _, number = line.decode().partition(" ")
         return (word, int(number)) if number else ("", 0)
 
-    def status(self) -> str:
-        """How the guest has ended, in words, "" while it lives."""
-        with suppress(BlockingIOError):
-            if not self._status:
-                self._status = _in_words(*self._hear())
-        return self._status
+    def talk(self, unsent: bytes, deadline: float, heard: Callable[[int, bytes], bool]) -> bool:
+        """Write to the guest and give what it says to ``heard``, until that is enough.
+
+        ``heard`` gets 1 or 2, for standard output or error, and the bytes, none at its end. False
+        when the time (monotonic, s) is up before.
+        """
+        stdin, *outputs = self._streams
+        left = memoryview(unsent)
+        with selectors.DefaultSelector() as selector:
+            for number, stream in enumerate(outputs, start=1):
+                selector.register(stream, selectors.EVENT_READ, number)
+            if left:
+                selector.register(stdin, selectors.EVENT_WRITE, 0)
+            more: bytes | memoryview
+            while selector.get_map():
+                if (left_s := deadline - time.monotonic()) <= 0.0:
+                    return False
+                for key, _ in selector.select(left_s):
+                    try:
+                        if key.data:
+                            more = os.read(key.fd, _CHUNK)
+                            if heard(key.data, more):
+                                return True
+                        else:
+                            more = left = left[_written(key.fd, left) :]
+                    except BlockingIOError:
+                        continue
+                    if not more:
+                        selector.unregister(key.fileobj)
+        return True
+
+    def last_words(self) -> bytes:
+        """What it has left unread on its standard error."""
+        words = b""
+        with suppress(OSError):
+            while data := os.read(self._streams[2].fileno(), _CHUNK):
+                words += data
+        return words
+
+    def status(self, within_s: float = 0.0) -> str:
+        """How the guest has ended, in words, "" where it lives; it is waited for so long."""
+        deadline = time.monotonic() + within_s
+        while True:
+            with suppress(BlockingIOError):
+                if not self._status:
+                    self._status = _in_words(*self._hear())
+            if self._status or time.monotonic() >= deadline:
+                return self._status
+            time.sleep(0.005)
+
+    def end_input(self) -> None:
+        """The guest has heard all."""
+        self._streams[0].close()
 
     def hush(self) -> None:
         """Close the guest's input and output."""
-        for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
-            if stream is not None:
-                with suppress(OSError):
-                    stream.close()
+        for stream in self._streams:
+            with suppress(OSError):
+                stream.close()
 
-    def dismiss(self) -> None:
-        """It kills the guest and all that this started, and ends."""
+    def dismiss(self, farewell: bytes = b"", leave_s: float = 0.0) -> None:
+        """End the guest and all that it started, and the guard.
+
+        Before, the guest hears ``farewell`` and the end of its input, and has a moment to leave.
+        """
+        if farewell:
+            with suppress(OSError, ValueError):
+                os.write(self._streams[0].fileno(), farewell)
         self.hush()
+        if leave_s:
+            self.status(leave_s)
         self._socket.close()
         try:
             self.process.wait(_DISMISS_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
+
+
+def _written(descriptor: int, unsent: memoryview) -> int:
+    """Bytes written; all of them when nobody reads any more: its output says why."""
+    try:
+        return os.write(descriptor, unsent[:_CHUNK])
+    except BrokenPipeError:
+        return len(unsent)
 
 
 def _in_words(how: str, number: int) -> str:

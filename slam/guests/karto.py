@@ -14,19 +14,13 @@ from typing import Any
 import numpy as np
 
 from slam import se2
-from slam.errors import InvalidValueError
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.beams import ranges_of
 from slam.guests.guest import Guest, needed
-from slam.guests.kept import nearest
+from slam.guests.layers import NOTHING_M, check_beams, moved_on, nearest, ranges_of
 from slam.system import register
 
-KEEP_M = 0.2  # m, Karto's minimum travel distance
-KEEP_RAD = math.radians(10.0)  # Karto's minimum travel heading
 RANGE_M = 20.0
-MOST_BEAMS = 4000  # its matcher takes seconds a scan for as many
-NOTHING_M = 1e3  # a range that its matcher takes for no return
 FINE_RAD = math.radians(0.1)
 NARROW = (0.3, 0.35)  # m across, rad either way
 WIDE = (1.2, 0.5)  # the same, where the narrow search does poorly
@@ -49,10 +43,7 @@ class KartoSlam(Guest):
 
     def begin(self, spec: LaserSpec) -> None:
         """Two matchers, of a narrow and a wide search."""
-        if spec.n_beams > MOST_BEAMS:
-            raise InvalidValueError(
-                f"KartoSlam takes scanners of up to {MOST_BEAMS} beams, got {spec.n_beams}"
-            )
+        check_beams(self, spec)
         self._spec = spec
         reach = min(spec.range_max, RANGE_M)
         first, step = spec.angle_min, spec.angle_increment
@@ -84,8 +75,7 @@ class KartoSlam(Guest):
                 result = wide
         best = result.best_pose
         T_map_laser = np.array([best.x, best.y, best.yaw])
-        moved = se2.between(self._places[-1], T_map_laser)
-        if math.hypot(float(moved[0]), float(moved[1])) > KEEP_M or abs(moved[2]) > KEEP_RAD:
+        if moved_on(self._places[-1], T_map_laser):
             self._keep(scan, T_map_laser)
         T_map_robot = se2.compose(T_map_laser, se2.inverse(self._spec.T_robot_laser))
         return T_map_robot, {"response": float(result.response)}

@@ -12,14 +12,14 @@ from typing import ClassVar
 import numpy as np
 
 from slam import se2
-from slam.errors import InvalidValueError, MissingDependencyError, SlamFailedError
+from slam.errors import MissingDependencyError, SlamFailedError
 from slam.estimate import Estimate
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests import program, rawlog
-from slam.guests.beams import ranges_of
+from slam.guests import rawlog, wire
 from slam.guests.guest import Guest
-from slam.guests.limits import Limits
+from slam.guests.layers import check_beams, ranges_of
+from slam.guests.pipe import Limits
 from slam.trajectory import Trajectory
 
 MOST_BEAMS = 100_000
@@ -62,11 +62,7 @@ class MrptSlam(Guest):
 
     def begin(self, spec: LaserSpec) -> None:
         """Note the scanner; the rawlog has one."""
-        if spec.n_beams > MOST_BEAMS:
-            raise InvalidValueError(
-                f"{type(self).__name__} takes scanners of up to {MOST_BEAMS} beams, "
-                f"got {spec.n_beams}"
-            )
+        check_beams(self, spec, MOST_BEAMS)
         self._spec = spec
 
     def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
@@ -103,7 +99,7 @@ class MrptSlam(Guest):
                 file.write(rawlog.sensed(stamp_ns, ranges, self._spec))
         (folder / "config.ini").write_text(self.config.format(folder=f"{folder}/log"))
         words = [self._program, f"{folder}/config.ini", f"{folder}/frames.rawlog"]
-        processor_s = program.run(words, Limits.first_s + len(stamps) * SCAN_LIMIT_S)
+        processor_s = wire.run(words, Limits.first_s + len(stamps) * SCAN_LIMIT_S)
         rows = self._log(folder / "log" / "log_estimated_path.txt", self.columns[0])
         path = rows[:, self.pose_columns]
         if not np.isfinite(path).all():

@@ -8,22 +8,24 @@ Python class the same way, so that neither its crash nor its endless loop is our
 from __future__ import annotations
 
 import json
+import math
 import os
 import shlex
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 from weakref import ReferenceType, ref
 
+from slam.checked import is_number
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Frame, LaserSpec
 from slam.guests import protocol
 from slam.guests.confined import rules
-from slam.guests.limits import Limits
 from slam.guests.wire import Wire
 from slam.names import child_environment, join_folders, refuse_code
 from slam.oracle import Oracle
@@ -33,9 +35,30 @@ from slam.trajectory import Trajectory
 from slam.variants import PIPE, oracle_of
 
 
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """How long an answer may take, seconds of wall-clock time.
+
+    scan_s   one scan
+    first_s  its start, the first scan after it, a reset, the map and the final poses: compilers and
+             great maps are no hang
+    hidden   folders of results, which hold the truth: a command sees nothing in them
+    """
+
+    scan_s: float = 10.0
+    first_s: float = 120.0
+    hidden: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("scan_s", "first_s"):
+            value = getattr(self, name)
+            if not is_number(value) or not 0.0 < value < math.inf:
+                raise InvalidValueError(f"Limits.{name} must be > 0 s and finite, got {value!r}")
+
+
 @register_prefix(PIPE)
 class PipeSlam:
-    """The system behind a command. After a failure it is over; ``reset`` starts it anew.
+    """The system behind a command. After a failure it is over; ``reset`` starts it again.
 
     It has ``estimates_at_end`` (``slam.system.RunsAtTheEnd``) where its hello promises that.
 

@@ -14,7 +14,8 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
@@ -44,21 +45,17 @@ def line(message: Message) -> bytes:
 
 def message_of(text: bytes) -> dict[str, Any]:
     """The object of one line; the nan and inf of C and Python are understood, to be scored so."""
-    try:
+    message: Any = None
+    with suppress(ValueError, RecursionError):
         words = text.decode()
         try:
             message = json.loads(words)
         except ValueError:
             message = json.loads(_NO_JSON_NUMBER.sub("NaN", words))
-    except (ValueError, RecursionError) as error:
-        raise SlamFailedError(f"answered no JSON object but {_shown(text)}", "bad") from error
     if not isinstance(message, dict):
-        raise SlamFailedError(f"answered no JSON object but {_shown(text)}", "bad")
+        shown = text.decode(errors="replace").strip()[:80]
+        raise SlamFailedError(f"answered no JSON object but {shown!r}", "bad")
     return message
-
-
-def _shown(text: bytes) -> str:
-    return repr(text.decode(errors="replace").strip()[:80])
 
 
 def hello_message() -> dict[str, Any]:
@@ -144,12 +141,14 @@ def frame_of(message: Message, known: LaserSpec | None) -> Frame:
         twist=wheels.get("twist"),
     )
     features = message.get("features")
-    return Frame(
-        stamp_ns=stamp_ns,
-        odometry=odometry,
-        scan=_scan_of(message, known) if "ranges" in message else None,
-        features=None if features is None else _features_of(stamp_ns, features),
-    )
+    if features is not None:
+        features = Features(
+            stamp_ns=stamp_ns,
+            points_robot=np.reshape(features["points_robot"], (-1, 2)),
+            covariances=np.reshape(features["covariances"], (-1, 2, 2)),
+        )
+    scan = _scan_of(message, known) if "ranges" in message else None
+    return Frame(stamp_ns=stamp_ns, odometry=odometry, scan=scan, features=features)
 
 
 def _scan_of(message: Message, known: LaserSpec | None) -> Scan:
@@ -165,14 +164,6 @@ def _scan_of(message: Message, known: LaserSpec | None) -> Scan:
         ranges=ranges,
         spec=spec,
         intensities=None if intensities is None else np.array(intensities, dtype=np.float32),
-    )
-
-
-def _features_of(stamp_ns: int, message: Message) -> Features:
-    return Features(
-        stamp_ns=stamp_ns,
-        points_robot=np.reshape(message["points_robot"], (-1, 2)),
-        covariances=np.reshape(message["covariances"], (-1, 2, 2)),
     )
 
 
@@ -214,7 +205,7 @@ def estimate_of(message: Message, stamp_ns: int) -> Estimate:
     covariance = np.zeros(9)
     if "covariance" in message:
         covariance = _numbers(message, "covariance", 9)
-    try:
+    with _judged():
         return Estimate(
             stamp_ns=stamp_ns,
             T_map_robot=_numbers(message, "T_map_robot", 3),
@@ -222,8 +213,15 @@ def estimate_of(message: Message, stamp_ns: int) -> Estimate:
             converged=converged,
             diagnostics=diagnostics,
         )
-    except InvalidValueError as error:
-        outcome = "nan" if isinstance(error, NotFiniteError) else "bad"
+
+
+@contextmanager
+def _judged(not_finite: str = "nan") -> Iterator[None]:
+    """What no type of ours takes is "bad", or what is said for numbers that are not finite."""
+    try:
+        yield
+    except (InvalidValueError, OverflowError) as error:
+        outcome = not_finite if isinstance(error, NotFiniteError) else "bad"
         raise SlamFailedError(f"answered: {error}", outcome) from error
 
 
@@ -277,16 +275,10 @@ def map_of(message: Message) -> Raster | None:
     resolution_m = message.get("resolution_m")
     if not is_number(resolution_m):
         raise SlamFailedError(f"answered a map of resolution {resolution_m!r:.40}", "bad")
-    try:
-        with np.errstate(over="ignore"):  # what is past float32 is outside [0, 1], too
-            cells = values.astype(np.float32).reshape(height, width)
-        return Raster(
-            values=cells,
-            resolution_m=float(resolution_m),
-            T_map_origin=_numbers(message, "T_map_origin", 3),
-        )
-    except (InvalidValueError, OverflowError) as error:
-        raise SlamFailedError(f"answered: {error}", "bad") from error
+    origin = _numbers(message, "T_map_origin", 3)
+    with _judged("bad"), np.errstate(over="ignore"):  # past float32 is outside [0, 1], too
+        cells = values.astype(np.float32).reshape(height, width)
+        return Raster(values=cells, resolution_m=float(resolution_m), T_map_origin=origin)
 
 
 def trajectory_message(trajectory: Trajectory) -> dict[str, Any]:
@@ -304,11 +296,8 @@ def trajectory_of(message: Message) -> Trajectory:
     if not isinstance(stamps, list) or any(type(s) is not int for s in stamps):
         raise SlamFailedError("answered a trajectory whose 'stamps_ns' are no whole numbers", "bad")
     poses = _numbers(message, "poses", 3 * len(stamps)).reshape(-1, 3)
-    try:
+    with _judged():
         return Trajectory(stamps_ns=np.array(stamps, dtype=np.int64), poses=poses)
-    except (InvalidValueError, OverflowError) as error:
-        outcome = "nan" if isinstance(error, NotFiniteError) else "bad"
-        raise SlamFailedError(f"answered: {error}", outcome) from error
 
 
 def at_end_message(estimates: Sequence[Estimate], spent_s: Sequence[float]) -> dict[str, Any]:

@@ -1,24 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A child process asked line by line, within a time limit, and always ended and reaped."""
+"""A child process with a time limit, always ended and reaped: asked line by line, or just run."""
 
 from __future__ import annotations
 
 import os
-import selectors
-import subprocess
+import resource
 import time
 import weakref
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import IO
 
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.guests.guarding import Guard
+from slam.names import child_environment
 
 MAX_LINE_BYTES = 1 << 28  # a map of 5000 x 5000 cells with all digits of a float32
 KEPT_WORDS = 4000  # bytes of its standard error
-_CHUNK = 1 << 16
+_OUTPUT = 1
 _LEAVE_S = 1.0  # from the end of its input to the end of its life
 _STATUS_S = 0.2  # from the end of its output to the end of its life
 
@@ -41,17 +40,15 @@ class Wire:
         rules: Sequence[tuple[str, int]] | None = None,
     ) -> None:
         """``rules``: what it may see (``confined.rules``), None: all that we see."""
+        environment = os.environ if environment is None else environment
         try:
-            environment = os.environ if environment is None else environment
             self._guard = Guard(command, environment, rules=rules)
-            self._confined = rules is not None
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             raise InvalidValueError(f"cannot start {command[0]!r}: {why}") from error
-        self._stdin, self._stdout, self._stderr = _pipes(self._guard.process)
-        self._finalizer = weakref.finalize(self, _end, self._guard, farewell)
-        self._heard = bytearray()
-        self._words = bytearray()
+        self._confined = rules is not None
+        self._finalizer = weakref.finalize(self, self._guard.dismiss, farewell, _LEAVE_S)
+        self._heard, self._words = bytearray(), bytearray()
 
     @property
     def pid(self) -> int:
@@ -74,81 +71,39 @@ class Wire:
         process ends, "bad" for a line past all measure. Then, as after any exception, it is over.
         """
         try:
-            return self._exchange(request, time.monotonic() + limit_s, limit_s)
+            deadline = time.monotonic() + limit_s
+            there = b"\n" in self._heard
+            if not there and not self._guard.talk(request, deadline, self._hear):
+                why = f"hung: no answer within {limit_s:g} s{self._last_words()}"
+                raise SlamFailedError(why, "hung")
         except BaseException:
             if self._finalizer.detach():
-                _end(self._guard, leave_s=0.0)
+                self._guard.dismiss()
             raise
-
-    def _exchange(self, request: bytes, deadline: float, limit_s: float) -> bytes:
-        unsent = memoryview(request)
-        searched = 0  # each byte once: a map comes in thousands of pieces
-        with selectors.DefaultSelector() as selector:
-            selector.register(self._stdin, selectors.EVENT_WRITE)
-            selector.register(self._stdout, selectors.EVENT_READ)
-            selector.register(self._stderr, selectors.EVENT_READ)
-            while (end := self._heard.find(b"\n", searched)) < 0:
-                searched = len(self._heard)
-                left_s = deadline - time.monotonic()
-                if left_s <= 0.0:
-                    raise SlamFailedError(
-                        f"hung: no answer within {limit_s:g} s{self._last_words()}", "hung"
-                    )
-                for key, _ in selector.select(left_s):
-                    if key.fileobj is self._stdin:
-                        unsent = unsent[self._write(unsent) :]
-                        if not unsent:
-                            selector.unregister(self._stdin)
-                    elif not self._read(key.fileobj):
-                        selector.unregister(key.fileobj)
-                        if key.fileobj is self._stdout:
-                            raise SlamFailedError(self._epitaph())
+        end = self._heard.find(b"\n")
         answer = bytes(self._heard[:end])
         del self._heard[: end + 1]
         return answer
 
-    def _write(self, unsent: memoryview) -> int:
-        """Bytes written; all of them when nobody reads any more: its output says why."""
-        try:
-            return os.write(self._stdin.fileno(), unsent[:_CHUNK])
-        except BlockingIOError:
-            return 0
-        except BrokenPipeError:
-            return len(unsent)
-
-    def _read(self, stream: object) -> bool:
-        """Take what is there; False at the end."""
-        source, into = (
-            (self._stdout, self._heard) if stream is self._stdout else (self._stderr, self._words)
-        )
-        try:
-            data = os.read(source.fileno(), _CHUNK)
-        except BlockingIOError:
-            return True
-        into += data
-        if source is self._stderr:
+    def _hear(self, stream: int, data: bytes) -> bool:
+        """Take what it says; whether that ends a line. Each byte is looked at once."""
+        if stream != _OUTPUT:
+            self._words += data
             del self._words[:-KEPT_WORDS]
-        elif len(self._heard) > MAX_LINE_BYTES:
+            return False
+        if not data:
+            status = self._guard.status(_STATUS_S)
+            how = f"its process {status}" if status else "closed its standard output"
+            raise SlamFailedError(f"{how}{self._last_words()}")
+        self._heard += data
+        if len(self._heard) > MAX_LINE_BYTES:
             raise SlamFailedError(f"answered a line of more than {MAX_LINE_BYTES} bytes", "bad")
-        return bool(data)
-
-    def _epitaph(self) -> str:
-        """How it ended."""
-        deadline = time.monotonic() + _STATUS_S
-        while not (status := self._guard.status()) and time.monotonic() < deadline:
-            time.sleep(0.005)
-        if not status:
-            return f"closed its standard output{self._last_words()}"
-        return f"its process {status}{self._last_words()}"
+        return b"\n" in data
 
     def _last_words(self) -> str:
-        with suppress(BlockingIOError):
-            while data := os.read(self._stderr.fileno(), _CHUNK):
-                self._words += data
-        lines = self._words[-KEPT_WORDS:].decode(errors="replace").split("\n")
-        said = [text for text in (" ".join(part.split()) for part in lines) if text]
-        words = " ".join(said)
-        refused = "Permission denied" in words or "No module named" in words
+        words = (self._words + self._guard.last_words())[-KEPT_WORDS:]
+        said = _said(words)
+        refused = any(why in " ".join(said) for why in ("Permission denied", "No module named"))
         hint = ""
         if self._confined and refused:
             hint = "; it sees only its own folder: docs/bring_your_own.md"
@@ -171,24 +126,45 @@ class Wire:
         return None
 
 
-def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes], IO[bytes]]:
-    assert process.stdin is not None
-    assert process.stdout is not None
-    assert process.stderr is not None
-    streams = (process.stdin, process.stdout, process.stderr)
-    for stream in streams:
-        os.set_blocking(stream.fileno(), False)
-    return streams
+def run(command: Sequence[str], limit_s: float) -> float:
+    """Run a program without input to its end; processor time it took, s.
+
+    Raises ``SlamFailedError``: "hung" after ``limit_s`` of wall-clock time, "raised" where it
+    cannot be started, or ends with another status than 0, with its last words.
+    """
+    before = _children_s()
+    try:
+        guard = Guard(command, child_environment(guest=True))
+    except (OSError, ValueError) as error:
+        raise SlamFailedError(f"cannot start {command[0]!r}: {error}") from error
+    words = bytearray()
+
+    def heard(_stream: int, data: bytes) -> bool:
+        words.extend(data)
+        del words[:-KEPT_WORDS]
+        return False
+
+    deadline = time.monotonic() + limit_s
+    try:
+        guard.end_input()
+        guard.talk(b"", deadline, heard)
+        status = guard.status(deadline - time.monotonic())
+    finally:
+        guard.dismiss()
+    if not status:
+        raise SlamFailedError(f"hung: did not end within {limit_s:g} s", "hung")
+    if status != "ended with status 0":
+        raise SlamFailedError(f"{command[0]!r} {status}: {' | '.join(_said(words))[-400:]!r}")
+    return _children_s() - before
 
 
-def _end(guard: Guard, farewell: bytes = b"", leave_s: float = _LEAVE_S) -> None:
-    """Say farewell, close the guest's input, wait a moment, have it killed."""
-    process = guard.process
-    if process.stdin is not None and farewell:
-        with suppress(OSError):
-            os.write(process.stdin.fileno(), farewell)
-    guard.hush()
-    deadline = time.monotonic() + leave_s
-    while not guard.status() and time.monotonic() < deadline:
-        time.sleep(0.005)
-    guard.dismiss()
+def _said(words: bytearray) -> list[str]:
+    """Its lines, but empty ones, blanks in them made one."""
+    lines = words.decode(errors="replace").split("\n")
+    return [text for line in lines if (text := " ".join(line.split()))]
+
+
+def _children_s() -> float:
+    """Processor time of all children that have ended, s."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime

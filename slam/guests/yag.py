@@ -15,24 +15,19 @@ from typing import Any
 import numpy as np
 
 from slam import se2
-from slam.errors import InvalidValueError
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.beams import ranges_of
 from slam.guests.guest import Guest, needed
+from slam.guests.layers import KEEP_M, NOTHING_M, check_beams, moved_on, ranges_of
 from slam.system import register
 from slam.trajectory import Trajectory
 
-KEEP_M = 0.2  # m, Karto's minimum travel distance
-KEEP_RAD = math.radians(10.0)  # Karto's minimum travel heading
 BUFFER = 20  # latest vertices matched against
 LOOP_M = 3.0  # m, how far a loop may be away; its default
 CHAIN = 10  # vertices of a loop, at least; its default
 COARSE = 0.35  # least response of a loop, coarse; its default
 FINE = 0.45  # and fine; its default, see ``begin``
 RANGE_M = 20.0  # m; ranges beyond are not matched
-MOST_BEAMS = 4000  # its matcher takes seconds a scan for as many
-NOTHING_M = 1e3  # a range that its matcher takes for no return
 MATCHER = {
     "search_size": 0.3,  # m across
     "resolution": 0.01,  # m
@@ -59,10 +54,7 @@ class YagSlam(Guest):
 
     def begin(self, spec: LaserSpec) -> None:
         """An empty graph, and its two matchers."""
-        if spec.n_beams > MOST_BEAMS:
-            raise InvalidValueError(
-                f"YagSlam takes scanners of up to {MOST_BEAMS} beams, got {spec.n_beams}"
-            )
+        check_beams(self, spec)
         self._spec = spec
         self._reach = min(spec.range_max, RANGE_M)
         reach = {"range_threshold": self._reach}
@@ -91,8 +83,7 @@ class YagSlam(Guest):
         result = self._matcher.match_scan(scan, latest, True, True)
         scan.corrected_pose = result.best_pose
         last = latest[-1]
-        moved = se2.between(_pose(last.corrected_pose), _pose(scan.corrected_pose))
-        if math.hypot(float(moved[0]), float(moved[1])) > KEEP_M or abs(moved[2]) > KEEP_RAD:
+        if moved_on(_pose(last.corrected_pose), _pose(scan.corrected_pose), KEEP_M):
             # it starts from odometry since the last vertex: here from the match
             last.odom_pose, scan.odom_pose = last.corrected_pose, scan.corrected_pose
             with redirect_stdout(io.StringIO()):  # it says a line for each loop it tries

@@ -2,8 +2,7 @@
 """Readers of recorded logs: one function each, path -> Stream."""
 
 from slam.logs.bag import read_bag
-from slam.logs.carmen import read_carmen
-from slam.logs.carmen_writer import write_carmen
+from slam.logs.carmen import read_carmen, write_carmen
 from slam.logs.centimetre import read_centimetre
 from slam.logs.open import open_log
 from slam.logs.rawlog import read_rawlog

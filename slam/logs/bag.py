@@ -15,8 +15,8 @@ from slam.frames import EPOCH, NS_PER_S, Stream, StreamMetadata
 from slam.logs.bag_frames import frames_of, stamp_of
 from slam.logs.bag_laser import Laser, mounting
 from slam.logs.bag_topics import SCAN, Bag, Topics, choose
-from slam.logs.border import about
 from slam.logs.repairs import NO_ODOMETRY, Repairs
+from slam.logs.text import about
 
 PROBE_NS = 20 * NS_PER_S  # how far the transform to the laser is looked for
 _BASE = "base_link"  # of REP 105

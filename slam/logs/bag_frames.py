@@ -18,8 +18,8 @@ from slam.frames import MOST_TWIST, NS_PER_S, BeamLabels, Float, Frame, Odometry
 from slam.logs.bag_laser import Laser
 from slam.logs.bag_odometry import PoseTrack, Stamped, increment_covariance
 from slam.logs.bag_topics import Bag, Topics
-from slam.logs.border import about
 from slam.logs.ros_numbers import yaw_of
+from slam.logs.text import about
 
 PATIENCE_NS = 2 * NS_PER_S  # how long a scan waits for its odometry
 _PLANAR = np.array([[6 * i + j for j in (0, 1, 5)] for i in (0, 1, 5)])

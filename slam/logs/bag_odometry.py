@@ -29,14 +29,11 @@ class PoseTrack:
 
     def __init__(self) -> None:
         self._poses: deque[Stamped] = deque()
-        self.dropped = 0
 
     def add(self, now: Stamped) -> None:
         """Append; a pose that is not later than the one before is left out."""
-        if self._poses and now.stamp_ns <= self._poses[-1].stamp_ns:
-            self.dropped += 1
-            return
-        self._poses.append(now)
+        if not self._poses or now.stamp_ns > self._poses[-1].stamp_ns:
+            self._poses.append(now)
 
     def reaches(self, stamp_ns: int) -> bool:
         """Whether ``at`` knows that time, as far as the end is concerned."""

@@ -29,7 +29,7 @@ unpacking.bound_rosbags()
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 for _name in TRANSFORMS:  # the library's ROS 1 has none of the two
     ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", _name))
-BEGAN = "/ground_truth/time"  # of our own recordings
+BEGAN, LABELS = "/ground_truth/time", "/ground_truth/labels"  # of our own recordings
 _STORAGE = (".mcap", ".db3", ".bag")
 
 
@@ -39,7 +39,7 @@ def is_bag(path: Path) -> bool:
 
 
 @contextmanager
-def failing_as_ours(path: Path) -> Iterator[None]:
+def failing_as_ours(path: Path, where: str = "") -> Iterator[None]:
     """Whatever the library raises on damaged bytes becomes a ``LogFormatError``."""
     try:
         yield
@@ -50,19 +50,15 @@ def failing_as_ours(path: Path) -> Iterator[None]:
     except OSError as error:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
     except Exception as error:  # parsers of foreign bytes fail in every way
-        raise _damaged(path, error) from error
-
-
-def _damaged(path: Path, error: Exception, where: str = "") -> LogFormatError:
-    text = " ".join(str(error).split())[:200] or type(error).__name__
-    return LogFormatError(path, f"{where}corrupt or truncated bag: {text}")
+        text = " ".join(str(error).split())[:200] or type(error).__name__
+        raise LogFormatError(path, f"{where}corrupt or truncated bag: {text}") from error
 
 
 class Bag:
     """An open bag; a context manager. ``topics``: name -> (message type, count).
 
     Messages are decoded by the standard definitions of their types, whatever the bag itself says of
-    them: those read here are the same in every ROS 2, and compiling decoders for each bag anew
+    them: those read here are the same in every ROS 2, and compiling decoders for each bag again
     would take longer than reading a short one.
     """
 
@@ -103,27 +99,15 @@ class Bag:
         for connection, log_ns, data in self._messages(topics):
             count[connection.topic] += 1
             self.at = f"topic {connection.topic}, message {count[connection.topic]}"
-            try:
+            with failing_as_ours(self.path, f"{self.at}: "):
                 decoded = self._decode(data, connection.msgtype)
-            except Exception as error:  # see failing_as_ours
-                raise _damaged(self.path, error, f"{self.at}: ") from error
             yield connection.topic, log_ns, decoded
 
     def _messages(self, topics: Collection[str] | None) -> Iterator[tuple[Any, int, bytes]]:
         wanted = [c for c in self._reader.connections if topics is None or c.topic in topics]
-        if not wanted:
-            return
-        iterator: Iterator[Any] = iter(())
-        with failing_as_ours(self.path):
-            iterator = iter(self._reader.messages(connections=wanted))
-        while True:
-            try:
-                item = next(iterator, None)
-            except Exception as error:  # see failing_as_ours
-                raise _damaged(self.path, error) from error
-            if item is None:
-                return
-            yield item
+        if wanted:
+            with failing_as_ours(self.path):
+                yield from self._reader.messages(connections=wanted)
 
 
 def _storage(path: Path) -> Path:
@@ -159,8 +143,10 @@ def choose(
     wanted_odometry = None
     if odometry is not None or any(k == ODOMETRY and count for k, count in bag.topics.values()):
         wanted_odometry = _pick(bag, odometry, (ODOMETRY,), "odom")
-    turns = f"{wanted_scan}_turn"
-    increment = f"{wanted_odometry}_increment"
+
+    def there(name: str, kind: str) -> str | None:
+        return name if _kind(bag, name) == kind else None
+
     truths = [
         name
         for name, (kind, _) in sorted(bag.topics.items())
@@ -172,21 +158,16 @@ def choose(
         scan=wanted_scan,
         odometry=wanted_odometry,
         truth=truths[0] if truths else None,
-        turns=turns if _kind(bag, turns) == SCAN else None,
-        increment=increment if _kind(bag, increment) == INCREMENT else None,
-        labels=_labels(bag) if labels else None,
+        turns=there(f"{wanted_scan}_turn", SCAN),
+        increment=there(f"{wanted_odometry}_increment", INCREMENT),
+        labels=there(LABELS, CLOUD) if labels else None,
         transforms=tuple(n for n, (kind, _) in sorted(bag.topics.items()) if kind in TRANSFORMS),
-        began=BEGAN if _kind(bag, BEGAN) == TIME else None,
+        began=there(BEGAN, TIME),
     )
 
 
 def _kind(bag: Bag, topic: str) -> str:
     return bag.topics.get(topic, ("", 0))[0]
-
-
-def _labels(bag: Bag) -> str | None:
-    name = "/ground_truth/labels"
-    return name if _kind(bag, name) == CLOUD else None
 
 
 def _pick(bag: Bag, asked: str | None, kinds: tuple[str, ...], hint: str) -> str:

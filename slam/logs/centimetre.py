@@ -12,17 +12,27 @@ counter-clockwise over the half circle ahead.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
 from slam.errors import LogFormatError
 from slam.frames import Stream
-from slam.logs import carmen_messages as messages
-from slam.logs.carmen import Log, stream_of
-from slam.logs.carmen_messages import LaserMessage, Pose, PoseMessage
 from slam.logs.repairs import Repairs
+from slam.logs.scan_log import ScanLog, stream_of
+from slam.logs.scan_poses import LaserMessage, PoseMessage
 from slam.logs.stamps import digits_of
-from slam.logs.text import numbered_lines
+from slam.logs.text import (
+    MAX_BEAMS,
+    MAX_RANGE_M,
+    Pose,
+    about,
+    number,
+    numbered_lines,
+    pose_of,
+    stamp_ns,
+    words_of,
+)
 
 _CM = 0.01
 _POSES = 8  # words of an L line that are no ranges
@@ -34,9 +44,9 @@ def is_centimetre(path: Path) -> bool:
     """Whether one of the first lines is an ``L`` or ``O`` followed by numbers."""
     for _, line in islice(numbered_lines(path, Repairs(path)), _LINES_TO_LOOK_AT):
         words = line.split()
-        known = words[:1] in ([SCAN], [ODOM]) and len(words) >= 5
-        if known and all(map(_is_number, words[1:5])):
-            return True
+        with suppress(ValueError):
+            if words[:1] in ([SCAN], [ODOM]) and len([number(w, "") for w in words[1:5]]) == 4:
+                return True
     return False
 
 
@@ -46,47 +56,42 @@ def read_centimetre(path: str | Path, *, strict: bool = False) -> Stream:
     Odometry is the robot's pose in the scan's own line, the mount of the laser that between its two
     poses. Repairs, ``strict`` and errors are those of ``read_carmen``.
     """
-    repairs = Repairs(Path(path), strict)
-    log = Log(Path(path), scans={SCAN: []})
-    for number, line in numbered_lines(log.path, repairs):
-        words = line.split()
-        if not words or words[0].startswith("#"):
-            continue
-        try:
+    path = Path(path)
+    repairs = Repairs(path, strict)
+    scans: list[LaserMessage] = []
+    odom: list[PoseMessage] = []
+    digits = 1
+    for at, words in words_of(path, repairs):
+        with about(path, line=at):
             if words[0] == SCAN:
-                log.scans[SCAN].append(_scan(number, words))
+                scans.append(_scan(at, words))
             elif words[0] == ODOM:
-                log.odom.append(_odom(number, words))
+                odom.append(_odom(at, words))
             else:
                 raise ValueError(f"expected {SCAN} or {ODOM}, got {words[0][:40]!r}")
-        except ValueError as error:
-            raise LogFormatError(log.path, str(error), number) from error
-        log.digits = max(log.digits, digits_of(words[-1]))
-    if not log.scans[SCAN]:
+        digits = max(digits, digits_of(words[-1]))
+    if not scans:
         raise LogFormatError(path, f"no scan found (no {SCAN} line)")
-    return stream_of(log, SCAN, repairs, "carmen-centimetres")
+    log = ScanLog(path=path, message=SCAN, scans=scans, odom=odom, digits=digits)
+    return stream_of(log, repairs, "carmen-centimetres")
 
 
 def _scan(line: int, words: list[str]) -> LaserMessage:
     n = len(words) - _POSES
-    if not 1 <= n <= messages.MAX_BEAMS:
+    if not 1 <= n <= MAX_BEAMS:
         raise ValueError(
-            f"L of {len(words)} words; expected L, six words of poses, 1 to {messages.MAX_BEAMS} "
-            "ranges and a time"
+            f"L of {len(words)} words; expected L, six words of poses, 1 to {MAX_BEAMS} ranges "
+            "and a time"
         )
-    ranges = [messages.number(word, f"range {k}") * _CM for k, word in enumerate(words[7:-1])]
+    ranges = [number(word, f"range {k}") * _CM for k, word in enumerate(words[7:-1])]
     for k, value in enumerate(ranges):
-        if not 0.0 <= value <= messages.MAX_RANGE_M:
-            raise ValueError(
-                f"range {k}: ranges must be 0 to {messages.MAX_RANGE_M / _CM:g} cm, "
-                f"got {words[7 + k]}"
-            )
+        if not 0.0 <= value <= MAX_RANGE_M:
+            most = f"{MAX_RANGE_M / _CM:g} cm"
+            raise ValueError(f"range {k}: ranges must be 0 to {most}, got {words[7 + k]}")
     return LaserMessage(
         line=line,
-        stamp_ns=messages.stamp_ns(words[-1]),
+        stamp_ns=stamp_ns(words[-1]),
         ranges=ranges,
-        intensities=[],
-        beams=None,
         laser_pose=_pose(words[4:7], "laser"),
         robot_pose=_pose(words[1:4], "robot"),
     )
@@ -95,18 +100,10 @@ def _scan(line: int, words: list[str]) -> LaserMessage:
 def _odom(line: int, words: list[str]) -> PoseMessage:
     if len(words) != 5:
         raise ValueError(f"O has 5 words, got {len(words)}")
-    stamp_ns = messages.stamp_ns(words[-1])
-    return PoseMessage(line=line, stamp_ns=stamp_ns, pose=_pose(words[1:4], "robot"))
+    at = stamp_ns(words[-1])
+    return PoseMessage(line=line, stamp_ns=at, pose=_pose(words[1:4], "robot"))
 
 
 def _pose(words: list[str], whose: str) -> Pose:
-    x, y, theta = messages.pose_of(words, whose)
+    x, y, theta = pose_of(words, whose)
     return x * _CM, y * _CM, theta
-
-
-def _is_number(word: str) -> bool:
-    try:
-        messages.number(word, "")
-    except ValueError:
-        return False
-    return True

@@ -5,27 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 from slam.errors import LogFormatError
 from slam.frames import Stream
 from slam.logs.bag import read_bag
 from slam.logs.bag_topics import is_bag
-from slam.logs.carmen import read_carmen
-from slam.logs.carmen_messages import KNOWN_NAMES
+from slam.logs.carmen import is_carmen, read_carmen
 from slam.logs.centimetre import is_centimetre, read_centimetre
 from slam.logs.rawlog import is_rawlog, read_rawlog
-from slam.logs.repairs import Repairs
 from slam.logs.rover import read_rover
-from slam.logs.text import numbered_lines
 from slam.logs.victoria_park import is_victoria_park, read_victoria_park
 
-_LINES_TO_LOOK_AT = 1000
 _NAMED = 3  # recordings of a folder that a message names
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class LogFormat:
     """``recognises`` may raise ``LogFormatError``; ``read(path, strict)`` gives the stream."""
 
@@ -34,39 +29,42 @@ class LogFormat:
     read: Callable[[Path, bool], Stream]
 
 
-def _is_carmen(path: Path) -> bool:
-    """True when one of the first thousand lines begins with the name of a CARMEN message."""
-    lines = islice(numbered_lines(path, Repairs(path)), _LINES_TO_LOOK_AT)
-    return any(line.split(maxsplit=1)[:1] in KNOWN_NAMES for _, line in lines)
-
-
 FORMATS: tuple[LogFormat, ...] = (
     LogFormat(
-        description="bag of ROS 2 (its folder, .mcap or .db3) or of ROS 1 (.bag)",
-        recognises=is_bag,
-        read=lambda path, strict: read_bag(path, strict=strict),
+        "bag of ROS 2 (its folder, .mcap or .db3) or of ROS 1 (.bag)",
+        is_bag,
+        lambda path, strict: read_bag(path, strict=strict),
     ),
     LogFormat(
-        description="Victoria Park (its folder, features_*.mat or rfs_measurements.dat)",
-        recognises=is_victoria_park,
-        read=lambda path, _: read_victoria_park(path),
+        "Victoria Park (its folder, features_*.mat or rfs_measurements.dat)",
+        is_victoria_park,
+        lambda path, _: read_victoria_park(path),
     ),
     LogFormat(
-        description="MRPT rawlog (.rawlog)",
-        recognises=is_rawlog,
-        read=lambda path, strict: read_rawlog(path, strict=strict),
+        "MRPT rawlog (.rawlog)",
+        is_rawlog,
+        lambda path, strict: read_rawlog(path, strict=strict),
     ),
     LogFormat(
-        description="CARMEN text log (.log, .clf, .log.gz, .log.xz)",
-        recognises=_is_carmen,
-        read=lambda path, strict: read_carmen(path, strict=strict),
+        "CARMEN text log (.log, .clf, .log.gz, .log.xz)",
+        is_carmen,
+        lambda path, strict: read_carmen(path, strict=strict),
     ),
     LogFormat(
-        description="L/O text log in centimetres",
-        recognises=is_centimetre,
-        read=lambda path, strict: read_centimetre(path, strict=strict),
+        "L/O text log in centimetres",
+        is_centimetre,
+        lambda path, strict: read_centimetre(path, strict=strict),
     ),
 )
+
+
+_registered: list[LogFormat] = []
+
+
+def register(log_format: LogFormat) -> LogFormat:
+    """One more format, asked after those of ``FORMATS``; a file of one's own calls this."""
+    _registered.append(log_format)
+    return log_format
 
 
 def open_log(
@@ -85,10 +83,10 @@ def open_log(
         return read_rover(path, text_format, strict=strict)
     if path.is_dir() and not (is_bag(path) or is_victoria_park(path)):
         raise LogFormatError(path, _what_folder(path))
-    for log_format in FORMATS:
+    for log_format in (*FORMATS, *_registered):
         if log_format.recognises(path):
             return log_format.read(path, strict)
-    known = "; ".join(log_format.description for log_format in FORMATS)
+    known = "; ".join(log_format.description for log_format in (*FORMATS, *_registered))
     raise LogFormatError(
         path, f"of no known format; known: {known}; others by a description of their columns "
         "(--format)"

@@ -8,20 +8,19 @@ import math
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
 from slam.errors import LogFormatError
 from slam.frames import Float, Stream
-from slam.logs.carmen import Log, stream_of
-from slam.logs.carmen_messages import MAX_COORDINATE, MAX_RANGE_M, Beams, LaserMessage, PoseMessage
 from slam.logs.rawlog_objects import MoveObject, Object, Objects, OdometryObject, ScanObject, Torn
 from slam.logs.repairs import TORN_LINE, Repairs
+from slam.logs.scan_log import ScanLog, stream_of
+from slam.logs.scan_poses import Beams, LaserMessage, PoseMessage
 from slam.logs.stamps import FINE_DIGITS
+from slam.logs.text import MAX_COORDINATE, MAX_RANGE_M, Pose
 from slam.logs.unpacking import MAX_RAWLOG_BYTES
 
 SCAN = "CObservation2DRangeScan"
@@ -77,9 +76,7 @@ def read_rawlog(path: str | Path, *, strict: bool = False) -> Stream:
     except ValueError as error:
         raise LogFormatError(path, str(error), objects.number) from error
     label = _label(path, found, objects.skipped)
-    log = _Builder(path, found, label).log()
-    log.ignored.update(objects.skipped)
-    return stream_of(log, SCAN, repairs, "rawlog")
+    return stream_of(_Builder(path, found, label).log(objects.skipped), repairs, "rawlog")
 
 
 def _unpacked(path: Path, repairs: Repairs) -> bytes:
@@ -137,23 +134,26 @@ class _Builder:
         ]
         self._mount = self._mounted()
 
-    def log(self) -> Log:
-        """All of it."""
+    def log(self, ignored: Counter[str]) -> ScanLog:
+        """All of it, but what is ``ignored``."""
         poses = self._poses()
         odom: list[PoseMessage] = []
         if poses is None:
-            odom = [
-                PoseMessage(
-                    line=o.number, stamp_ns=o.stamp_ns, pose=self._checked(o.number, o.pose)
-                )
-                for o in self._found
-                if isinstance(o, OdometryObject)
-            ]
-        flags = self._flags()
-        scans = [self._scan(s, poses[s.number] if poses else None, flags) for s in self._scans]
-        log = Log(self._path, {SCAN: scans}, odom, wheels=False, mount=self._mount)
-        log.digits = FINE_DIGITS
-        return log
+            for o in self._found:
+                if isinstance(o, OdometryObject):
+                    pose = self._checked(o.number, o.pose)
+                    odom.append(PoseMessage(line=o.number, stamp_ns=o.stamp_ns, pose=pose))
+        turned = self._flags_are_turned()
+        return ScanLog(
+            path=self._path,
+            message=SCAN,
+            scans=[self._scan(s, poses[s.number] if poses else None, turned) for s in self._scans],
+            odom=odom,
+            ignored=ignored,
+            digits=FINE_DIGITS,
+            wheels=False,
+            mount=self._mount,
+        )
 
     def _mounted(self) -> Float:
         """(3,) of the laser on the robot: the middle one, as all should be the same."""
@@ -169,17 +169,17 @@ class _Builder:
             )  # fmt: skip
         return middle
 
-    def _checked(self, number: int, pose: tuple[float, float, float]) -> tuple[float, float, float]:
+    def _checked(self, number: int, pose: Pose) -> Pose:
         if not all(abs(value) <= MAX_COORDINATE for value in pose):  # false for NaN too
             raise LogFormatError(
                 self._path, f"a pose must lie within {MAX_COORDINATE:g} m, got {pose}", number
             )
         return pose
 
-    def _poses(self) -> dict[int, tuple[float, float, float]] | None:
+    def _poses(self) -> dict[int, Pose] | None:
         """The robot's pose at each scan, by the scan's number; None: it must be interpolated."""
         moves = any(isinstance(o, MoveObject) for o in self._found)
-        out: dict[int, tuple[float, float, float]] = {}
+        out: dict[int, Pose] = {}
         T_odom_robot: Float = np.zeros(3)
         before: Object | None = None
         for item in self._found:
@@ -194,28 +194,21 @@ class _Builder:
             before = item
         return out if all(scan.number in out for scan in self._scans) else None
 
-    def _flags(self) -> Callable[[ScanObject], NDArray[np.bool_]]:
-        """How to tell which beams are valid: the first carmen2rawlog wrote the opposite."""
+    def _flags_are_turned(self) -> bool:
+        """Whether valid beams are marked invalid, as the first carmen2rawlog did."""
+        return not any(
+            (scan.valid & (scan.ranges > 0.0) & (scan.ranges < scan.range_max)).any()
+            for scan in self._scans
+        )
 
-        def usable(scan: ScanObject) -> bool:
-            return bool((scan.valid & (scan.ranges > 0.0) & (scan.ranges < scan.range_max)).any())
-
-        turned = not any(map(usable, self._scans))
-        return lambda scan: scan.valid ^ turned
-
-    def _scan(
-        self,
-        scan: ScanObject,
-        robot: tuple[float, float, float] | None,
-        flags: Callable[[ScanObject], NDArray[np.bool_]],
-    ) -> LaserMessage:
+    def _scan(self, scan: ScanObject, robot: Pose | None, turned: bool) -> LaserMessage:
         if not (scan.range_max > 0.0 and 0.0 < scan.aperture <= 2.0 * math.tau):
             raise LogFormatError(
                 self._path, f"a field of view of {scan.aperture} rad up to {scan.range_max} m",
                 scan.number,
             )  # fmt: skip
         known = np.isfinite(scan.ranges) & (scan.ranges > 0.0)
-        known &= flags(scan) | (scan.ranges >= scan.range_max)
+        known &= (scan.valid ^ turned) | (scan.ranges >= scan.range_max)
         ranges = np.where(known, np.minimum(scan.ranges, MAX_RANGE_M), 0.0)
         if scan.counter_clockwise != (scan.pose[2, 2] > 0.0):
             ranges = ranges[::-1]
@@ -228,7 +221,6 @@ class _Builder:
             line=scan.number,
             stamp_ns=scan.stamp_ns,
             ranges=ranges.tolist(),
-            intensities=[],
             beams=Beams(
                 start_angle=-scan.aperture / 2.0,
                 increment=scan.aperture / max(n - 1, 1),

@@ -150,7 +150,7 @@ class Objects:
     def _pass_over(self, old: bool) -> None:
         """To the next observation or action."""
         if old:
-            raise ValueError("holds objects that only newer files name an end of; save it anew "
+            raise ValueError("holds objects that only newer files name an end of; save it again "
                              "with MRPT")  # fmt: skip
         at = max(self.at - 1, 0)
         while (found := _NEXT.search(self._data, at)) is not None:

@@ -12,19 +12,19 @@ import numpy as np
 from slam import se2
 from slam.errors import LogFormatError
 from slam.frames import NS_PER_S, Float, Stream
-from slam.logs.carmen import Log, stream_of
-from slam.logs.carmen_messages import (
+from slam.logs.repairs import Repairs
+from slam.logs.rover_format import LARGEST, Poses, RoverFormat, Ticks, read_format
+from slam.logs.scan_log import ScanLog, stream_of
+from slam.logs.scan_poses import Beams, LaserMessage
+from slam.logs.stamps import FINE_DIGITS
+from slam.logs.text import (
     MAX_COORDINATE,
     MAX_RANGE_M,
     MAX_STAMP_S,
-    Beams,
-    LaserMessage,
     Pose,
+    about,
+    numbered_lines,
 )
-from slam.logs.repairs import Repairs
-from slam.logs.rover_format import LARGEST, Poses, RoverFormat, Ticks, read_format
-from slam.logs.stamps import FINE_DIGITS
-from slam.logs.text import numbered_lines
 
 SCAN = "line"
 
@@ -46,16 +46,16 @@ def read_rover(path: str | Path, text_format: str | Path, *, strict: bool = Fals
     mount = np.array(log_format.mount)
     scans = []
     for number, words in _rows(path, log_format, repairs):
-        try:
+        with about(path, line=number):
             robot = odometry.pose(words)
             scans.append(_scan(number, words, log_format, robot, mount))
-        except ValueError as error:
-            raise LogFormatError(path, str(error), number) from error
     if not scans:
         raise LogFormatError(path, "no scan found: no line but empty ones and comments")
     wheels = log_format.odometry is not None
-    log = Log(path, {SCAN: scans}, mount=mount, wheels=wheels, digits=FINE_DIGITS)
-    return stream_of(log, SCAN, repairs, "rover")
+    log = ScanLog(
+        path=path, message=SCAN, scans=scans, mount=mount, wheels=wheels, digits=FINE_DIGITS
+    )
+    return stream_of(log, repairs, "rover")
 
 
 def _rows(path: Path, log_format: RoverFormat, repairs: Repairs) -> Iterator[tuple[int, list[str]]]:
@@ -129,7 +129,6 @@ def _scan(
         line=number,
         stamp_ns=_ns(words[log_format.time], log_format.s),
         ranges=ranges,
-        intensities=[],
         beams=Beams(start_angle=start, increment=step, range_max=log_format.range_max_m),
         laser_pose=laser,
         robot_pose=robot,

@@ -42,7 +42,7 @@ from typing import Any
 
 from slam.bounded import text_of
 from slam.errors import LogFormatError
-from slam.logs.carmen_messages import MAX_BEAMS, MAX_RANGE_M
+from slam.logs.text import MAX_BEAMS, MAX_RANGE_M
 
 MAX_TOML_BYTES = 1 << 16
 MAX_COLUMN = 100_000

@@ -30,18 +30,12 @@ NEAR_ZERO_NS = 10**7 * NS_PER_S  # the clock of such seconds began within months
 FINE_DIGITS = 19  # significant digits of 64-bit nanoseconds
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Ordered:
-    """``order``: indices by time (stable). ``stamps_ns``: those times, strictly increasing.
-
-    ``stepped_back``: how many stamps were smaller than the one before them in the log.
-    ``spread``: how many were moved because they equalled another.
-    """
+    """``order``: indices by time (stable). ``stamps_ns``: those times, strictly increasing."""
 
     order: list[int]
     stamps_ns: list[int]
-    stepped_back: int
-    spread: int
 
 
 def digits_of(word: str) -> int:
@@ -191,7 +185,7 @@ def put_in_order(
         at = order[equal[0]]
         why = f"{len(equal)} scans have the time of another, as {to_s(stamps_ns[at]):.9g} s here"
         repairs.note(STAMPS_SPREAD, why, lines[at], len(equal))
-    return Ordered(order=order, stamps_ns=strict, stepped_back=len(back), spread=len(equal))
+    return Ordered(order, strict)
 
 
 def _along(order: list[int], steps_s: Sequence[float] | None) -> list[float] | None:

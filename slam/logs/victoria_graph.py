@@ -21,9 +21,7 @@ from slam import se2
 from slam.errors import LogFormatError
 from slam.frames import Float, Frame
 from slam.landmarks.filter import EkfFilter
-from slam.logs.border import about
-from slam.logs.carmen_messages import number
-from slam.logs.text import numbered_lines
+from slam.logs.text import about, number, numbered_lines
 from slam.logs.victoria_park import LASER_AHEAD_M, LASER_LEFT_M
 from slam.posegraph import Edge, optimise
 from slam.trajectory import Trajectory

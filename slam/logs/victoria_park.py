@@ -27,9 +27,14 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.errors import LogFormatError
 from slam.frames import NS_PER_S, Features, Float, Frame, Odometry, Stream, StreamMetadata, to_ns
-from slam.logs.border import about
-from slam.logs.carmen_messages import MAX_COORDINATE, MAX_RANGE_M, MAX_STAMP_S, number
-from slam.logs.text import numbered_lines
+from slam.logs.text import (
+    MAX_COORDINATE,
+    MAX_RANGE_M,
+    MAX_STAMP_S,
+    about,
+    number,
+    numbered_lines,
+)
 from slam.logs.unpacking import check_mat
 
 AXLES_M, HALF_TRACK_M = 2.83, 0.76  # L, H

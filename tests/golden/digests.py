@@ -24,6 +24,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, made_with, read_recipe
 from sim.recording.sums import read_sums
 from sim.simulation import Simulation, stream
-from slam import create, se2
+from slam import Estimate, create, se2
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import Frame
 from slam.logs import open_log
@@ -55,6 +56,7 @@ LATER = ("error_tracking_m", "silent_share")  # columns that are younger than th
 WORLD_1: dict[str, Any] = {"change": 0.0, "options": {"crowd": "none"}}  # of a recipe
 CROWDED = (("0.5 of world 2", 0.5),)  # rows of this world, with its crowd
 Golden = dict[str, Any]
+Seen = tuple[Frame, Estimate]
 
 
 class Missing(Exception):
@@ -96,11 +98,15 @@ def frames_of(scene: str, dynamism: float | Dynamism) -> Golden:
     return {"sha256": digest.hex(), "end": _numbers(last.truth)}
 
 
-def estimates_of(frames: Iterable[Frame], name: str, **options: Any) -> Golden:
-    """Estimates, covariances, final trajectory and map of a SLAM."""
+def estimates_of(
+    frames: Iterable[Frame], name: str, seen: list[Seen] | None = None, **options: Any
+) -> Golden:
+    """Estimates, covariances, final trajectory and map of a SLAM; ``seen`` gets each of them."""
     system, digest, estimate = create(name, **options), _Digest(), None
     for frame in frames:
         estimate = system.update(frame.without_truth())
+        if seen is not None:
+            seen.append((frame, estimate))
         digest.add(estimate.T_map_robot, estimate.covariance, estimate.converged)
     assert estimate is not None
     final, raster = system.trajectory(), system.map()
@@ -150,14 +156,16 @@ def on_points(name: str, **options: Any) -> Golden:
     return estimates_of(world.stream(), name, **options)
 
 
-def on_intel(name: str, scans: int, **options: Any) -> Golden:
-    """On a real log."""
+@cache
+def on_intel(name: str, scans: int) -> tuple[Golden, list[Seen]]:
+    """On a real log; beside the digest all that was estimated, for a test of how good it is."""
     root = os.environ.get("MOBILIA_DATA")
     data = Path(root) if root else Path(__file__).resolve().parents[3] / "shared" / "data"
     log = data / "intel" / "intel-corrected.log.xz"
     if not log.exists():
         raise Missing(f"NO REAL LOGS: {log} is missing (set MOBILIA_DATA to their folder)")
-    return estimates_of(itertools.islice(open_log(log), scans), name, **options)
+    seen: list[Seen] = []
+    return estimates_of(itertools.islice(open_log(log), scans), name, seen), seen
 
 
 def episode() -> Golden:
@@ -232,9 +240,9 @@ MAKERS: dict[str, Callable[[], Golden]] = {
         "shunting-features", config="paper"
     ),
     "estimates/points/ekf": lambda: on_points("ekf"),
-    "estimates/intel/shunting": lambda: on_intel("shunting", 910),
-    "estimates/intel/occupancy": lambda: on_intel("occupancy", 200),
-    "estimates/intel/ekf": lambda: on_intel("ekf", 200),
+    "estimates/intel/shunting": lambda: on_intel("shunting", 910)[0],
+    "estimates/intel/occupancy": lambda: on_intel("occupancy", 200)[0],
+    "estimates/intel/ekf": lambda: on_intel("ekf", 200)[0],
     "episode": episode,
     "compare": compared,
     "film": film,

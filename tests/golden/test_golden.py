@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 from sim.recording.recipe import made_with
-from tests.golden.digests import MAKERS, TOLERANCE, Missing, read
+from slam.evaluation import metrics
+from slam.trajectory import Trajectory
+from tests.golden.digests import MAKERS, TOLERANCE, Missing, on_intel, read
 
 GOLDEN = read()
 RECORDED = ("frames/", "episode", "film")  # the rest are of SLAMs
@@ -36,6 +38,25 @@ def test_results_are_what_they_were(name: str):
     if elsewhere := _elsewhere(recorded=name.startswith(RECORDED)):
         pytest.skip(f"the numbers agree; the digests were made with another {elsewhere}")
     assert got["sha256"] == want["sha256"]
+
+
+def test_the_online_path_of_intel_stays_near_the_corrected_one():
+    """Beside its digest, for it is the longest of the runs."""
+    try:
+        _, seen = on_intel("shunting", 910)
+    except Missing as error:
+        pytest.skip(str(error))
+    stamps_ns = np.array([frame.stamp_ns for frame, _ in seen])
+    true, wheels, believed = (
+        Trajectory(stamps_ns=stamps_ns, poses=np.array(poses))
+        for poses in zip(
+            *((frame.truth, frame.odometry.T_odom_robot, e.T_map_robot) for frame, e in seen),
+            strict=True,
+        )
+    )
+    assert len(true) == 910
+    assert metrics.ate(wheels, true, align="se2").value > 10.0
+    assert metrics.ate(believed, true, align="se2").value <= 0.12
 
 
 def _elsewhere(*, recorded: bool) -> str:

@@ -135,11 +135,11 @@ class Hostile:
     def begun_drive(self) -> list[str]:
         """The same of ``mobilia drive``."""
         out = self.path / "driven"
-        plan = DrivePlan(scene="arena", slams=("odometry",), levels=(0.5,), seeds=(1, 2))
+        plan = DrivePlan(scene="arena", slams=("odometry",), levels=(0.5,), seeds=(1,), goals=1)
         for _, job in plan.jobs():
             self.pickled(out / "runs" / job.file_name(), "rest", "stamps_ns")
         write_recipe(out, "drive", {"drive_schema": 1, "scene": SCENE, "slams": [SLAM]})
-        words = ["arena", "--slam", "odometry", "--dynamism", "0.5", "--seeds", "1", "2"]
+        words = ["arena", "--slam", "odometry", "--dynamism", "0.5", "--seeds", "1", "--goals", "1"]
         return [*words, "--out", "driven"]
 
     def report(self) -> Path:

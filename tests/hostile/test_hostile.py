@@ -283,8 +283,8 @@ def test_settings_of_the_working_folder_stay_out(hostile: Hostile):
     program = hostile.path.parent / "look.py"
     program.write_text(
         "import os, sys\n"
-        "from scripts import folder\n"
-        "folder.leave_out()\n"
+        "from scripts.__main__ import leave_out\n"
+        "leave_out()\n"
         "assert os.getcwd() not in sys.path, sys.path\n"
         "assert '' not in os.environ['PYTHONPATH'].split(os.pathsep)\n"
         "import slam, matplotlib, numba\n"

@@ -11,33 +11,7 @@ import pytest
 
 import scenes
 from slam.errors import InvalidValueError
-from tests.built_scenes import built, model_of, reached
-
-
-def test_the_true_map_agrees_with_rays():
-    """The static raster says occupied where a vertical look along the scan plane meets a geom."""
-    scene, model = built("office", 0), model_of("office")
-    data = mujoco.MjData(model)
-    scene.place(model, data)
-    mujoco.mj_kinematics(model, data)
-    raster = scene.static_map
-    groups = np.array([1, 1, 0, 0, 0, 0], dtype=np.uint8)
-    hit = np.zeros(1, dtype=np.int32)
-    rng = np.random.default_rng(0)
-    checked = 0
-    for angle in rng.uniform(-math.pi, math.pi, 400).tolist():
-        start = np.array([scene.start[0] + 0.5, scene.start[1], scenes.SCAN_HEIGHT])
-        way = np.array([math.cos(angle), math.sin(angle), 0.0])
-        robot = model.body("robot/base").id
-        distance = mujoco.mj_ray(model, data, start, way, groups, 1, robot, hit, None)
-        if distance < 0 or model.body_weldid[model.geom_bodyid[hit[0]]] != 0:
-            continue
-        end = start + way * (distance + 0.5 * raster.resolution_m)
-        cell = (end[:2] - raster.T_map_origin[:2]) / raster.resolution_m
-        column, row = int(cell[0]), int(cell[1])
-        assert raster.values[row - 1 : row + 2, column - 1 : column + 2].max() == 1.0
-        checked += 1
-    assert checked > 200
+from tests.built_scenes import built, reached
 
 
 def test_arena_has_only_chairs_by_default():

@@ -98,23 +98,6 @@ def test_a_laser_meets_a_board_over_its_whole_length_and_a_bed_at_ends_and_colum
     assert seen_across("couch", 0.0) == pytest.approx(0.36)
 
 
-def test_a_chair_shows_its_column_or_its_legs_to_the_laser():
-    for kind, wanted in (("chair_swivel", 1), ("chair_visitor", 4)):
-        model = mujoco.MjModel.from_xml_path(str(PARTS[0].parent / f"{kind}.xml"))
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        offsets = np.arange(-0.4, 0.4, 0.005)
-        groups = np.array([1, 1, 1, 0, 0, 0], dtype=np.uint8)
-        seen = set()
-        for offset in offsets.tolist():
-            for origin, way in (((-1.0, offset), (1.0, 0.0)), ((1.0, offset), (-1.0, 0.0))):
-                hit = np.zeros(1, dtype=np.int32)
-                point = np.array([*origin, scenes.SCAN_HEIGHT])
-                mujoco.mj_ray(model, data, point, np.array([*way, 0.0]), groups, 1, -1, hit, None)
-                seen.add(int(hit[0]))
-        assert len(seen - {-1}) == wanted
-
-
 @pytest.mark.parametrize("material", sorted(textures.PAINTERS))
 def test_a_floor_tile_wraps_round_without_a_seam(material):
     data, n, size_m = textures.floor(material)

@@ -36,8 +36,6 @@ print("loaded:", *sorted({name.partition(".")[0] for name in sys.modules}))
         ("run shuntin --scene arena", "Did you mean 'shunting'"),
         ("run ekf --scene aren", "Did you mean 'arena'"),
         ("compare --slam shunting{a=1 --out x", "'{' without '}'"),
-        ("drive arena --slam shuntin --out x", "Did you mean 'shunting'"),
-        ("generate aren --out x", "Did you mean 'arena'"),
     ],
 )
 def test_what_simulates_nothing_loads_no_simulator(words, said, tmp_path):

@@ -58,10 +58,6 @@ def test_what_counts_nothing_tells_too(printed: io.StringIO):
     assert printed.getvalue() == told
 
 
-def test_it_is_told_every_ten_seconds():
-    assert console.LINE_EVERY_S == 10.0
-
-
 def test_the_time_left_of_few_long_steps_is_that_of_all_so_far():
     bar = Progress(get_time=lambda: now)
     now = 0.0

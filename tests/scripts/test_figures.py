@@ -7,16 +7,7 @@ import matplotlib as mpl
 import numpy as np
 
 from scripts import figures
-from scripts.figures import styled
 from slam.trajectory import Trajectory
-
-
-def test_a_style_is_left_behind_by_nobody():
-    before = dict(mpl.rcParams)
-    with styled({"font.size": 5}):
-        assert mpl.rcParams["font.size"] == 5
-        assert mpl.rcParams["axes.grid"] is True
-    assert dict(mpl.rcParams) == before
 
 
 def test_a_figure_is_the_same_to_the_byte_whoever_drew_before(tmp_path):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from scripts.comparison import maps, schema, tables
-from scripts.comparison.columns import scored
+from scripts.comparison.entry import scored
 from scripts.metrics import table
 from scripts.metrics.judged import Judged, lost_s
 from scripts.metrics.table import METRICS

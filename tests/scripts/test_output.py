@@ -34,12 +34,6 @@ def make(path: Path, text: str, *, overwrite: bool = False) -> None:
         write_recipe(folder, "test", {"text": text})
 
 
-def test_a_folder_appears_whole(tmp_path: Path):
-    make(tmp_path / "run", "one")
-    assert (tmp_path / "run" / "data.txt").read_text() == "one"
-    assert [p.name for p in tmp_path.iterdir()] == ["run"]
-
-
 def test_an_earlier_run_is_refused_and_replaced_only_when_asked(tmp_path: Path):
     make(tmp_path / "run", "one")
     with pytest.raises(OutputError, match="earlier run of the same settings: pass --overwrite"):

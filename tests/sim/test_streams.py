@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.actors import doors
-from sim.actors.people import columns
 from sim.core.seeds import Seeds
 from sim.driving.pilot import Pilot
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 
 PARTS = ("layout", "chairs", "bins", "doors", "people", "lidar", "odometry", "driving", "tags")
-SECONDS = 8.0
+SECONDS = 5.0
 
 
 def _state(*rngs: np.random.Generator) -> str:
@@ -39,19 +37,19 @@ def draws(seeds: Seeds) -> dict[str, Any]:
     noise = hashlib.sha256()
     for _ in range(round(SECONDS / simulation.scan_period_s)):
         before = people.draws.copy()
-        angle = world._doors.schedule[:, doors.ANGLE].copy()
+        angle = world._doors.schedule["angle"].copy()
         noise.update(_state(*simulation.laser.streams).encode())
         simulation.observe()
         for i in np.flatnonzero(people.draws[: len(trips)] != before[: len(trips)]).tolist():
-            trips[i].append((people.state[i, columns.ARRIVE], float(people.task[i, columns.GOAL])))
-        for d in np.flatnonzero(angle != world._doors.schedule[:, doors.ANGLE]).tolist():
-            angles[d].append(float(world._doors.schedule[d, doors.ANGLE]))
+            trips[i].append((people.state["arrive"][i], float(people.task["goal"][i])))
+        for d in np.flatnonzero(angle != world._doors.schedule["angle"]).tolist():
+            angles[d].append(float(world._doors.schedule["angle"][d]))
     return {
         "layout": initial,
         "chairs": world._shoves["chair"].schedule[:, 0].tolist(),
         "bins": world._shoves["bin"].schedule[:, 0].tolist(),
-        "doors": (angles, world._doors.schedule[:, doors.NEXT].tolist()),
-        "people": (people.state[:, columns.SPEED].tolist(), trips),
+        "doors": (angles, world._doors.schedule["next"].tolist()),
+        "people": (people.state["speed"].tolist(), trips),
         "lidar": noise.hexdigest(),
         "odometry": (_state(simulation.encoders._rng), simulation.encoders.errors),
         "driving": tour.tolist(),

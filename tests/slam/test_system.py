@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import slam
-from slam import Estimate, Frame, Odometry, Raster, SlamSystem, Trajectory, se2, system
+from slam import Estimate, Frame, Odometry, Raster, SlamSystem, se2, system
 from slam.errors import InvalidValueError, UnknownNameError, UntrustedNameError
 from slam.names import NameFromFile
 
@@ -160,9 +160,3 @@ def test_odometry_sums_its_covariance_as_sampling_does():
         samples.append(T)
     sampled = np.cov(np.array(samples).T)
     np.testing.assert_allclose(estimate.covariance, sampled, atol=0.08 * sampled.max())
-
-
-def test_trajectory_of_nothing_is_empty():
-    empty = slam.create("odometry").trajectory()
-    assert isinstance(empty, Trajectory)
-    assert (len(empty), empty.length_m()) == (0, 0.0)

@@ -127,15 +127,6 @@ def test_set_is_for_the_slam_it_names() -> None:
         with_set(["shunting"], ["reward=7", "shunting.reward=8"])
 
 
-def test_a_nested_number_reaches_the_estimate() -> None:
-    stream = tour()
-    ends = []
-    for name in ("shunting{cell_m=0.1}", "shunting{cell_m=0.1,frontend.sigma_cells=1.0}"):
-        system = slam.create(name)
-        ends.append([system.update(frame.without_truth()).T_map_robot for frame in stream][-1])
-    assert not np.array_equal(*ends)
-
-
 def test_a_map_file_keeps_every_number_and_an_older_one_has_the_defaults(tmp_path: Path) -> None:
     config = ShuntingConfig().changed({"cell_m": 0.1, "matching.local.points": 90})
     ShuntingSlam(config).save(tmp_path / "map.npz")

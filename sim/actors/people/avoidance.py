@@ -11,8 +11,9 @@ import math
 
 from sim.actors.config import ACTORS
 from sim.actors.people import columns
-from sim.actors.people.right_of_way import BODY, Crowd, Float, Int
+from sim.actors.people.right_of_way import BODY, Crowd, Int
 from sim.core.flow import Field, clearance_at
+from sim.core.state import Record, Records
 from slam._jit import njit
 
 _S = ACTORS.steering
@@ -42,34 +43,28 @@ def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> flo
 
 @njit
 def danger(  # noqa: PLR0913 (kernel)
-    i: int, vx: float, vy: float, near: Int, discs: Float, fade: float, dense: float
+    i: int, vx: float, vy: float, near: Int, discs: Records, fade: float, dense: float
 ) -> float:
     """Cost of what person ``i`` would run into at velocity (vx, vy).
 
     fade, dense  weight of things and of people
     """
-    x, y, r, ux, uy = (
-        discs[i, columns.X],
-        discs[i, columns.Y],
-        discs[i, columns.R],
-        discs[i, columns.U],
-        discs[i, columns.V],
-    )
+    x, y, r, ux, uy = discs[i].x, discs[i].y, discs[i].r, discs[i].u, discs[i].v
     cost = 0.0
     for k in range(len(near)):
         other = discs[near[k]]
         weight = fade
-        if other[columns.KIND] == columns.PERSON:
+        if other.kind == columns.PERSON:
             weight = dense
-        elif other[columns.KIND] == columns.ROBOT:
+        elif other.kind == columns.ROBOT:
             weight = 1.0
         if weight <= 0.0:
             continue
-        dx, dy, reach = other[columns.X] - x, other[columns.Y] - y, r + other[columns.R] + APART
-        if other[columns.KIND] == columns.PERSON:  # each takes half of the evasion
-            wx, wy = 2.0 * vx - ux - other[columns.U], 2.0 * vy - uy - other[columns.V]
+        dx, dy, reach = other.x - x, other.y - y, r + other.r + APART
+        if other.kind == columns.PERSON:  # each takes half of the evasion
+            wx, wy = 2.0 * vx - ux - other.u, 2.0 * vy - uy - other.v
         else:
-            wx, wy = vx - other[columns.U], vy - other[columns.V]
+            wx, wy = vx - other.u, vy - other.v
         gap2 = dx * dx + dy * dy
         if gap2 < reach * reach:
             closing = (dx * vx + dy * vy) / math.sqrt(max(gap2, 1e-6))
@@ -92,12 +87,12 @@ def choose(
     """The best of 35 velocities for person ``i`` who would like to walk at ``wanted``."""
     discs, state = crowd.discs, crowd.state
     wx, wy = wanted
-    x, y = discs[i, columns.X], discs[i, columns.Y]
+    x, y = discs[i].x, discs[i].y
     heading = math.atan2(wy, wx)
     here = min(clearance_at(field, x, y), BODY)
     wish = math.sqrt(wx * wx + wy * wy)
     pace = max(wish, LEAST_PACE)
-    hurry = min(HURRY * state[i, columns.BLOCKED], HURRY_MOST) if wish > HURRY_FROM else 0.0
+    hurry = min(HURRY * state[i].blocked, HURRY_MOST) if wish > HURRY_FROM else 0.0
     best, best_x, best_y = math.inf, 0.0, 0.0
     for k in range(35):
         if k == 0:
@@ -105,16 +100,14 @@ def choose(
         elif k == 1:
             vx, vy = 0.0, 0.0
         elif k == 2:
-            vx, vy = state[i, columns.VX], state[i, columns.VY]
+            vx, vy = state[i].vx, state[i].vy
         else:
             angle = heading + (k - 3) // 2 * (math.pi / 8.0)
             speed = pace if k % 2 == 0 else 0.5 * pace
             vx, vy = speed * math.cos(angle), speed * math.sin(angle)
         speed = math.sqrt(vx * vx + vy * vy)
         cost = math.sqrt((vx - wx) ** 2 + (vy - wy) ** 2)
-        cost += CHANGE * math.sqrt(
-            (vx - state[i, columns.VX]) ** 2 + (vy - state[i, columns.VY]) ** 2
-        )
+        cost += CHANGE * math.sqrt((vx - state[i].vx) ** 2 + (vy - state[i].vy) ** 2)
         cost += KEEP_RIGHT * max(0.0, wx * vy - wy * vx)  # people keep right
         if speed < SLOW * pace:  # who has been held up steps aside rather than stand
             cost += hurry * (1.0 - speed / pace)
@@ -123,7 +116,7 @@ def choose(
             if c < here:
                 cost += WALL * (here - c)
         if cost < best:
-            cost += danger(i, vx, vy, near, discs, fade, state[i, columns.DENSE])
+            cost += danger(i, vx, vy, near, discs, fade, state[i].dense)
         if cost < best:
             best, best_x, best_y = cost, vx, vy
     return best_x, best_y
@@ -139,19 +132,19 @@ def spare_robot(
     near the robot. Those of a crowd stop earlier.
     """
     vx, vy = wanted
-    discs, held = crowd.discs, crowd.task[i, columns.HELD]
+    discs, held = crowd.discs, crowd.task[i].held
     spare, brake = SPARE, ACCEL
-    if crowd.state[i, columns.DENSE] < 1.0:
+    if crowd.state[i].dense < 1.0:
         spare, brake = CROWD_SPARE, CROWD_BRAKE
     for k in range(len(near)):
         robot = discs[near[k]]
-        if robot[columns.KIND] != columns.ROBOT:
+        if robot.kind != columns.ROBOT:
             continue
         vx, vy = _spare(vx, vy, discs[i], robot, spare, brake)
         for part in range(len(discs) if held >= 0 else 0):
             if crowd.owner[part] != held:
                 continue
-            u, v = discs[part, columns.U], discs[part, columns.V]
+            u, v = discs[part].u, discs[part].v
             own = math.sqrt(u * u + v * v)
             if own < STANDS_MPS:
                 vx, vy = _spare(vx, vy, discs[part], robot, spare + HELD_SPARE, HELD_BRAKE)
@@ -164,14 +157,14 @@ def spare_robot(
 
 @njit
 def _spare(
-    vx: float, vy: float, disc: Float, robot: Float, spare: float, brake: float
+    vx: float, vy: float, disc: Record, robot: Record, spare: float, brake: float
 ) -> tuple[float, float]:
-    dx, dy = robot[columns.X] - disc[columns.X], robot[columns.Y] - disc[columns.Y]
+    dx, dy = robot.x - disc.x, robot.y - disc.y
     far = math.sqrt(max(dx * dx + dy * dy, 1e-6))
     ux, uy = dx / far, dy / far
-    gap = far - disc[columns.R] - robot[columns.R] - spare
+    gap = far - disc.r - robot.r - spare
     # A person stops at ``brake``; what the robot itself comes nearer is stepped back from.
-    approach = vx * ux + vy * uy - (robot[columns.U] * ux + robot[columns.V] * uy)
+    approach = vx * ux + vy * uy - (robot.u * ux + robot.v * uy)
     allowed = math.sqrt(2.0 * brake * gap) if gap > 0.0 else 4.0 * gap
     excess = min(max(approach - allowed, 0.0), SPARE_MPS)
     return vx - excess * ux, vy - excess * uy

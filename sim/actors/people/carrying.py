@@ -8,10 +8,11 @@ import math
 import numpy as np
 
 from sim.actors.config import ACTORS
-from sim.actors.holding import QA, QB, Held
+from sim.actors.holding import Held
 from sim.actors.people import columns
-from sim.actors.people.right_of_way import Crowd, Float, Int
+from sim.actors.people.right_of_way import Crowd, Int
 from sim.core.flow import Field, clearance_at, time_at
+from sim.core.state import Record
 from slam._jit import njit
 
 PEOPLE_STEPS = 2  # of the look ahead, in which people matter
@@ -34,8 +35,8 @@ def parts_of(i: int, crowd: Crowd, parts: Int) -> int:
     c, s = math.cos(yaw), math.sin(yaw)
     parts[0], count, first, most = i, 1, 0, -math.inf
     for row in range(len(discs)):
-        if crowd.owner[row] == crowd.task[i, columns.HELD] and count < len(parts):
-            ahead = discs[row, columns.X] * c + discs[row, columns.Y] * s
+        if crowd.owner[row] == crowd.task[i].held and count < len(parts):
+            ahead = discs[row].x * c + discs[row].y * s
             if ahead > most:
                 first, most = count, ahead
             parts[count] = row
@@ -47,14 +48,14 @@ def parts_of(i: int, crowd: Crowd, parts: Int) -> int:
 
 @njit
 def part_at(
-    part: Float, pivot: Float, yaw: float, v: float, omega: float, t: float
+    part: Record, pivot: Record, yaw: float, v: float, omega: float, t: float
 ) -> tuple[float, float]:
     """Where a disc is after ``t`` s, if its thing goes ahead at ``v`` and turns at ``omega``."""
     c, s = math.cos(omega * t), math.sin(omega * t)
-    dx, dy = part[columns.X] - pivot[columns.X], part[columns.Y] - pivot[columns.Y]
+    dx, dy = part.x - pivot.x, part.y - pivot.y
     way, along = v * t, yaw + 0.5 * omega * t
-    x = pivot[columns.X] + way * math.cos(along) + c * dx - s * dy
-    return x, pivot[columns.Y] + way * math.sin(along) + s * dx + c * dy
+    x = pivot.x + way * math.cos(along) + c * dx - s * dy
+    return x, pivot.y + way * math.sin(along) + s * dx + c * dy
 
 
 @njit
@@ -62,7 +63,7 @@ def runs_into(  # noqa: PLR0913 (kernel)
     v: float,
     omega: float,
     parts: Int,
-    pivot: Float,
+    pivot: Record,
     yaw: float,
     near: Int,
     field: Field,
@@ -80,28 +81,25 @@ def runs_into(  # noqa: PLR0913 (kernel)
         for p in range(len(parts)):
             part = discs[parts[p]]
             x, y = part_at(part, pivot, yaw, v, omega, t)
-            free = clearance_at(field, x, y) - part[columns.R] - STOP_WALL
+            free = clearance_at(field, x, y) - part.r - STOP_WALL
             if free < 0.0:
-                now = clearance_at(field, part[columns.X], part[columns.Y])
-                if free < now - part[columns.R] - STOP_WALL - 0.01:
+                now = clearance_at(field, part.x, part.y)
+                if free < now - part.r - STOP_WALL - 0.01:
                     return HIT * (1.25 - 0.25 * step) ** 3
             closest = min(closest, free)
             for k in range(len(near)):
                 other = discs[near[k]]
-                kind = other[columns.KIND]
+                kind = other.kind
                 if kind == columns.CHAIR or (kind == columns.PERSON and step > PEOPLE_STEPS):
                     continue
-                apart = part[columns.R] + other[columns.R]
+                apart = part.r + other.r
                 apart += STOP_ROBOT if kind == columns.ROBOT else STOP_M
-                dx = other[columns.X] + on * other[columns.U] - x
-                dy = other[columns.Y] + on * other[columns.V] - y
+                dx = other.x + on * other.u - x
+                dy = other.y + on * other.v - y
                 if dx * dx + dy * dy < (apart + CLOSE_M) ** 2:
                     free = math.sqrt(dx * dx + dy * dy) - apart
                     if free < 0.0:
-                        nx, ny = (
-                            other[columns.X] - part[columns.X],
-                            other[columns.Y] - part[columns.Y],
-                        )
+                        nx, ny = other.x - part.x, other.y - part.y
                         if free < math.sqrt(nx * nx + ny * ny) - apart - 0.01:
                             cost = HIT * (1.25 - 0.25 * step) ** 3
                             return 10.0 * cost if kind == columns.ROBOT else cost
@@ -119,21 +117,21 @@ def pushes(
     back. What stands in the way of any part of it is waited for, but chairs are pushed along.
     """
     pace, yaw = math.sqrt(wanted[0] ** 2 + wanted[1] ** 2), crowd.yaws[i]
-    crowd.state[i, columns.LOOK] = yaw
+    crowd.state[i].look = yaw
     if pace < 0.05:
         return 0.0, 0.0
     rows = np.empty(8, dtype=np.int64)
     parts = rows[: parts_of(i, crowd, rows)]
-    discs, goal = crowd.discs, crowd.task[i, columns.GOAL]
-    me, tip, pivot = discs[i], discs[parts[1]], discs[crowd.task[i, columns.HELD]]
-    here = time_at(field, goal, me[columns.X], me[columns.Y])
-    ahead = min(time_at(field, goal, tip[columns.X], tip[columns.Y]), here + 5.0)
+    discs, goal = crowd.discs, crowd.task[i].goal
+    me, tip, pivot = discs[i], discs[parts[1]], discs[crowd.task[i].held]
+    here = time_at(field, goal, me.x, me.y)
+    ahead = min(time_at(field, goal, tip.x, tip.y), here + 5.0)
     standing = runs_into(0.0, 0.0, parts, pivot, yaw, near, field, crowd)
     best, best_v, best_omega = ahead + min(standing, CLOSE * CLOSE_M), 0.0, 0.0
     for a in range(-1, 4):
         v = pace * a / 3.0 if a >= 0 else -min(pace, BACKWARDS)
         for b in range(-2, 3):
-            omega = 0.5 * b * crowd.state[i, columns.TURN_RATE]
+            omega = 0.5 * b * crowd.state[i].turn_rate
             if a < 0:
                 x, y = part_at(me, pivot, yaw, v, omega, 4.0 * STEP_S)
                 cost = ahead - BACK * max(here - time_at(field, goal, x, y), -1.0)
@@ -142,14 +140,14 @@ def pushes(
                 cost = min(time_at(field, goal, x, y), here + 5.0)
             cost += TURNING * abs(omega)
             if v != 0.0 or omega != 0.0:  # who is held up rather backs out or turns than stands
-                cost -= min(HURRY * crowd.state[i, columns.BLOCKED], HURRY_MOST)
+                cost -= min(HURRY * crowd.state[i].blocked, HURRY_MOST)
             if cost < best:
                 cost += runs_into(v, omega, parts, pivot, yaw, near, field, crowd)
             if cost < best:
                 best, best_v, best_omega = cost, v, omega
-    crowd.state[i, columns.LOOK] = yaw + best_omega / TURN_GAIN
-    vx = best_v * math.cos(yaw) - best_omega * (me[columns.Y] - pivot[columns.Y])
-    return vx, best_v * math.sin(yaw) + best_omega * (me[columns.X] - pivot[columns.X])
+    crowd.state[i].look = yaw + best_omega / TURN_GAIN
+    vx = best_v * math.cos(yaw) - best_omega * (me.y - pivot.y)
+    return vx, best_v * math.sin(yaw) + best_omega * (me.x - pivot.x)
 
 
 @njit
@@ -158,15 +156,15 @@ def keep_hold(
 ) -> tuple[float, float]:
     """The velocity of person ``i`` less what would tear it from the thing it holds."""
     vx, vy = velocity
-    row = crowd.task[i, columns.HELD]
+    row = crowd.task[i].held
     for k in range(len(held.at) if row >= 0 else 0):
-        if held.at[k, QA] != at[i, 0] or held.at[k, QB] != at[row, 0]:
+        if held.at[k].qa != at[i, 0] or held.at[k].qb != at[row, 0]:
             continue
         me, thing = crowd.discs[i], crowd.discs[row]
         c, s = math.cos(crowd.yaws[i]), math.sin(crowd.yaws[i])
         px, py = held.pose[k, 0], held.pose[k, 1]
-        ex = me[columns.X] - thing[columns.X] + c * px - s * py
-        ey = me[columns.Y] - thing[columns.Y] + s * px + c * py
+        ex = me.x - thing.x + c * px - s * py
+        ey = me.y - thing.y + s * px + c * py
         if held.hinged[k]:
             ct, st = math.cos(crowd.yaws[row]), math.sin(crowd.yaws[row])
             ex -= px * (c - ct)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from sim.actors.config import ACTORS
-from sim.actors.holding import DROPPED, QB, VB, Held
+from sim.actors.holding import Held
 from sim.actors.people import columns
 from sim.actors.people.formation import in_sight, route
 from sim.actors.people.leaders import Leaders
@@ -17,7 +17,6 @@ from slam._jit import njit
 _C = ACTORS.cleaning
 REACH, NEAR, REST_S = _C.hand_m, _C.near_m, _C.rest_s
 PACE, THERE, TRIP_S = _C.pace_mps, _C.there_m, _C.trip_s
-CHAIR, HOME = 3, 4  # columns of ``Leaders.lines``: the chair of a place, and its pose before
 GIVES_UP_S = ACTORS.walking.blocked_s
 
 
@@ -28,19 +27,19 @@ def next_chair(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> int:
     Those that stand in a row of chairs stay there.
     """
     discs, task, best, found = crowd.discs, crowd.task, REACH * REACH, -1
-    x, y = discs[i, columns.X], discs[i, columns.Y]
+    x, y = discs[i].x, discs[i].y
     for k in range(len(crowd.yaws)):
-        if discs[k, columns.KIND] != columns.CHAIR:
+        if discs[k].kind != columns.CHAIR:
             continue
-        dx, dy = discs[k, columns.X] - x, discs[k, columns.Y] - y
+        dx, dy = discs[k].x - x, discs[k].y - y
         far = dx * dx + dy * dy
-        if far >= best or discs[k, columns.U] ** 2 + discs[k, columns.V] ** 2 > 0.01:
+        if far >= best or discs[k].u ** 2 + discs[k].v ** 2 > 0.01:
             continue
         taken = False
         for other in range(len(task)):
-            taken = taken or task[other, columns.SEAT] == k or task[other, columns.HELD] == k
+            taken = taken or task[other].seat == k or task[other].held == k
         for place in range(len(leaders.lines)):
-            taken = taken or leaders.lines[place, CHAIR] == k
+            taken = taken or leaders.lines[place].chair == k
         if not taken and in_sight(field, x, y, x + 0.7 * dx, y + 0.7 * dy):
             best, found = far, k
     return found
@@ -49,38 +48,38 @@ def next_chair(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> int:
 @njit
 def row_place(i: int, leaders: Leaders, crowd: Crowd) -> int:
     """Row of ``lines`` that is next: the chairs go in, then out again, the last one first."""
-    first, turn = crowd.task[i, columns.FIRST], crowd.task[i, columns.PLACE]
-    n = int(leaders.lines[first, 2])
+    first, turn = crowd.task[i].first, crowd.task[i].place
+    n = int(leaders.lines[first].places)
     return int(first + (turn if turn < n else 2 * n - 1 - turn))
 
 
 @njit
 def fills(i: int, leaders: Leaders, crowd: Crowd) -> bool:
     """Whether somebody's row of chairs is being filled, or else emptied."""
-    n = int(leaders.lines[crowd.task[i, columns.FIRST], 2])
-    return bool(crowd.task[i, columns.PLACE] < n)
+    n = int(leaders.lines[crowd.task[i].first].places)
+    return bool(crowd.task[i].place < n)
 
 
 @njit
 def next_turn(i: int, time: float, leaders: Leaders, crowd: Crowd) -> None:
     """The next chair, after a rest."""
-    n = int(leaders.lines[crowd.task[i, columns.FIRST], 2])
-    crowd.task[i, columns.PLACE] = (crowd.task[i, columns.PLACE] + 1) % (2 * n)
-    crowd.task[i, columns.WALKING], crowd.task[i, columns.HELD] = columns.CLEANS, -1
-    crowd.state[i, columns.FREE_AT], crowd.state[i, columns.BLOCKED] = time + REST_S, 0.0
+    n = int(leaders.lines[crowd.task[i].first].places)
+    crowd.task[i].place = (crowd.task[i].place + 1) % (2 * n)
+    crowd.task[i].walking, crowd.task[i].held = columns.CLEANS, -1
+    crowd.state[i].free_at, crowd.state[i].blocked = time + REST_S, 0.0
 
 
 @njit
 def to_what_is_taken(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """The velocity with which person ``i`` goes to the chair to take, or takes it to its place."""
     task = crowd.task[i]
-    if task[columns.WALKING] == columns.CLEANS:
+    if task.walking == columns.CLEANS:
         return 0.0, 0.0
-    x, y = crowd.discs[i, columns.X], crowd.discs[i, columns.Y]
-    tx, ty = crowd.discs[task[columns.HELD], columns.X], crowd.discs[task[columns.HELD], columns.Y]
-    if task[columns.WALKING] == columns.CARRIES:
+    x, y = crowd.discs[i].x, crowd.discs[i].y
+    tx, ty = crowd.discs[task.held].x, crowd.discs[task.held].y
+    if task.walking == columns.CARRIES:
         line = leaders.lines[row_place(i, leaders, crowd)]
-        tx, ty = (line[0], line[1]) if fills(i, leaders, crowd) else (line[HOME], line[HOME + 1])
+        tx, ty = (line.x, line.y) if fills(i, leaders, crowd) else (line.home_x, line.home_y)
     tx, ty = route(i, tx, ty, field, crowd)
     dx, dy = tx - x, ty - y
     far = math.sqrt(dx * dx + dy * dy)
@@ -93,27 +92,27 @@ def find_work(i: int, time: float, field: Field, leaders: Leaders, crowd: Crowd)
     """Choose the next chair; where there is none, the row is emptied, or one goes elsewhere."""
     task = crowd.task
     place = row_place(i, leaders, crowd)
-    row = int(leaders.lines[place, CHAIR])
+    row = int(leaders.lines[place].chair)
     if fills(i, leaders, crowd):
         row = next_chair(i, field, leaders, crowd)
         if row >= 0:
-            leaders.lines[place, CHAIR] = row
-            leaders.lines[place, HOME] = crowd.discs[row, columns.X]
-            leaders.lines[place, HOME + 1] = crowd.discs[row, columns.Y]
-            leaders.lines[place, HOME + 2] = crowd.yaws[row]
+            leaders.lines[place].chair = row
+            leaders.lines[place].home_x = crowd.discs[row].x
+            leaders.lines[place].home_y = crowd.discs[row].y
+            leaders.lines[place].home_yaw = crowd.yaws[row]
     elif row >= 0:
-        dx = crowd.discs[row, columns.X] - leaders.lines[place, 0]
-        dy = crowd.discs[row, columns.Y] - leaders.lines[place, 1]
+        dx = crowd.discs[row].x - leaders.lines[place].x
+        dy = crowd.discs[row].y - leaders.lines[place].y
         if dx * dx + dy * dy > 1.0:  # somebody has taken it away meanwhile
-            leaders.lines[place, CHAIR] = row = -1
+            leaders.lines[place].chair = row = -1
         for other in range(len(task)):
-            if row >= 0 and task[other, columns.SEAT] == row:
-                leaders.lines[place, CHAIR] = row = -1
+            if row >= 0 and task[other].seat == row:
+                leaders.lines[place].chair = row = -1
     if row < 0:
         next_turn(i, time, leaders, crowd)
         return
-    task[i, columns.WALKING], task[i, columns.HELD] = columns.TO_CHAIR, row
-    crowd.state[i, columns.BLOCKED], crowd.state[i, columns.BEST_AT] = 0.0, time
+    task[i].walking, task[i].held = columns.TO_CHAIR, row
+    crowd.state[i].blocked, crowd.state[i].best_at = 0.0, time
 
 
 @njit
@@ -131,41 +130,41 @@ def clean(  # noqa: PLR0913 (kernel)
 
     A chair that cannot be reached is left; one that cannot be brought to its place is put down.
     """
-    task, state, hand = crowd.task, crowd.state, crowd.task[i, columns.HAND]
-    if hand < 0 or task[i, columns.FIRST] < 0:
+    task, state, hand = crowd.task, crowd.state, crowd.task[i].hand
+    if hand < 0 or task[i].first < 0:
         return
-    doing, row = task[i, columns.WALKING], task[i, columns.HELD]
+    doing, row = task[i].walking, task[i].held
     if doing < columns.TO_CHAIR:
-        task[i, columns.WALKING] = columns.CLEANS
+        task[i].walking = columns.CLEANS
         return
     if doing == columns.CLEANS:
-        if time >= state[i, columns.FREE_AT]:
+        if time >= state[i].free_at:
             find_work(i, time, field, leaders, crowd)
         return
     place = row_place(i, leaders, crowd)
-    late = state[i, columns.BLOCKED] > GIVES_UP_S or time - state[i, columns.BEST_AT] > TRIP_S
-    dx = crowd.discs[row, columns.X] - crowd.discs[i, columns.X]
-    dy = crowd.discs[row, columns.Y] - crowd.discs[i, columns.Y]
+    late = state[i].blocked > GIVES_UP_S or time - state[i].best_at > TRIP_S
+    dx = crowd.discs[row].x - crowd.discs[i].x
+    dy = crowd.discs[row].y - crowd.discs[i].y
     if doing == columns.TO_CHAIR:
-        reach = crowd.discs[i, columns.R] + crowd.discs[row, columns.R]
+        reach = crowd.discs[i].r + crowd.discs[row].r
         if math.sqrt(dx * dx + dy * dy) - reach < NEAR:
-            held.at[hand, QB], held.at[hand, VB] = at[row, 0], at[row, 1]
+            held.at[hand].qb, held.at[hand].vb = at[row, 0], at[row, 1]
             held.bodies[hand, 0], held.bodies[hand, 1] = weights[row, 0], weights[row, 1]
             held.pose[hand, 0], held.pose[hand, 1] = reach + 0.04, 0.0
             held.pose[hand, 2] = crowd.yaws[row] - math.atan2(dy, dx)
-            task[i, columns.WALKING], state[i, columns.BEST_AT] = columns.CARRIES, time
-            state[i, columns.BLOCKED] = 0.0
+            task[i].walking, state[i].best_at = columns.CARRIES, time
+            state[i].blocked = 0.0
         elif late:
-            leaders.lines[place, CHAIR] = -1.0
+            leaders.lines[place].chair = -1.0
             next_turn(i, time, leaders, crowd)
         return
     line = leaders.lines[place]
     filling = fills(i, leaders, crowd)
-    tx, ty = (line[0], line[1]) if filling else (line[HOME], line[HOME + 1])
-    tx, ty = tx - crowd.discs[row, columns.X], ty - crowd.discs[row, columns.Y]
+    tx, ty = (line.x, line.y) if filling else (line.home_x, line.home_y)
+    tx, ty = tx - crowd.discs[row].x, ty - crowd.discs[row].y
     if late or tx * tx + ty * ty < THERE * THERE:
-        held.at[hand, DROPPED] = held.at[hand, VB]
-        held.at[hand, QB] = held.at[hand, VB] = -1
+        held.at[hand].dropped = held.at[hand].vb
+        held.at[hand].qb = held.at[hand].vb = -1
         if not filling:
-            leaders.lines[place, CHAIR] = -1.0
+            leaders.lines[place].chair = -1.0
         next_turn(i, time, leaders, crowd)

@@ -48,6 +48,7 @@ from sim.actors.people.sensing import nearby, sense
 from sim.actors.people.sitting import Hulls, on_chair, to_chair
 from sim.actors.people.trips import patience, plan
 from sim.core.flow import Field, clearance_at, time_at, way_at
+from sim.core.state import Records
 from slam._jit import njit
 
 _W = ACTORS.walking
@@ -94,41 +95,41 @@ class People(NamedTuple):
 def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[float, float]:
     """The velocity person ``i`` would like to have, other movers aside."""
     discs, state, task = crowd.discs, crowd.state, crowd.task
-    if task[i, columns.WALKING] == columns.TO_SEAT:
+    if task[i].walking == columns.TO_SEAT:
         return to_chair(i, crowd)
-    if task[i, columns.WALKING] != columns.WALKS:
+    if task[i].walking != columns.WALKS:
         return 0.0, 0.0
-    goal = task[i, columns.GOAL]
-    wx, wy = way_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
-    left = time_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
-    speed = min(pace * state[i, columns.SPEED] * state[i, columns.SLOW], 0.3 + 1.2 * left)
+    goal = task[i].goal
+    wx, wy = way_at(field, goal, discs[i].x, discs[i].y)
+    left = time_at(field, goal, discs[i].x, discs[i].y)
+    speed = min(pace * state[i].speed * state[i].slow, 0.3 + 1.2 * left)
     wx, wy = speed * wx, speed * wy
-    if state[i, columns.STAYS] == 0.0:
+    if state[i].stays == 0.0:
         wx, wy = keep_right(i, wx, wy, field, discs)
     return at_doors(i, (wx, wy), ways, field, discs)
 
 
 @njit
 def at_doors(
-    i: int, wanted: tuple[float, float], ways: Doors, field: Field, discs: Float
+    i: int, wanted: tuple[float, float], ways: Doors, field: Field, discs: Records
 ) -> tuple[float, float]:
     """The wanted velocity, where it is others' turn to pass a door or the leaf is not open yet."""
     wx, wy = wanted
     for d in range(ways.doors.shape[0]):
-        side, turn = ways.sides[i, d], ways.passage[d, columns.TURN]
+        side, turn = ways.sides[i, d], ways.passage[d].turn
         if side == 0:
             continue
         if turn != 0.0 and side != turn:
             wx, wy = wait_beside(i, ways.doors[d], side, field, discs)
-        elif ways.doors[d, columns.ANGLE] < OPEN:
+        elif ways.doors[d].angle < OPEN:
             wx, wy = hold_off(i, d, (wx, wy), ways, discs)
     return wx, wy
 
 
 @njit
-def keep_right(i: int, wx: float, wy: float, field: Field, discs: Float) -> tuple[float, float]:
+def keep_right(i: int, wx: float, wy: float, field: Field, discs: Records) -> tuple[float, float]:
     """The wanted velocity of one of a stream, which keeps to the right side of a corridor."""
-    x, y = discs[i, columns.X], discs[i, columns.Y]
+    x, y = discs[i].x, discs[i].y
     speed = math.sqrt(wx * wx + wy * wy)
     if speed < STILL or clearance_at(field, x, y) > LANE_HALF:
         return wx, wy
@@ -148,19 +149,19 @@ def wrap(angle: float) -> float:
 def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -> None:
     """Change towards (vx, vy) as fast as legs allow and face the way; servo targets to ``out``."""
     state, yaw = crowd.state, crowd.yaws[i]
-    dvx, dvy = vx - state[i, columns.VX], vy - state[i, columns.VY]
+    dvx, dvy = vx - state[i].vx, vy - state[i].vy
     change = math.sqrt(dvx * dvx + dvy * dvy)
     share = min(1.0, ACCEL * tick / change) if change > 0.0 else 0.0
-    state[i, columns.VX] += share * dvx
-    state[i, columns.VY] += share * dvy
-    heading, most = yaw, state[i, columns.TURN_RATE]
+    state[i].vx += share * dvx
+    state[i].vy += share * dvy
+    heading, most = yaw, state[i].turn_rate
     if on_chair(i, crowd) or is_pushing(i, crowd):
-        heading = state[i, columns.LOOK]
-    elif state[i, columns.VX] ** 2 + state[i, columns.VY] ** 2 > 0.04:
-        heading = math.atan2(state[i, columns.VY], state[i, columns.VX])
-    elif crowd.task[i, columns.WALKING] in (columns.STANDS, columns.FOLLOWS, columns.QUEUES):
-        heading = state[i, columns.LOOK]
-    out[0], out[1] = state[i, columns.VX], state[i, columns.VY]
+        heading = state[i].look
+    elif state[i].vx ** 2 + state[i].vy ** 2 > 0.04:
+        heading = math.atan2(state[i].vy, state[i].vx)
+    elif crowd.task[i].walking in (columns.STANDS, columns.FOLLOWS, columns.QUEUES):
+        heading = state[i].look
+    out[0], out[1] = state[i].vx, state[i].vy
     out[2] = min(max(TURN_GAIN * wrap(heading - yaw), -most), most)
 
 
@@ -169,11 +170,11 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
     """The velocity person ``i`` would like to have, whatever it does; keeps account of the way."""
     crowd, field = people.crowd, people.field
     state, task = crowd.state, crowd.task
-    doing = task[i, columns.WALKING]
+    doing = task[i].walking
     if doing < columns.FOLLOWS:
         return want(i, people.rates[1], people.ways, field, crowd)
     if doing == columns.FOLLOWS:
-        state[i, columns.LOOK] = faces(i, people.leaders, crowd)
+        state[i].look = faces(i, people.leaders, crowd)
         if rests(i, time, people.leaders, crowd):
             return make_room(i, (0.0, 0.0), field, crowd)
         wx, wy = follow(i, field, people.leaders, crowd)
@@ -187,15 +188,15 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
     else:
         wx, wy = to_what_is_taken(i, field, people.leaders, crowd)
     if wx * wx + wy * wy > 0.09:
-        still = crowd.discs[i, columns.U] ** 2 + crowd.discs[i, columns.V] ** 2 < STILL * STILL
+        still = crowd.discs[i].u ** 2 + crowd.discs[i].v ** 2 < STILL * STILL
         # Who stands still with the leader has nowhere to get on to.
         waits = still and doing == columns.FOLLOWS and near_place(i, people.leaders, crowd)
-        state[i, columns.WALKED_S] += 0.0 if waits else tick
+        state[i].walked_s += 0.0 if waits else tick
         if still:
-            state[i, columns.BLOCKED] += tick
-            state[i, columns.BLOCKED_S] += 0.0 if waits else tick
+            state[i].blocked += tick
+            state[i].blocked_s += 0.0 if waits else tick
             return wx, wy
-    state[i, columns.BLOCKED] = max(0.0, state[i, columns.BLOCKED] - 2.0 * tick)
+    state[i].blocked = max(0.0, state[i].blocked - 2.0 * tick)
     return wx, wy
 
 
@@ -211,7 +212,7 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
     qpos, qvel, ctrl = physics
     at, field, ways, crowd = people.at, people.field, people.ways, people.crowd
     servos = people.servos
-    crowded = (crowd.state[:, columns.DENSE] < 1.0).any()
+    crowded = (crowd.state["dense"] < 1.0).any()
     near = np.zeros(CROWD_NEAR if crowded else NEAR, dtype=np.int64)
     sense(at, qpos, qvel, ways, crowd)
     note_ways(tick, people.leaders, crowd)
@@ -237,6 +238,6 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
         vx, vy = spare_robot(i, (vx, vy), near[:count], crowd)
         if is_pushing(i, crowd):  # nor is a long thing turned into it
             share = min(math.sqrt((vx * vx + vy * vy) / max(before, 1e-9)), 1.0)
-            turn = crowd.state[i, columns.LOOK] - crowd.yaws[i]
-            crowd.state[i, columns.LOOK] = crowd.yaws[i] + share * turn
+            turn = crowd.state[i].look - crowd.yaws[i]
+            crowd.state[i].look = crowd.yaws[i] + share * turn
         steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])

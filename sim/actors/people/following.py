@@ -12,7 +12,7 @@ import math
 from sim.actors.config import ACTORS
 from sim.actors.people import columns
 from sim.actors.people.formation import in_file, in_sight, near_place, taken, through_door
-from sim.actors.people.leaders import MOVING, STOOD, Leaders
+from sim.actors.people.leaders import MOVING, Leaders
 from sim.actors.people.right_of_way import Crowd
 from sim.core.flow import Field, clearance_at, way_at
 from slam._jit import njit
@@ -30,15 +30,15 @@ HELD_UP_S, REST_S = _F.held_up_s, _F.rest_s
 @njit
 def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """The velocity with which person ``i`` would like to keep its place."""
-    k = crowd.task[i, columns.LEADER]
-    x, y = crowd.discs[i, columns.X], crowd.discs[i, columns.Y]
-    tx, ty = float(crowd.state[i, columns.SPOT_X]), float(crowd.state[i, columns.SPOT_Y])
+    k = crowd.task[i].leader
+    x, y = crowd.discs[i].x, crowd.discs[i].y
+    tx, ty = float(crowd.state[i].spot_x), float(crowd.state[i].spot_y)
     disc = crowd.discs[leaders.rows[k]]
-    u, v = disc[columns.U], disc[columns.V]
+    u, v = disc.u, disc.v
     if not in_sight(field, x, y, tx, ty) or through_door(field, x, y, tx, ty):
         u, v = 0.0, 0.0
         tx, ty = in_file(i, k, field, leaders, crowd)
-    crowd.state[i, columns.AIM_X], crowd.state[i, columns.AIM_Y] = tx, ty
+    crowd.state[i].arrive, crowd.state[i].luck = tx, ty
     far = math.sqrt((tx - x) ** 2 + (ty - y) ** 2)
     if far < TAKEN_M and taken(i, tx, ty, crowd):  # as near as one gets
         return share_of(far) * u, share_of(far) * v
@@ -73,29 +73,25 @@ def wait_behind(
     So in a narrow place, and where the leader stands; only those nearer to the leader count, so
     nobody waits for one who waits for it.
     """
-    k, discs, task = crowd.task[i, columns.LEADER], crowd.discs, crowd.task
-    x, y = discs[i, columns.X], discs[i, columns.Y]
+    k, discs, task = crowd.task[i].leader, crowd.discs, crowd.task
+    x, y = discs[i].x, discs[i].y
     speed = math.sqrt(wanted[0] ** 2 + wanted[1] ** 2)
-    if speed < THERE or (
-        leaders.course[k, STOOD] < STANDS_S and clearance_at(field, x, y) > NARROW
-    ):
+    if speed < THERE or (leaders.course[k].stood < STANDS_S and clearance_at(field, x, y) > NARROW):
         return wanted
     c, s, most = wanted[0] / speed, wanted[1] / speed, speed
     row = leaders.rows[k]
-    lx, ly = discs[row, columns.X], discs[row, columns.Y]
+    lx, ly = discs[row].x, discs[row].y
     own = (x - lx) ** 2 + (y - ly) ** 2
     for j in range(len(task) + 1):
         other = row if j == len(task) else j
-        company = j == len(task) or (
-            task[j, columns.WALKING] == columns.FOLLOWS and task[j, columns.LEADER] == k
-        )
-        ox, oy = discs[other, columns.X], discs[other, columns.Y]
+        company = j == len(task) or (task[j].walking == columns.FOLLOWS and task[j].leader == k)
+        ox, oy = discs[other].x, discs[other].y
         if not company or (ox - lx) ** 2 + (oy - ly) ** 2 >= own:
             continue
         ahead, left = c * (ox - x) + s * (oy - y), c * (oy - y) - s * (ox - x)
-        reach = discs[i, columns.R] + discs[other, columns.R]
+        reach = discs[i].r + discs[other].r
         if 0.0 < ahead < reach + FILE_M and abs(left) < FILE_HALF * reach:
-            before = max(discs[other, columns.U] * c + discs[other, columns.V] * s, 0.0)
+            before = max(discs[other].u * c + discs[other].v * s, 0.0)
             most = min(most, before + GAIN * max(ahead - reach - FILE_GAP, 0.0))
     return most * c, most * s
 
@@ -108,18 +104,18 @@ def make_way(
 
     Where there is no room beside, it goes ahead.
     """
-    robot = crowd.discs[leaders.rows[crowd.task[i, columns.LEADER]]]
-    if robot[columns.KIND] != columns.ROBOT:
+    robot = crowd.discs[leaders.rows[crowd.task[i].leader]]
+    if robot.kind != columns.ROBOT:
         return wanted
-    yaw = crowd.yaws[leaders.rows[crowd.task[i, columns.LEADER]]]
+    yaw = crowd.yaws[leaders.rows[crowd.task[i].leader]]
     c, s = math.cos(yaw), math.sin(yaw)
-    dx = crowd.discs[i, columns.X] - robot[columns.X]
-    dy = crowd.discs[i, columns.Y] - robot[columns.Y]
+    dx = crowd.discs[i].x - robot.x
+    dy = crowd.discs[i].y - robot.y
     ahead, left = c * dx + s * dy, c * dy - s * dx
     if ahead < 0.0 or ahead > WAY_M or abs(left) > WAY_HALF:
         return wanted
     side = 1.0 if left >= 0.0 else -1.0
-    narrow = clearance_at(field, crowd.discs[i, columns.X], crowd.discs[i, columns.Y]) < NARROW
+    narrow = clearance_at(field, crowd.discs[i].x, crowd.discs[i].y) < NARROW
     along = max(wanted[0] * c + wanted[1] * s, ASIDE if narrow else 0.3)
     return along * c - side * ASIDE * s, along * s + side * ASIDE * c
 
@@ -127,7 +123,7 @@ def make_way(
 @njit
 def is_pushing(i: int, crowd: Crowd) -> bool:
     """Whether person ``i`` has something long before it, and not lost it since."""
-    return bool(crowd.task[i, columns.HELD] >= 0 and crowd.state[i, columns.TURN_RATE] < TURN_MOST)
+    return bool(crowd.task[i].held >= 0 and crowd.state[i].turn_rate < TURN_MOST)
 
 
 @njit
@@ -137,19 +133,16 @@ def make_room(
     """The velocity of person ``i``, sideways where it stands in the way of one who is held up."""
     discs, task, state = crowd.discs, crowd.task, crowd.state
     for j in range(len(task)):
-        if task[j, columns.WALKING] != columns.WALKS or state[j, columns.BLOCKED] < ASKED_S:
+        if task[j].walking != columns.WALKS or state[j].blocked < ASKED_S:
             continue
-        dx, dy = (
-            discs[i, columns.X] - discs[j, columns.X],
-            discs[i, columns.Y] - discs[j, columns.Y],
-        )
+        dx, dy = discs[i].x - discs[j].x, discs[i].y - discs[j].y
         pushing = is_pushing(j, crowd)
         reach = ROOM_PUSH_M if pushing else ROOM_M
         if dx * dx + dy * dy > reach * reach:
             continue
         c, s = math.cos(crowd.yaws[j]), math.sin(crowd.yaws[j])
         if not pushing:
-            c, s = way_at(field, task[j, columns.GOAL], discs[j, columns.X], discs[j, columns.Y])
+            c, s = way_at(field, task[j].goal, discs[j].x, discs[j].y)
         ahead, left = c * dx + s * dy, c * dy - s * dx
         if ahead > 0.0 and abs(left) < ROOM_HALF:
             side = 1.0 if left >= 0.0 else -1.0
@@ -161,10 +154,10 @@ def make_room(
 def rests(i: int, time: float, leaders: Leaders, crowd: Crowd) -> bool:
     """Whether person ``i`` was held up near its place and lets it be for a while."""
     state = crowd.state[i]
-    if time < state[columns.BEST_AT]:
+    if time < state.best_at:
         return True
-    if state[columns.BLOCKED] > HELD_UP_S and near_place(i, leaders, crowd):
-        state[columns.BEST_AT], state[columns.BLOCKED] = time + REST_S, 0.0
+    if state.blocked > HELD_UP_S and near_place(i, leaders, crowd):
+        state.best_at, state.blocked = time + REST_S, 0.0
         return True
     return False
 
@@ -172,24 +165,21 @@ def rests(i: int, time: float, leaders: Leaders, crowd: Crowd) -> bool:
 @njit
 def stand_in_line(i: int, time: float, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Velocity to one's place in the line, which moves up by one every ``SERVED_S``."""
-    place = crowd.task[i, columns.PLACE]
-    first = crowd.task[i, columns.FIRST]
-    n = int(leaders.lines[first, 2])
+    place = crowd.task[i].place
+    first = crowd.task[i].first
+    n = int(leaders.lines[first].places)
     now = (place - int(time / SERVED_S)) % n
-    tx, ty = leaders.lines[first + now, 0], leaders.lines[first + now, 1]
-    dx, dy = tx - crowd.discs[i, columns.X], ty - crowd.discs[i, columns.Y]
+    tx, ty = leaders.lines[first + now].x, leaders.lines[first + now].y
+    dx, dy = tx - crowd.discs[i].x, ty - crowd.discs[i].y
     return to_place(dx, dy, 0.0, 0.0)
 
 
 @njit
 def faces(i: int, leaders: Leaders, crowd: Crowd) -> float:
     """Heading rad of someone who stands: towards the leader, or up the line."""
-    k = crowd.task[i, columns.LEADER]
+    k = crowd.task[i].leader
     if k < 0:
-        return float(crowd.state[i, columns.LOOK])
+        return float(crowd.state[i].look)
     disc = crowd.discs[leaders.rows[k]]
-    dx, dy = (
-        disc[columns.X] - crowd.discs[i, columns.X],
-        disc[columns.Y] - crowd.discs[i, columns.Y],
-    )
+    dx, dy = disc.x - crowd.discs[i].x, disc.y - crowd.discs[i].y
     return math.atan2(dy, dx)

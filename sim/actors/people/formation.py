@@ -13,7 +13,7 @@ import math
 
 from sim.actors.config import ACTORS
 from sim.actors.people import columns
-from sim.actors.people.leaders import COUNT, CRUMB, CRUMBS, HEADING, LAST, STOOD, Leaders
+from sim.actors.people.leaders import CRUMB, CRUMBS, Leaders
 from sim.actors.people.right_of_way import Crowd
 from sim.core.flow import FAR, Field, clearance_at, time_at, way_at
 from slam._jit import njit
@@ -55,7 +55,7 @@ def route(i: int, tx: float, ty: float, field: Field, crowd: Crowd) -> tuple[flo
 
     Round walls one goes the way to the goal that is the nearest to it.
     """
-    x, y = crowd.discs[i, columns.X], crowd.discs[i, columns.Y]
+    x, y = crowd.discs[i].x, crowd.discs[i].y
     if in_sight(field, x, y, tx, ty):
         return tx, ty
     goal, least = -1, FAR
@@ -73,26 +73,26 @@ def route(i: int, tx: float, ty: float, field: Field, crowd: Crowd) -> tuple[flo
 def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Where person ``i`` would like to be, in the formation of leader ``k``."""
     course, disc = leaders.course[k], crowd.discs[leaders.rows[k]]
-    ahead, left = crowd.state[i, columns.AHEAD], crowd.state[i, columns.LEFT]
+    ahead, left = crowd.state[i].ahead, crowd.state[i].left
     far = math.sqrt(ahead * ahead + left * left)
-    clear = clearance_at(field, disc[columns.X], disc[columns.Y])
+    clear = clearance_at(field, disc.x, disc.y)
     if clear < NARROW:  # those beside it go in file, those ahead keep between the walls
         room = max(clear - NARROW_SIDE, 0.1)
         if ahead <= 0.5:
-            ahead = -float(crowd.state[i, columns.FILE])
+            ahead = -float(crowd.state[i].file)
         elif abs(left) > room:
             ahead += 0.5 * (abs(left) - room)
             left = room if left > 0.0 else -room
         far = math.sqrt(ahead * ahead + left * left)
     if ahead < BEHIND:  # on the way that the leader has come
-        back = min(int(-ahead / CRUMB), int(course[COUNT]) - 1)
-        at = (int(course[LAST]) - back) % CRUMBS
+        back = min(int(-ahead / CRUMB), int(course.count) - 1)
+        at = (int(course.last) - back) % CRUMBS
         return float(leaders.trail[k, at, 0]), float(leaders.trail[k, at, 1])
-    back_off = min(max(course[STOOD] - GIVE_WAY_S, 0.0) * STEP_BACK, STEP_BACK_M)
+    back_off = min(max(course.stood - GIVE_WAY_S, 0.0) * STEP_BACK, STEP_BACK_M)
     far += back_off
-    angle = course[HEADING] + math.atan2(left, ahead)
+    angle = course.heading + math.atan2(left, ahead)
     c, s = math.cos(angle), math.sin(angle)
-    x, y, reach = disc[columns.X], disc[columns.Y], 0.0
+    x, y, reach = disc.x, disc.y, 0.0
     while reach + 0.1 <= far:
         if clearance_at(field, x + (reach + 0.1) * c, y + (reach + 0.1) * s) < MARGIN:
             break
@@ -101,51 +101,47 @@ def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tu
 
 
 @njit
+def _crossing(a: float, b: float, p: float, q: float) -> float:
+    """By how much (m2) the ways from a to q and b to p are shorter, on one axis."""
+    return (a - p) ** 2 + (b - q) ** 2 - (a - q) ** 2 - (b - p) ** 2
+
+
+@njit
 def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
     """Where everybody's place is now; pairs who would cross take each other's."""
     state, task, discs = crowd.state, crowd.task, crowd.discs
     for i in range(len(task)):
-        if task[i, columns.WALKING] == columns.FOLLOWS:
-            x, y = place_of(i, task[i, columns.LEADER], field, leaders, crowd)
-            state[i, columns.SPOT_X], state[i, columns.SPOT_Y] = x, y
+        if task[i].walking == columns.FOLLOWS:
+            x, y = place_of(i, task[i].leader, field, leaders, crowd)
+            state[i].spot_x, state[i].spot_y = x, y
     for i in range(len(task)):
-        for j in range(
-            i + 1 if task[i, columns.WALKING] == columns.FOLLOWS else len(task), len(task)
-        ):
-            if (
-                task[j, columns.WALKING] != columns.FOLLOWS
-                or task[j, columns.LEADER] != task[i, columns.LEADER]
-            ):
+        for j in range(i + 1 if task[i].walking == columns.FOLLOWS else len(task), len(task)):
+            if task[j].walking != columns.FOLLOWS or task[j].leader != task[i].leader:
                 continue
-            gain = 0.0
-            for axis in range(2):
-                a, b = discs[i, columns.X + axis], discs[j, columns.X + axis]
-                p, q = state[i, columns.SPOT_X + axis], state[j, columns.SPOT_X + axis]
-                gain += (a - p) ** 2 + (b - q) ** 2 - (a - q) ** 2 - (b - p) ** 2
+            one, two = state[i], state[j]
+            gain = _crossing(discs[i].x, discs[j].x, one.spot_x, two.spot_x)
+            gain += _crossing(discs[i].y, discs[j].y, one.spot_y, two.spot_y)
             if gain > CROSSING:
-                for column in (
-                    columns.AHEAD,
-                    columns.LEFT,
-                    columns.FILE,
-                    columns.SPOT_X,
-                    columns.SPOT_Y,
-                ):
-                    state[i, column], state[j, column] = state[j, column], state[i, column]
+                one.ahead, two.ahead = two.ahead, one.ahead
+                one.left, two.left = two.left, one.left
+                one.file, two.file = two.file, one.file
+                one.spot_x, two.spot_x = two.spot_x, one.spot_x
+                one.spot_y, two.spot_y = two.spot_y, one.spot_y
 
 
 @njit
 def in_file(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Where person ``i`` goes who does not see its place: in file on the way of leader ``k``."""
-    x, y = crowd.discs[i, columns.X], crowd.discs[i, columns.Y]
-    course, count = leaders.course[k], int(leaders.course[k, COUNT])
-    own = min(int(crowd.state[i, columns.FILE] / CRUMB), count - 1)
+    x, y = crowd.discs[i].x, crowd.discs[i].y
+    course, count = leaders.course[k], int(leaders.course[k].count)
+    own = min(int(crowd.state[i].file / CRUMB), count - 1)
     for step in range(count):  # one's own place, then those behind it, then those before it
         back = own + step if own + step < count else count - 1 - step
-        at = (int(course[LAST]) - back) % CRUMBS
+        at = (int(course.last) - back) % CRUMBS
         if in_sight(field, x, y, leaders.trail[k, at, 0], leaders.trail[k, at, 1]):
             return float(leaders.trail[k, at, 0]), float(leaders.trail[k, at, 1])
     leader = crowd.discs[leaders.rows[k]]
-    return route(i, leader[columns.X], leader[columns.Y], field, crowd)
+    return route(i, leader.x, leader.y, field, crowd)
 
 
 @njit
@@ -154,15 +150,15 @@ def near_place(i: int, leaders: Leaders, crowd: Crowd) -> bool:
 
     Farther off will do while the leader stands.
     """
-    k = crowd.task[i, columns.LEADER]
-    reach = STANDS_M if leaders.course[k, STOOD] > STANDS_S else NEAR_M
+    k = crowd.task[i].leader
+    reach = STANDS_M if leaders.course[k].stood > STANDS_S else NEAR_M
     leader = crowd.discs[leaders.rows[k]]
-    lx = leader[columns.X] - crowd.discs[i, columns.X]
-    ly = leader[columns.Y] - crowd.discs[i, columns.Y]
+    lx = leader.x - crowd.discs[i].x
+    ly = leader.y - crowd.discs[i].y
     if lx * lx + ly * ly < reach * reach:
         return True
-    dx = crowd.state[i, columns.SPOT_X] - crowd.discs[i, columns.X]
-    dy = crowd.state[i, columns.SPOT_Y] - crowd.discs[i, columns.Y]
+    dx = crowd.state[i].spot_x - crowd.discs[i].x
+    dy = crowd.state[i].spot_y - crowd.discs[i].y
     return bool(dx * dx + dy * dy < reach * reach)
 
 
@@ -171,8 +167,8 @@ def taken(i: int, x: float, y: float, crowd: Crowd) -> bool:
     """Whether something else stands at a place, so that person ``i`` cannot."""
     discs = crowd.discs
     for k in range(len(discs)):
-        dx, dy = discs[k, columns.X] - x, discs[k, columns.Y] - y
-        reach = discs[k, columns.R] + discs[i, columns.R]
+        dx, dy = discs[k].x - x, discs[k].y - y
+        reach = discs[k].r + discs[i].r
         if k != i and dx * dx + dy * dy < reach * reach:
             return True
     return False

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from sim.actors.config import ACTORS
 from sim.actors.people import columns
 from sim.actors.people.right_of_way import Crowd, Float, Int
+from sim.core.state import Records, flat
 from slam._jit import njit
 
 _F = ACTORS.following
 CRUMB, COURSE_RATE, MOVING = _F.crumb_m, _F.course_rate, _F.moving_mps
 CRUMBS = 160  # remembered of each leader: 40 m
-HEADING, STOOD, LAST, COUNT = range(4)  # columns of ``Leaders.course``
 
 
 class Leaders(NamedTuple):
@@ -29,15 +29,14 @@ class Leaders(NamedTuple):
 
     rows    (l,) disc row of each leader
     trail   (l, CRUMBS, 2) m, places it has been at, a ring
-    course  (l, 4) heading rad of its formation, s it has stood, last crumb, number of crumbs
-    lines   (q, 7) place in a line x, y m, and the number of places of that line; of a row of chairs
-            also the disc row of the chair that stands there (-1 none) and its pose before
+    course  (l,) of each leader
+    lines   (q,) places
     """
 
     rows: Int
     trail: Float
-    course: Float
-    lines: Float
+    course: Records
+    lines: Records
 
 
 def leaders_of(rows: list[int], lines: list[tuple[float, ...]]) -> Leaders:
@@ -46,14 +45,15 @@ def leaders_of(rows: list[int], lines: list[tuple[float, ...]]) -> Leaders:
     return Leaders(
         np.array(rows, dtype=np.int64),
         np.zeros((n, CRUMBS, 2)),
-        np.zeros((n, 4)),
-        np.array(lines, dtype=np.float64).reshape(-1, 7),
+        np.zeros(n, columns.COURSE),
+        np.array(lines, columns.PLACE),
     )
 
 
 def arrays(leaders: Leaders) -> dict[str, NDArray[np.generic]]:
     """The live arrays that are state."""
-    return {"trail": leaders.trail, "course": leaders.course, "lines": leaders.lines}
+    course, lines = flat(leaders.course), flat(leaders.lines)
+    return {"trail": leaders.trail, "course": course, "lines": lines}
 
 
 @njit
@@ -61,22 +61,22 @@ def note_ways(tick: float, leaders: Leaders, crowd: Crowd) -> None:
     """Remember where every leader is, and turn its formation after it."""
     for k in range(len(leaders.rows)):
         disc, course = crowd.discs[leaders.rows[k]], leaders.course[k]
-        x, y, u, v = disc[columns.X], disc[columns.Y], disc[columns.U], disc[columns.V]
-        if course[COUNT] == 0.0:
-            course[HEADING] = crowd.yaws[leaders.rows[k]]
-        last = int(course[LAST])
+        x, y, u, v = disc.x, disc.y, disc.u, disc.v
+        if course.count == 0.0:
+            course.heading = crowd.yaws[leaders.rows[k]]
+        last = int(course.last)
         dx, dy = x - leaders.trail[k, last, 0], y - leaders.trail[k, last, 1]
-        if course[COUNT] == 0.0 or dx * dx + dy * dy > CRUMB * CRUMB:
+        if course.count == 0.0 or dx * dx + dy * dy > CRUMB * CRUMB:
             last = (last + 1) % CRUMBS
             leaders.trail[k, last, 0], leaders.trail[k, last, 1] = x, y
-            course[LAST], course[COUNT] = last, min(course[COUNT] + 1.0, CRUMBS)
+            course.last, course.count = last, min(course.count + 1.0, CRUMBS)
         moves = u * u + v * v > MOVING * MOVING
-        course[STOOD] = 0.0 if moves else course[STOOD] + tick
-        towards = course[HEADING]
-        if disc[columns.KIND] == columns.ROBOT:  # shows where it will go before it does
+        course.stood = 0.0 if moves else course.stood + tick
+        towards = course.heading
+        if disc.kind == columns.ROBOT:  # shows where it will go before it does
             towards = crowd.yaws[leaders.rows[k]]
         elif moves:
             towards = math.atan2(v, u)
-        turn = towards - course[HEADING]
+        turn = towards - course.heading
         turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
-        course[HEADING] += min(max(turn, -COURSE_RATE * tick), COURSE_RATE * tick)
+        course.heading += min(max(turn, -COURSE_RATE * tick), COURSE_RATE * tick)

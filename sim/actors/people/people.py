@@ -22,6 +22,7 @@ from sim.actors.people.right_of_way import Addresses, Crowd
 from sim.core.bodies import Bodies
 from sim.core.draws import between, normal, uniform
 from sim.core.flow import Field, FlowMap, nowhere
+from sim.core.state import flat
 
 Float = NDArray[np.float64]
 _LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
@@ -99,7 +100,7 @@ class People:
             torsos=np.ascontiguousarray(at.discs[:n]),
             limbs=np.array(limbs, dtype=np.int64).reshape(n, 4),
             feet=self.feet,
-            sitting=self.crowd.state[:, columns.SIT],
+            sitting=self.crowd.state["sit"],
             hulls=_hulls(model, self.names),
             leaders=self._give_roles(_planar(bodies, self.names), scene),
             held=holding.hands(model, bodies, scene, self._cleaners),
@@ -116,30 +117,29 @@ class People:
         goals, lines, behind = list(scene.goals), _Lines(), dict.fromkeys(leaders, FILE_FIRST)
         for i, name in enumerate(self.names):
             role = _role(scene, name)
-            state[i, [columns.STAYS, columns.SLOW]] = role.stay, role.slow
-            state[i, [columns.AHEAD, columns.LEFT]] = role.slot
+            state[["stays", "slow", "ahead", "left"]][i] = role.stay, role.slow, *role.slot
             if scene.roles:
-                state[i, columns.DENSE] = ACTORS.steering.dense
+                state["dense"][i] = ACTORS.steering.dense
             if role.goals:
                 self.crowd.allowed[i] = [goal in role.goals for goal in goals]
             if role.places:
-                task[i, columns.FIRST] = lines.first_of(role)
+                task["first"][i] = lines.first_of(role)
             if role.does == "follow":
-                task[i, columns.WALKING] = columns.FOLLOWS
-                task[i, columns.LEADER] = leaders.index(role.leader)
-                state[i, columns.FILE] = behind[role.leader]
+                task["walking"][i] = columns.FOLLOWS
+                task["leader"][i] = leaders.index(role.leader)
+                state["file"][i] = behind[role.leader]
                 behind[role.leader] += FILE_STEP
             elif role.does == "queue":
-                task[i, columns.WALKING], task[i, columns.PLACE] = columns.QUEUES, role.turn
+                task["walking"][i], task["place"][i] = columns.QUEUES, role.turn
             elif role.does == "clean":
-                task[i, columns.HAND] = len(scene.holds) + self._cleaners.index(name)
-                task[i, columns.PLACE] = 0
+                task["hand"][i] = len(scene.holds) + self._cleaners.index(name)
+                task["place"][i] = 0
         for hold in scene.holds:
             if hold.holder in self.names:
                 i = self.names.index(hold.holder)
-                task[i, columns.HELD] = planar.index(hold.held)
+                task["held"][i] = planar.index(hold.held)
                 if not hold.hinged:
-                    state[i, columns.TURN_RATE] = ACTORS.holding.turn_most
+                    state["turn_rate"][i] = ACTORS.holding.turn_most
         return leaders_of([planar.index(name) for name in leaders], lines.rows)
 
     def start(self, data: mujoco.MjData) -> None:
@@ -148,16 +148,15 @@ class People:
         for i in range(len(self.names)):
             numbers = ACTORS.walking
             speed = numbers.speed_mps + numbers.speed_sd * normal(draws, i)
-            state[i, columns.SPEED] = min(max(speed, numbers.speed_least), numbers.speed_most)
+            state["speed"][i] = min(max(speed, numbers.speed_least), numbers.speed_most)
             first = min(self._rates[0], numbers.first_stay_s)
-            state[i, columns.STAY_UNTIL] = first * uniform(draws, i)
-            state[i, columns.LOOK] = data.qpos[self.table.torsos[i, 0] + 2]
-            state[i, columns.LOOK_UNTIL] = between(
-                draws, i, numbers.look_least_s, numbers.look_most_s
-            )
+            state["stay_until"][i] = first * uniform(draws, i)
+            state["look"][i] = data.qpos[self.table.torsos[i, 0] + 2]
+            look = between(draws, i, numbers.look_least_s, numbers.look_most_s)
+            state["look_until"][i] = look
             n_goals = max(len(self.table.field.times), 1)
             goal = int(uniform(draws, i) * n_goals)
-            task[i, columns.GOAL] = goal
+            task["goal"][i] = goal
         self.stand(data)
 
     def dress(self) -> None:
@@ -174,7 +173,7 @@ class People:
 
     def in_use(self, bodies: Bodies) -> NDArray[np.int64]:
         """Rows of the movers that somebody sits on or holds, or goes to for that."""
-        rows = self.crowd.task[:, [columns.SEAT, columns.HELD]].ravel()
+        rows = np.array([self.crowd.task["seat"], self.crowd.task["held"]]).T.ravel()
         names = _planar(bodies, self.names)
         used = [names[k] for k in rows[rows >= 0].tolist()]
         return bodies.rows([*used, *(hold.held for hold in bodies.scene.holds)])
@@ -186,13 +185,14 @@ class People:
     def walked_s(self) -> tuple[Float, Float]:
         """(n,) s each has been on the way so far, and (n,) s of these standing still, blocked."""
         state = self.crowd.state
-        return state[:, columns.WALKED_S].copy(), state[:, columns.BLOCKED_S].copy()
+        return state["walked_s"].copy(), state["blocked_s"].copy()
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """The live arrays that are the state."""
         c, held = self.crowd, self.table.held
-        own = {"feet": self.feet, "state": c.state, "task": c.task, "draws": c.draws}
-        hands = {"hands": held.at, "hands.pose": held.pose, "hands.bodies": held.bodies}
+        own = {"feet": self.feet, "draws": c.draws}
+        own |= {"state": flat(c.state), "task": flat(c.task)}
+        hands = {"hands": flat(held.at), "hands.pose": held.pose, "hands.bodies": held.bodies}
         return {**own, **arrays(self.table.leaders), **hands}
 
 
@@ -208,28 +208,25 @@ def _crowd(
         owner=owner,
         long=long,
         allowed=np.ones((n, max(len(bodies.scene.goals), 1)), dtype=np.bool_),
-        state=np.zeros((n, columns.N_STATE)),
-        task=np.full((n, columns.N_TASK), -1, dtype=np.int64),
+        state=np.zeros(n, columns.STATE),
+        task=np.full(n, -1, columns.TASK),
         draws=np.concatenate([counters[:n], counters[:n] ^ _LOOKS]),
     )
-    crowd.task[:, [columns.WALKING, columns.GOAL]] = 0
-    crowd.state[:, [columns.STAYS, columns.SLOW, columns.DENSE]] = 1.0
-    crowd.state[:, columns.TURN_RATE] = ACTORS.walking.turn_most
+    crowd.task["walking"] = crowd.task["goal"] = 0
+    crowd.state["stays"] = crowd.state["slow"] = crowd.state["dense"] = 1.0
+    crowd.state["turn_rate"] = ACTORS.walking.turn_most
     return crowd
 
 
 def _ways(doors: Doors, n_people: int) -> right_of_way.Doors:
     m = len(doors.names)
-    table = np.zeros((m, columns.N_DOOR))
-    table[:, [columns.CX, columns.CY]] = doors.middles
-    table[:, [columns.EX, columns.EY]] = doors.along
+    table = np.zeros(m, columns.DOOR)
+    table["cx"], table["cy"] = doors.middles.T
+    table["ex"], table["ey"] = doors.along.T
     sign = np.where(doors.hinges[:, 4] != 0.0, 1.0, doors.hinges[:, 3])
-    table[:, columns.NX], table[:, columns.NY] = (
-        -sign * doors.along[:, 1],
-        sign * doors.along[:, 0],
-    )
-    table[:, columns.WIDTH] = doors.widths
-    table[:, columns.SLIDES] = doors.hinges[:, 4]
+    table["nx"], table["ny"] = -sign * doors.along[:, 1], sign * doors.along[:, 0]
+    table["width"] = doors.widths
+    table["slides"] = doors.hinges[:, 4]
     sides = np.zeros((n_people, m), dtype=np.int64)
     return right_of_way.Doors(doors=table, passage=doors.passage, sides=sides)
 
@@ -259,25 +256,25 @@ def _discs(
     ]
     ends = np.array(long, dtype=np.float64).reshape(-1, 2)
     leaves = len(planar) + 3 * len(doors.names)
-    discs = np.zeros((leaves + len(ends), 6))
-    discs[: len(planar), columns.KIND] = columns.THING
-    discs[: len(people), columns.KIND] = columns.PERSON
+    discs = np.zeros(leaves + len(ends), columns.DISC)
+    discs["kind"][: len(planar)] = columns.THING
+    discs["kind"][: len(people)] = columns.PERSON
     for mover in bodies.scene.movers:
         if mover.kind == "robot":
-            discs[planar.index(mover.name), columns.KIND] = columns.ROBOT
+            discs["kind"][planar.index(mover.name)] = columns.ROBOT
         elif mover.group == "chair":
-            discs[planar.index(mover.name), columns.KIND] = columns.CHAIR
-    discs[: len(planar), columns.R] = bodies.radii(planar)
+            discs["kind"][planar.index(mover.name)] = columns.CHAIR
+    discs["r"][: len(planar)] = bodies.radii(planar)
     for row in range(len(planar), leaves):
-        discs[row, columns.KIND] = columns.LEAF + (row - len(planar)) // 3
-        discs[row, columns.R] = 0.06
+        discs["kind"][row] = columns.LEAF + (row - len(planar)) // 3
+        discs["r"][row] = 0.06
     owner = np.arange(len(discs))
     for hold in bodies.scene.holds:  # a train is one thing to whoever pulls it
         if hold.holder not in people:
             owner[planar.index(hold.held)] = owner[planar.index(hold.holder)]
     owner[leaves:] = ends[:, 0]
-    discs[leaves:, columns.KIND] = columns.THING
-    discs[leaves:, columns.R] = discs[owner[leaves:], columns.R]
+    discs["kind"][leaves:] = columns.THING
+    discs["r"][leaves:] = discs["r"][owner[leaves:]]
     return discs, owner, ends
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sim.actors.config import ACTORS
 from sim.actors.people import columns
 from sim.core.flow import Field, clearance_at, time_at, way_at
+from sim.core.state import Record, Records
 from slam._jit import njit
 
 Float = NDArray[np.float64]
@@ -32,31 +33,31 @@ PUSH_STOP, QUEUE, HOLD_GAIN, HOLD_MPS = _R.push_stop_m, _R.queue_m, _R.hold_gain
 
 
 class Crowd(NamedTuple):
-    """The people and what is around them, in the columns named above.
+    """The people and what is around them, in the records of ``columns``.
 
-    discs (k, 6) people first; yaws rad of people and things; owner (k,) disc row of the mover that
+    discs (k,) people first; yaws rad of people and things; owner (k,) disc row of the mover that
     each disc is of; long (p, 2) disc row and m along its x axis of the last p discs, which are the
-    ends of what is long; allowed (n, goals) where each one goes; state (n, 24); task (n, 8);
+    ends of what is long; allowed (n, goals) where each one goes; state (n,); task (n,);
     draws (2 n,) generators:
     of each one's trips, then of each one's looking about while standing, which happens as often as
     time allows. So the trips of a person are the same, however long each takes.
     """
 
-    discs: Float
+    discs: Records
     yaws: Float
     owner: Int
     long: Float
     allowed: NDArray[np.bool_]
-    state: Float
-    task: Int
+    state: Records
+    task: Records
     draws: NDArray[np.uint64]
 
 
 class Doors(NamedTuple):
-    """doors (m, 9), passage (m, 3), and from which side each person wants through, sides (n, m)."""
+    """doors (m,), passage (m,), and from which side each person wants through, sides (n, m)."""
 
-    doors: Float
-    passage: Float
+    doors: Records
+    passage: Records
     sides: Int
 
 
@@ -73,44 +74,39 @@ class Addresses(NamedTuple):
 
 
 @njit
-def wants_through(i: int, door: Float, field: Field, crowd: Crowd) -> int:
+def wants_through(i: int, door: Record, field: Field, crowd: Crowd) -> int:
     """Side (+1 where the leaf swings to, -1) from which person ``i`` wants to pass; 0: none."""
     discs, task = crowd.discs, crowd.task
-    dx, dy = discs[i, columns.X] - door[columns.CX], discs[i, columns.Y] - door[columns.CY]
+    dx, dy = discs[i].x - door.cx, discs[i].y - door.cy
     distance = math.sqrt(dx * dx + dy * dy)
-    if task[i, columns.WALKING] != columns.WALKS or distance > WANTS:
+    if task[i].walking != columns.WALKS or distance > WANTS:
         return 0
-    goal = task[i, columns.GOAL]
-    normal = dx * door[columns.NX] + dy * door[columns.NY]
+    goal = task[i].goal
+    normal = dx * door.nx + dy * door.ny
     if distance < IN_DOORWAY:
-        wx, wy = way_at(field, goal, discs[i, columns.X], discs[i, columns.Y])
-        return -1 if wx * door[columns.NX] + wy * door[columns.NY] > 0.0 else 1
-    there = time_at(field, goal, door[columns.CX], door[columns.CY])
-    if time_at(field, goal, discs[i, columns.X], discs[i, columns.Y]) - there < ON_WAY * distance:
+        wx, wy = way_at(field, goal, discs[i].x, discs[i].y)
+        return -1 if wx * door.nx + wy * door.ny > 0.0 else 1
+    there = time_at(field, goal, door.cx, door.cy)
+    if time_at(field, goal, discs[i].x, discs[i].y) - there < ON_WAY * distance:
         return 0
     return 1 if normal > 0.0 else -1
 
 
 @njit
-def follows_through(i: int, door: Float, crowd: Crowd) -> int:
+def follows_through(i: int, door: Record, crowd: Crowd) -> int:
     """The same of person ``i`` who follows somebody, by the next place on its way."""
-    dx, dy = (
-        crowd.discs[i, columns.X] - door[columns.CX],
-        crowd.discs[i, columns.Y] - door[columns.CY],
-    )
-    if crowd.task[i, columns.WALKING] != columns.FOLLOWS or dx * dx + dy * dy > WANTS * WANTS:
+    dx, dy = crowd.discs[i].x - door.cx, crowd.discs[i].y - door.cy
+    if crowd.task[i].walking != columns.FOLLOWS or dx * dx + dy * dy > WANTS * WANTS:
         return 0
-    tx = crowd.state[i, columns.AIM_X] - door[columns.CX]
-    ty = crowd.state[i, columns.AIM_Y] - door[columns.CY]
-    here = dx * door[columns.NX] + dy * door[columns.NY]
-    there = tx * door[columns.NX] + ty * door[columns.NY]
+    tx = crowd.state[i].arrive - door.cx
+    ty = crowd.state[i].luck - door.cy
+    here = dx * door.nx + dy * door.ny
+    there = tx * door.nx + ty * door.ny
     if here * there >= 0.0:
         return 0
     share = here / (here - there)
-    along = (dx + share * (tx - dx)) * door[columns.EX] + (dy + share * (ty - dy)) * door[
-        columns.EY
-    ]
-    if abs(along) > 0.5 * door[columns.WIDTH] + IN_FRAME:
+    along = (dx + share * (tx - dx)) * door.ex + (dy + share * (ty - dy)) * door.ey
+    if abs(along) > 0.5 * door.width + IN_FRAME:
         return 0
     return 1 if here > 0.0 else -1
 
@@ -125,65 +121,61 @@ def give_turns(  # noqa: C901, PLR0912 (kernel)
         door = doors[d]
         inside, nearest, turn = 0, math.inf, 0
         kept, asked = False, False
-        passage[d, columns.INSIDE] = 0.0
+        passage[d].inside = 0.0
         for i in range(sides.shape[0]):
             side = wants_through(i, door, field, crowd)
             if side == 0:
                 side = follows_through(i, door, crowd)
             sides[i, d] = side
-            dx, dy = discs[i, columns.X] - door[columns.CX], discs[i, columns.Y] - door[columns.CY]
+            dx, dy = discs[i].x - door.cx, discs[i].y - door.cy
             distance = math.sqrt(dx * dx + dy * dy)
-            hx = dx + 0.5 * door[columns.WIDTH] * door[columns.EX]
-            hy = dy + 0.5 * door[columns.WIDTH] * door[columns.EY]
-            swept = door[columns.SLIDES] == 0.0 and (
-                dx * door[columns.NX] + dy * door[columns.NY] > 0.0 and hx * hx + hy * hy < SWEPT
+            hx = dx + 0.5 * door.width * door.ex
+            hy = dy + 0.5 * door.width * door.ey
+            swept = door.slides == 0.0 and (
+                dx * door.nx + dy * door.ny > 0.0 and hx * hx + hy * hy < SWEPT
             )
             if distance < CLEAR or swept:  # nobody is hit by a leaf that moves by itself
-                passage[d, columns.INSIDE] = 1.0
-            if crowd.task[i, columns.WALKING] == columns.FOLLOWS and distance < ASKS:
+                passage[d].inside = 1.0
+            if crowd.task[i].walking == columns.FOLLOWS and distance < ASKS:
                 asked = True
             if side == 0:
                 continue
-            across, along = (
-                dx * door[columns.NX] + dy * door[columns.NY],
-                dx * door[columns.EX] + dy * door[columns.EY],
-            )
-            in_frame = abs(across) < IN_FRAME and abs(along) < 0.5 * door[columns.WIDTH]
-            if in_frame and (inside == 0 or side == int(passage[d, columns.TURN])):
+            across, along = dx * door.nx + dy * door.ny, dx * door.ex + dy * door.ey
+            in_frame = abs(across) < IN_FRAME and abs(along) < 0.5 * door.width
+            if in_frame and (inside == 0 or side == int(passage[d].turn)):
                 inside = side
-            if side == int(passage[d, columns.TURN]) and distance < KEPT:
+            if side == int(passage[d].turn) and distance < KEPT:
                 kept = True
             if distance < nearest:
                 nearest, turn = distance, side
         if inside != 0:
             turn = inside
         elif kept:
-            turn = int(passage[d, columns.TURN])
-        passage[d, columns.TURN] = turn
+            turn = int(passage[d].turn)
+        passage[d].turn = turn
         for i in range(sides.shape[0]):
             if turn != 0 and sides[i, d] == turn:
-                dx, dy = (
-                    discs[i, columns.X] - door[columns.CX],
-                    discs[i, columns.Y] - door[columns.CY],
-                )
+                dx, dy = discs[i].x - door.cx, discs[i].y - door.cy
                 # who pulls a door starts earlier, and what slides looks ahead
-                reach = PULL if turn > 0 or doors[d, columns.SLIDES] != 0.0 else PUSH
+                reach = PULL if turn > 0 or doors[d].slides != 0.0 else PUSH
                 asked = asked or dx * dx + dy * dy < reach * reach
-        passage[d, columns.ASKED] = 1.0 if asked else 0.0
+        passage[d].asked = 1.0 if asked else 0.0
 
 
 @njit
-def wait_beside(i: int, door: Float, side: int, field: Field, discs: Float) -> tuple[float, float]:
+def wait_beside(
+    i: int, door: Record, side: int, field: Field, discs: Records
+) -> tuple[float, float]:
     """Velocity to a place on one's own side, out of the way of those who come through."""
-    dx, dy = discs[i, columns.X] - door[columns.CX], discs[i, columns.Y] - door[columns.CY]
-    beside = BESIDE if dx * door[columns.EX] + dy * door[columns.EY] >= 0.0 else -BESIDE
+    dx, dy = discs[i].x - door.cx, discs[i].y - door.cy
+    beside = BESIDE if dx * door.ex + dy * door.ey >= 0.0 else -BESIDE
     for _ in range(2):
-        tx = door[columns.CX] + BACK * side * door[columns.NX] + beside * door[columns.EX]
-        ty = door[columns.CY] + BACK * side * door[columns.NY] + beside * door[columns.EY]
+        tx = door.cx + BACK * side * door.nx + beside * door.ex
+        ty = door.cy + BACK * side * door.ny + beside * door.ey
         if clearance_at(field, tx, ty) > BODY:
             break
         beside = -beside
-    tx, ty = tx - discs[i, columns.X], ty - discs[i, columns.Y]
+    tx, ty = tx - discs[i].x, ty - discs[i].y
     gap = math.sqrt(tx * tx + ty * ty)
     speed = min(WAIT_MPS, WAIT_GAIN * gap) / max(gap, 1e-6)
     return speed * tx, speed * ty
@@ -191,7 +183,7 @@ def wait_beside(i: int, door: Float, side: int, field: Field, discs: Float) -> t
 
 @njit
 def hold_off(
-    i: int, d: int, wanted: tuple[float, float], ways: Doors, discs: Float
+    i: int, d: int, wanted: tuple[float, float], ways: Doors, discs: Records
 ) -> tuple[float, float]:
     """The wanted velocity less what would run into a leaf that is not open yet.
 
@@ -199,22 +191,22 @@ def hold_off(
     leaves room to the one in front.
     """
     door, side = ways.doors[d], ways.sides[i, d]
-    dx, dy = discs[i, columns.X] - door[columns.CX], discs[i, columns.Y] - door[columns.CY]
+    dx, dy = discs[i].x - door.cx, discs[i].y - door.cy
     first = 0
     for k in range(len(ways.sides)):
         if k != i and ways.sides[k, d] == side:
-            kx, ky = discs[k, columns.X] - door[columns.CX], discs[k, columns.Y] - door[columns.CY]
+            kx, ky = discs[k].x - door.cx, discs[k].y - door.cy
             first += kx * kx + ky * ky < dx * dx + dy * dy
-    if door[columns.SLIDES] != 0.0:
-        rx, ry, stop = side * door[columns.NX], side * door[columns.NY], PUSH_STOP
+    if door.slides != 0.0:
+        rx, ry, stop = side * door.nx, side * door.ny, PUSH_STOP
         gap = dx * rx + dy * ry
     elif side > 0:
-        rx = dx + 0.5 * door[columns.WIDTH] * door[columns.EX]
-        ry = dy + 0.5 * door[columns.WIDTH] * door[columns.EY]
+        rx = dx + 0.5 * door.width * door.ex
+        ry = dy + 0.5 * door.width * door.ey
         gap = math.sqrt(rx * rx + ry * ry)
-        rx, ry, stop = rx / gap, ry / gap, door[columns.WIDTH] + LEAF_M
+        rx, ry, stop = rx / gap, ry / gap, door.width + LEAF_M
     else:
-        rx, ry, stop = -door[columns.NX], -door[columns.NY], PUSH_STOP
+        rx, ry, stop = -door.nx, -door.ny, PUSH_STOP
         gap = dx * rx + dy * ry
     excess = -(wanted[0] * rx + wanted[1] * ry) - HOLD_GAIN * (gap - stop - QUEUE * first)
     excess = min(max(excess, 0.0), HOLD_MPS)
@@ -223,23 +215,20 @@ def hold_off(
 
 @njit
 def round_leaf(
-    i: int, wanted: tuple[float, float], ways: Doors, discs: Float
+    i: int, wanted: tuple[float, float], ways: Doors, discs: Records
 ) -> tuple[float, float]:
     """The wanted velocity of one who follows, round the end of a leaf that stands in its way."""
     wx, wy = wanted
     speed = math.sqrt(wx * wx + wy * wy)
     for d in range(len(ways.doors) if speed > 0.0 else 0):
         door = ways.doors[d]
-        if door[columns.SLIDES] != 0.0:
+        if door.slides != 0.0:
             continue
-        width = door[columns.WIDTH]
-        c, s = math.cos(door[columns.ANGLE]), math.sin(door[columns.ANGLE])
-        lx, ly = (
-            c * door[columns.EX] + s * door[columns.NX],
-            c * door[columns.EY] + s * door[columns.NY],
-        )
-        hx = discs[i, columns.X] - door[columns.CX] + 0.5 * width * door[columns.EX]
-        hy = discs[i, columns.Y] - door[columns.CY] + 0.5 * width * door[columns.EY]
+        width = door.width
+        c, s = math.cos(door.angle), math.sin(door.angle)
+        lx, ly = c * door.ex + s * door.nx, c * door.ey + s * door.ny
+        hx = discs[i].x - door.cx + 0.5 * width * door.ex
+        hy = discs[i].y - door.cy + 0.5 * width * door.ey
         off = lx * hy - ly * hx
         towards = (ly * wx - lx * wy) / speed  # to the leaf, per m, where ``off`` is positive
         if off * towards <= 0.0 or abs(off) > abs(towards) * ROUND:

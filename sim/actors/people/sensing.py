@@ -19,31 +19,28 @@ def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) ->
     discs, k = crowd.discs, at.discs.shape[0]
     for row in range(k):
         q, v = at.discs[row]
-        discs[row, columns.X], discs[row, columns.Y] = qpos[q], qpos[q + 1]
-        discs[row, columns.U], discs[row, columns.V] = qvel[v], qvel[v + 1]
+        discs[row].x, discs[row].y = qpos[q], qpos[q + 1]
+        discs[row].u, discs[row].v = qvel[v], qvel[v + 1]
         if row < len(crowd.yaws):
             crowd.yaws[row] = qpos[q + 2]
     for d in range(at.doors.shape[0]):
         q, v = at.doors[d]
         x, y, closed, sign, slides = at.hinges[d]
-        ways.doors[d, columns.ANGLE] = qpos[q]
+        ways.doors[d].angle = qpos[q]
         if slides != 0.0:
-            ways.doors[d, columns.ANGLE] = 0.5 * math.pi * qpos[q] / ways.doors[d, columns.WIDTH]
+            ways.doors[d].angle = 0.5 * math.pi * qpos[q] / ways.doors[d].width
         c, s = math.cos(closed + sign * qpos[q]), math.sin(closed + sign * qpos[q])
         for part in range(3):
             row = k + 3 * d + part
-            length = (0.35 + 0.3 * part) * ways.doors[d, columns.WIDTH]
+            length = (0.35 + 0.3 * part) * ways.doors[d].width
             if slides != 0.0:
                 along = length + slides * qpos[q]
-                discs[row, columns.X], discs[row, columns.Y] = x + along * c, y + along * s
-                discs[row, columns.U], discs[row, columns.V] = (
-                    slides * qvel[v] * c,
-                    slides * qvel[v] * s,
-                )
+                discs[row].x, discs[row].y = x + along * c, y + along * s
+                discs[row].u, discs[row].v = slides * qvel[v] * c, slides * qvel[v] * s
                 continue
-            discs[row, columns.X], discs[row, columns.Y] = x + length * c, y + length * s
-            discs[row, columns.U] = -length * s * sign * qvel[v]
-            discs[row, columns.V] = length * c * sign * qvel[v]
+            discs[row].x, discs[row].y = x + length * c, y + length * s
+            discs[row].u = -length * s * sign * qvel[v]
+            discs[row].v = length * c * sign * qvel[v]
     first = len(discs) - len(crowd.long)
     for part in range(len(crowd.long)):
         row = int(crowd.long[part, 0])
@@ -53,8 +50,8 @@ def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) ->
             crowd.long[part, 1] * math.sin(qpos[q + 2]),
         )
         end = discs[first + part]
-        end[columns.X], end[columns.Y] = qpos[q] + rx, qpos[q + 1] + ry
-        end[columns.U], end[columns.V] = qvel[v] - qvel[v + 2] * ry, qvel[v + 1] + qvel[v + 2] * rx
+        end.x, end.y = qpos[q] + rx, qpos[q + 1] + ry
+        end.u, end.v = qvel[v] - qvel[v + 2] * ry, qvel[v + 1] + qvel[v + 2] * rx
 
 
 @njit
@@ -67,21 +64,15 @@ def nearby(i: int, crowd: Crowd, sides: Int, near: Int) -> int:
     chair that one sits down on, nor what one holds.
     """
     discs, count = crowd.discs, 0
-    seat, held = crowd.task[i, columns.SEAT], crowd.task[i, columns.HELD]
+    seat, held = crowd.task[i].seat, crowd.task[i].held
     reach = 9.0 if held < 0 else SIGHT_M * SIGHT_M
     for k in range(discs.shape[0]):
-        dx, dy = (
-            discs[k, columns.X] - discs[i, columns.X],
-            discs[k, columns.Y] - discs[i, columns.Y],
-        )
+        dx, dy = discs[k].x - discs[i].x, discs[k].y - discs[i].y
         if k in (i, seat) or dx * dx + dy * dy > reach or count == len(near):
             continue
         if held >= 0 and crowd.owner[k] == held:
             continue
-        if (
-            discs[k, columns.KIND] >= columns.LEAF
-            and sides[i, int(discs[k, columns.KIND] - columns.LEAF)] != 0
-        ):
+        if discs[k].kind >= columns.LEAF and sides[i, int(discs[k].kind - columns.LEAF)] != 0:
             continue
         near[count] = k
         count += 1

@@ -48,11 +48,11 @@ def dress(crowd: Crowd, hulls: Hulls) -> None:
     """Who has a chair, and no longer walks to it, meets walls, people and doors only; and sinks."""
     for i in range(len(hulls.geoms)):
         geom, look = hulls.geoms[i], hulls.looks[i]
-        off = crowd.task[i, columns.SEAT] >= 0 and crowd.task[i, columns.WALKING] != columns.TO_SEAT
+        off = crowd.task[i].seat >= 0 and crowd.task[i].walking != columns.TO_SEAT
         hulls.contype[geom] = 0 if off else hulls.bits[i, 0]
         hulls.affinity[geom] = hulls.bits[i, 1] & ~PLANAR_BIT if off else hulls.bits[i, 1]
         if look >= 0:
-            sunk = (HIP - SEAT_HEIGHT) * crowd.state[i, columns.SIT]
+            sunk = (HIP - SEAT_HEIGHT) * crowd.state[i].sit
             hulls.body_pos[look, 2] = hulls.heights[i] - sunk
 
 
@@ -62,21 +62,18 @@ def free_seat(i: int, field: Field, crowd: Crowd) -> int:
     discs, task = crowd.discs, crowd.task
     best, found = HAND * HAND, -1
     for k in range(discs.shape[0]):
-        dx, dy = (
-            discs[k, columns.X] - discs[i, columns.X],
-            discs[k, columns.Y] - discs[i, columns.Y],
-        )
+        dx, dy = discs[k].x - discs[i].x, discs[k].y - discs[i].y
         far = dx * dx + dy * dy
-        if discs[k, columns.KIND] != columns.CHAIR or far >= best:
+        if discs[k].kind != columns.CHAIR or far >= best:
             continue
-        if discs[k, columns.U] ** 2 + discs[k, columns.V] ** 2 > 0.01:
+        if discs[k].u ** 2 + discs[k].v ** 2 > 0.01:
             continue
         taken = False
         for other in range(len(task)):
-            taken = taken or task[other, columns.SEAT] == k
-        open_way = clearance_at(field, discs[k, columns.X], discs[k, columns.Y]) > ROOM
+            taken = taken or task[other].seat == k
+        open_way = clearance_at(field, discs[k].x, discs[k].y) > ROOM
         for part in range(1, 5):
-            x, y = discs[i, columns.X] + 0.2 * part * dx, discs[i, columns.Y] + 0.2 * part * dy
+            x, y = discs[i].x + 0.2 * part * dx, discs[i].y + 0.2 * part * dy
             open_way = open_way and clearance_at(field, x, y) > 0.25
         if open_way and not taken:
             best, found = far, k
@@ -86,64 +83,53 @@ def free_seat(i: int, field: Field, crowd: Crowd) -> int:
 @njit
 def may_sit(i: int, field: Field, crowd: Crowd) -> None:
     """On arrival: perhaps go on to a chair."""
-    if crowd.state[i, columns.LUCK] < SHARE:
+    if crowd.state[i].luck < SHARE:
         seat = free_seat(i, field, crowd)
         if seat >= 0:
-            crowd.task[i, columns.WALKING], crowd.task[i, columns.SEAT] = columns.TO_SEAT, seat
-            crowd.state[i, columns.BLOCKED] = 0.0
+            crowd.task[i].walking, crowd.task[i].seat = columns.TO_SEAT, seat
+            crowd.state[i].blocked = 0.0
 
 
 @njit
 def sit(i: int, time: float, tick: float, crowd: Crowd) -> None:
     """Come to the chair, sit down, get up; call it at every tick."""
     discs, state, task = crowd.discs, crowd.state, crowd.task
-    seat = task[i, columns.SEAT]
+    seat = task[i].seat
     if seat < 0:
         return
-    dx, dy = (
-        discs[seat, columns.X] - discs[i, columns.X],
-        discs[seat, columns.Y] - discs[i, columns.Y],
-    )
+    dx, dy = discs[seat].x - discs[i].x, discs[seat].y - discs[i].y
     far = math.sqrt(dx * dx + dy * dy)
-    apart = far - discs[i, columns.R] - discs[seat, columns.R]
-    if task[i, columns.WALKING] == columns.TO_SEAT:
-        slow = discs[i, columns.U] ** 2 + discs[i, columns.V] ** 2 < 0.01
-        state[i, columns.BLOCKED] += tick if slow else 0.0
+    apart = far - discs[i].r - discs[seat].r
+    if task[i].walking == columns.TO_SEAT:
+        slow = discs[i].u ** 2 + discs[i].v ** 2 < 0.01
+        state[i].blocked += tick if slow else 0.0
         if apart < NEAR:
-            task[i, columns.WALKING] = columns.SEATED
-            state[i, columns.STAY_UNTIL] += (STAY - 1.0) * max(
-                state[i, columns.STAY_UNTIL] - time, 0.0
-            ) + 2.0
-        elif state[i, columns.BLOCKED] > GIVE_UP_S or far > HAND + 1.0:
-            task[i, columns.WALKING], task[i, columns.SEAT] = columns.STANDS, -1
-    elif task[i, columns.WALKING] == columns.SEATED:
-        state[i, columns.LOOK] = crowd.yaws[seat]
+            task[i].walking = columns.SEATED
+            state[i].stay_until += (STAY - 1.0) * max(state[i].stay_until - time, 0.0) + 2.0
+        elif state[i].blocked > GIVE_UP_S or far > HAND + 1.0:
+            task[i].walking, task[i].seat = columns.STANDS, -1
+    elif task[i].walking == columns.SEATED:
+        state[i].look = crowd.yaws[seat]
         if far < 0.15:
-            state[i, columns.SIT] = min(state[i, columns.SIT] + tick / DOWN_S, 1.0)
+            state[i].sit = min(state[i].sit + tick / DOWN_S, 1.0)
     else:
-        state[i, columns.SIT] = max(state[i, columns.SIT] - tick / DOWN_S, 0.0)
-        if state[i, columns.SIT] == 0.0 and apart > 0.03:
-            task[i, columns.SEAT] = -1
+        state[i].sit = max(state[i].sit - tick / DOWN_S, 0.0)
+        if state[i].sit == 0.0 and apart > 0.03:
+            task[i].seat = -1
 
 
 @njit
 def on_chair(i: int, crowd: Crowd) -> bool:
     """Sitting, sitting down or getting up: moves with the chair."""
-    seated = crowd.task[i, columns.WALKING] == columns.SEATED
-    return bool(
-        seated
-        or (crowd.task[i, columns.WALKING] == columns.WALKS and crowd.state[i, columns.SIT] > 0.0)
-    )
+    seated = crowd.task[i].walking == columns.SEATED
+    return bool(seated or (crowd.task[i].walking == columns.WALKS and crowd.state[i].sit > 0.0))
 
 
 @njit
 def to_chair(i: int, crowd: Crowd) -> tuple[float, float]:
     """Velocity to the middle of the chair."""
-    discs, seat = crowd.discs, crowd.task[i, columns.SEAT]
-    dx, dy = (
-        discs[seat, columns.X] - discs[i, columns.X],
-        discs[seat, columns.Y] - discs[i, columns.Y],
-    )
+    discs, seat = crowd.discs, crowd.task[i].seat
+    dx, dy = discs[seat].x - discs[i].x, discs[seat].y - discs[i].y
     far = math.sqrt(dx * dx + dy * dy)
     speed = min(PACE, 3.0 * far) / max(far, 1e-6)
     return speed * dx + 0.0, speed * dy + 0.0

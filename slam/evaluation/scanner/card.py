@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,10 +12,10 @@ import numpy as np
 from slam.errors import InvalidValueError
 from slam.evaluation.scanner.codes import COARSE, COARSE_BINS_M, codes
 from slam.evaluation.scanner.edges import DEPTH_BINS_M, edges
-from slam.evaluation.scanner.figures import Figure, ratio
-from slam.evaluation.scanner.noise import RANGE_BINS_M, Noise, about_walls, found_walls, standing
-from slam.evaluation.scanner.stretches import Stretch, stretches_of
-from slam.evaluation.scanner.walls import SPLIT_M, Wall
+from slam.evaluation.scanner.figures import Figure, key_of, ratio
+from slam.evaluation.scanner.noise import RANGE_BINS_M, about_walls, found_walls, standing
+from slam.evaluation.scanner.stretches import stretches_of
+from slam.evaluation.scanner.walls import SPLIT_M
 from slam.frames import LaserSpec, Stream
 
 MM, PERCENT, PLAIN = "mm", "%", ""
@@ -34,30 +34,26 @@ class Statistic:
 
 def _bins(
     key: str, what: str, unit: str, bins: Sequence[tuple[float, float]], detail: bool = False
-) -> list[Statistic]:
-    return [
-        Statistic(key=f"{key}.{low:g}-{high:g}", what=f"{what}, {low:g} to {high:g} m", unit=unit,
-                  detail=detail)
-        for low, high in bins
-    ]  # fmt: skip
+) -> Iterator[Statistic]:
+    for low, high in bins:
+        named = f"{what}, {low:g} to {high:g} m"
+        yield Statistic(key=key_of(key, low, high), what=named, unit=unit, detail=detail)
 
 
-def _noise_rows(key: str, what: str) -> list[Statistic]:
-    return [
-        Statistic(key=key, what=what, unit=MM),
-        *_bins(key, what, MM, RANGE_BINS_M, detail=True),
-        Statistic(key=f"{key}.square", what=f"{what}, incidence below 45°", unit=MM),
-        Statistic(key=f"{key}.oblique", what=f"{what}, incidence 45° to 70°", unit=MM),
-    ]
+def _noise(key: str, what: str) -> Iterator[Statistic]:
+    yield Statistic(key=key, what=what, unit=MM)
+    yield from _bins(key, what, MM, RANGE_BINS_M, detail=True)
+    yield Statistic(key=f"{key}.square", what=f"{what}, incidence below 45°", unit=MM)
+    yield Statistic(key=f"{key}.oblique", what=f"{what}, incidence 45° to 70°", unit=MM)
 
 
 STATISTICS: tuple[Statistic, ...] = (
     Statistic(key="step", what="step of the code", unit=MM),
     *_bins("coarse", f"codes that are multiples of {COARSE} steps", PERCENT, COARSE_BINS_M),
-    *_noise_rows("standing", "noise of a standing robot"),
+    *_noise("standing", "noise of a standing robot"),
     Statistic(key="slow", what="deviation in a stretch / from scan to scan", unit=PLAIN),
     Statistic(key="stray", what="returns 15 cm or more off, standing", unit=PERCENT),
-    *_noise_rows("wall", "deviation about a straight wall"),
+    *_noise("wall", "deviation about a straight wall"),
     Statistic(key="no_return", what="no return, all beams", unit=PERCENT),
     Statistic(key="holes", what="no return, within straight walls", unit=PERCENT),
     Statistic(key="flicker", what="no return between two returns, standing", unit=PERCENT),
@@ -65,7 +61,7 @@ STATISTICS: tuple[Statistic, ...] = (
     Statistic(key="edge_jumps", what="beams beside an edge that move by 5 cm", unit=PERCENT),
     Statistic(key="edge_lost", what="edges with a lost beam", unit=PERCENT),
     Statistic(key="place", what="place of those ranges, 0 near to 1 far", unit=PLAIN),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,19 +91,19 @@ def measure(*streams: Stream) -> ScannerCard:
     spec = _one_spec([cut.spec for cut in cuts])
     parts = [part for cut in cuts for part in cut.parts]
     still = [part for part in parts if part.standing]
-    coded = codes(parts)
-    step = coded.step_m.value
-    counted = step * (COARSE if any(f.value > 0.5 for f in coded.coarse) else 1)
+    figures = codes(parts)
+    step = figures["step"].value
+    fives = any(figures[key_of("coarse", *ends)].value > 0.5 for ends in COARSE_BINS_M)
+    counted = step * (COARSE if fives else 1)
     found = [found_walls(part, spec.angles, max(SPLIT_M, 1.5 * counted)) for part in parts]
-    rest, flat, sides = standing(still, spec.angles, step), about_walls(found), edges(parts)
-    figures = {
-        "step": coded.step_m, **_binned("coarse", coded.coarse, COARSE_BINS_M),
-        **_noise("standing", rest.noise), "slow": rest.slow, "stray": rest.stray,
-        **_noise("wall", flat),
-        "no_return": _no_return(parts), "holes": _holes(found), "flicker": rest.flicker,
-        **_binned("between", sides.between, DEPTH_BINS_M),
-        "edge_jumps": rest.edge_jumps, "edge_lost": sides.lost, "place": sides.place,
-    }  # fmt: skip
+    lost = [float(np.isnan(part.ranges).sum()) for part in parts]
+    holes = [sum(wall.holes for wall in part) for part in found]
+    beams = [sum(wall.holes + len(wall.beams) for wall in part) for part in found]
+    figures |= standing(still, spec.angles, step) | about_walls(found) | edges(parts)
+    figures |= {
+        "no_return": ratio(lost, [part.ranges.size for part in parts]),
+        "holes": ratio(holes, beams),
+    }
     return ScannerCard(
         figures=figures, scans=sum(cut.scans for cut in cuts), beams=spec.n_beams,
         increment_rad=spec.angle_increment, blocks=len(parts) - len(still),
@@ -129,30 +125,3 @@ def _one_spec(specs: Sequence[LaserSpec]) -> LaserSpec:
                 f"{math.degrees(other.angle_increment):g} degrees apart"
             )
     return first
-
-
-def _noise(key: str, noise: Noise) -> dict[str, Figure]:
-    return {
-        key: noise.overall,
-        **_binned(key, noise.by_range, RANGE_BINS_M),
-        f"{key}.square": noise.square,
-        f"{key}.oblique": noise.oblique,
-    }
-
-
-def _binned(
-    key: str, figures: Sequence[Figure], bins: Sequence[tuple[float, float]]
-) -> dict[str, Figure]:
-    pairs = zip(bins, figures, strict=True)
-    return {f"{key}.{low:g}-{high:g}": figure for (low, high), figure in pairs}
-
-
-def _no_return(parts: Sequence[Stretch]) -> Figure:
-    return ratio([float(np.isnan(p.ranges).sum()) for p in parts], [p.ranges.size for p in parts])
-
-
-def _holes(found: Sequence[Sequence[Wall]]) -> Figure:
-    """Share of the beams from the first to the last of a wall."""
-    holes = [sum(wall.holes for wall in part) for part in found]
-    beams = [sum(wall.holes + len(wall.beams) for wall in part) for part in found]
-    return ratio(holes, beams)

@@ -5,75 +5,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.evaluation.scanner.figures import Figure, exact, ratio
+from slam.evaluation.scanner.figures import Figures, exact, key_of, ratio
 from slam.evaluation.scanner.stretches import Stretch
 from slam.frames import Float
 
-STEPS_M = tuple(
-    1e-3 * s
-    for s in (
-        100.0,
-        50.0,
-        40.0,
-        25.0,
-        20.0,
-        10.0,
-        8.0,
-        5.0,
-        4.0,
-        2.5,
-        2.0,
-        1.0,
-        0.5,
-        0.25,
-        0.2,
-        0.1,
-    )
-)  # m, those that scanners and logs have
+STEPS_MM = (100.0, 50.0, 40.0, 25.0, 20.0, 10.0, 8.0, 5.0, 4.0, 2.5, 2.0, 1.0, 0.5, 0.25, 0.2, 0.1)
 ALL = 0.995  # share of returns on multiples of a step that makes it the step
 NEAR = 0.02  # of a step from its multiple, beside what single precision cannot hold
 COARSE_BINS_M = ((0.0, 4.0), (4.0, 80.0))
 COARSE = 5  # how many steps some devices count at once
 
 
-@dataclass(frozen=True, kw_only=True)
-class Codes:
-    """The step m, 0 for ranges that are not rounded.
+def codes(stretches: Sequence[Stretch]) -> Figures:
+    """Of all returns: ``step`` m, 0 for ranges that are not rounded, and ``coarse`` by range.
 
-    coarse  share of codes that are multiples of five steps, in ``COARSE_BINS_M`` of range
-
-    Of evenly used codes a fifth are multiples of five; all are where the device counts so.
+    coarse  share of codes that are multiples of five steps. Of evenly used codes a fifth are; all
+            are where the device counts so.
     """
-
-    step_m: Figure
-    coarse: tuple[Figure, ...]
-
-
-def codes(stretches: Sequence[Stretch]) -> Codes:
-    """Of all returns."""
     returns = [part.ranges[np.isfinite(part.ranges)] for part in stretches]
     every = np.concatenate([np.zeros(0), *returns])
-    step = (
-        next((s for s in STEPS_M if on_multiples(every, s).mean() >= ALL), 0.0)
-        if len(every)
-        else math.nan
-    )
-
-    def on_five(low: float, high: float) -> Figure:
+    steps, step = (1e-3 * mm for mm in STEPS_MM), math.nan
+    if len(every):
+        step = next((s for s in steps if on_multiples(every, s).mean() >= ALL), 0.0)
+    figures = {"step": exact(step, len(every), len(returns))}
+    for low, high in COARSE_BINS_M:
         own = [r[(r >= low) & (r < high)] for r in returns if step]
-        return ratio(
-            [float(on_multiples(r, COARSE * step).sum()) for r in own], [len(r) for r in own]
-        )
-
-    return Codes(
-        step_m=exact(step, len(every), len(returns)),
-        coarse=tuple(on_five(low, high) for low, high in COARSE_BINS_M),
-    )
+        fives = [float(on_multiples(r, COARSE * step).sum()) for r in own]
+        figures[key_of("coarse", low, high)] = ratio(fives, [len(r) for r in own])
+    return figures
 
 
 def on_multiples(ranges: Float, step_m: float) -> NDArray[np.bool_]:

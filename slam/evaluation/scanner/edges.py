@@ -7,12 +7,11 @@ A mixed pixel is a range where nothing is: the spot lights the edge and what is 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.evaluation.scanner.figures import NOTHING, Figure, ratio
+from slam.evaluation.scanner.figures import Figures, key_of, ratio
 from slam.evaluation.scanner.stretches import Stretch
 from slam.frames import Float
 
@@ -23,35 +22,24 @@ DEPTH_BINS_M = ((0.4, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 20.0))  # from side to
 LEAST_EDGES = 30  # below which a bin says nothing
 
 
-@dataclass(frozen=True, kw_only=True)
-class Edges:
-    """Of edges with at most one beam between the sides; by their depth, in ``DEPTH_BINS_M``.
+def edges(stretches: Sequence[Stretch]) -> Figures:
+    """Of edges with at most one beam between the sides, of all scans that are looked at.
 
-    between  share with a range between the sides
-    lost     share with a beam without a return
-    place    mean of where those ranges lie: 0 at the near side, 1 at the far side
+    between    by their depth, the share with a range between the sides
+    edge_lost  share with a beam without a return
+    place      mean of where those ranges lie: 0 at the near side, 1 at the far side
     """
-
-    between: tuple[Figure, ...]
-    lost: Figure
-    place: Figure
-
-
-def edges(stretches: Sequence[Stretch]) -> Edges:
-    """Of all scans that are looked at."""
     found = [np.concatenate([_edges(scan) for scan in part.looked_at()]) for part in stretches]
-
-    def share(low: float, high: float) -> Figure:
+    mixed = [e[e[:, 1] == 1.0, 2] for e in found]
+    figures = {
+        "edge_lost": ratio([float((e[:, 1] == 2.0).sum()) for e in found], [len(e) for e in found]),
+        "place": ratio([float(m.sum()) for m in mixed], [len(m) for m in mixed]),
+    }
+    for low, high in DEPTH_BINS_M:
         own = [e[(e[:, 0] >= low) & (e[:, 0] < high)] for e in found]
         made = ratio([float((e[:, 1] == 1.0).sum()) for e in own], [len(e) for e in own])
-        return made if made.n >= LEAST_EDGES else NOTHING
-
-    mixed = [e[e[:, 1] == 1.0, 2] for e in found]
-    return Edges(
-        between=tuple(share(low, high) for low, high in DEPTH_BINS_M),
-        lost=ratio([float((e[:, 1] == 2.0).sum()) for e in found], [len(e) for e in found]),
-        place=ratio([float(m.sum()) for m in mixed], [len(m) for m in mixed]),
-    )
+        figures[key_of("between", low, high)] = made.if_of(LEAST_EDGES)
+    return figures
 
 
 def mixed_beams(ranges: Float) -> NDArray[np.int64]:

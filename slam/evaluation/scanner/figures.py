@@ -44,8 +44,19 @@ class Figure:
         """Whether there were stretches enough to draw from."""
         return math.isfinite(self.low) and math.isfinite(self.high)
 
+    def if_of(self, least: int) -> Figure:
+        """Itself, where it is of so many beams, walls or edges; less says nothing."""
+        return self if self.n >= least else NOTHING
+
 
 NOTHING = Figure(value=math.nan, low=math.nan, high=math.nan, n=0, stretches=0)
+Figures = dict[str, Figure]
+"""By the keys of ``slam.evaluation.scanner.card.STATISTICS``."""
+
+
+def key_of(key: str, low: float, high: float) -> str:
+    """Of a statistic within a bin."""
+    return f"{key}.{low:g}-{high:g}"
 
 
 def exact(value: float, n: int, stretches: int) -> Figure:
@@ -53,12 +64,8 @@ def exact(value: float, n: int, stretches: int) -> Figure:
     return Figure(value=value, low=math.nan, high=math.nan, n=n, stretches=stretches)
 
 
-def _usual(mean: float) -> float:
-    return mean
-
-
 def ratio(
-    sums: Sequence[float], counts: Sequence[float], told: Callable[[float], float] = _usual
+    sums: Sequence[float], counts: Sequence[float], told: Callable[[float], float] = float
 ) -> Figure:
     """``told`` of sum / count; one ``sums`` and one ``counts`` >= 0 a stretch.
 
@@ -73,7 +80,7 @@ def ratio(
     return _figure(len(count), round(float(count.sum())), of, told)
 
 
-def median(values: Sequence[Float], told: Callable[[float], float] = _usual) -> Figure:
+def median(values: Sequence[Float], told: Callable[[float], float] = float) -> Figure:
     """``told`` of the median of all values; (k,) values >= 0 a stretch."""
     own = [np.asarray(v, np.float64) for v in values if len(v)]
     every = np.concatenate([np.zeros(0), *own])

@@ -109,6 +109,9 @@ class Belief:
         match = near(self._match(observations, prediction, cell_map), prediction)
         self._agreement.take(prediction, match.T_map_robot)
         odd = self._suspect or self._usual.is_odd(match, observations)
+        if self._odds.asked and self._agreement.dragged(observations.mean_vote) > 0.5:
+            pose = self._undragged(match)
+            match, odd = unmatched(pose, matched=match.matched, score=0.0), True
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
         episode = self._begun(cell_map, observations, prediction, match)
@@ -267,29 +270,25 @@ class Belief:
             goes_on = self._usual.share(found, observations) >= self._config.breaks
             self._note_break(episode, observations, prediction, found)
             self._usual.follow(found, observations, prediction.elapsed)
-            pose = self._undragged(observations, prediction, found, episode.evidence.latest_m)
-            episode.matched = goes_on and pose is None
+            self._agreement.take(prediction, found.T_map_robot)
+            # what the map confirmed in the scan before was not all hidden
+            dragged = (
+                episode.evidence.latest_m < self._config.confirmed_m
+                and self._agreement.dragged(observations.mean_vote) > 0.5
+            )
+            episode.matched = goes_on and not dragged
             match = found if episode.matched else replace(match, matched=found.matched)
-            if pose is not None:
-                match = replace(match, T_map_robot=pose)
+            if dragged:
+                match = replace(match, T_map_robot=self._undragged(found))
         episode.before = episode.evidence.copy()
         episode.evidence.add(cell_map, observations, match.T_map_robot)
         episode.match = match
         return match
 
-    def _undragged(
-        self, observations: Observations, prediction: Prediction, match: Match, seen_m: float
-    ) -> Float | None:
-        """Where odometry leads, (3,), if movers hide the map and rather carried the matches off.
-
-        ``seen_m``: m of the map that the scan before confirmed.
-        """
-        agreement = self._agreement
-        agreement.take(prediction, match.T_map_robot)
-        if seen_m >= self._config.confirmed_m or agreement.dragged(observations.mean_vote) <= 0.5:
-            return None
-        pose = agreement.undragged(match.T_map_robot)
-        agreement.forget()
+    def _undragged(self, match: Match) -> Float:
+        """Where odometry leads, (3,): movers rather carried the matches off from there."""
+        pose = self._agreement.undragged(match.T_map_robot)
+        self._agreement.forget()
         return pose
 
     def _weigh(self, episode: Episode) -> None:
@@ -330,16 +329,15 @@ class Belief:
         prediction: Prediction,
     ) -> Judged:
         """Whether one place is certain: where motion led, or another; else wait."""
-        sure, weighed = 1.0 - self._config.frozen_above, self._weighed
-        waited_enough = episode.elapsed_s > self._give_up_s
+        weighed, waited_enough = self._weighed, episode.elapsed_s > self._give_up_s
+        sure = 1.0 - self._config.frozen_above * (10.0 if waited_enough else 1.0)
         for place, p in zip(episode.places.followed, weighed.places, strict=True):
             same = _same(place.match, match) and p > weighed.followed
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks
-            taken = p >= 0.5 if waited_enough else p >= sure and goes_on
+            taken = p >= sure and (goes_on or waited_enough)
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
                 return self._found(place, episode, cell_map, observations, prediction)
-        elsewhere = self._likeliest is not None and self.p_lost < 0.5
-        if 1.0 - self._p_off >= sure or (waited_enough and not elsewhere):
+        if 1.0 - self._p_off >= sure:
             self._episode = None
             return self._settled(episode.local, match, prediction)
         if episode.elapsed_s > prediction.elapsed:

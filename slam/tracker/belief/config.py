@@ -25,7 +25,7 @@ class BeliefConfig(Settings):
         6.0, "m", "of surface from which on it counts a metre alike: more than one view shows"
     )
     confirmed_share: float = number(
-        0.15, "m/m", "of what is seen through, added to c: a wrong place confirms as it denies",
+        0.15, "m/m", "of what is seen through, added to c: a wrong place confirms and contradicts",
     )  # fmt: skip
     through_per_m: float = number(
         6.2, "nats/m", "b: of long-known surface that they see through", FITTED, low=1e-3

@@ -48,7 +48,7 @@ class UsualConfig(Settings):
     )
     fallen_s: float = number(1.0, "s", "memory of the usual reward", low=1e-3)
     outvoted: float = number(
-        0.75, "vote", "mean vote from which on a reward that fell means nothing", high=1.0
+        0.75, "vote", "mean weight of returns: above, a reward that fell means nothing", high=1.0
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers of trust in returns: who votes, and when odometry denies the matches."""
+"""The numbers of trust in returns: the weight of a return, and when odometry contradicts."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ SEEDS = "training seeds of crowds, and real logs (docs/trust_in_returns.md)"
 
 @dataclass(frozen=True, kw_only=True)
 class StandingConfig(Settings):
-    """For how long the place of a return was not seen empty, and what vote it has by that."""
+    """For how long the place of a return was not seen empty, and what weight it has by that."""
 
     settled_s: float = number(
-        5.0, "s", "a return whose place was seen empty so long ago has half a vote; 0: all vote",
+        5.0, "s", "a return whose place was seen empty so long ago has half its weight; 0: off",
         SEEDS,
     )  # fmt: skip
     young_trace: float = number(
-        1.0, "share", "of a faint trace (1 - y) that is closed to who has no vote", SEEDS, high=1.0
+        1.0, "share", "of a faint trace (1 - y), closed to returns without weight", SEEDS, high=1.0
     )
     views: int = number(5, "scans", "earlier scans that are asked", SEEDS, low=1, high=64)
     spacing_s: float = number(
@@ -43,13 +43,13 @@ class StandingConfig(Settings):
         0.25, "m", "returns this near to such a place belong to what left it", SEEDS
     )
     along_m: float = number(
-        0.3, "m", "votes are averaged along a surface so far each way", SEEDS, low=1e-3
+        0.3, "m", "weights are averaged along a surface so far each way", SEEDS, low=1e-3
     )
     thin_m: float = number(
-        0.1, "m", "narrower things vote: earlier beams may have missed them", SEEDS
+        0.1, "m", "narrower things keep their weight: earlier beams may have missed them", SEEDS
     )
     disagreed: float = number(
-        5.0, "ratio", "of corrections over what odometry may be off, squared, at which it is as "
+        3.0, "ratio", "of corrections over what odometry may be off, squared, at which it is as "
         "likely as not that something is wrong; 0: never asked", SEEDS,
     )  # fmt: skip
     window_s: float = number(2.0, "s", "corrections are summed over it", SEEDS, low=1e-3)
@@ -57,7 +57,7 @@ class StandingConfig(Settings):
     match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
     match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
     doubtful_m: float = number(
-        0.15, "m", "deviation by being dragged: not converged; 0: never", SEEDS
+        0.15, "m", "deviation by drift that movers cause: not converged; 0: never", SEEDS
     )
 
 

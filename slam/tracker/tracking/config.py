@@ -16,7 +16,7 @@ class TrackingConfig(Settings):
     """Following the robot, and finding it again."""
 
     give_up_s: float = number(
-        60.0, "s", "of doubt; then the likeliest place is gone on at, or else where motion led"
+        60.0, "s", "of doubt; from then on a place is certain at ten times belief.frozen_above"
     )
     relocalise: RelocaliseConfig = field(default=RelocaliseConfig())
 
@@ -35,9 +35,9 @@ class LoopsConfig(Settings):
     gate_rad: float = number(0.5, "rad", "heading error at which loops are searched")
     near_m: float = number(1.0, "m", "a submap this far beyond the gate is tried")
     most: int = number(4, "places", "most that are examined for one loop", low=1, high=1000)
-    again_m: float = number(3.0, "m", "second pass: farthest passage that is tied")
+    again_m: float = number(3.0, "m", "second pass: farthest revisit constrained")
     passages: int = number(
-        3, "passages", "second pass: most passages tied to a key frame", low=1, high=1000
+        3, "passages", "second pass: most revisits constrained to a key frame", low=1, high=1000
     )
     recent: int = number(
         6, "key frames", "before it that a step is matched against", low=1, high=1000
@@ -54,7 +54,7 @@ class LoopsConfig(Settings):
     good_step: float = number(0.5, "share", "least matched share to take a step's match")
     good_match: float = number(0.6, "share", "least matched share of a loop")
     good_support: float = number(0.5, "share", "least support of a loop")
-    alias: float = number(0.9, "share", "of the best support: another is a rival, no loop")
+    alias: float = number(0.9, "share", "of the best support: where another place has it, no loop")
     chain_m: float = number(0.02, "m", "added deviation of a step's match", low=1e-6)
     chain_rad: float = number(0.0015, "rad", "added deviation of a step's match", low=1e-6)
     loop_m: float = number(0.03, "m", "added deviation of a loop", low=1e-6)
@@ -68,7 +68,7 @@ class LoopsConfig(Settings):
     agree_m: float = number(0.3, "m", "a closure farther off needs another that agrees", low=1e-6)
     agree_rad: float = number(0.05, "rad", "a closure farther off needs another that agrees")
     denying: int = number(
-        2, "key frames", "at which the map is torn: it is drawn anew", low=1, high=MANY
+        2, "key frames", "found torn: from so many on the map is drawn again", low=1, high=MANY
     )
     datum: str = word(
         "all", ("all", "first"), "what a correction moves least: all key frames, or the first"

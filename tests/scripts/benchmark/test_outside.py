@@ -49,7 +49,8 @@ def test_submit_verify_and_merge(outside: Path):
     submit, verify, merge = block.strip().splitlines()
 
     printed = call(f"{submit} {SHORT}")
-    assert "Too few runs to tell: 1 at each level" in printed
+    assert "6 seeds tell from which level on; these are 1." in printed
+    assert "`my_slam:MySlam` was lost in" in printed
     file = outside / "out/benchmark/submission_my_slam.json"
     data = json.loads(file.read_text())
     assert data["slam"] == "my_slam:MySlam"

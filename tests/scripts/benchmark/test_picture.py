@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
@@ -46,13 +45,6 @@ def test_names_at_the_ends_of_lines_never_overlap():
     assert picture.spread([10.0, 90.0]) == [10.0, 90.0]
 
 
-def test_both_pictures_are_drawn(board, tmp_path):
-    lost = picture.read(board)
-    for draw in (picture.overall, picture.by_track):
-        draw(lost, tmp_path / "it.png")
-        assert cv2.imread(str(tmp_path / "it.png")) is not None
-
-
 def test_what_is_no_leaderboard_is_refused(tmp_path):
     path = tmp_path / "leaderboard.json"
     for text in ("[]", "{}", "no json", '{"tracks": {"a": 1}, "levels_run": [0]}'):
@@ -73,10 +65,12 @@ def test_a_leaderboard_is_published(board, tmp_path):
     data["slams"] = ["mine"]
     data["leaderboard"]["a-v1 mine"] |= {"lost_from": 0.5, "lost_at_top": 0.75}
     board.write_text(json.dumps(data, indent=1))
-    (board.parent / "leaderboard.md").write_text("# Leaderboard\n")
+    (board.parent / "leaderboard.md").write_text("# Leaderboard\n\n## a-v1\n\n| long |\n")
     docs = tmp_path / "docs"
     (docs / "pictures").mkdir(parents=True)
-    (docs / "benchmark.md").write_text("<!-- leaderboard -->\n<!-- /leaderboard -->\n")
+    (docs / "benchmark.md").write_text(
+        "".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in ("tracks", "leaderboard"))
+    )
     words = [str(tmp_path), "--docs", str(docs), "--results", str(docs), "--commit", "abc"]
     assert publish.main(words) == 0
     page = (docs / "benchmark.md").read_text()
@@ -86,5 +80,8 @@ def test_a_leaderboard_is_published(board, tmp_path):
     assert "`c-v1`" in page
     assert "`a-v1` 1 of 1, `b-v1` 0 of 1" in page
     assert json.loads((docs / "leaderboard.json").read_text())["commit"] == "abc"
-    assert (docs / "leaderboard.md").is_file()
+    short = (docs / "leaderboard.md").read_text()
+    assert "| long |" not in short
+    assert "(results/leaderboard.csv)" in short
+    assert (docs / "leaderboard.csv").read_text().startswith("track,counts,slam,")
     assert (docs / "pictures" / "benchmark.png").is_file()

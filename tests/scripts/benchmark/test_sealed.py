@@ -6,16 +6,17 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from scripts.benchmark import sealed, submission
 from scripts.benchmark.again import made_again
 from scripts.benchmark.make import Wanted, carry_out
-from scripts.benchmark.tracks import TEST, TRACKS, TRAIN
+from scripts.benchmark.tracks import TEST, TRACKS, TRAIN, newest
 from slam.errors import InvalidValueError, LogFormatError
 
-TRACK = TRACKS["no-walls-v1"]
+TRACK = newest()["no-walls"]
 
 
 def test_they_come_back_and_are_none_that_is_published(tmp_path: Path):
@@ -50,7 +51,8 @@ def test_the_seal_is_of_each_seed_its_order_and_the_salt():
         ("sealed", "21", "whole numbers"),
         ("salt", "", "64 hexadecimal"),
         ("what", "a recipe", "no sealed seeds"),
-        ("tracks", {}, "its tracks are others"),
+        ("tracks", {}, "one or more"),
+        ("tracks", {TRACK.name: "0" * 64}, "none of this version's"),
         ("more", 1, "no sealed seeds"),
     ],
 )
@@ -61,6 +63,21 @@ def test_what_is_wrong_is_named(tmp_path: Path, key: str, value: object, says: s
     with pytest.raises(LogFormatError, match=says) as told:
         sealed.read(path)
     assert str(path) in str(told.value)
+
+
+def test_a_later_track_takes_nothing_from_seeds_that_were_sealed_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    drawn, path = sealed.drawn(2), tmp_path / "seeds.json"
+    sealed.write(path, drawn)
+    later = TRACK.later(seconds=30.0)
+    monkeypatch.setitem(TRACKS, later.name, later)
+    assert sealed.read(path).sha256 == drawn.sha256
+    wanted: dict[str, Any] = {"slams": ("ekf",), "subject": "ekf", "seeds": 2}
+    Wanted(tracks=(TRACK,), sealed=sealed.read(path), **wanted)
+    with pytest.raises(InvalidValueError, match=f"not for track {later.name}"):
+        Wanted(tracks=(later,), sealed=sealed.read(path), **wanted)
+    Wanted(tracks=(later,), sealed=sealed.drawn(2), **wanted)
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,13 @@ import pytest
 from scripts.benchmark import again, make, submission
 from scripts.benchmark.make import Wanted
 from scripts.benchmark.submission import Submission
-from scripts.benchmark.tracks import LEVELS, TRACKS
+from scripts.benchmark.tracks import LEVELS, newest
+from scripts.result_files import MAX_BYTES
+from sim.core import versions
 from sim.core.versions import WorldVersionError
 from slam.errors import InvalidValueError, LogFormatError
 
-TRACK = "tour-guide-v1"
+TRACK = newest()["tour-guide"].name
 ROW = {
     "outcome": "finished", "failure": None, "lost": 0, "scans": 282.0, "lost_at_s": None,
     "ate_unaligned_m": 0.01, "error_tracking_m": 0.01, "silent_share": float("nan"),
@@ -164,24 +166,48 @@ def test_damage_and_other_files_are_refused(file: Path):
         file.write_text(wrong)
         with pytest.raises(LogFormatError):
             submission.read(file)
-    file.write_text(text.replace('"world": 2', '"world": 1'))
-    with pytest.raises(WorldVersionError):
-        submission.read(file)
     with pytest.raises(LogFormatError):
         submission.read(file.parent)
     with file.open("wb") as big:
-        big.truncate(submission.MAX_BYTES + 1)
+        big.truncate(MAX_BYTES + 1)
     with pytest.raises(LogFormatError, match="at most"):
         submission.read(file)
 
 
+def test_a_submission_of_an_older_world_is_read_but_its_scans_are_not_made_again(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(versions, "WORLD", versions.WORLD + 1)
+    assert submission.read(file).runs == made().runs
+    with pytest.raises(WorldVersionError, match=f"track {TRACK}: cannot be made again"):
+        list(again.made_again(file, 1))
+
+
+@pytest.mark.parametrize(
+    ("by", "kind"),
+    [(1, WorldVersionError), (-1, LogFormatError)],
+    ids=["newer", "of no such track"],
+)
+def test_a_submission_that_says_another_world_than_its_tracks_is_refused(
+    file: Path, by: int, kind: type[Exception]
+):
+    data = json.loads(file.read_text())
+    data["world"] += by
+    data["sha256"] = submission._sha256({k: v for k, v in data.items() if k != "sha256"})
+    file.write_text(json.dumps(data))
+    with pytest.raises(kind, match=f"world.* {data['world']}"):
+        submission.read(file)
+
+
 def test_only_what_is_alike_is_merged():
-    track = TRACKS[TRACK]
+    track = newest()["tour-guide"]
     plain: dict[str, Any] = {"tracks": (track,), "slams": ("ekf",), "subject": "ekf", "seeds": 2}
     make._check_alike([made()], Wanted(**plain), set())
     for other in ({"seeds": 3}, {"quick": True}, {"seconds": 5.0}, {"train": True}):
         with pytest.raises(InvalidValueError, match="those of the board"):
             make._check_alike([made()], Wanted(**plain | other), set())
+    with pytest.raises(InvalidValueError, match="the board has none of its tracks"):
+        make._check_alike([made()], Wanted(**plain | {"tracks": (track.later(),)}), set())
     with pytest.raises(InvalidValueError, match="of that name"):
         make._check_alike([made(), made()], Wanted(**plain), set())
     there = {(level, seed): f"{seed:064x}" for level in LEVELS for seed in (720, 721)}

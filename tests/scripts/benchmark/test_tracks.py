@@ -1,20 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tracks: twelve, each as it was published, each possible."""
+"""The tracks: each as it was published, each possible, and a new one beside them."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import scenes
 from scenes.crowd import crowd_of
-from scripts.benchmark.tracks import LEVELS, TEST, TRACKS, TRAIN, Track, chosen
+from scripts.benchmark.publish import tracks_table
+from scripts.benchmark.tracks import LEVELS, TEST, TRACKS, TRAIN, Track, chosen, newest, register
+from sim.core import versions
+from sim.core.versions import WORLD, WorldVersionError
 from slam.errors import InvalidValueError, UnknownNameError
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "benchmark.md"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+BOARD = json.loads((DOCS / "results" / "leaderboard.json").read_text())
 
-PUBLISHED = {
+PUBLISHED = {  # what is published is added, and nothing here ever changes
     "tour-guide-v1": "5af2086d9b4e",
     "rush-hour-v1": "4005dac13643",
     "busy-chairs-v1": "fbce4241b9fe",
@@ -28,16 +34,54 @@ PUBLISHED = {
     "kidnapped-in-a-crowd-v1": "e73cb0e804eb",
     "no-walls-v1": "d11c3e575a0a",
 }
+NOW = [track for track in newest().values() if track.world == WORLD]
+ONE = TRACKS["tour-guide-v1"]
 
 
-def test_a_track_never_changes():
+@pytest.fixture
+def one_more() -> Iterator[Track]:
+    """A second version of one of them, for as long as the test runs."""
+    later = ONE.later(seconds=30.0)
+    register(later)
+    yield later
+    del TRACKS[later.name]
+
+
+def test_a_published_track_never_changes():
     """One that must gets a new version, or its numbers would have two meanings."""
-    assert {name: track.sha256[:12] for name, track in TRACKS.items()} == PUBLISHED
+    assert {name: TRACKS[name].sha256[:12] for name in PUBLISHED} == PUBLISHED
+    for name, said in BOARD["tracks"].items():
+        assert said["sha256"] == TRACKS[name].sha256
+        assert name in PUBLISHED
 
 
-def test_there_are_twelve_and_tuning_has_seeds_of_its_own():
-    assert len(TRACKS) == 12
-    assert all(name.endswith("-v1") and track.name == name for name, track in TRACKS.items())
+def test_another_world_moves_no_hash_and_runs_no_track_of_this_one(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr(versions, "WORLD", WORLD + 1)
+    test_a_published_track_never_changes()
+    says = f"track tour-guide-v1: cannot be made again, it is of world version {ONE.world}, this"
+    with pytest.raises(WorldVersionError, match=says):
+        ONE.plan((), (720,))
+    later = ONE.later(world=WORLD + 1)
+    assert later.plan((), (720,)).runs()
+    assert later.sha256 != ONE.later().sha256
+
+
+def test_a_new_version_is_one_declaration_and_moves_nothing_else(one_more: Track):
+    assert (one_more.name, one_more.family, one_more.version) == ("tour-guide-v2", "tour-guide", 2)
+    test_a_published_track_never_changes()
+    test_the_page_has_every_published_track()
+    assert chosen(["tour-guide"]) == (one_more,)
+    assert chosen(["tour-guide-v1", "tour-guide-v2"]) == (ONE, one_more)
+    assert ONE not in chosen(None)
+    assert len(chosen(None)) == len({track.family for track in TRACKS.values()})
+    register(one_more)
+    with pytest.raises(InvalidValueError, match="tour-guide-v2 is there already"):
+        register(ONE.later(seconds=31.0))
+
+
+def test_tuning_has_seeds_of_its_own():
     assert not set(TRAIN) & set(TEST)
     for track in TRACKS.values():
         assert track.scanner == "noise"
@@ -45,11 +89,11 @@ def test_there_are_twelve_and_tuning_has_seeds_of_its_own():
         assert track.controls[1].startswith("oracle(shunting")
 
 
-@pytest.mark.parametrize("name", TRACKS)
-def test_every_level_sets_something_else_and_the_top_one_has_room(name: str):
-    plan = TRACKS[name].plan(("ekf",), (TEST[0],))
+@pytest.mark.parametrize("track", NOW, ids=lambda track: track.name)
+def test_every_level_sets_something_else_and_the_top_one_has_room(track: Track):
+    plan = track.plan(("ekf",), (TEST[0],))
     assert plan.levels == LEVELS
-    assert plan.slams == ("ekf", *TRACKS[name].controls)
+    assert plan.slams == ("ekf", *track.controls)
     recipes = [plan.recipe(run) for run in plan.runs()]
     assert len({recipe.sha256 for recipe in recipes}) == len(LEVELS)
     assert recipes[0].motion in (0.0, 0.5, 1.0)
@@ -59,26 +103,24 @@ def test_every_level_sets_something_else_and_the_top_one_has_room(name: str):
     assert crowd_of(built.options.get("crowd", "none")) == wanted
 
 
-def test_the_page_has_every_track_with_its_levels():
-    rows = [line for line in PAGE.read_text().splitlines() if line.startswith("| `")]
-    for track in TRACKS.values():
-        (row,) = (row for row in rows if f"`{track.name}`" in row)
-        counts = ", ".join(word.split(" ", 1)[0] for word in track.says)
-        for words in (track.about, f"{track.axis}: {counts}", track.scene, f"{track.seconds:g}"):
-            assert words in row
+def test_the_page_has_every_published_track():
+    assert tracks_table(BOARD) in (DOCS / "benchmark.md").read_text()
 
 
 def test_names_may_leave_out_the_version_and_a_wrong_one_is_told():
-    assert chosen(["tour-guide", "no-walls-v1"]) == (TRACKS["tour-guide-v1"], TRACKS["no-walls-v1"])
-    assert chosen(None) == tuple(TRACKS.values())
-    with pytest.raises(UnknownNameError, match=r"'tour-giude'.*tour-guide-v1"):
+    assert chosen(["tour-guide", "no-walls-v1"]) == (newest()["tour-guide"], TRACKS["no-walls-v1"])
+    with pytest.raises(UnknownNameError, match=r"'tour-giude'.*tour-guide"):
         chosen(["tour-giude"])
+    with pytest.raises(UnknownNameError, match=r"'tour-guide-v9'.*tour-guide-v1"):
+        chosen(["tour-guide-v9"])
 
 
 def test_a_track_that_cannot_be_is_refused():
-    one = TRACKS["tour-guide-v1"]
-    told = {"name": "x", "about": "x", "scene": "arena", "axis": "x", "says": one.says}
+    told = {"name": "x-v1", "about": "x", "world": 2, "scene": "arena", "axis": "x"}
     with pytest.raises(InvalidValueError, match=r"Track\.sets must have 5 levels"):
-        Track(**told, sets=one.sets[:4])
+        Track(**told, says=ONE.says, sets=ONE.sets[:4])
     with pytest.raises(InvalidValueError, match="must be apart"):
-        Track(**told, sets=one.sets, train=(720,))
+        Track(**told, says=ONE.says, sets=ONE.sets, train=(720,))
+    for name in ("x", "x-v0", "X-v1", "x-v01", "-v1"):
+        with pytest.raises(InvalidValueError, match="end in its version"):
+            Track(**told | {"name": name}, says=ONE.says, sets=ONE.sets)

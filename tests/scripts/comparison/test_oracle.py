@@ -6,17 +6,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import typer
-from typer.testing import CliRunner
 
 import slam
 from scripts.comparison import entry, folder, make
-from scripts.comparison.plan import Plan, source_of
+from scripts.comparison.plan import Plan
 from scripts.comparison.recording import load
-from scripts.many import ManyValues
+from scripts.imports import source_of
 from scripts.names import file_name
 from scripts.output import slams_of
-from scripts.verbs import compare as verb
 from sim.simulation import Simulation, tour
 from slam import system
 from slam.frames import BeamClass, Frame
@@ -67,20 +64,6 @@ def test_each_slam_of_a_comparison_sees_what_it_may(tmp_path: Path, monkeypatch)
     assert slams_of(tmp_path / "recipe.json", compared.recipe["settings"]) == list(slams)
 
 
-def test_an_oracle_joins_a_comparison_and_nothing_is_made_again(tmp_path: Path):
-    plan = Plan(slams=("odometry",), **PLAN)
-    make.carry_out(plan, tmp_path)
-    before = {file: file.stat().st_mtime_ns for file in tmp_path.glob("*/arena*-*.npz")}
-    assert len(before) == 2
-    more = Plan(slams=("odometry", "oracle(odometry)"), **PLAN)
-    rows = make.carry_out(more, tmp_path)
-    assert {file: file.stat().st_mtime_ns for file in before} == before
-    assert rows[0]["ate_unaligned_m"] == rows[1]["ate_unaligned_m"]
-    after = {file: file.stat().st_mtime_ns for file in tmp_path.glob("*/arena*-*.npz")}
-    make.carry_out(more, tmp_path)
-    assert {file: file.stat().st_mtime_ns for file in after} == after
-
-
 def test_in_a_room_without_movers_the_oracle_is_the_slam():
     """Dynamism 0 and nothing that could move: byte for byte."""
     simulation = Simulation("arena", seed=3, dynamism=0.0, n_chairs=0, n_people=0, labels=True)
@@ -95,22 +78,6 @@ def test_in_a_room_without_movers_the_oracle_is_the_slam():
         [e.T_map_robot.tobytes() for e in t.estimates] for t in replay.tracks.values()
     )
     assert all(other == first for other in others)
-
-
-def test_the_option_names_them_beside_the_slams(monkeypatch):
-    seen: dict[str, Plan] = {}
-    app = typer.Typer()
-    app.command(cls=ManyValues)(verb.compare)
-    monkeypatch.setattr(make, "carry_out", lambda plan, out, **ways: seen.update(plan=plan) or [])
-    monkeypatch.setattr(verb, "tell", lambda *_: None)
-    line = "--slam shunting,oracle(ekf,moving),ekf --oracle shunting karto,moving --scene arena"
-    words = [*line.split(), "--set", "shunting.reward=7", "--out", "there"]
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 0, result.output
-    assert seen["plan"].slams == (
-        "shunting{reward=7}", "oracle(ekf,moving)", "ekf", "oracle(shunting{reward=7})",
-        "oracle(karto,moving)",
-    )  # fmt: skip
 
 
 def test_names_of_files_and_code_within():

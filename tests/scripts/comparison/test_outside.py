@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from scripts.comparison import plan as plan_module
+from scripts import imports
 from scripts.comparison.entry import Entry
-from scripts.comparison.plan import Plan, source_of
+from scripts.comparison.plan import Plan
+from scripts.imports import source_of
 from scripts.jobs import _digest
 from slam.guests import Limits
 from tests.scripts.comparison.hand_made import recording
@@ -118,21 +119,6 @@ def test_of_what_is_installed_only_its_package_counts(own: Path):
     assert "own_helper.py" not in within
 
 
-def test_after_a_change_in_a_helper_its_runs_are_made_again(own: Path):
-    def files() -> dict[str, str]:
-        jobs = Plan(
-            slams=("own_module:System", "odometry"), scenes=("arena",), levels=(0.0,), seeds=(1,)
-        ).entries()
-        _digest.cache_clear()
-        return {slam: job.file_name() for _, slam, job in jobs}
-
-    before = files()
-    assert files() == before
-    (own / "own_helper.py").write_text("GAIN = 2.0")
-    assert files()["odometry"] == before["odometry"]
-    assert files()["own_module:System"] != before["own_module:System"]
-
-
 def files_of(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
     """File names of the runs, and of the SLAMs on them."""
     _digest.cache_clear()
@@ -140,32 +126,32 @@ def files_of(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
     return runs, {slam: job.file_name() for _, slam, job in plan.entries()}
 
 
-def test_after_a_change_in_a_module_given_by_with_all_is_made_again(own: Path, monkeypatch):
-    plan = Plan(slams=("odometry",), scenes=("arena",), levels=(0.0,), seeds=(1,))
-    without = files_of(plan)
-    monkeypatch.setattr(plan_module, "loaded", lambda: ("own_module",))
+@pytest.mark.parametrize(
+    ("slam", "scene", "given", "file", "remade"),
+    [
+        ("own_module:System", "arena", (), "own_helper.py", (False, True)),
+        ("odometry", "arena", ("own_module",), "own_helper.py", (True, True)),
+        ("odometry", "own_module:room", (), "own_helper.py", (True, True)),
+        ("odometry", "own_module:room", (), "room.xml", (True, True)),
+        ("odometry", "arena", (), "own_helper.py", (False, False)),
+    ],
+)
+def test_after_a_change_in_code_of_ones_own_what_depends_on_it_is_made_again(
+    own: Path, monkeypatch, slam, scene, given, file, remade
+):
+    """Recordings, and SLAMs on them: a SLAM, what ``--with`` loads, a scene or its plan."""
+    monkeypatch.setattr(imports, "loaded", lambda: given)
+    plan = Plan(slams=(slam,), scenes=(scene,), levels=(0.0,), seeds=(1,))
     before = files_of(plan)
-    assert before != without
-    (own / "own_helper.py").write_text("SIGMA_M = 0.5")
-    runs, entries = files_of(plan)
-    assert runs["arena_d0_s1"] != before[0]["arena_d0_s1"]
-    assert entries["odometry"] != before[1]["odometry"]
-
-
-def test_after_a_change_in_a_scene_of_ones_own_or_its_plan_it_is_made_again(own: Path):
-    plan = Plan(slams=("odometry",), scenes=("own_module:room",), levels=(0.0,), seeds=(1,))
-    found = [files_of(plan)]
-    for name in ("own_helper.py", "room.xml"):
-        (own / name).write_text("")
-        found.append(files_of(plan))
-    runs = [next(iter(runs.values())) for runs, _ in found]
-    assert len(set(runs)) == len(runs)
+    assert files_of(plan) == before
+    (own / file).write_text("")
+    assert tuple(a != b for a, b in zip(files_of(plan), before, strict=True)) == remade
 
 
 def test_rows_are_scored_again_when_what_scores_them_changes():
     plan = Plan(slams=("odometry",), scenes=("arena",), levels=(0.0,), seeds=(1,))
     ((_, _, job),) = plan.entries()
-    scoring = {"columns.py", "entry.py", "maps.py", "memory.py", "places.py", "sight.py"}
+    scoring = {"entry.py", "maps.py", "memory.py", "places.py", "sight.py"}
     scoring |= {"judged.py", "row.py", "table.py"}
     assert scoring | {"slam"} <= {path.name for path in job.code}
     assert not {"tables.py", "verb.py", "plan.py"} & {path.name for path in job.code}

@@ -14,9 +14,8 @@ import pytest
 
 from scripts.comparison import folder, make
 from scripts.comparison.plan import Plan
-from scripts.days import living, scores
-from scripts.days.make import beside
-from scripts.days.plan import Buildings, identity, name_of, of_comparison
+from scripts.days import lifelong, scores
+from scripts.days.buildings import Buildings, beside, identity, name_of, of_comparison
 from scripts.output import read_recipe_words
 from scripts.results import check
 from scripts.verbs import compare
@@ -153,18 +152,6 @@ def test_sessions_take_what_makes_the_buildings(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("sessions", [1, 51, 2.5])
-def test_a_count_that_cannot_be_is_refused(sessions):
-    with pytest.raises(InvalidValueError, match="--sessions"):
-        replace(PLAN, sessions=sessions)
-
-
-def test_a_first_session_that_would_be_too_long_is_refused():
-    recipe = Recipe(scene="arena", seed=7, dynamism=0.0, change=0.3, seconds=40_000.0)
-    with pytest.raises(InvalidValueError, match=r"--seconds must be at most 28800.*got 40000"):
-        Buildings(slams=("odometry",), recipes=(recipe,), sessions=2)
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [("{", "no rows"), ("[]", "schema 1"), ('{"schema": 1, "rows": []}', "without 'ages'"),
@@ -173,7 +160,7 @@ def test_a_first_session_that_would_be_too_long_is_refused():
 def test_what_is_no_life_is_refused(tmp_path, text, says):
     (tmp_path / "life.json").write_text(text)
     with pytest.raises(LogFormatError, match=says):
-        living.read(tmp_path / "life.json")
+        lifelong.read(tmp_path / "life.json")
 
 
 def test_one_that_cannot_start_is_a_row(compared, tmp_path):
@@ -181,7 +168,7 @@ def test_one_that_cannot_start_is_a_row(compared, tmp_path):
     (tmp_path / "lives").mkdir()
     files = sorted((compared.folder / "days/sessions").glob("*.npz"))
     mute = f"pipe:{sys.executable} -S -E -c pass"
-    living.live(tmp_path / "lives/a.json", sessions=[str(file) for file in files], slam=mute)
+    lifelong.live(tmp_path / "lives/a.json", sessions=[str(file) for file in files], slam=mute)
     found = json.loads((tmp_path / "lives/a.json").read_text())
     assert [row["place"] for row in found["rows"]] == ["failed", "failed"]
     assert found["ages"] == []

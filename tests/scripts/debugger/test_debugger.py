@@ -8,18 +8,17 @@ import math
 from pathlib import Path
 
 import cv2
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from scripts.cli import app
 from scripts.debugger.counterfactual import Inquest, Question, Trial, hold
-from scripts.debugger.episode import Case, case_of, options_of
+from scripts.debugger.episode import Case, case_of
 from scripts.debugger.picture import blame_picture
-from scripts.debugger.recording import Checkpoint, Strip, Tape, record, row_at
+from scripts.debugger.recording import Checkpoint, Tape, record
 from scripts.debugger.words import as_json, headline
 from sim.twins.absence import Change
-from slam.errors import InvalidValueError, LogFormatError, SlamFailedError, UnknownNameError
+from slam.errors import LogFormatError, SlamFailedError, UnknownNameError
 from slam.evaluation.divergence import Divergence
 
 SKITTISH = """
@@ -182,20 +181,11 @@ def test_a_slam_that_fails_with_other_noise_neither_strays_again_nor_is_cured(
     assert found.verdict == "undecided"
 
 
-def test_a_chosen_time_at_which_nothing_happens_is_said_to_be_that():
-    tape = record(case("Skittish", 2.0, dynamism=0.0, n_chairs=0))
-    found = hold(tape, Question(at_s=1.0, horizon_s=0.5))
-    assert found.verdict == "weak"
-    assert found.trials == []
-    with pytest.raises(InvalidValueError, match=r"--at must lie in 0\.\.1\.9 s, got 9"):
-        row_at(tape, 9.0)
-
-
 def trial(name: str, share: float, again: int, kind: str = "single") -> Trial:
     names = tuple(name.split("+"))
     return Trial(
         change=Change(out=names), kind=kind, rise_m=1.0 - share, share=share, cured=share > 0.5,
-        path_m=0.0, others_m=0.0, strip=Strip(), again=again,
+        again=again,
     )  # fmt: skip
 
 
@@ -205,11 +195,9 @@ def trial(name: str, share: float, again: int, kind: str = "single") -> Trial:
         ([trial("a", 0.9, 3), trial("b", 0.1, 0)], 3, "culprit", True),
         ([trial("a", 0.9, 2), trial("b", 0.1, 0)], 3, "culprit", False),
         ([trial("a", 0.9, 3), trial("b", 0.8, 3)], 3, "several", True),
-        ([trial("a", 0.9, 3), trial("b", 0.8, 1)], 3, "culprit", True),
         ([trial("a", 0.9, 1)], 3, "undecided", True),
         ([trial("a", 0.9, 3)], 1, "undecided", False),
         ([trial("a", 0.2, 0), trial("a+b", 0.9, 3, "pair")], 3, "joint", True),
-        ([trial("a", 0.2, 0), trial("a+b+c", 0.9, 3, "all")], 3, "joint", True),
         ([trial("a", 0.2, 0), trial("a+b+c", 0.1, 0, "all")], 3, "not the movers", True),
     ],
 )
@@ -268,7 +256,6 @@ def test_the_verb_leaves_picture_table_and_numbers(tmp_path: Path):
     [
         ((), "name exactly one of RUN and --scene"),
         (("nowhere",), "nowhere: no such folder"),
-        (("--scene", "arnea"), "Did you mean 'arena'"),
         (("--scene", "arena", "--threshold", "0"), "--threshold must be > 0"),
         (("--scene", "arena", "--every", "0"), "--every must be a whole number >= 1"),
         (("--scene", "arena", "--horizon", "-1"), "--horizon must be > 0 s"),
@@ -276,8 +263,6 @@ def test_the_verb_leaves_picture_table_and_numbers(tmp_path: Path):
         (("--scene", "arena", "--option", "walls"), "--option must be NAME=VALUE"),
         (("--scene", "arena", "--option", "seed=4"), "--option seed: that has an option"),
         (("--scene", "arena", "--option", "wall=no"), "cannot take these options"),
-        (("--scene", "arena", "--scanner", "best"), "no scanner is called 'best'. Known: lms221"),
-        (("--scene", "arena", "--slam", "shuntin"), "Did you mean 'shunting'"),
         (("--scene", "arena", "--seconds", "1", "--at", "7"), "--at must lie in"),
     ],
 )
@@ -312,17 +297,3 @@ def test_a_recipe_that_cannot_be_one_is_named(tmp_path: Path, text, says):
     (tmp_path / "recipe.json").write_text(text)
     with pytest.raises(LogFormatError, match=says):
         case_of(tmp_path, None, 1)
-
-
-def test_an_episode_of_a_dataset_is_a_case(tmp_path: Path):
-    made = mobilia("generate", "arena", "--seconds", "1", "--seed", "5", "--out", tmp_path / "data")
-    assert made.exit_code == 0
-    case = case_of(tmp_path / "data" / "arena-d0.5-s0005", None, 1)
-    assert (case.slam, case.seconds, case.settings["seed"]) == ("shunting", 1.0, 5)
-    assert np.isfinite(record(case).strip.errors_m((np.zeros(3), np.zeros(3)))).all()
-
-
-def test_options_are_read():
-    assert options_of(["walls=none", "n_chairs=6", "moving_share=0.3", "glass=true"]) == {
-        "walls": "none", "n_chairs": 6, "moving_share": 0.3, "glass": True,
-    }  # fmt: skip

@@ -10,38 +10,32 @@ import pytest
 from scipy.stats import chi2
 
 from scripts.experiments import association_effort, corner_recall, rival_bar, tune_ekf
-from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 from slam.frames import LaserSpec, Scan
 from slam.trajectory import Trajectory
 
 
-def test_trials_are_scored_on_the_training_seeds(tmp_path, monkeypatch):
+def test_trials_are_scored_beside_the_preset(monkeypatch):
     monkeypatch.setattr(tune_ekf, "WORLDS", {"points": ({"moving": 0.0, "n_steps": 15},)})
-    results = tune_ekf.tune("points", [0, 1], tmp_path, 1, ["noise_scale"])
-    assert [changes for changes, _ in results[:2]] == [{}, {"noise_scale": 0.8}]
-    assert all(scores.shape == (2, 1) for _, scores in results)
-    assert all((scores < math.log10(0.05)).all() for _, scores in results)
-    assert len(list(tmp_path.glob("*.json"))) == 2
-    lines = list(tune_ekf.table("points", results))
-    assert lines[4].startswith("| noise_scale | 1.25 | 0.8 |")
-    assert len(lines) == 4 + len(results) - 1
+    case = {"preset": "points", "world": 0, "seconds": 30.0}
+    trials = [(tune_ekf.FROZEN, 0), ("noise_scale", 0)]
+    rows = [
+        {**case, "knob": knob, "value": value, "seed": seed}
+        for knob, value in trials
+        for seed in (0, 1)
+    ]
+    rows = [row | tune_ekf.run(row) for row in rows]
+    assert all(row["score"] < math.log10(0.05) for row in rows)
+    told = tune_ekf.tell(rows).splitlines()
+    assert told[0].startswith("Preset points, 2 seeds: score -")
+    assert told[-1].startswith("| noise_scale | 1.25 | 0.8 |")
 
 
-def test_runs_on_corners_are_made_again_when_the_rooms_change():
-    corners, points = ({p.name for p in tune_ekf.made_of(w)} for w in ("corners", "points"))
-    assert {"slam", "sim", "scenes", "tune_ekf.py", "runs.py"} <= corners
-    assert {"slam", "tune_ekf.py", "runs.py"} <= points
-    assert not {"sim", "scenes"} & points
-
-
-@pytest.mark.parametrize("seeds", ["0", "21"])
-def test_seeds_that_are_shown_are_never_tuned_on(seeds, capsys):
-    assert max(tune_ekf.TRAINING) < 100
-    assert tune_ekf.main(["points", "--seeds", seeds]) == 1
-    assert (
-        f"--seeds must lie in [1, 20], the training seeds, got {seeds}" in capsys.readouterr().err
-    )
+@pytest.mark.parametrize("words", [["--first-seed", "20"], ["--seeds", "21"]])
+def test_seeds_that_are_shown_are_never_tuned_on(words, capsys, tmp_path):
+    more = ["--folder", str(tmp_path), "--results", str(tmp_path / "r.json")]
+    assert tune_ekf.STUDY.main([*words, *more]) == 1
+    assert "seeds must lie in 0 to 19, got 20" in capsys.readouterr().err
 
 
 def test_the_bar_is_judged_on_both_ways_to_associate():
@@ -88,19 +82,14 @@ def test_bar_refuses_impossible_numbers_of_seeds(capsys):
     assert "--seeds must lie in [1, 100], got 0" in capsys.readouterr().err
 
 
-def test_effort_of_association_is_told_for_each_number_of_pairs_and_clutter():
-    lines = list(association_effort.table((4, 6), (0, 2), range(2)))
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    assert rows[0] == [
-        "pairs", "clutter", "JCBB ms", "IPJC ms", "JCBB nodes", "IPJC nodes", "JCBB tests",
-        "IPJC tests",
-    ]  # fmt: skip
-    assert [row[:2] for row in rows[2:]] == [["4", "0"], ["4", "2"], ["6", "0"], ["6", "2"]]
-    assert [float(cell) for cell in rows[2][4:6]] == [5, 4]  # straight down
-    assert float(rows[3][4]) > 5
-    assert all(float(row[2]) > 0.0 for row in rows[2:])
-    single = list(association_effort.depths((2, 5)))
-    assert [line.split("|")[1].strip() for line in single[2:]] == ["2", "5"]
+def test_effort_of_association_grows_with_clutter_for_jcbb():
+    case = {"pairs": 4, "clutter": 0, "seed": 0}
+    straight = {m: association_effort.run({**case, "method": m}) for m in ("jcbb", "ipjc")}
+    assert [row["nodes"] for row in straight.values()] == [5, 4]  # straight down
+    amid = association_effort.run({**case, "clutter": 2, "method": "jcbb"})
+    assert amid["nodes"] > 5
+    assert amid["ms"] > 0.0
+    assert association_effort.cell([amid]).endswith(f"{amid['tests']}")
 
 
 def test_truths_lie_where_the_scene_has_them():
@@ -136,15 +125,22 @@ def test_a_corner_of_a_room_needs_its_walls():
         assert len(corner_recall.visible(point, scan)) == 1
 
 
-def test_in_the_arena_features_lie_at_known_things_and_are_found_again():
-    tallies = corner_recall.recall("arena", seed=0, seconds=4.0, laser=Lms221Config())
-    assert tallies[corner_recall.KNOWN].recall > 0.8
-    assert tallies[corner_recall.AGAIN].recall > 0.6
+def tallied(scene: str, kind: str, seconds: float) -> tuple[int, list[float]]:
+    case = {"scene": scene, "degrees": 0.5, "seed": 0, "seconds": seconds}
+    tally = corner_recall.run(case)[kind]
+    return tally["seen"], tally["errors"]
 
 
-@pytest.mark.parametrize("kind", ["door jambs"])
-def test_most_jambs_of_the_office_are_found(kind):
-    tally = corner_recall.recall("office", seed=0, seconds=2.0, laser=Lms221Config())[kind]
-    assert tally.seen > 10
-    assert tally.recall > 0.4
-    assert np.median(tally.errors) < 0.1
+@pytest.mark.parametrize(
+    ("kind", "least"), [(corner_recall.KNOWN, 0.8), (corner_recall.AGAIN, 0.6)]
+)
+def test_in_the_arena_features_lie_at_known_things_and_are_found_again(kind, least):
+    seen, errors = tallied("arena", kind, 4.0)
+    assert len(errors) > least * seen
+
+
+def test_most_jambs_of_the_office_are_found():
+    seen, errors = tallied("office", "door jambs", 2.0)
+    assert seen > 10
+    assert len(errors) > 0.4 * seen
+    assert np.median(errors) < 0.1

@@ -12,10 +12,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from scripts.comparison import folder
 from scripts.comparison.plan import Plan
 from scripts.experiments import breaking_point, penetration, share_seen
-from scripts.knobs import Axis
+from scripts.options import Axis
 from sim.core.dynamism import Dynamism
 from sim.simulation import Simulation
 from slam import system
@@ -88,54 +87,21 @@ def test_change_is_counted_when_a_thing_comes_back_into_view():
     assert room.look(count, 20.0, 2, 3) == (3, 2)  # the person does not count
 
 
-def test_what_is_seen_goes_into_the_results_and_the_page(tmp_path: Path):
-    page, out = tmp_path / "page.md", tmp_path / "seen.json"
-    page.write_text("Seen:\n\n<!-- share_seen -->\n<!-- /share_seen -->\nend\n")
-    words = ["--scenes", "arena", "--levels", "0", "1", "--seeds", "1", "--seconds", "2"]
-    words += ["--scanner", "scanner(fov_deg=180,beams=31,rate_hz=5,sigma_m=0.01)"]
-    assert share_seen.main([*words, "--results", str(out), "--page", str(page)]) == 0
-    data = json.loads(out.read_text())
-    assert data["seeds"] == [500]
-    assert data["commit"] is None
-    assert data["command"].startswith("python -m scripts.experiments.share_seen --scenes arena")
-    still, busy = data["seen"]["arena 0"], data["seen"]["arena 1"]
-    assert still["moving"] == [0.0]
-    assert 0.0 < still["movable"][0] < 1.0
-    assert busy["moving_p90"][0] >= busy["moving"][0] > 0.0
-    assert busy["driven_m"][0] > 0.1
-    assert busy["elsewhere"] == [None]
-    text = page.read_text()
-    assert "| arena | 0 | 0.0 (0.0) |" in text
-    assert text.endswith("<!-- /share_seen -->\nend\n")
-
-
 @pytest.mark.parametrize("scene", ["arena", "corridor"])
 def test_what_is_seen_grows_in_a_line_with_the_motion(scene: str):
     seen = []
     for level in (0.5, 1.0):
-        cases = [
-            share_seen.Case(
-                scene=scene, level=level, seed=seed, axis="motion", seconds=16.0,
-                scanner="scanner(fov_deg=180,beams=61,rate_hz=2.5,sigma_m=0.01)", away_s=5.0,
-            )
+        rows = [
+            share_seen.measure({
+                "scene": scene, "level": level, "seed": seed, "axis": "motion", "seconds": 16.0,
+                "scanner": "scanner(fov_deg=180,beams=61,rate_hz=2.5,sigma_m=0.01)", "away": 5.0,
+            })
             for seed in (500, 501, 502)
         ]  # fmt: skip
-        rows = [share_seen.measure(case) for case in cases]
         seen.append(np.mean([row["moving"] for row in rows]))
         assert np.mean([row["blocked"] for row in rows]) < 0.15
     assert seen[1] > 0.3
     assert abs(seen[0] - 0.5 * seen[1]) < 0.2 * seen[1]
-
-
-def test_a_page_without_the_mark_is_left_and_nothing_is_run(tmp_path: Path, capsys):
-    (page := tmp_path / "page.md").write_text("nothing")
-    words = ["--page", str(page), "--results", str(tmp_path / "r.json")]
-    for script in (share_seen, breaking_point):
-        assert script.main(words) == 1
-        assert "page.md must have one <!-- " in capsys.readouterr().err
-        assert script.main([*words[2:], "--page", str(tmp_path / "none.md")]) == 1
-        assert "none.md" in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["page.md"]
 
 
 def test_who_stands_in_whom_is_named_with_the_depth():
@@ -174,39 +140,26 @@ class Raises(OdometrySlam):
 def test_the_breaking_point_of_a_tiny_plan(tmp_path: Path, capsys, monkeypatch):
     for name, kind in (("sure", Sure), ("raises", Raises)):
         monkeypatch.setitem(system._registry, name, kind)
-    words = ["--slams", "sure", "raises", "oracle(odometry)", "--scenes", "arena"]
-    words += ["--axis", "dynamism"]
-    words += ["--levels", "0", "1", "--seeds", "1", "--seconds", "1.6", "--no-page"]
-    files = {name: str(tmp_path / name) for name in ("out", "results.json", "picture.png")}
-    words += ["--out", files["out"], "--results", files["results.json"]]
-    words += ["--picture", files["picture.png"]]
-    assert breaking_point.main(words) == 0
+    words = ["--slam", "sure", "raises", "oracle(odometry)", "--scene", "arena"]
+    words += ["--axis", "dynamism", "--level", "0", "1", "--seeds", "1", "--seconds", "1.6"]
+    for option in ("folder", "results", "picture.png"):
+        words += [f"--{option.partition('.')[0]}", str(tmp_path / option)]
+    assert breaking_point.STUDY.main([*words, "--no-page"]) == 0
     printed = capsys.readouterr().out
-    assert "| dynamism, arena | 0 | 0.0 |" in printed
+    assert "| dynamism | arena | 0 |" in printed
     assert "failed (1)" in printed
     assert (tmp_path / "picture.png").stat().st_size > 10_000
-    data = json.loads((tmp_path / "results.json").read_text())
-    assert data["levels"] == [0.0, 1.0]
-    cells = data["broken"]
-    assert set(cells) == {
-        f"dynamism arena {slam}" for slam in ("sure", "raises", "oracle(odometry)")
-    }
-    sure, raises = cells["dynamism arena sure"], cells["dynamism arena raises"]
-    assert sure["claimed_m"] == pytest.approx([math.sqrt(2e-4)] * 2, rel=1e-5)
-    assert sure["error_m"] == pytest.approx(sure["ate_median_m"], rel=1e-5)
-    assert sure["lost"] == [0, 0]
-    assert raises["lost"] == [1, 1]
-    assert raises["ate_median_m"] == ["inf", "inf"]
-    assert raises["claimed_m"] == [None, None]
-    kept = {p: p.stat().st_mtime_ns for p in (tmp_path / "out").glob("dynamism/*/arena*-*.npz")}
-    assert len(kept) == 8
-    assert breaking_point.main(words) == 0
-    assert {p: p.stat().st_mtime_ns for p in kept} == kept
-    assert folder.read(tmp_path / "out" / "dynamism").recipe["settings"]["axis"] == "dynamism"
+    runs = json.loads((tmp_path / "results").read_text())["runs"]
+    assert len(runs) == 6
+    sure, raises = (runs[f"dynamism arena 0.0 noise {slam} 500"] for slam in ("sure", "raises"))
+    assert sure["claimed_m"] == pytest.approx(math.sqrt(2e-4), rel=1e-5)
+    assert sure["off_m"] == sure["ate_unaligned_m"]
+    assert (sure["lost"], raises["lost"]) == (0, 1)
+    assert "claimed_m" not in raises
 
 
 def test_what_cannot_be_planned_is_one_line(tmp_path: Path, capsys):
-    words = ["--scenes", "arenna", "--axis", "dynamism", "--no-page", "--out", str(tmp_path)]
+    words = ["--scene", "arenna", "--axis", "dynamism", "--no-page", "--folder", str(tmp_path)]
     words += ["--results", str(tmp_path / "r.json")]
-    assert breaking_point.main(words) == 1
-    assert "Did you mean 'arena'" in capsys.readouterr().err
+    assert breaking_point.STUDY.main(words) == 1
+    assert "arenna" in capsys.readouterr().err

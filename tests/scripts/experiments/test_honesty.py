@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scripts.experiments.crowd_streams import SCENES, TRAIN, train_streams
+from scripts.experiments import honesty, pushes
 from scripts.metrics.judged import DUE_S, Judged
 from slam.errors import InvalidValueError
 from slam.estimate import Estimate
@@ -58,10 +58,17 @@ def test_it_is_told_by_the_covariance_or_by_not_being_converged() -> None:
 
 
 def test_streams_are_of_train_seeds_each_used_once_in_a_scene() -> None:
-    streams = train_streams()
-    assert len({stream.name for stream in streams}) == len(streams) == 20 * len(SCENES)
-    assert {stream.seed for stream in streams} == set(range(20))
-    assert len(train_streams(["office"], [1.0], most=2)) == 2
-    with pytest.raises(InvalidValueError, match="motion must be one of"):
-        train_streams(motions=[0.3])
-    assert sum(len(seeds) for seeds in TRAIN.values()) == 20
+    for one in (honesty.STUDY, pushes.STUDY):
+        cases = one.cases(one._parser().parse_args([]))
+        drives = {(case["scene"], case["motion"], case["seed"]) for case in cases}
+        assert len(drives) == 20 * len(honesty.SCENES)
+        assert {seed for *_, seed in drives} == set(range(20))
+
+
+def test_a_push_is_as_far_as_it_says_and_comes_to_an_end() -> None:
+    rng = np.random.default_rng(0)
+    far, turned = (pushes.push(kind, rng) for kind in pushes.KINDS)
+    assert np.hypot(*far[:2]) == pytest.approx(pushes.PUSH_M)
+    assert abs(np.degrees(turned[2])) == pytest.approx(pushes.PUSH_DEG)
+    rows = [{"back_s": back} for back in (0.5, 2.0, 4.0, None)]
+    assert pushes.quick(rows) == "2 of 4"

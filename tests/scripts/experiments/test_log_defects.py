@@ -26,11 +26,14 @@ def test_the_defects_are_what_they_are_called():
     assert not torn[2].endswith("\n")
 
 
-def test_an_excerpt_of_intel_comes_through_all_of_them(capsys):
+def test_an_excerpt_of_intel_comes_through_all_of_them(tmp_path, capsys):
     root = os.environ.get("MOBILIA_DATA")
     folder = Path(root) if root else Path(__file__).resolve().parents[4] / "shared" / "data"
     log = folder / "intel" / "intel-corrected.log.xz"
     if not log.is_file():
         pytest.skip(f"NO REAL LOGS: {log} is missing (set MOBILIA_DATA to their folder)")
-    assert log_defects.main([str(log), "--scans", "60"]) == 0
-    assert "NOT WELL" not in capsys.readouterr().out
+    words = ["--log", str(log), "--scans", "60", "--folder", str(tmp_path)]
+    assert log_defects.STUDY.main([*words, "--results", str(tmp_path / "r.json")]) == 0
+    told = capsys.readouterr().out
+    assert told.count("| yes |") == len(log_defects.DEFECTS)
+    assert "**no**" not in told

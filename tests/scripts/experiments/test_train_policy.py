@@ -9,25 +9,26 @@ import json
 import numpy as np
 import pytest
 
-from scripts.experiments import policy_tables, train_policy
-from scripts.experiments.goal_policies import drive
+from scripts.experiments import train_policy
 from scripts.experiments.goal_room import free_way, room, rule
+from scripts.experiments.train_policy import DRIVER, RULE, gap, reached, run, share
 from slam.errors import LogFormatError
+
+CASE = {"weights": "", "level": 0.0, "seconds": 30.0}
 
 
 def test_the_driver_reaches_goals_where_nothing_is_in_the_way():
-    rows = drive("driver", "arena", "truth", 0.0, [501, 502], 30.0)
-    assert [row["seed"] for row in rows] == [501, 502]
-    assert {row["outcome"] for row in rows} <= {"reached", "collided"}
-    assert rows == drive("driver", "arena", "truth", 0.0, [501, 502], 30.0)
+    row = run({**CASE, "who": DRIVER, "seed": 501})
+    assert row["outcome"] in ("reached", "collided")
+    assert row == run({**CASE, "who": DRIVER, "seed": 501})
 
 
 def test_the_rule_drives_round_what_it_sees():
-    env = room("arena", "odometry", 0.0)
+    env = room("odometry", 0.0)
     seen, _ = env.reset(seed=502, options={"dynamism": 0.0})
     assert env.observation_space.contains(seen)
-    rows = drive("rule", "arena", "odometry", 0.0, [502, 503], 30.0)
-    assert [row["outcome"] for row in rows] == ["reached", "reached"]
+    for seed in (502, 503):
+        assert run({**CASE, "who": RULE, "seed": seed})["outcome"] == "reached"
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -52,47 +53,28 @@ def test_a_disc_goes_until_it_touches():
     assert way[9 + 36] == way[0] == pytest.approx(3.5, abs=0.51)
 
 
-def test_the_interval_of_a_share_is_wilson_s():
-    assert policy_tables.share_interval(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+def outcomes(letters: str) -> list[dict[str, str]]:
+    words = {word[0]: word for word in train_policy.OUTCOMES}
+    return [{"outcome": words[letter]} for letter in letters]
 
 
-def _cells(driver, policy):
-    cell = {"reached": 3, "collided": 1, "late": 0, "low": 0.3, "high": 0.95}
-    return {
-        f"{name} {level:g}": cell | {"outcomes": driver if name == "driver" else policy}
-        for name in policy_tables.NAMES
-        for level in policy_tables.LEVELS
-    }
-
-
-def test_the_table_has_a_line_for_each_pose_and_a_column_for_each_level():
-    lines = policy_tables.shares(_cells("rrrc", "rrrc"), 4).splitlines()
-    assert len(lines) == 2 + 5
-    assert all(line.count("75% (30% to 95%), 25%") == 5 for line in lines[2:])
-
-
-def test_the_difference_is_that_of_the_same_seeds():
+def test_a_share_has_its_interval_and_the_difference_is_that_of_the_same_seeds():
+    assert share(outcomes("rrrc")) == "75% (30% to 95%), 25%"
     # by seed 0, 0, 1, 0: mean 0.25, standard deviation 0.5, over the root of 4
-    assert policy_tables.paired("rrrl", "rrcl") == pytest.approx((0.25, 1.96 * 0.25))
-    lines = policy_tables.differences(_cells("rrcl", "rrrl")).splitlines()
-    assert len(lines) == 2 + 4
-    assert all(line.count("+25 ± 49") == 6 for line in lines[2:])
+    assert gap(reached(outcomes("rrrl")) - reached(outcomes("rrcl"))) == "+25 ± 49"
 
 
 def test_weights_are_wanted_where_nothing_is_trained(tmp_path, capsys):
-    files = ["--results", str(tmp_path / "r.json"), "--no-page", "--steps", "0"]
-    assert train_policy.main(files) == 1
+    words = ["--results", str(tmp_path / "r.json"), "--no-page", "--steps", "0"]
+    assert train_policy.main([*words, "--weights", str(tmp_path / "none.pt")]) == 1
     assert "--steps 0 needs a file of --weights" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"episodes": {}, "steps": 1, "seconds": 1}'])
 def test_a_file_that_no_training_left_is_refused(tmp_path, text):
-    (tmp_path / "w.pt").write_bytes(b"")
     (tmp_path / "w.json").write_text(text)
-    wanted = ["--steps", "0", "--weights", str(tmp_path / "w.pt"), "--no-page"]
-    wanted = train_policy._parser().parse_args(wanted)
     with pytest.raises(LogFormatError, match=r"w\.json: not"):
-        train_policy._run(wanted, {}, wanted.weights)
+        train_policy.training(tmp_path / "w.json")
 
 
 @pytest.mark.skipif(
@@ -100,18 +82,14 @@ def test_a_file_that_no_training_left_is_refused(tmp_path, text):
     reason="STABLE-BASELINES3 IS NOT HERE: training not tested",
 )
 @pytest.mark.filterwarnings("default")  # of PyTorch and Stable-Baselines3
-def test_a_tiny_training_leaves_results_a_curve_and_weights(tmp_path, monkeypatch):
-    monkeypatch.setattr(train_policy, "LEVELS", (0.0,))
-    monkeypatch.setattr(train_policy, "POSES", ("odometry",))
-    monkeypatch.setattr(train_policy, "tables", lambda *_: "")
-    results, curve, weights = (tmp_path / name for name in ("r.json", "c.png", "w.pt"))
+def test_a_tiny_training_leaves_results_a_curve_and_weights(tmp_path):
+    results, picture, weights = (tmp_path / name for name in ("r.json", "c.png", "w.pt"))
     words = [
-        "--steps", "512", "--rooms", "1", "--jobs", "1",
-        "--seeds", "1", "--seconds", "3",
-        "--results", str(results), "--picture", str(curve), "--weights", str(weights), "--no-page",
+        "--steps", "512", "--rooms", "1", "--jobs", "1", "--seeds", "1", "--seconds", "3",
+        "--level", "0", "--results", str(results), "--picture", str(picture),
+        "--weights", str(weights), "--folder", str(tmp_path / "runs"), "--no-page",
     ]  # fmt: skip
     assert train_policy.main(words) == 0
-    found = json.loads(results.read_text())
-    assert found["training"]["steps"] >= 512
-    assert len(found["cells"]["odometry 0"]["outcomes"]) == 1
-    assert curve.stat().st_size > 1000
+    assert train_policy.training(weights.with_suffix(".json"))["steps"] >= 512
+    assert len(json.loads(results.read_text())["runs"]) == len(train_policy.POSES)
+    assert picture.stat().st_size > 1000

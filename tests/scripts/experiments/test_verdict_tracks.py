@@ -8,14 +8,14 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from scripts.experiments.verdict import Seen, area
 from scripts.experiments.verdict_tracks import (
     AFTER_S,
     CHANGES,
     KIDNAPS,
     MAPPED_S,
     PUSH_M,
-    Stream,
+    Seen,
+    area,
     interval,
     judged,
     markdown,
@@ -38,17 +38,12 @@ def test_a_push_counts_until_the_pose_is_near_again():
 def test_the_room_has_changed_on_some_tracks_and_the_robot_is_carried_on_others():
     track = [said(0.01, 0.2), said(0.03, 0.0, verdict="blind"), said(0.2, 0.3), said(2.0, 0.4)]
     push = [said(2.0, 1.0), said(2.0, 0.7, state="relocated"), said(0.1, 0.0)]
-    room, carried = judged(
-        [
-            (Stream(track=CHANGES[0], level=1.0, seed=0), track, [push]),
-            (Stream(track=KIDNAPS[0], level=1.0, seed=0), track, []),
-        ]
-    )
+    room, carried = judged(CHANGES[0], track, [push]), judged(KIDNAPS[0], track, [])
     assert (room["outdated"], room["kidnapped"], room["pushed"]) == ([0.2], [], [1.0, 0.7])
     assert (carried["outdated"], carried["kidnapped"]) == ([], [0.4])
-    assert (room["pushes"], room["back"], room["wrong"]) == (1, 1, 1)
+    assert (room["tried"], room["back"], room["wrong"]) == (1, 1, 1)
     assert interval([room, carried], "kidnapped", "pushed") == (1.0, 1.0, 1.0)
-    assert "| pose wrong | 0.0 % | 0.0 % | 100.0 % | 0.0 % |" in markdown([room, carried], "")
+    assert "| pose wrong | 0.0 % | 0.0 % | 100.0 % | 0.0 % |" in markdown([room, carried])
     assert math.isnan(interval([carried], "kidnapped")[0])
 
 
@@ -57,8 +52,8 @@ def test_the_interval_is_as_wide_as_the_streams_differ():
         {"outdated": [0.5] * 50 if k < 4 else [], "kidnapped": [p] * 50 if k >= 4 else []}
         for k, p in enumerate([0.0] * 4 + [0.9, 0.9, 0.9, 0.1])
     ]
-    area, low, high = interval(rows, "kidnapped")
-    assert area == 0.75
+    found, low, high = interval(rows, "kidnapped")
+    assert found == 0.75
     assert low <= 0.25
     assert high == 1.0
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from pathlib import Path
 
 import cv2
@@ -21,16 +20,15 @@ from scripts.film.encode import FILM_S, Pace, size_of
 from scripts.film.footage import of_scene, open_run
 from scripts.film.layout import Layout
 from scripts.film.render import pictures_at
-from scripts.film.rerun_log import RerunLog
 from scripts.film.scan_pane import LEGEND, RobotScan, beam_colors
 from sim.core.versions import WORLD
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe
 from sim.simulation import stream
 from sim.view.gl import Gl
-from slam.errors import InvalidValueError, LogFormatError, MissingDependencyError, MobiliaError
+from slam.errors import InvalidValueError, LogFormatError, MobiliaError
 from slam.frames import BeamClass, BeamLabels, Frame, LaserSpec, Odometry, Scan
-from slam.logs.carmen_writer import write_carmen
+from slam.logs.carmen import write_carmen
 
 SETTINGS = {"scene": "arena", "seconds": 2.0, "dynamism": 1.0, "seed": 3}
 
@@ -216,7 +214,7 @@ def test_a_size_is_two_even_numbers(words: str):
         (("--at", "3,99", "--strip", "x.png"), "--at must lie within the run's"),
         (("--at", "1"), "--at names the moments of --strip"),
         (("--strip", "x.txt"), "--strip must be a file that ends in .png, got 'x.txt'"),
-        (("--rerun", "x.mp4"), "--rerun must be a file that ends in .rrd"),
+        (("--replay", "x.mp4"), "--replay must be a file that ends in .html"),
         (("--slam", "shuntin"), "Did you mean 'shunting'"),
     ],
 )
@@ -269,18 +267,9 @@ def test_a_log_torn_in_the_middle_is_named(tmp_path: Path):
     assert [p.name for p in tmp_path.iterdir()] == ["torn.log"]
 
 
-def test_rerun_is_asked_for_in_words_where_it_is_missing(run: Path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "rerun", None)
-    with pytest.raises(MissingDependencyError, match=r"pip install 'mobilia\[rerun\]'"):
-        render(run, "--rerun", "out.rrd")
-
-
-def test_a_rerun_recording_is_written_whole(run: Path, tmp_path: Path):
-    pytest.importorskip("rerun")
-    out = tmp_path / "run.rrd"
-    render(run, "--rerun", out, "--slam", "odometry", "--to", "0.5", "--no-3d")
-    assert out.read_bytes()[:3] == b"RRF"
-    assert out.stat().st_size > 10_000
-    assert {p.name for p in tmp_path.iterdir()} == {"run", "run.rrd"}
-    with pytest.raises(MobiliaError):
-        RerunLog.writing(tmp_path / "run" / "recipe.json" / "x.rrd", None).__enter__()
+def test_a_replay_is_written_whole(run: Path, tmp_path: Path):
+    pytest.importorskip("viser")
+    out = tmp_path / "run.html"
+    render(run, "--replay", out, "--slam", "odometry", "--to", "0.5", "--no-3d")
+    assert "__VISER_EMBED_DATA__" in out.read_text()
+    assert {p.name for p in tmp_path.iterdir()} == {"run", "run.html"}

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from scripts.integrity import driving
-from scripts.integrity.crew import BOARD, HALF, KEEP_M, RADIUS
 from scripts.integrity.geometry import first_hits
 from scripts.integrity.kinds import KINDS, LAYOUTS, PARTS, Kind, StreamSpec
 from scripts.integrity.layouts import CLEAR_M, layout
+from scripts.integrity.movers import KEEP_M
 from scripts.integrity.plane import frames, world
+from scripts.integrity.things import BOARD, THING
 from slam import se2
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.frames import BeamClass
@@ -23,11 +24,9 @@ from slam.frames import BeamClass
 
 def looked(pose, angles, segments, discs):
     ranges, hit = np.zeros(len(angles)), np.zeros(len(angles))
-    segments, discs = np.array(segments, float).reshape(-1, 4), np.array(discs).reshape(-1, 3)
-    first_hits(
-        np.array(pose, float), np.array(angles), segments, np.arange(len(segments)) + 10.0,
-        discs, np.arange(len(discs)) + 20.0, ranges, hit,
-    )  # fmt: skip
+    segments = np.array([(*one, 10.0 + k) for k, one in enumerate(segments)]).reshape(-1, 5)
+    discs = np.array([(*one, 20.0 + k) for k, one in enumerate(discs)]).reshape(-1, 4)
+    first_hits(np.array(pose, float), np.array(angles), segments, discs, ranges, hit)
     return ranges, hit
 
 
@@ -108,21 +107,16 @@ def test_wheels_err_as_their_model_says(model):
         assert stated[9] is None
 
 
-def digest(spec: StreamSpec) -> str:
-    found = hashlib.sha256()
-    for frame in frames(spec):
-        for part in (frame.scan.ranges, frame.truth, frame.odometry.T_odom_robot):
-            found.update(part.tobytes())
-        found.update(frame.labels.kind.tobytes())
-    return found.hexdigest()
-
-
 def test_one_seed_gives_the_same_bytes_and_another_others():
-    spec = StreamSpec(kind="pass10", seed=4, seconds=6.0)
-    first = digest(spec)
-    others = [StreamSpec(kind="crowd10", seed=4, seconds=2.0), StreamSpec(kind="pass10", seed=5)]
-    assert first not in [digest(other) for other in others]
-    assert digest(spec) == first
+    digests = []
+    for seed in (4, 5, 4):
+        found = hashlib.sha256()
+        for frame in frames(StreamSpec(kind="pass10", seed=seed, seconds=4.0)):
+            for part in (frame.scan.ranges, frame.truth, frame.odometry.T_odom_robot):
+                found.update(part.tobytes())
+            found.update(frame.labels.kind.tobytes())
+        digests.append(found.hexdigest())
+    assert digests[0] == digests[2] != digests[1]
 
 
 def test_parts_have_generators_of_their_own():
@@ -133,8 +127,8 @@ def test_parts_have_generators_of_their_own():
     assert np.array_equal(first.layout.walls, again.layout.walls)
     assert not np.allclose(first.robot[0], again.robot[0])
     assert np.array_equal(first.robot, more.robot)
-    chairs = first.things.kinds < BOARD
-    assert np.array_equal(first.things.traits[chairs], more.things.traits)
+    chairs, traits = first.things["kind"] < BOARD, list(THING.names[: THING.names.index("x")])
+    assert np.array_equal(first.things[chairs][traits], more.things[traits])
     draws = {float(spec.rng(part).random()) for part in PARTS}
     assert len(draws) == len(PARTS)
 
@@ -161,8 +155,8 @@ def test_noise_dropouts_and_labels_are_as_stated():
 def test_things_keep_off_walls_and_the_robot(kind):
     known = world(StreamSpec(kind=kind, seed=6, seconds=40.0))
     assert clear_m(known.robot[:, :2], known.layout) > 0.3
-    traits, near = known.things.traits, []
-    for i, (half, radius) in enumerate(traits[:, [HALF, RADIUS]]):
+    near = []
+    for i, (half, radius) in enumerate(known.things[["half", "radius"]]):
         at = known.poses[::5, i]
         way = np.column_stack([np.cos(at[:, 2]), np.sin(at[:, 2])])
         line = [at[:, :2] + share * half * way for share in np.linspace(-1.0, 1.0, 21)]
@@ -171,13 +165,6 @@ def test_things_keep_off_walls_and_the_robot(kind):
         near.append(min(away))
     assert min(near) > KEEP_M - 0.05
     assert known.moving.any(axis=0).all()
-
-
-def test_everything_stands_elsewhere_after_a_while():
-    known = world(StreamSpec(kind="moved30_calm", seed=1, seconds=70.0))
-    jumps = np.linalg.norm(np.diff(known.poses[:, :, :2], axis=0), axis=2) > 0.5
-    assert jumps[:299].mean() < 1e-3  # only what stood in the robot's way without room
-    assert jumps[299:].any(axis=0).mean() > 0.9
 
 
 def test_a_wrong_spec_is_refused():

@@ -3,22 +3,21 @@
 
 from __future__ import annotations
 
-import json
 import math
 from itertools import islice
 
 import numpy as np
 import pytest
 
-from scripts.live import opened
 from scripts.live.hands import Hands
-from scripts.live.requests import Drive, Kidnap, MoveDoor, Push, Touch
-from scripts.live.session import EPOCH_NS, Path, stamps_of
-from scripts.verbs.live import LAYOUT
+from scripts.live.opened import Opener
+from scripts.live.requests import Anew, Drive, Kidnap, MoveDoor, Push, Touch
 from sim.moments import toured
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe
 from sim.simulation import Simulation
+from sim.view.moment import Path
+from sim.view.parts import STATIC, Parts, Placed
 from slam.errors import InvalidValueError, NeedsLabelsError, UnknownNameError
 from slam.frames import Frame
 
@@ -60,16 +59,13 @@ def test_a_twist_holds_for_a_second_then_the_robot_stands():
     assert late < 0.01
 
 
-def test_a_click_pushes_what_is_there_in_either_frame_and_nothing_far_away():
+def test_a_click_pushes_what_is_there_and_nothing_far_away():
     simulation = Simulation("arena", dynamism=0.0)
     hands, world = Hands(simulation), simulation.world
     row = next(k for k, name in enumerate(world.mover_names) if name.startswith("chair"))
     x, y = world.mover_poses()[row, :2].tolist()
     assert hands.do(Touch(x=x, y=y)).startswith(world.mover_names[row])
-    with pytest.raises(InvalidValueError, match="must be in 'world' or 'map'"):
-        hands.do(Touch(x=x, y=y, frame="map"))
-    hands.T_world_map = np.array([x, y, 1.0])
-    assert hands.do(Touch(x=0.0, y=0.0, frame="map")).startswith(world.mover_names[row])
+    assert hands.do(Touch(x=1e5, y=0.0, name=world.mover_names[row])).startswith("chair")
     with pytest.raises(InvalidValueError, match="nothing to push or to open within 1 m"):
         hands.do(Touch(x=1e5, y=0.0))
     with pytest.raises(UnknownNameError, match="there is no door ''"):
@@ -89,22 +85,42 @@ def carmen(n: int) -> str:
     return "".join(lines)
 
 
-def test_a_log_is_shown_with_its_own_stamps(tmp_path):
+def test_a_log_is_shown(tmp_path):
     log = tmp_path / "made.log"
     log.write_text(carmen(12))
-    session, (first_ns, last_ns) = opened.of_file(["odometry"], log)
-    shown = list(session.run())
+    shown = list(Opener(slams=["odometry"], path=log).open().run())
     assert [moment.number for moment in shown] == list(range(12))
-    assert shown[0].stamp_ns == first_ns
-    assert shown[-1].stamp_ns == last_ns
-    assert last_ns - first_ns == pytest.approx(2.2e9, abs=1e6)
+    assert shown[-1].seconds == pytest.approx(2.2, abs=1e-3)
     assert shown[-1].placed is None
+    assert shown[-1].error("odometry") is None
     assert shown[-1].estimates["odometry"].T_map_robot[0] == pytest.approx(0.55)
 
 
-def test_a_simulated_run_does_not_begin_at_zero():
-    assert stamps_of(0, 2.0) == (EPOCH_NS, EPOCH_NS + 2 * 10**9)
-    assert stamps_of(5 * EPOCH_NS, 2.0)[0] == 5 * EPOCH_NS
+def test_a_page_asks_for_another_world_and_keeps_the_seed():
+    opener = Opener(slams=["shunting", "grid"], settings=SETTINGS | {"seed": 4}, seconds=1.0)
+    again = opener.anew(Anew(slam="odometry", motion=1.0, crowd="none"))
+    assert again.slams == ["odometry", "grid"]
+    assert again.settings == SETTINGS | {"seed": 4, "motion": 1.0, "crowd": "none"}
+    assert opener.anew(Anew()) == opener
+
+
+def test_every_part_of_a_room_is_where_mujoco_has_it_and_a_ray_finds_it():
+    world = Simulation("arena", dynamism=0.5).world
+    parts = Parts(world)
+    parts.place(Placed.of(world))
+    chair = next(k for k, name in enumerate(world.mover_names) if name.startswith("chair"))
+    around = world.mover_poses()[chair, :2]
+    of_chair = [b for b in parts.batches if chair in b.owners]
+    assert of_chair
+    for batch in of_chair:
+        centres, turns = parts.poses(batch)
+        assert np.hypot(*(centres[batch.owners == chair, :2] - around).T).max() < 0.6
+        np.testing.assert_allclose(np.linalg.norm(turns, axis=1), 1.0)
+    assert all((batch.owners == STATIC).all() != batch.moves for batch in parts.batches)
+    name, place = parts.hit((*around, 3.0), (0.0, 0.0, -1.0))
+    assert name == world.mover_names[chair]
+    assert place[2] > 0.2
+    assert parts.hit((0.0, 0.0, 9.0), (0.0, 0.0, 1.0)) is None
 
 
 def test_a_path_is_thinned_and_ends_where_the_robot_is():
@@ -117,37 +133,19 @@ def test_a_path_is_thinned_and_ends_where_the_robot_is():
     assert thin[-1, 0] == 4321.0
 
 
-def test_the_layout_names_topics_and_services_that_there_are():
-    layout = json.loads(LAYOUT.read_text())
-    from scripts.live.published import TOPICS
-    from scripts.live.requests import SERVICES
-
-    panels = layout["configById"]
-    called = {p["serviceName"] for name, p in panels.items() if name.startswith("CallService")}
-    assert called <= {f"/{name}" for name in SERVICES}
-    publish = panels["3D!mobilia"]["publish"]
-    assert {publish["poseTopic"], publish["pointTopic"]} <= set(TOPICS)
-    assert panels["Teleop!drive"]["topic"] in TOPICS
-    for name, panel in panels.items():
-        if name.startswith("CallService"):
-            service = panel["serviceName"].lstrip("/")
-            SERVICES[service].read(service, panel["requestPayload"].encode())
-
-
 def test_a_bag_is_shown_with_its_truth_and_labels(tmp_path):
     recipe = Recipe(scene="arena", dynamism=0.5, seed=3, seconds=0.4)
     record(recipe, tmp_path)
     (bag,) = tmp_path.iterdir()
-    session, _ = opened.of_file(["odometry"], bag)
-    shown = list(session.run())
+    shown = list(Opener(slams=["odometry"], path=bag).open().run())
     assert len(shown) > 10
     assert shown[0].frame.labels is not None
     assert shown[-1].truth_map is not None
-    assert shown[-1].errors("odometry")["position_m"] == pytest.approx(0.0, abs=0.05)
+    assert math.hypot(*shown[-1].error("odometry")[:2]) < 0.05
 
 
 def test_an_oracle_needs_labels(tmp_path):
     log = tmp_path / "made.log"
     log.write_text(carmen(3))
     with pytest.raises(NeedsLabelsError, match=r"made.log has no labels"):
-        opened.of_file(["oracle(shunting)"], log)
+        Opener(slams=["oracle(shunting)"], path=log).open()

@@ -1,35 +1,39 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A client drives the robot, pushes a chair and looks back, over a real socket."""
+"""The page in a real browser: it draws, keys drive, clicks shove, the past is shown again."""
 
 from __future__ import annotations
 
-import json
+import io
 import math
 import re
-import struct
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from scripts.experiments import live_client
-from scripts.live import gate, opened, sdk
-from scripts.live.client import Client, fields
-from scripts.live.playback import Playback
-from scripts.live.session import EPOCH_NS
+from scripts.live import gate, served
+from scripts.live.opened import Opener
+from scripts.live.replay import Recorder
 from scripts.live.view import View
 from slam.errors import InvalidValueError, MissingDependencyError
+from slam.replay import Replay, systems_named
+from tests.scripts.report.browser import CHROMIUM, Browser
 
 LOOPBACK = ("127.0.0.1", 0)
+OPENER = Opener(slams=["odometry"], settings={"scene": "arena", "dynamism": 0.0}, seconds=600.0)
+LIMIT_S = 120.0
+SIZE = 800, 500  # px; software GL pays for each
 
 
 @pytest.fixture(scope="module")
 def view() -> Iterator[View]:
-    pytest.importorskip("foxglove", reason="needs the extra 'live'")
-    session, shown_ns = opened.of_scene(["odometry"], {"scene": "arena", "dynamism": 0.0}, 600.0)
-    view = View(sdk.require(), session, Playback(session.run()), LOOPBACK, shown_ns)
+    pytest.importorskip("viser")
+    view = View(OPENER, LOOPBACK)
     over = threading.Event()
 
     def turn() -> None:
@@ -44,117 +48,124 @@ def view() -> Iterator[View]:
     view.close()
 
 
-@pytest.fixture
-def client(view: View) -> Iterator[Client]:
-    pytest.importorskip("websockets", reason="needs a WebSocket client")
-    with Client.of(f"ws://127.0.0.1:{view.port}") as client:
-        client.subscribe(
-            "/playback", "/world", "/truth/pose", "/scan/points", "/tf", "/odometry/errors"
-        )
-        client.until(lambda: client.playback() and "/truth/pose" in client.newest)
-        yield client
-        client.call("/seek", back_s=0)
-        client.call("/tour")
-        client.call("/play")
+@pytest.fixture(scope="module")
+def browser(view: View, tmp_path_factory) -> Iterator[Browser]:
+    if CHROMIUM is None:
+        pytest.skip("needs chromium")
+    with Browser(tmp_path_factory.mktemp("profile"), gl=True) as browser:
+        browser.open(f"http://127.0.0.1:{view.served.port}/", *SIZE)
+        until(lambda: "odometry" in words(browser))
+        yield browser
 
 
-def test_a_client_drives_the_robot_with_twists(client: Client):
-    x, y = client.pose("/truth/pose")
-    client.send(op="advertise", channels=[
-        {"id": 7, "topic": "/cmd_vel", "encoding": "json", "schemaName": "geometry_msgs/Twist"}
-    ])  # fmt: skip
-    twist = json.dumps({"linear": {"x": 0.5}, "angular": {"z": 0.0}}).encode()
+def until(true: Callable[[], object]) -> None:
+    end = time.monotonic() + LIMIT_S
+    while not true():
+        assert time.monotonic() < end, "it never came"
+        time.sleep(0.1)
+
+
+def words(browser: Browser) -> str:
+    return str(browser.evaluate("document.body.innerText"))
+
+
+def picture(browser: Browser) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(browser.pixels())).convert("RGB")).astype(int)
+
+
+def truth(view: View) -> np.ndarray:
+    return view.playback.present.truth_map[:2]
+
+
+def colors(browser: Browser) -> dict[str, int]:
+    """How many pixels of the left of the page, where the scene is, are of which colour."""
+    red, green, blue = np.moveaxis(picture(browser)[:, :450], -1, 0)
+    return {
+        "drawn": int(((red < 235) | (green < 235) | (blue < 235)).sum()),
+        "scan": int(((blue > 180) & (red < 120) & (green < 170)).sum()),
+        "estimate": int(((red > 190) & (green > 70) & (green < 150) & (blue < 90)).sum()),
+    }
+
+
+def test_the_page_draws_the_room_the_scan_and_the_estimate(browser: Browser):
+    until(lambda: colors(browser)["scan"] > 20)
+    seen = colors(browser)
+    assert seen["drawn"] > 20_000
+    assert seen["estimate"] > 20
+
+
+def test_keys_drive_and_the_tour_goes_on(browser: Browser, view: View):
+    start = truth(view)
 
     def gone() -> bool:
-        client.publish(7, twist)
-        now = client.pose("/truth/pose")
-        return math.hypot(now[0] - x, now[1] - y) > 0.2
+        browser.press("I")
+        return math.hypot(*(truth(view) - start)) > 0.2
 
-    client.until(gone)
-    assert client.playback()["driver"] == "client"
-    assert client.call("/tour") == {"done": "the built-in driver drives"}
-    client.until(lambda: client.playback()["driver"] == "tour")
-
-
-def test_a_client_pushes_a_chair_and_sees_it_move(client: Client):
-    assert client.call("/pause") == {"done": "paused"}
-    name = next(name for name in client.entities if name.startswith("mover/chair"))
-    x, y = client.middle(name)
-    said = client.call("/push", name=name.partition("/")[2], speed_mps=1.0, heading_deg=90)
-    assert "is pushed at 1 m/s to 90 deg" in said["done"]
-    before = client.playback()["time_s"]
-    client.call("/step", scans=20)
-    client.until(lambda: client.playback()["time_s"] > before + 0.4)
-    now = client.middle(name)
-    assert now[1] - y > 0.1
-    assert abs(now[0] - x) < 0.1
+    until(gone)
+    until(lambda: browser.press("I") or "you drive" in words(browser))
+    browser.press("T")
+    until(lambda: "on tour" in words(browser))
 
 
-def test_looking_back_shows_the_past_and_touches_nothing(client: Client):
-    client.call("/pause")
-    client.until(lambda: not client.playback()["playing"])
-    present = client.playback()["time_s"]
-    client.call("/seek", time_s=0)
-    client.until(lambda: client.playback()["time_s"] == 0.0)
-    assert client.stamps["/playback"] >= EPOCH_NS
-    assert client.stamps["/playback"] < EPOCH_NS + 10**9
-    assert "an earlier moment is shown" in client.call("/push")
-    assert "is not kept, only 0.00 to" in client.call("/seek", time_s=1e6)
-    client.call("/seek", back_s=0)
-    client.until(lambda: client.playback()["time_s"] >= present)  # a step may have been under way
+def test_a_click_shoves_the_chair_that_is_seen_there(browser: Browser, view: View):
+    world = view.session.hands.simulation.world
+    camera = next(iter(view.served.clients().values())).camera
+    for row, name in enumerate(world.mover_names):
+        before = world.mover_poses()[row, :2]
+        x, y = projected(camera, (*before, 0.45), SIZE)
+        if name.startswith("chair") and 0 < x < 450 and 0 < y < SIZE[1]:  # not under the panel
+            break
+    browser.click(x, y)
+    until(lambda: np.hypot(*(world.mover_poses()[row, :2] - before)) > 0.1)
+    until(lambda: f"you: {world.mover_names[row]} is pushed" in words(browser))
 
 
-def test_the_time_line_of_the_app_is_obeyed(client: Client):
-    states = client.states
-    seek = EPOCH_NS
-    request = struct.pack("<BBfBQI", 3, 1, 2.0, 1, seek, 2) + b"ab"  # pause at twice the speed
-    client.socket.send(request)
-    client.until(lambda: client.states > states)
-    client.until(lambda: client.playback()["time_s"] == 0.0 and not client.playback()["playing"])
-    assert client.playback()["speed"] == 2.0
-    client.send(op="setParameters", parameters=[{"name": "speed", "value": 1.0}], id="q")
-    client.until(lambda: client.playback()["speed"] == 1.0 or client.call("/step"))
-
-
-def test_points_carry_what_they_hit(client: Client):
-    cloud = fields(client.newest["/scan/points"])
-    assert cloud[2] == [b"laser"]
-    (stride,) = cloud[4]
-    points = np.frombuffer(cloud[6][0], np.uint8).reshape(-1, stride)
-    names = [fields(part)[1][0].decode() for part in cloud[5]]
-    assert names == ["x", "y", "z", "red", "green", "blue", "alpha", "label"]
-    assert set(points[:, 16]) <= {1, 2, 3, 4}
-    assert (points[:, 15] == 255).all()
-    frames = [fields(part)[3][0] for part in fields(client.newest["/tf"])[1]]
-    assert frames == [b"map", b"odom", b"base_link", b"laser", b"truth", b"truth_laser"]
-    assert json.loads(client.newest["/odometry/errors"])["position_m"] >= 0.0
-
-
-def test_bad_messages_are_told_and_kill_nothing(client: Client):
-    client.socket.send("garbage")
-    client.socket.send(b"\xff\x01")
-    client.publish(99, b"{}")
-    client.send(op="advertise", channels=[
-        {"id": 1, "topic": "/cmd_vel", "encoding": "json", "schemaName": ""},
-        {"id": 2, "topic": "/etc", "encoding": "json", "schemaName": ""},
+def projected(camera, place, size) -> tuple[float, float]:
+    """CSS pixels of a place in the world, as a camera of viser sees it."""
+    w, x, y, z = camera.wxyz
+    turn = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ])  # fmt: skip
-    client.publish(1, b'{"linear": {"x": 1e999}}')
-    client.until(lambda: any("must lie in" in said for said in client.said))
-    client.publish(1, b"\x00" * 100_000)
-    client.until(lambda: any("at most 16384 bytes" in said for said in client.said))
-    assert "no door 'x'" in client.call("/open_door", name="x")
-    assert "nothing called 'y'" in client.call("/push", name="y")
-    assert "the robot cannot stand at" in client.call("/kidnap", x_m=1e5, y_m=0)
-    client.send(op="setParameters", parameters=[{"name": "rm", "value": "-rf"}], id="q")
-    client.until(lambda: any("parameters that can be set" in said for said in client.said))
-    before = client.playback()["time_s"]
-    client.until(lambda: client.playback()["time_s"] > before)
+    local = turn.T @ (np.array(place) - camera.position)
+    focal = 0.5 * size[1] / math.tan(0.5 * camera.fov)
+    return (
+        0.5 * size[0] + focal * local[0] / local[2],
+        0.5 * size[1] + focal * local[1] / local[2],
+    )
 
 
-def test_without_the_sdk_one_line_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "foxglove", None)
-    with pytest.raises(MissingDependencyError, match=r"pip install 'mobilia\[live\]'"):
-        sdk.require()
+def test_the_past_is_shown_again_and_not_touched(browser: Browser, view: View):
+    until(lambda: view.playback.present.seconds > 6.0)
+    browser.press("P")
+    until(lambda: "paused" in words(browser))
+    present = view.playback.present.seconds
+    browser.press("B")
+    until(lambda: "looking back" in words(browser))
+    assert view.playback.shown.seconds == pytest.approx(present - 5.0, abs=0.1)
+    assert float(re.search(r"([\d.]+) s ·", words(browser))[1]) == pytest.approx(
+        view.playback.shown.seconds, abs=0.06
+    )
+    browser.press("X")
+    until(lambda: "an earlier moment is shown" in words(browser))
+
+
+def test_nothing_left_the_machine_and_nothing_went_wrong(browser: Browser, view: View):
+    own = ("http://127.0.0.1:", "data:", "blob:")
+    assert [url for url in browser.requests if not url.startswith(own)] == []
+    assert [line for line in browser.console if '"type": "error"' in line] == []
+
+
+def test_a_port_that_is_taken_is_named(view: View):
+    with pytest.raises(InvalidValueError, match=f"cannot listen at 127.0.0.1:{view.served.port}"):
+        View(OPENER, ("127.0.0.1", view.served.port))
+
+
+def test_without_viser_one_line_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(MissingDependencyError, match=r"pip install viser"):
+        served.require()
 
 
 def test_only_loopback_is_private():
@@ -162,25 +173,48 @@ def test_only_loopback_is_private():
     assert not any(gate.is_loopback(host) for host in ("0.0.0.0", "192.168.1.2", "a.example", ""))
 
 
-def test_a_port_that_is_taken_is_named(view: View):
-    session = view.session
-    with pytest.raises(InvalidValueError, match=f"cannot listen at 127.0.0.1:{view.port}"):
-        View(sdk.require(), session, Playback(iter(())), ("127.0.0.1", view.port), (0, 1))
+def written(path: Path) -> Path:
+    """A replay of two seconds."""
+    session = OPENER.open()
+    replay = Replay.of(systems_named(["occupancy"]))
+    stage = session.footage.stage
+    with Recorder.writing(path, replay, stage.world, title="<arena>", seconds=2.0) as recorder:
+        for frame in replay.run(session.footage.stream):
+            recorder.note(frame, stage.placed)
+            if recorder.moments.seconds >= 2.0:
+                break
+    return path
 
 
-def test_the_client_of_the_page_drives_pushes_and_draws(tmp_path, monkeypatch, capsys):
-    pytest.importorskip("foxglove", reason="needs the extra 'live'")
-    pytest.importorskip("websockets", reason="needs a WebSocket client")
-    monkeypatch.setattr(live_client, "TWISTS", 3)
-    monkeypatch.setattr(live_client, "PUSH_SCANS", 40)
-    live_client.main(["--out", str(tmp_path / "live.png")])
-    said = capsys.readouterr().out
-    way, rolled = (
-        re.search(words, said) for words in (r"/truth/pose: ([\d.]+) m", r"([\d.]+) m moved")
-    )
-    assert way
-    assert float(way[1]) > 0.1
-    assert rolled
-    assert float(rolled[1]) > 0.1
-    assert "/events: client: the robot takes twists" in said
-    assert (tmp_path / "live.png").read_bytes().startswith(b"\x89PNG")
+def test_a_replay_plays_from_disk_and_is_the_same_again(tmp_path: Path):
+    pytest.importorskip("viser")
+    page, again = written(tmp_path / "replay.html"), written(tmp_path / "again.html")
+    assert page.read_bytes() == again.read_bytes()
+    assert page.stat().st_size < 2_000_000
+    assert "<title>&lt;arena&gt;</title>" in page.read_text()
+    if CHROMIUM is None:
+        pytest.skip("needs chromium")
+    with Browser(tmp_path / "profile", gl=True) as browser:
+        browser.open(page, 390, 500)
+        until(lambda: colors(browser)["scan"] > 5)
+        assert colors(browser)["drawn"] > 10_000
+        own = ("file://", "data:", "blob:")
+        assert [url for url in browser.requests if not url.startswith(own)] == []
+        assert [line for line in browser.console if '"type": "error"' in line] == []
+
+
+def test_the_server_behind_the_gate_knows_the_gate_only(view: View):
+    connect = pytest.importorskip("websockets.sync.client").connect
+    closed = pytest.importorskip("websockets.exceptions").ConnectionClosed
+    behind = view.served.behind
+    version = [f"viser-v{sys.modules['viser'].__version__}"]
+    forged = {"X-Mobilia-Gate": "guess"}
+    inner, own = f"ws://{behind[0]}:{behind[1]}", f"ws://127.0.0.1:{view.served.port}"
+    for url, headers in ((inner, {}), (inner, forged), (own, forged)):
+        with (
+            connect(url, subprotocols=version, additional_headers=headers) as client,
+            pytest.raises(closed),
+        ):
+            client.recv(timeout=30.0)
+    with connect(own, subprotocols=version) as client:
+        assert len(client.recv(timeout=30.0)) > 1000

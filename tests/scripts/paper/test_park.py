@@ -11,7 +11,6 @@ import pytest
 from scripts.paper import park_landmarks, park_scores
 from scripts.paper.census import NAMELESS
 from scripts.paper.runs import Run
-from scripts.paper.victoria_park import broken
 from slam import se2
 from slam.logs.victoria_park import GpsTrack
 from slam.trajectory import Trajectory
@@ -87,21 +86,6 @@ def test_what_a_drifted_map_has_lost_is_counted():
     assert counts == [3, 3, 3, 2]
 
 
-def test_a_place_keeps_its_better_fit(monkeypatch):
-    """On the way back a worse one is offered."""
-    offered = iter([(9, 1.0), (5, 2.0), (5, 3.0), (4, 4.0)])
-
-    def lay(self, points, starts):
-        pairs, x = next(offered)
-        return park_landmarks.Laid(T_graph_map=np.array([x, 0.0, 0.0]), pairs=pairs)
-
-    monkeypatch.setattr(park_landmarks.Surveyor, "lay", lay)
-    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
-    place = park_landmarks.Place(here=np.zeros(2), T_graph_map=np.zeros(3))
-    moved = park_landmarks.Surveyor(points).unbent(points, [place, place])
-    np.testing.assert_array_equal(moved, points + np.array([1.0, 0.0]))
-
-
 def test_headings_are_turned_as_positions_are():
     t = np.linspace(0.0, 3.0, 300)
     poses = np.column_stack([60.0 * np.sin(t), 60.0 * (1.0 - np.cos(t)), t])
@@ -112,11 +96,3 @@ def test_headings_are_turned_as_positions_are():
     np.testing.assert_allclose(park_scores.headings_off(track, graph, gps), 0.0, atol=1e-9)
     laid = se2.transform(park_scores.over_graph(track, graph, gps), turned[:, :2])
     np.testing.assert_allclose(laid, poses[:, :2], atol=1e-9)
-
-
-def test_lines_are_broken_where_gps_is_silent():
-    seconds, errors = broken(np.array([0.0, 0.2, 9.0, 9.2]), np.ones((4, 3)))
-    assert len(seconds) == len(errors) == 5
-    assert np.isnan(errors[2]).all()
-    assert not np.isnan(np.delete(errors, 2, axis=0)).any()
-    assert (np.diff(seconds) > 0.0).all()

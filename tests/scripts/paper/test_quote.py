@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scripts.paper.comparison import paper_table
-from scripts.paper.paper_numbers import TABLE_3
+from scripts.paper.comparison import TABLE_3, paper_table
 from scripts.paper.quote import compact, quote
 from scripts.paper.report import Report, new_figure
 from scripts.paper.runs import Plan
@@ -44,23 +43,6 @@ def test_a_page_quotes_what_was_run_and_keeps_the_rest(tmp_path):
     assert page.read_text() == mixed_up
 
 
-def test_each_experiment_goes_to_the_one_page_that_marks_it(tmp_path: Path):
-    for name in ("office", "chairs"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "summary.md").write_text(f"{name} anew\n")
-    (folder := tmp_path / "docs").mkdir()
-    one, other = folder / "a.md", folder / "b.md"
-    one.write_text("<!-- office -->\n<!-- /office -->\n")
-    other.write_text("<!-- chairs -->\n<!-- /chairs -->\n")
-    assert quote(tmp_path, folder) == ["chairs", "office"]
-    assert one.read_text() == "<!-- office -->\n\noffice anew\n\n<!-- /office -->\n"
-    assert other.read_text() == "<!-- chairs -->\n\nchairs anew\n\n<!-- /chairs -->\n"
-    for text in ("", one.read_text()):
-        other.write_text(text)
-        with pytest.raises(InvalidValueError, match="must be one page"):
-            quote(tmp_path, folder)
-
-
 def test_the_real_pages_mark_every_experiment_once():
     pages = [page.read_text() for page in (ROOT / "docs" / "paper").glob("*.md")]
     for name in ("all", *EXPERIMENTS):
@@ -87,12 +69,6 @@ def test_its_figures_come_along_and_those_of_before_go(tmp_path: Path):
     assert sorted(path.name for path in pictures.iterdir()) == names
     with Image.open(pictures / "office-rmse.png") as small:
         assert small.size == (520, 390)
-
-
-def test_pictures_get_small_whatever_is_in_them(tmp_path: Path):
-    noise = np.random.default_rng(0).integers(0, 256, (90, 120, 3), dtype=np.uint8)
-    Image.fromarray(noise).save(tmp_path / "noise.png")
-    assert 2_000 < len(compact(tmp_path / "noise.png", most=6_000)) <= 6_000
 
 
 def test_a_colour_of_few_pixels_is_kept(tmp_path: Path):

@@ -12,14 +12,13 @@ import pytest
 from scripts.jobs import _digest, run_jobs
 from scripts.output import write_recipe
 from scripts.paper import park_runs, point_runs, rooms
-from scripts.paper.depends import depends_on
-from scripts.paper.runs import Plan, job, load_run, save_run, sign_test, spread
-from scripts.paper.times import total
+from scripts.paper.report import total
+from scripts.paper.runs import Plan, depends_on, job, load_run, save_run, sign_test, spread
 from slam.errors import InvalidValueError
 
 
 def a_run(path: Path, *, seed: int, data: str) -> None:
-    save_run(path, {"seed": seed}, {"poses": np.eye(3)})
+    save_run(path, {"seed": seed, "θ": math.nan}, {"poses": np.eye(3)})
 
 
 def test_a_run_is_made_again_when_its_data_change_and_not_when_their_folder_is_named_anew(
@@ -47,21 +46,13 @@ def test_a_run_depends_on_what_makes_it_and_not_on_pages():
 
     of_rooms = depends(rooms.run_one, scene="office")
     assert {"slam", "rooms.py", "runs.py", "sim", "scenes"} <= of_rooms
-    assert not {"report.py", "times.py"} & of_rooms
+    assert not {"report.py", "comparison.py"} & of_rooms
     assert {"slam", "point_runs.py", "census.py"} <= depends(point_runs.run_one)
     for runs in (point_runs, park_runs):
         made_of = depends(runs.run_one)
         assert (
             not {"sim", "landmarks.py", "victoria_park.py", "report.py", "map_figures.py"} & made_of
         )
-
-
-def test_a_run_keeps_its_processor_time(tmp_path):
-    (made,) = run_jobs([job("a", a_run, seed=7, data=str(tmp_path))], tmp_path).values()
-    run = load_run(made)
-    assert run.numbers == {"seed": 7}
-    assert list(run.arrays) == ["poses"]
-    assert 0.0 <= run.cpu_s < 10.0
 
 
 def test_time_is_told_of_all_whenever_it_was_spent(tmp_path):
@@ -74,13 +65,14 @@ def test_time_is_told_of_all_whenever_it_was_spent(tmp_path):
     assert total(Plan(out=tmp_path), ["office", "theory"], 13.0).endswith("**missed.**")
 
 
-def test_runs_come_back_as_they_were(tmp_path):
-    numbers = {"a": {"b": math.nan, "θ": 1.5}}
-    save_run(tmp_path / "run.npz", numbers, {"poses": np.eye(3)})
-    run = load_run(tmp_path / "run.npz")
-    assert math.isnan(run.numbers["a"]["b"])
-    assert run.numbers["a"]["θ"] == 1.5
+def test_runs_come_back_as_they_were_with_their_processor_time(tmp_path):
+    (made,) = run_jobs([job("a", a_run, seed=7, data=str(tmp_path))], tmp_path).values()
+    run = load_run(made)
+    assert run.numbers["seed"] == 7
+    assert math.isnan(run.numbers["θ"])
+    assert list(run.arrays) == ["poses"]
     np.testing.assert_array_equal(run.arrays["poses"], np.eye(3))
+    assert 0.0 <= run.cpu_s < 10.0
 
 
 def test_medians_and_sign_tests():

@@ -12,7 +12,8 @@ from scripts.comparison.folder import Compared, write_table
 from scripts.comparison.schema import LEVELS, RUNS
 from scripts.comparison.tables import levels
 from scripts.quotes.distil import distil, main
-from scripts.quotes.results import Comparison, Pair, write
+from scripts.quotes.results import Comparison, Pair
+from scripts.result_files import write
 from slam.errors import InvalidValueError
 
 DYNAMISM, SEEDS = [0.0, 0.5, 1.0], [100, 101, 102]
@@ -70,9 +71,9 @@ def test_what_a_results_file_holds(compared: Compared, tmp_path: Path, monkeypat
     assert found.rank_correlation("arena", "occupancy", "ate_unaligned_m") == 1.0
 
 
-def test_a_folder_that_other_code_made_is_refused(compared: Compared, tmp_path: Path, capsys):
-    assert main([str(compared.folder), "--command", "c", "--out", str(tmp_path / "r.json")]) == 1
-    assert "was not made by the code here" in capsys.readouterr().err
+def test_a_folder_that_other_code_made_is_refused(compared: Compared, tmp_path: Path):
+    with pytest.raises(InvalidValueError, match="was not made by the code here"):
+        main([str(compared.folder), "--command", "c", "--out", str(tmp_path / "r.json")])
     assert not (tmp_path / "r.json").exists()
 
 

@@ -13,13 +13,11 @@ import pytest
 
 from scripts import marks
 from scripts.quotes.__main__ import PAGES, main, quoted
-from scripts.quotes.results import RESULTS, ROOT, Comparison, Interval, Pair, load, write
+from scripts.quotes.results import Comparison, Interval, Pair, verdict
 from scripts.quotes.texts import texts
-from scripts.quotes.words import interval, shown, verdict, verdicts
+from scripts.result_files import RESULTS, ROOT, load, write
 from slam.errors import InvalidValueError, LogFormatError
 
-# comparison.md has tables of other scripts
-WHOLLY_QUOTED = ("README.md", "docs/comparing.md", "docs/films.md")
 _COUNT = r"(?:two|three|four|five|six|seven|eight|nine|ten|a dozen|twenty|thirty|sixty|a hundred)"
 _UNIT = (
     r"(?:cm|mm|km|ms|µs|s|m|min|minutes?|seconds?|hours?|[KMG]B|%|x|×|times|steps?|Hz|fps|degrees?)"
@@ -61,22 +59,11 @@ def test_the_pages_say_what_the_results_say(capsys):
     assert main(["--check"]) == 0, capsys.readouterr().out
 
 
-@pytest.mark.parametrize("page", WHOLLY_QUOTED)
+@pytest.mark.parametrize("page", PAGES)
 def test_no_measured_number_stands_outside_a_marked_place(page: str):
     found = set(NUMBER.findall(prose((ROOT / page).read_text())))
     assert sorted(found - DEFINED[page].keys()) == []
     assert sorted(DEFINED[page].keys() - found) == []  # the list holds nothing that is gone
-
-
-def test_what_counts_as_a_measured_number():
-    page = (
-        "It takes 3 s, 0.7 of it, 2×, three minutes, 170 MB and 40 %.\n\n    run  # 5 minutes\n"
-        "    run --seconds 9.5\n\n`--speed 1.5` [a](b1.5) four methods, 20 seeds "
-        "<!-- a -->1.5 cm<!-- /a --> v1.2.3\n"
-    )
-    assert NUMBER.findall(prose(page)) == [
-        "3 s", "0.7", "2×", "three minutes", "170 MB", "40 %", "5 minutes",
-    ]  # fmt: skip
 
 
 def test_every_text_stands_on_a_page_and_no_mark_is_taken_for_a_line_of_html():
@@ -120,36 +107,23 @@ def test_a_number_changed_by_hand_or_by_a_new_result_is_noticed_and_written(copy
     assert "docs/comparing.md: differs: comparing.errors" in told
 
 
-def test_a_results_file_that_is_damaged_or_gone_is_named(copy: Path, capsys):
+def test_a_results_file_that_is_damaged_or_gone_is_named(copy: Path):
     there = ["--root", str(copy), "--results", str(copy / "results"), "--check"]
     path = copy / "results" / "comparison.json"
     data = json.loads(path.read_text())
     del data["paired"]["office ekf ate_unaligned_m"]
     path.write_text(json.dumps(data))
-    assert main(there) == 1
-    assert "office ekf ate_unaligned_m" in capsys.readouterr().err
+    with pytest.raises(LogFormatError, match="office ekf ate_unaligned_m"):
+        main(there)
     for content in ("{", "[]", '{"schema": 0}'):
         path.write_text(content)
-        assert main(there) == 1
-        assert "comparison.json: no results file" in capsys.readouterr().err
-    path.unlink()
-    assert main(there) == 1
-    assert "comparison.json" in capsys.readouterr().err
+        with pytest.raises(LogFormatError, match=r"comparison\.json: no results file"):
+            main(there)
 
 
 def test_a_mark_that_nobody_fills_is_refused():
     with pytest.raises(InvalidValueError, match="page marks c, must be one of a, b"):
         quoted("<!-- c --><!-- /c -->", {"a": "", "b": ""}, "page")
-
-
-def test_places_within_a_line_and_of_their_own_lines():
-    text = "It is <!-- a -->old<!-- /a --> now.\n\n<!-- b -->\nold\n<!-- /b -->\n"
-    now = marks.filled(marks.filled(text, "a", "new", "page"), "b", "| 1 |", "page")
-    assert now == "It is <!-- a -->new<!-- /a --> now.\n\n<!-- b -->\n\n| 1 |\n\n<!-- /b -->\n"
-    assert marks.names(now) == ["a", "b"]
-    assert marks.without(now) == "It is  now.\n\n\n"
-    with pytest.raises(InvalidValueError, match="line of its own"):
-        marks.filled(text, "a", "two\nlines", "page")
 
 
 def test_results_read_back_with_what_json_has_no_number_for(tmp_path: Path):
@@ -168,6 +142,20 @@ def test_results_read_back_with_what_json_has_no_number_for(tmp_path: Path):
         found.levels("office", "shunting", "lost")
 
 
+def test_a_long_table_goes_to_a_file_and_its_sum_stays(tmp_path: Path):
+    rows = [f"| way {k} | {k} |" for k in range(marks.MOST_CELLS // 2)] + ["| all | 780 |"]
+    count = len(rows)
+    (page := tmp_path / "page.md").write_text("<!-- told -->\n<!-- /told -->\n")
+    marks.fill_page(page, "told", "\n".join(["Ways:", "", "| way | n |", "| --- | ---: |", *rows]))
+    link = f"All {count} rows: [page_told.csv](results/page_told.csv)."
+    assert f"| --- | ---: |\n| all | 780 |\n\n{link}\n" in page.read_text()
+    assert "way 3" not in page.read_text()
+    lines = (tmp_path / "results" / "page_told.csv").read_text().splitlines()
+    assert (lines[:2], len(lines)) == (["way,n", "way 0,0"], count + 1)
+    marks.fill_page(page, "told", short := "| way | n |\n| --- | ---: |\n| all | 780 |")
+    assert short in page.read_text()
+
+
 def pair(value: float, low: float, high: float) -> Pair:
     return Pair(value, low, high, wins=9, ties=0, losses=1)
 
@@ -176,17 +164,6 @@ def test_verdicts_follow_the_interval_and_which_way_is_better():
     less, neither, more = pair(-2.0, -3.0, -1.0), pair(-1.0, -2.0, 0.0), pair(0.1, 0.05, 0.2)
     assert [verdict(p, "ate_unaligned_m") for p in (less, neither, more, None)] == [1, 0, -1, 0]
     assert [verdict(p, "new_object_recall") for p in (less, neither, more)] == [-1, 0, 1]
-    said = verdicts([less, neither, more, None], [0.0, 0.5, 0.75, 1.0], "ate_unaligned_m")
-    assert said == (
-        "better at dynamism 0, **beaten** at dynamism 0.75, no clear difference at dynamism 0.5"
-    )
-
-
-def test_numbers_as_pages_say_them():
-    assert [shown(x, 1) for x in (1.25, -0.04, -0.06, math.inf, math.nan)] == [
-        "1.2", "0.0", "−0.1", "∞", "–",
-    ]  # fmt: skip
-    assert interval(pair(-0.0022, -0.004, 0.0001), "ate_unaligned_m", 2) == "−0.22 [−0.40, 0.01]"
 
 
 @pytest.mark.parametrize("path", sorted(RESULTS.glob("*.json")), ids=lambda path: path.name)

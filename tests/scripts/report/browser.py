@@ -20,6 +20,10 @@ OPTIONS = (
     "--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run",
     "--disable-dev-shm-usage", "--disable-background-networking", "--remote-debugging-pipe",
 )  # fmt: skip
+SOFTWARE_GL = (
+    "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+)  # fmt: skip
 LIMIT_S = 60.0
 CONNECT = """
 import os, sys
@@ -35,8 +39,9 @@ class Browser:
     console    words of errors and warnings; requests  every address asked for
     """
 
-    def __init__(self, profile: Path) -> None:
+    def __init__(self, profile: Path, *, gl: bool = False) -> None:
         assert CHROMIUM is not None
+        options = [o for o in OPTIONS if not gl or o != "--disable-gpu"]
         read_theirs, self._write = os.pipe()
         self._read, write_theirs = os.pipe()
 
@@ -48,7 +53,8 @@ class Browser:
                 CONNECT,
                 *map(str, high),
                 CHROMIUM,
-                *OPTIONS,
+                *options,
+                *(SOFTWARE_GL if gl else ()),
                 f"--user-data-dir={profile}",
                 "about:blank",
             ],
@@ -113,11 +119,11 @@ class Browser:
         elif method in ("Runtime.consoleAPICalled", "Runtime.exceptionThrown"):
             self.console.append(json.dumps(parameters)[:300])
 
-    def open(self, page: Path, width: int) -> None:
-        """Load a file at a width in CSS pixels, as a phone does below 500."""
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=900,
+    def open(self, page: Path | str, width: int, height: int = 900) -> None:
+        """Load a file or an address at a width in CSS pixels, as a phone does below 500."""
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
                   deviceScaleFactor=1, mobile=width < 500)  # fmt: skip
-        self.call("Page.navigate", url=page.as_uri())
+        self.call("Page.navigate", url=page if isinstance(page, str) else page.as_uri())
         while self.evaluate("document.readyState") != "complete":
             time.sleep(0.02)
 
@@ -126,6 +132,23 @@ class Browser:
         result = self.call("Runtime.evaluate", expression=expression, returnByValue=True)
         assert "exceptionDetails" not in result, result
         return result["result"].get("value")
+
+    def pixels(self) -> bytes:
+        """What is seen, as PNG."""
+        return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+
+    def click(self, x: float, y: float) -> None:
+        """With the left button, at CSS pixels."""
+        for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, clickCount=1,
+                      button="none" if kind == "mouseMoved" else "left")  # fmt: skip
+
+    def press(self, key: str) -> None:
+        """A letter."""
+        for kind in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=key.lower(), code=f"Key{key}",
+                      text=key.lower() if kind == "keyDown" else "",
+                      windowsVirtualKeyCode=ord(key))  # fmt: skip
 
     def screenshot(self, path: Path) -> None:
         """The whole page as PNG."""

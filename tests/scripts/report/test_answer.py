@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sentence on top: what it says in each case, and that it claims nothing of few runs."""
+"""The sentence on top: what it says in each case, however few the runs."""
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
@@ -42,65 +43,73 @@ def of(lost: list[int], *, runs: int = 10, levels=(0.0, 0.4, 1.0), failures=(), 
     [
         (
             of([0, 6, 9], against=[-1, -1, -1]),
-            "is lost half of the time from dynamism 0.4 on in arena (6 of 10 runs, 31 to 83 % "
-            "there); at 0 it is already worse than its own odometry, so dynamism is not its "
-            "problem.",
-        ),
-        (
-            of([0, 0, 5]),
-            "is lost half of the time at dynamism 1 in arena (5 of 10 runs, 24 to 76 % there).",
+            "was lost in arena in 0 of 10 at 0, 6 of 10 at 0.4 and 9 of 10 at 1 (dynamism); it "
+            "holds at 0 and is lost at 0.4, so at least 31 % of such runs are lost at 0.4 (95 %); "
+            "at 0 it is already worse than its own odometry, so dynamism is not its problem; that "
+            "is too near to one half at 0.4 for 50 seeds to tell.",
         ),
         (
             of([8, 6, 9]),
-            "is lost half of the time at every level in arena (8 of 10 runs, 49 to 94 % at "
-            "dynamism 0); this begins at 0, so dynamism is not its problem.",
+            "was lost in arena in 8 of 10 at 0, 6 of 10 at 0.4 and 9 of 10 at 1 (dynamism); so at "
+            "least 49 % of such runs are lost at 0 (95 %); this begins at 0, so dynamism is not "
+            "its problem; `--seeds 11` would tell whether more than half are lost at 0.",
         ),
         (
-            of([0, 6, 2]),
-            "is lost half of the time at dynamism 0.4 in arena (6 of 10 runs, 31 to 83 % at "
-            "0.4), but not at 1.",
+            of([5, 5, 5], runs=5),
+            "was lost in 15 of 15 runs in arena, already at dynamism 0; so at least 57 % of such "
+            "runs are lost at 0 (95 %); this begins at 0, so dynamism is not its problem.",
         ),
         (
             of([0, 0, 0], odometry=[9, 8, 9]),
-            "is never lost in arena up to dynamism 1 (0 of 10 runs at each level, 0 to 28 %).",
+            "was lost in none of 30 runs in arena, up to dynamism 1; so at most 28 % of such runs "
+            "are lost at 1 (95 %).",
         ),
         (
             of([0, 0, 0], odometry=[0, 0, 0]),
-            "is never lost in arena up to dynamism 1 (0 of 10 runs at each level, 0 to 28 %); "
-            "but odometry alone is not lost either, so these runs are too easy to tell.",
+            "was lost in none of 30 runs in arena, up to dynamism 1; so at most 28 % of such runs "
+            "are lost at 1 (95 %); but odometry alone is not lost either, so these runs are too "
+            "easy to tell.",
         ),
         (
             of([0, 1, 4]),
-            "is lost in fewer than half of the runs at every level in arena (at the most 4 of "
-            "10 runs, 17 to 69 % at dynamism 1).",
+            "was lost in arena in 0 of 10 at 0, 1 of 10 at 0.4 and 4 of 10 at 1 (dynamism); so at "
+            "most 69 % of such runs are lost at 1 (95 %); that is too near to one half at 1 for 50 "
+            "seeds to tell.",
         ),
         (
-            of([0, 6, 9], oracle=[0, 0, 3]),
-            "is lost half of the time from dynamism 0.4 on in arena (6 of 10 runs, 31 to 83 % "
-            "there); the oracle fails too at dynamism 1 (3 of 10 runs, 11 to 60 %): the room is"
-            " unfair there.",
+            of([0, 10, 10], oracle=[0, 0, 3]),
+            "was lost in arena in 0 of 10 at 0, 10 of 10 at 0.4 and 10 of 10 at 1 (dynamism); it "
+            "holds at 0 and is lost at 0.4, so at least 72 % of such runs are lost at 0.4 (95 %); "
+            "the oracle fails too at dynamism 1 (3 of 10 runs, 11 to 60 %): the room is unfair "
+            "there.",
         ),
         (
-            of([0, 6, 9], oracle=[0, 2, 3], own=True),
-            "is lost half of the time from dynamism 0.4 on in arena (6 of 10 runs, 31 to 83 % "
-            "there); without the returns of movers it is lost too at dynamism 0.4 and 1 (3 of "
-            "10 runs, 11 to 60 % at 1), so they are not its only problem, or the room is "
-            "unfair.",
+            of([0, 10, 10], oracle=[0, 2, 3], own=True),
+            "was lost in arena in 0 of 10 at 0, 10 of 10 at 0.4 and 10 of 10 at 1 (dynamism); it "
+            "holds at 0 and is lost at 0.4, so at least 72 % of such runs are lost at 0.4 (95 %); "
+            "without the returns of movers it is lost too at dynamism 0.4 and 1 (3 of 10 runs, 11 "
+            "to 60 % at 1), so they are not its only problem, or the room is unfair.",
         ),
         (
-            of([0, 6, 6], failures=[0, 6, 6]),
-            "fails half of the time from dynamism 0.4 on in arena (6 of 10 runs, 31 to 83 % "
-            "there).",
+            of([0, 9, 9], failures=[0, 9, 9]),
+            "failed in arena in 0 of 10 at 0, 9 of 10 at 0.4 and 9 of 10 at 1 (dynamism); it holds "
+            "at 0 and is lost at 0.4, so at least 60 % of such runs are lost at 0.4 (95 %).",
         ),
         (
             of([9], levels=(0.5,), failures=[1]),
-            "fails or is lost half of the time at dynamism 0.5 in arena (9 of 10 runs, 60 to 98"
-            " %).",
+            "failed or was lost in 9 of 10 runs in arena at dynamism 0.5; so at least 60 % of such "
+            "runs are lost (95 %).",
         ),
         (
             of([2], levels=(0.5,)),
-            "is lost in fewer than half of the runs at dynamism 0.5 in arena (2 of 10 runs, 6 "
-            "to 51 %).",
+            "was lost in 2 of 10 runs in arena at dynamism 0.5; so at most 51 % of such runs are "
+            "lost (95 %); `--seeds 11` would tell whether more than half are lost.",
+        ),
+        (
+            of([0, 2], levels=(0.0, 1.0), runs=2),
+            "was lost in arena in 0 of 2 at 0 and 2 of 2 at 1 (dynamism); it holds at 0 and is "
+            "lost at 1, so at least 34 % of such runs are lost at 1 (95 %); `--seeds 4` would tell "
+            "whether more than half are lost at 0 and 1.",
         ),
     ],
 )  # fmt: skip
@@ -108,10 +117,15 @@ def test_the_sentence_of_each_case(case: Standing, said: str):
     assert answer(case) == f"`{MINE}` {said}"
 
 
-def test_of_few_runs_nothing_is_claimed():
-    assert answer(of([5, 5, 5], runs=5, against=[-1, -1, -1])) == (
-        "Too few runs to tell: `my_icp` has 5 at a level, and it takes 6 (`--seeds 6`)."
-    )
+@pytest.mark.parametrize("runs", [1, 2, 3, 5, 10, 40])
+def test_no_level_is_named_that_was_not_run_and_half_is_said_of_no_whole(runs: int):
+    for lost in ([0, 0, runs], [0, runs, runs], [runs] * 3, [0] * 3, [0, runs // 2, runs]):
+        said = answer(of(lost, runs=runs))
+        levels = {float(found) for found in re.findall(r" at (\d(?:\.\d+)?)", said)}
+        assert levels <= {0.0, 0.4, 1.0}
+        assert "half of the time" not in said
+        if sum(lost) == 3 * runs:
+            assert f"lost in {3 * runs} of {3 * runs} runs" in said
 
 
 def test_a_level_above_zero_blames_nothing_on_dynamism():

@@ -24,7 +24,7 @@ from sim.recording.sums import SUMS, write_sums
 from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.report import made, mutations
 
-CASES, DRAWN = 500, 8
+CASES, DRAWN = 200, 4
 MOST_BYTES = 48 << 20  # by which the process may grow; the folder has 100 kB
 # What ``verify`` wants to be there, and no report reads.
 UNREAD = (
@@ -180,7 +180,7 @@ def test_what_cannot_be_read_is_not_written(tmp_path: Path):
 
 
 def test_whatever_is_harmed_is_read_or_refused_in_a_line(whole: Path, folder: Path):
-    """500 harms: no traceback, no memory that the folder does not have, and ``verify`` agrees."""
+    """200 harms: no traceback, no memory that the folder does not have, and ``verify`` agrees."""
     ended: Counter[bool] = Counter()
     before = peak_bytes()
     for case in range(CASES):

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import html
-import json
 import re
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from scripts.report import page
 from scripts.report.study import study
 from slam.errors import LogFormatError
 from tests.scripts.report import made
-from tests.scripts.report.browser import CHROMIUM, Browser
 
 
 @pytest.fixture(scope="module")
@@ -70,16 +68,3 @@ def test_tables_that_are_not_whole_are_refused(tmp_path: Path):
     path.unlink()
     with pytest.raises(LogFormatError, match=r"ages\.csv"):
         page.render(study(folder))
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here (apt-get install chromium)")
-def test_a_browser_shows_it_on_a_phone_and_on_a_desk(folder: Path, tmp_path: Path):
-    path = page.write(study(folder))
-    with Browser(tmp_path / "profile") as browser:
-        for width in (390, 1280):
-            browser.open(path, width)
-            wide = browser.evaluate("document.documentElement.scrollWidth")
-            assert wide <= width, f"{width}: the page scrolls sideways"
-        browser.screenshot(tmp_path / "page.png")
-    assert browser.console == []
-    assert json.loads((folder / "recipe.json").read_text())["settings"]["sessions"] == 5

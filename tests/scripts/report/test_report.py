@@ -17,8 +17,6 @@ from typer.testing import CliRunner
 from scripts import cli
 from scripts.closed_loop.folder import driven
 from scripts.comparison import folder as files
-from scripts.comparison import schema
-from scripts.comparison.csv_files import write_csv
 from scripts.metrics.row import digits
 from scripts.metrics.table import METRICS
 from scripts.report import closed, page, pictures, tables, words
@@ -80,8 +78,7 @@ def test_with_few_runs_nobody_wins(tmp_path: Path):
     assert not any(" to " in cell.small or cell.mark for cell in cells)  # no interval, no winner
     assert "5 of 5" in [cell.text for cell in cells]  # a count is no share
     text = page.render(few)
-    assert text.index("Too few runs to tell") < text.index("<nav")
-    assert "95 %" not in text.partition("<dl>")[0]
+    assert text.index("of such runs are lost") < text.index("<nav")
 
 
 def test_a_pair_reads_the_same_from_both_sides(folder: Path):
@@ -242,7 +239,7 @@ def test_the_page_is_about_whom_one_asks(written: Path, tmp_path: Path):
     )  # it hung: nobody misled it
     failure = "`own:Hanging` hung in 6 of 12 runs, first in room at dynamism 1, seed 100: SLAM "
     assert failure in done.output
-    assert "`own:Hanging` fails half of the time at dynamism 1 in room" in done.output
+    assert "`own:Hanging` failed in room in 0 of 6 at 0 and 6 of 6 at 1 (dynamism)" in done.output
 
 
 class Addresses(HTMLParser):
@@ -278,20 +275,10 @@ def damage(name: str):
     return cut
 
 
-def without_a_column(folder: Path) -> None:
-    rows = files.read(folder).runs
-    write_csv(folder / schema.RUNS, rows, [name for name in rows[0] if name != "outcome"])
-
-
 def of_another_schema(folder: Path) -> None:
     recipe = json.loads((folder / "recipe.json").read_text())
     recipe["settings"]["compare_schema"] = 0
     (folder / "recipe.json").write_text(json.dumps(recipe))
-
-
-def run_of_another_schema(folder: Path) -> None:
-    for path in (folder / "runs").glob("*.npz"):
-        np.savez(path, slams=np.array([made.OURS]))
 
 
 @pytest.mark.parametrize(
@@ -305,18 +292,7 @@ def run_of_another_schema(folder: Path) -> None:
         (damage("recipe.json"), "recipe.json: no recipe: "),
         (of_another_schema, "no comparison of schema 1"),
         (lambda folder: (folder / "runs.csv").unlink(), "runs.csv: cannot be read"),
-        (damage("levels.csv"), "levels.csv:26: must have 11 cells, got 5"),
-        (
-            lambda folder: (folder / "paired.csv").write_bytes(b"\xff"),
-            "paired.csv: not a text",
-        ),
-        (
-            lambda folder: (folder / "runs.csv").write_text("scene\n"),
-            "runs.csv:1: a table without",
-        ),
-        (without_a_column, "a table without the column 'outcome'"),
         (damage("runs/room_d1_s102.npz"), "room_d1_s102.npz: no whole NumPy archive"),
-        (run_of_another_schema, "holds no array 'schema'"),
     ],
 )
 def test_what_is_no_comparison_is_told_in_a_line(tmp_path: Path, harm, says, monkeypatch, capsys):

@@ -18,7 +18,6 @@ from scripts.comparison.plan import Plan
 from scripts.console import console
 from scripts.film.encode import film
 from scripts.output import whole_folder, write_recipe
-from scripts.robustness.disk_log import tree
 from slam.errors import OutputError
 from slam.files import write_bytes
 from slam.maps import read_map, write_map
@@ -28,6 +27,14 @@ from slam.system import Raster
 REPO = Path(__file__).resolve().parents[3]
 FULL = "No space left on device"
 Disk = Callable[[int], Path]
+
+
+def tree(folder: Path) -> dict[str, bytes | None]:
+    """All that lies in a folder; None of a folder."""
+    return {
+        path.relative_to(folder).as_posix(): None if path.is_dir() else path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+    }
 
 
 @pytest.fixture
@@ -139,27 +146,16 @@ def test_tables_of_a_comparison(disk: Disk, tmp_path: Path):
     assert len(make.carry_out(two, out)) == 2
 
 
-@pytest.mark.parametrize(
-    ("kilobytes", "words", "named"),
-    [
-        (100, ("generate", "arena", "--episodes", "2", "--seconds", "20"), "out/arena-"),
-        (
-            24,
-            ("compare", "--slam", "odometry", "--scene", "arena", "--dynamism", "1"),
-            "out/recordings: ",
-        ),
-    ],
-)
-def test_two_processes(disk: Disk, kilobytes: int, words: tuple[str, ...], named: str):
-    place = disk(kilobytes)
-    more = ("--seconds", "3", "--seeds", "2") if words[0] == "compare" else ()
+def test_two_processes(disk: Disk):
+    place = disk(100)
+    words = ("generate", "arena", "--episodes", "2", "--seconds", "20")
     done = subprocess.run(
-        [sys.executable, "-m", "scripts", *words, *more, "--jobs", "2", "--out", "out"],
+        [sys.executable, "-m", "scripts", *words, "--jobs", "2", "--out", "out"],
         cwd=place, env={**os.environ, "PYTHONPATH": str(REPO)}, capture_output=True, text=True,
         check=False,
     )  # fmt: skip
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
-    assert f"{place}/{named}" in done.stderr
+    assert f"{place}/out/arena-" in done.stderr
     assert done.stderr.endswith(f": {FULL}\n")
     assert not [name for name in tree(place) if "/." in name]

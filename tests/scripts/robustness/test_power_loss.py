@@ -1,105 +1,110 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The power fails at any step: each thing is whole or absent, and the same command goes on."""
+"""A power cut leaves each thing whole or absent: bytes are synced, then named, then the name is.
+
+A file system keeps the bytes of a file once the file was synced, and a name once its folder was.
+So the order of the calls is what is held here.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable
+from pathlib import Path
 
+import numpy as np
 import pytest
 
-from scripts.console import console
-from scripts.robustness.disk_log import Cut, DiskLog, tree
-from scripts.robustness.power_cases import all_together, cases, each_alone
-from scripts.robustness.power_cuts import Case, tried
-from slam.files import put, write_text
+from scripts.output import whole_folder, write_recipe
+from slam import files
+from slam.maps import write_map
+from slam.shunting import ShuntingSlam
+from slam.system import Raster
 
-CASES = {case.name: case for case in cases(film=False)}
-RESUMES = dict.fromkeys(CASES, 2) | {"run": 1}
-
-
-@pytest.fixture(autouse=True)
-def quiet() -> Iterator[None]:
-    console.quiet = True
-    yield
-    console.quiet = False
+Calls = list[tuple[str, str]]
 
 
-@pytest.mark.parametrize("name", [n for n in CASES if not n.startswith("run --")])
-def test_whole_or_absent_and_it_goes_on(name, tmp_path):
-    outcome = tried(CASES[name], tmp_path, resumes=RESUMES[name])
-    assert outcome.torn == []
-    assert outcome.other == []
-    assert outcome.resumed == RESUMES[name]
-    assert outcome.found["whole"] > 0
-    had = CASES[name].first is not None
-    assert (outcome.found["as before"] > 0) == had
-    if had and name != "compare, a SLAM more":  # there some files are new
-        assert outcome.found["absent"] == 0
+@pytest.fixture
+def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Calls:
+    """Every fsync and rename below ``tmp_path`` in order: what, and of whom (or to which name)."""
+    seen: Calls = []
+    fsync, replace, swap = os.fsync, os.replace, files.exchange
 
+    def told(what: str, path: object) -> None:
+        name = os.path.relpath(str(path), tmp_path).replace(f".{os.getpid()}", "")
+        seen.append((what, name))
 
-def a_folder(text: str):
-    def call(root):
-        from scripts.output import whole_folder, write_recipe
-
-        with whole_folder(root / "run", overwrite=True) as part:
-            write_text(part / "a.txt", text)
-            write_recipe(part, "test", {})
-
-    return call
-
-
-@pytest.mark.parametrize("exchange", [True, False])
-def test_an_earlier_folder_is_never_lost(tmp_path, exchange):
-    case = Case(
-        name="folder", call=a_folder("new"), first=a_folder("old"), things=all_together,
-        exact=True, exchange=exchange,
-    )  # fmt: skip
-    outcome = tried(case, tmp_path, resumes=30, draws=10)
-    assert outcome.torn == []
-    assert outcome.other == []
-    assert outcome.found["absent"] == 0
-    assert (outcome.found["on its way"] > 0) == (not exchange)
-
-
-def test_without_syncing_it_would_be_torn(tmp_path, monkeypatch):
-    """The test can fail: what is not synced is lost with its bytes, though it has its name."""
-    monkeypatch.setattr("slam.files.sync", lambda path: None)
-    outcome = tried(CASES["map, npz"], tmp_path, resumes=0)
-    assert any("all names, no bytes" in line for line in outcome.torn)
-
-
-def test_a_name_without_its_folder_synced_may_be_gone(tmp_path):
-    def call(root):
-        (root / "a.part").write_bytes(b"bytes")
-        put(root / "a.part", root / "a")
-
-    log = DiskLog(tmp_path)
-    with log.recording():
-        call(tmp_path)
-    kinds = [type(step).__name__ for step in log.steps]
-    assert kinds == ["Names", "Synced", "Names", "Synced"]
-    assert log.left(3, Cut.NOTHING) == {}
-    assert log.left(3, Cut.NAMES) == {"a": b"bytes"}
-    assert log.left(1, Cut.NAMES) == {"a.part": b""}
-    assert log.left(4, Cut.NOTHING) == tree(tmp_path) == {"a": b"bytes"}
-
-
-def test_finished_things_are_synced_once(tmp_path, monkeypatch):
-    """Files of a folder with it, a single file and its folder's names once each."""
-    seen: list[str] = []
-    fsync = os.fsync
-
-    def counted(number):
-        seen.append(os.readlink(f"/proc/self/fd/{number}").removeprefix(f"{tmp_path}/"))
+    def synced(number: int) -> None:
+        told("sync", os.readlink(f"/proc/self/fd/{number}"))
         fsync(number)
 
-    monkeypatch.setattr(os, "fsync", counted)
-    a_folder("text")(tmp_path)
-    part = f".run.{os.getpid()}.part"
-    whole = ["a.txt", "recipe.json", "SHA256SUMS"]
-    assert sorted(seen) == sorted([*(f"{part}/{name}" for name in whole), part, str(tmp_path)])
-    seen.clear()
-    write_text(tmp_path / "b.txt", "text")
-    assert seen == [f".b.{os.getpid()}.part.txt", str(tmp_path)]
-    assert each_alone(["b.txt"]) == {"b.txt": {"b.txt"}}
+    def renamed(old: Path, new: Path) -> None:
+        told("rename", new)
+        replace(old, new)
+
+    def exchanged(old: Path, new: Path) -> bool:
+        told("rename", new)
+        return swap(old, new)
+
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(os, "replace", renamed)
+    monkeypatch.setattr("scripts.output.exchange", exchanged)
+    return seen
+
+
+def test_a_file_is_synced_then_named_then_its_name_is_synced(calls: Calls, tmp_path: Path):
+    files.write_text(tmp_path / "b.txt", "text")
+    assert calls == [("sync", ".b.part.txt"), ("rename", "b.txt"), ("sync", ".")]
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_folder_is_synced_whole_then_named(calls: Calls, tmp_path: Path, there: bool):
+    for text in ("old", "new") if there else ("new",):
+        calls.clear()
+        with whole_folder(tmp_path / "run", overwrite=there) as part:
+            files.write_text(part / "a.txt", text)
+            write_recipe(part, "test", {})
+    names = ["a.txt", "recipe.json", "SHA256SUMS"]
+    at = calls.index(("rename", "run"))
+    before = [name for what, name in calls[:at] if what == "sync"]
+    assert sorted(before) == sorted([*(f".run.part/{name}" for name in names), ".run.part"])
+    assert before[-1] == ".run.part"  # the names in it, after the bytes
+    assert ("sync", ".") in calls[at:]
+    assert (tmp_path / "run" / "a.txt").read_text() == "new"
+
+
+def test_where_names_cannot_be_swapped_an_earlier_folder_is_put_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Cut between its two renames, the next run finds it again."""
+    monkeypatch.setattr("scripts.output.exchange", lambda one, other: False)
+
+    def written(text: str, fails: Callable[[], object] = lambda: None) -> None:
+        with whole_folder(tmp_path / "run", overwrite=True) as part:
+            files.write_text(part / "a.txt", text)
+            write_recipe(part, "test", {})
+            fails()
+
+    written("old")
+    kept = tmp_path / f".run.{os.getpid()}.old"
+    (tmp_path / "run").rename(kept)
+    with pytest.raises(KeyboardInterrupt):
+        written("new", lambda: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert (tmp_path / "run" / "a.txt").read_text() == "old"
+    written("new")
+    assert (tmp_path / "run" / "a.txt").read_text() == "new"
+    assert not kept.exists()
+
+
+def test_of_a_map_the_image_is_named_before_the_file_that_vouches_for_it(
+    calls: Calls, tmp_path: Path
+):
+    values = np.full((3, 3), 0.5, dtype=np.float32)
+    write_map(tmp_path / "map", Raster(values=values, resolution_m=0.1, T_map_origin=np.zeros(3)))
+    renames = [name for what, name in calls if what == "rename"]
+    assert renames == ["map.pgm", "map.yaml"]
+    ShuntingSlam().save(tmp_path / "map.npz")
+    assert [name for what, name in calls if what == "rename"][-1] == "map.npz"
+    for name in ("map.pgm", "map.yaml", "map.npz"):
+        at = calls.index(("rename", name))
+        assert calls[at - 1][0] == "sync"
+        assert ("sync", ".") in calls[at:]

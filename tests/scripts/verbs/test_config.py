@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import sim
-from scripts.many import named
+from scripts.options import named
 from scripts.output import read_recipe_words, write_recipe
 from scripts.verbs.config import config
 from sim.actors.config import ACTORS

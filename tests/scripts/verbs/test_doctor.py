@@ -29,7 +29,7 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
 
     def told(name: str) -> SimpleNamespace:
         version(name)
-        return SimpleNamespace(get_all=lambda _: ["guests", "yag", "rerun"])
+        return SimpleNamespace(get_all=lambda _: ["guests", "yag", "rl"])
 
     monkeypatch.setattr(metadata, "version", version)
     monkeypatch.setattr(metadata, "requires", lambda name: version(name) and requires)

@@ -11,14 +11,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import typer
 
-from scripts.levels import sweep
+from scripts.options import sweep
 from scripts.verbs.export import export
 from scripts.verbs.generate import generate
 from scripts.verbs.verify import verify
@@ -235,27 +235,6 @@ def test_two_writers_another_plan_and_foreign_files_are_refused(serial, tmp_path
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
 
 
-@pytest.fixture
-def small_disk(tmp_path) -> Iterator[Path]:
-    """A file system of 512 KB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=512k", "tmpfs", str(folder)]
-    if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
-        pytest.skip("may not mount a tmpfs")
-    yield folder
-    subprocess.run(["umount", "-l", str(folder)], check=True)
-
-
-def test_a_full_and_a_read_only_disk_are_named(small_disk):
-    with pytest.raises(OutputError, match=f"cannot write .*{NAMES[0]}: No space left"):
-        generate(["arena"], small_disk / "data", **SETTINGS)
-    assert [p.name for p in (small_disk / "data").iterdir()] == ["dataset.json"]
-    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
-    with pytest.raises(OutputError, match=r"cannot write .*other: Read-only"):
-        generate(["arena"], small_disk / "other", **SETTINGS)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -265,9 +244,6 @@ def test_a_full_and_a_read_only_disk_are_named(small_disk):
         ({"dynamism_sweep": "0:1"}, "start:stop:step"),
         ({"dynamism_sweep": "0:2:0.5"}, "stop <= 1"),
         ({"dynamism_sweep": "0:1:1e-9"}, "at most"),
-        ({"seed": -1}, "seed must be a whole number >= 0"),
-        ({"seconds": float("nan")}, "seconds must be a finite number"),
-        ({"seconds": 0.0}, "seconds must be > 0"),
         ({"dynamism": 1.5}, "dynamism must lie in"),
     ],
 )
@@ -379,10 +355,6 @@ def test_exports_are_read_back(serial, tmp_path):
     (serial.parent / f"{episode.name}.log.gz").unlink()
     with pytest.raises(LogFormatError, match=f"name one of the recordings in it: {NAMES[0]}"):
         export(serial, "tum", None)
-    with pytest.raises(InvalidValueError, match="--to must be one of"):
-        export(episode, "minari", tmp_path / "a.h5")
-    with pytest.raises(LogFormatError, match="no such file"):
-        export(tmp_path / "none.mcap", "tum", None)
 
 
 @pytest.mark.parametrize(
@@ -415,8 +387,6 @@ def test_poses_with_covariances_are_exported(serial, tmp_path):
     assert np.hypot(*(truth - online.poses)[:, :2].T).max() < 0.05
     with pytest.raises(InvalidValueError, match="states none"):
         export(episode, "smfeval", tmp_path / "b.tum", "karto")
-    with pytest.raises(InvalidValueError, match="--slam is for --to smfeval"):
-        export(episode, "tum", tmp_path / "b.tum", "ekf")
 
 
 def kill_in_mid_episode(worker: subprocess.Popen[bytes], out: Path) -> None:

@@ -8,7 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from scripts.live import sdk, view
+from scripts.live import view
+from scripts.live.opened import Opener
 from scripts.verbs.live import _serve
 from slam.errors import InvalidValueError
 
@@ -30,11 +31,11 @@ def test_what_cannot_be_served_is_said_in_one_line(called, words, said):
     assert said in " ".join(ended.stderr.split())
 
 
-def test_without_the_sdk_it_says_what_to_install(called, monkeypatch):
-    monkeypatch.setitem(sys.modules, "foxglove", None)
+def test_without_viser_it_says_what_to_install(called, monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
     ended = called("live", "arena")
     assert ended.returncode == 1
-    assert "pip install 'mobilia[live]'" in ended.stderr
+    assert "pip install viser" in ended.stderr
 
 
 @pytest.mark.parametrize(("host", "warned"), [("127.0.0.1", False), ("0.0.0.0", True)])
@@ -42,10 +43,9 @@ def test_an_address_that_others_reach_is_warned_of(host, warned, monkeypatch, ca
     closed = []
 
     class Once:
-        port = 8765
-        token = "a-token" if warned else ""
+        served = SimpleNamespace(port=8765, token="a-token" if warned else "")
 
-        def __init__(self, *_: object) -> None:
+        def __init__(self, *_: object, **__: object) -> None:
             pass
 
         def turn(self) -> None:
@@ -55,12 +55,10 @@ def test_an_address_that_others_reach_is_warned_of(host, warned, monkeypatch, ca
             closed.append(True)
 
     monkeypatch.setattr(view, "View", Once)
-    session = SimpleNamespace(run=lambda: iter(()))
-    found = sdk.Sdk(None, None, None, None)
     with pytest.raises(InvalidValueError, match="enough"):
-        _serve(found, (session, (0, 1)), (host, 8765), [], playing=True, speed=1.0)
+        _serve(Opener(slams=["odometry"]), (host, 8765), [], playing=True, speed=1.0)
     printed = " ".join(capsys.readouterr().out.split())
-    assert f"ws://{host}:8765" in printed
+    assert f"http://{host}:8765/" in printed
     assert ("There is no encryption" in printed) is warned
     assert ("/a-token" in printed) is warned
     assert closed == [True]

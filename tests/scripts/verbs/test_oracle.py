@@ -11,7 +11,7 @@ from types import SimpleNamespace
 from scripts.debugger.episode import Case
 from scripts.debugger.recording import Checkpoint, record
 from sim.simulation import stream
-from slam.logs.carmen_writer import write_carmen
+from slam.logs.carmen import write_carmen
 
 
 def test_a_run_has_the_oracle_beside_the_slam(

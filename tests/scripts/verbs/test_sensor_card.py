@@ -6,23 +6,20 @@ Beside a real log, simulated scans are measured by the same code.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from scripts.card import beside, real, stated
 from scripts.card import rows as sensor_rows
-from scripts.card import stated
-from scripts.card.real import beside, table
-from scripts.card.real.picture import draw
-from scripts.card.real.simulated import simulated
+from scripts.card.page import Row, page
+from scripts.card.real import simulated
 from scripts.verbs.sensor_card import sensor_card
 from sim.sensors.lidar.registry import scanner_of
 from sim.sensors.lidar.sheet import NOT_STATED, sheet_of
-from slam.errors import InvalidValueError, LogFormatError, MobiliaError, UnknownNameError
+from slam.errors import InvalidValueError, MobiliaError, UnknownNameError
 from slam.evaluation.scanner.card import ScannerCard, measure
-from slam.evaluation.scanner.figures import Figure
 
 
 @pytest.mark.parametrize(
@@ -51,9 +48,7 @@ def test_the_card_is_a_page_with_two_small_pictures(
 
 
 def test_a_row_that_does_not_hold_fails_the_card(monkeypatch: pytest.MonkeyPatch) -> None:
-    broken = sensor_rows.Row(
-        what="colour", datasheet="blue", measured="red", source="TD p1", kept=False
-    )
+    broken = Row(what="colour", datasheet="blue", measured="red", source="TD p1", kept=False)
     monkeypatch.setattr(sensor_rows, "rows", lambda: [broken])
     with pytest.raises(MobiliaError, match="departs from its data sheet: colour"):
         sensor_card()
@@ -70,13 +65,7 @@ def test_every_row_of_another_scanner_agrees_with_its_data_sheet(name: str) -> N
     for row in sheet:
         assert (row.value is None) == row.text.startswith(NOT_STATED)
         assert row.source or row.value is None
-    assert f"| {rows[0].what} |" in stated.page(name, rows)
-
-
-def test_a_card_can_be_broken(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = [replace(row, value=50.0) for row in sheet_of("tim561") if row.what == "rate_hz"]
-    monkeypatch.setattr(stated, "sheet_of", lambda name: wrong)
-    assert [row.kept for row in stated.rows_of("tim561")] == [False]
+    assert f"| {rows[0].what} |" in "\n".join(page(name, rows))
 
 
 @pytest.mark.parametrize("name", ["full", "utm30lx:noise", "lms221(resolution_deg=0.25)"])
@@ -103,7 +92,7 @@ def cards() -> dict[str, ScannerCard]:
         scanner = scanner_of("lms221", resolution_deg=1.0, noise_m=noise_m)
         small = simulated(scanner, scenes=("arena",), places=9, driven_s=3.0)
         made[f"{noise_m:g}"] = measure(small.stream)
-        mix, beams = beside.between_that_mix(small)
+        mix, beams = small.between_that_mix()
         assert 0 <= mix <= beams
     return made
 
@@ -127,28 +116,16 @@ def test_our_scanner_measured_like_a_log_has_the_noise_it_is_given(
 def test_cards_side_by_side_as_table_and_picture(
     cards: dict[str, ScannerCard], tmp_path: Path
 ) -> None:
-    real, ours = {"less": cards["0.0047"]}, {"usual": cards["0.01"]}
-    text = table.markdown(real, ours)
-    (row,) = (
-        line for line in text.splitlines() if line.startswith("| noise of a standing robot |")
-    )
-    assert f"| {table.DIFFERS} |" in row
-    assert "range, 2 to 4 m" not in text
-    assert any("2 to 4 m" in line.what for line in table.lines(real, ours))
-    assert {line.verdicts for line in table.lines(ours, ours)} <= {("",), (table.AGREES,)}
-    draw(tmp_path / "cards.png", real, ours)
+    less, ours = {"less": cards["0.0047"]}, {"usual": cards["0.01"]}
+    text = beside.markdown(less, ours)
+    (row,) = (line for line in text if line.startswith("| noise of a standing robot |"))
+    assert f"| {beside.DIFFERS} |" in row
+    assert not any("range, 2 to 4 m" in line for line in text)
+    assert any("2 to 4 m" in what for what, *_ in beside.rows(less, ours))
+    verdicts = {row[3] for row in beside.rows({"again": cards["0.01"]}, ours)}
+    assert verdicts <= {"", beside.AGREES}
+    beside.draw(tmp_path / "cards.png", less, ours)
     assert (tmp_path / "cards.png").stat().st_size > 20_000
-
-
-def test_a_cell() -> None:
-    made = Figure(value=0.00371, low=0.0035, high=0.0039, n=9, stretches=4)
-    assert table.cell(made, "mm") == "3.7 (3.5 to 3.9)"
-    assert table.cell(replace(made, low=np.nan), "mm") == "3.7"
-    assert (
-        table.cell(replace(made, value=0.0002, low=0.0, high=0.0004), "%") == "0.02 (0.00 to 0.04)"
-    )
-    assert table.cell(replace(made, value=0.0), "%") == "0"
-    assert table.cell(replace(made, value=np.nan), "%") == table.NONE
 
 
 def flaser(path: Path) -> Path:
@@ -172,7 +149,7 @@ def test_a_log_beside_simulated_scans(
 ) -> None:  # fmt: skip
     monkeypatch.setenv("COLUMNS", "200")
     asked = []
-    monkeypatch.setattr(beside, "simulated_card", lambda name: asked.append(name) or cards["0.01"])
+    monkeypatch.setattr(real, "simulated_card", lambda name: asked.append(name) or cards["0.01"])
     sensor_card(log=[flaser(tmp_path / "robot.log")], out=tmp_path / "out")
     assert asked == ["lms221(resolution_deg=1)"]
     page = (tmp_path / "out" / "real_scanner_log.md").read_text()
@@ -181,14 +158,7 @@ def test_a_log_beside_simulated_scans(
     )
     value = float(row.split("|")[3].split("(")[0])
     assert value == pytest.approx((5.0**2 + 10.0**2 / 12) ** 0.5, rel=0.08)
-    assert table.DIFFERS in row
+    assert beside.DIFFERS in row
     assert "4 standing stretches (40 scans)" in page
     sensor_card(log=[tmp_path / "robot.log"], scanner="tim561")
     assert asked[-1] == "tim561"
-
-
-def test_a_log_that_is_none_and_a_scanner_that_is_none(tmp_path: Path) -> None:
-    with pytest.raises(LogFormatError, match="no such file"):
-        sensor_card(log=[tmp_path / "nothing.log"])
-    with pytest.raises(UnknownNameError, match="Did you mean 'tim561'"):
-        sensor_card(log=[tmp_path / "nothing.log"], scanner="tim562")

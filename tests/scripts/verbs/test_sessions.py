@@ -4,11 +4,6 @@
 from __future__ import annotations
 
 import csv
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -47,25 +42,6 @@ def test_one_episode_a_session_and_all_of_it_is_vouched_for(made):
     assert regenerate(made / NAMES[2]).verdict == "same bytes"
     maps = {(folder / "map.pgm").read_bytes() for folder in (made, *map(made.joinpath, NAMES))}
     assert len(maps) == 1
-
-
-def test_killed_and_started_again_ends_with_the_same_bytes(made, tmp_path):
-    out = tmp_path / "data"
-    command = [sys.executable, "-m", "scripts", "generate", "office", "--sessions", str(N)]
-    for name, value in SETTINGS.items():
-        command += [f"--{name}", str(value)]
-    child = subprocess.Popen(
-        [*command, "--out", str(out)], cwd=REPO, stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(REPO)},
-    )  # fmt: skip
-    for _ in range(6000):
-        if (out / NAMES[0]).exists() or child.poll() is not None:
-            break
-        time.sleep(0.01)
-    child.send_signal(signal.SIGKILL)
-    child.wait()
-    generate(["office"], out, sessions=N, **SETTINGS)
-    assert sums(out) == sums(made)
 
 
 def test_damage_to_the_truth_is_found_and_made_good(made, tmp_path):

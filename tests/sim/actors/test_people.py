@@ -66,7 +66,7 @@ def test_people_walk_from_room_to_room(walk):
         }
         visited.append(len(inside))
     assert np.mean(visited) > 3
-    arrivals = np.sum(np.diff(walk["tasks"][:, :, columns.WALKING], axis=0) < 0)
+    arrivals = np.sum(np.diff(walk["tasks"]["walking"], axis=0) < 0)
     assert arrivals > poses.shape[1]
 
 
@@ -188,7 +188,7 @@ def test_a_door_lets_the_robot_through():
     door = world._doors.names.index(world.scene.movers[row].name)
     at = int(world.model.joint(f"{world.scene.movers[row].name}/hinge").qposadr[0])
     world.model.qpos_spring[at] = world.data.qpos[at] = 0.0
-    world._doors._closers[door, 4] = 0.0
+    world._doors._closers["rest"][door] = 0.0
     middle, along = world._doors.middles[door], world._doors.along[door]
     sign = world._doors.hinges[door, 3]
     push_from = -sign * np.array([-along[1], along[0]])  # the side the leaf swings away from
@@ -223,12 +223,12 @@ def test_somebody_sits_down_gets_up_and_leaves():
     sitter, later = -1, 0
     for k in range(60 * SUBSTEPS_PER_S):
         world.substep()
-        if sitter < 0 and (crowd.state[:, columns.SIT] == 1.0).any():
-            sitter = int(np.argmax(crowd.state[:, columns.SIT]))
-            chair = crowd.discs[crowd.task[sitter, columns.SEAT]].copy()
+        if sitter < 0 and (crowd.state["sit"] == 1.0).any():
+            sitter = int(np.argmax(crowd.state["sit"]))
+            chair = crowd.discs[crowd.task["seat"][sitter]].copy()
             hull = int(world.model.geom(f"{world.people.names[sitter]}/hull").id)
-            assert np.hypot(*(crowd.discs[sitter, :2] - chair[:2])) < 0.15
-            assert chair[columns.KIND] == columns.CHAIR
+            assert math.dist([*crowd.discs[sitter]][:2], [*chair][:2]) < 0.15
+            assert chair["kind"] == columns.CHAIR
             assert world.model.geom_contype[hull] == 0
             thigh = world.model.body(f"{world.people.names[sitter]}/thigh_l").id
             assert world.data.xpos[thigh, 2] == pytest.approx(gait.SEAT_HEIGHT, abs=0.02)
@@ -243,11 +243,11 @@ def test_somebody_sits_down_gets_up_and_leaves():
                 fresh.substep()
             np.testing.assert_array_equal(fresh.data.qpos, expected)
         if sitter >= 0:
-            seen.add(int(crowd.task[sitter, columns.WALKING]))
-            if crowd.task[sitter, columns.SEAT] < 0:
+            seen.add(int(crowd.task["walking"][sitter]))
+            if crowd.task["seat"][sitter] < 0:
                 break
     assert {columns.SEATED, columns.WALKS} <= seen
     world.people.dress()
     assert world.model.geom_contype[hull] == 4
-    assert crowd.state[sitter, columns.SIT] == 0.0
+    assert crowd.state["sit"][sitter] == 0.0
     assert not any(w.number for w in world.data.warning)

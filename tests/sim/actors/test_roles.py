@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sim.actors.config import ACTORS
-from sim.actors.people import columns
 from sim.core.dynamism import Dynamism
 from sim.driving.pilot import Pilot
+from sim.simulation import Simulation, tour
 from sim.world.world import SUBSTEPS_PER_S, World
 from slam.errors import InvalidValueError
 
@@ -155,7 +155,7 @@ def test_a_cleaner_fills_a_row_of_chairs_and_empties_it():
         gaps = np.linalg.norm(chairs[:, None] - places[None], axis=2)
         full = max(full, int((gaps.min(axis=0) < 0.25).sum()))
         lines = world.people.table.leaders.lines
-        if full >= 2 and (lines[:, 3] < 0.0).all():
+        if full >= 2 and (lines["chair"] < 0.0).all():
             break
     assert full >= 2
     assert np.linalg.norm(chairs - before, axis=1).min() < 0.5
@@ -185,9 +185,25 @@ def test_nobody_walks_through_anybody(mixed: tuple[World, bytes]):
     world, _ = mixed
     people = world.people.crowd
     n = len(people.task)
-    xy = people.discs[:, [columns.X, columns.Y]]
+    xy = np.stack([people.discs["x"], people.discs["y"]], axis=1)
     gaps = np.linalg.norm(xy[:n, None] - xy[None], axis=2)
-    gaps -= people.discs[:n, None, columns.R] + people.discs[None, :, columns.R]
+    gaps -= people.discs["r"][:n, None] + people.discs["r"][None]
     gaps[np.arange(n), np.arange(n)] = 1.0
     assert gaps.min() > -0.03
     assert sum(world.data.warning[k].number for k in range(len(world.data.warning))) == 0
+
+
+def test_who_has_put_a_chair_down_is_pushed_by_nothing():
+    simulation = Simulation(
+        "arena", seed=3, motion=0.5, change=0.0, crowd="cleaners:2", n_chairs=8, n_people=0
+    )
+    world = simulation.world
+    held = world.people.table.held.at
+    had, empty = np.zeros(len(held), dtype=bool), 0
+    for _ in tour(simulation, 20.0):
+        for k in np.flatnonzero(had & (held["qb"] < 0) & (held["dropped"] < 0)):
+            empty += 1
+            first = held["va"][k]
+            assert (world.data.qfrc_applied[first : first + 3] == 0.0).all()
+        had |= held["qb"] >= 0
+    assert empty > 20

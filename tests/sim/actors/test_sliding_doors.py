@@ -15,7 +15,6 @@ import pytest
 from scenes import filled
 from scenes.scene import Scene
 from sim.actors.config import ACTORS
-from sim.actors.people import columns
 from sim.core.dynamism import Dynamism
 from sim.driving.pilot import Pilot
 from sim.recording.objects import ObjectsMessage
@@ -87,7 +86,7 @@ def stand_still(world: World, x: float, y: float) -> None:
     """Put person0 there for good."""
     first = int(world.model.joint("person0/x").qposadr[0])
     world.data.qpos[first : first + 2] = x, y
-    world.people.crowd.state[0, columns.STAY_UNTIL] = math.inf
+    world.people.crowd.state["stay_until"][0] = math.inf
     mujoco.mj_forward(world.model, world.data)
 
 
@@ -201,7 +200,7 @@ class TestLift:
         scene = room(folder, "lift", n_people=2)
         first, second = (World(scene, seed=4, dynamism=1.0) for _ in range(2))
         for _ in walk(first, 20.0):
-            if np.isfinite(first._doors.schedule[0, 4]):
+            if np.isfinite(first._doors.schedule["comes"][0]):
                 break
         second.load_state(first.save_state())
         for _ in zip(walk(first, 6.0), walk(second, 6.0), strict=True):

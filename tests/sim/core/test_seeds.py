@@ -88,13 +88,6 @@ def test_every_rate_rises_with_the_dynamism():
     assert stays == sorted(set(stays), reverse=True)
 
 
-def test_the_documented_table_is_the_one_in_use():
-    half = Dynamism.at(0.5)
-    assert half.chair_push_rate == pytest.approx(0.075)
-    assert half.stay_mean == pytest.approx(14.0)
-    assert half.pace == pytest.approx(0.85)
-
-
 def test_people_walk_in_proportion_to_the_dynamism():
     way_s = 10.0  # between two goals
     walking = [way_s / (way_s + Dynamism.at(d).stay_mean) for d in (0.25, 0.5, 0.75, 1.0)]

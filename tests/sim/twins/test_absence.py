@@ -179,14 +179,14 @@ def test_who_sat_on_a_chair_that_is_out_stands_there(before):
     people = simulation.world.people
     at, _ = simulation.world.bodies.addresses(["chair1"])
     seat = int(np.flatnonzero(people.table.at.discs[:, 0] == at[0])[0])
-    people.crowd.task[0, [columns.WALKING, columns.SEAT]] = columns.SEATED, seat
-    people.crowd.state[0, columns.SIT] = 1.0
-    people.crowd.state[0, columns.STAY_UNTIL] = 1e9
+    people.crowd.task[["walking", "seat"]][0] = columns.SEATED, seat
+    people.crowd.state["sit"][0] = 1.0
+    people.crowd.state["stay_until"][0] = 1e9
     apply(simulation, Change(out=("chair1",)))
     row = simulation.world.mover_names.index("person0")
     there = simulation.world.mover_poses()[row, :2]
     drive(simulation, 30)
-    assert people.crowd.task[0].tolist()[columns.SEAT] == -1
+    assert people.crowd.task["seat"][0] == -1
     assert np.abs(simulation.world.mover_poses()[row, :2] - there).max() < 0.5
 
 

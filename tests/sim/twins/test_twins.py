@@ -79,11 +79,6 @@ def test_nothing_is_displaced_while_in_view(trio):
             seen[body] = frame.stamp
 
 
-def test_streams_say_which_twin_they_are(trio):
-    made, _ = trio
-    assert [made[name].metadata.extra["twin"] for name in TWINS] == list(TWINS)
-
-
 def test_a_room_without_a_free_path_is_refused():
     blind = TourConfig(robot_radius_m=0.06)  # a driver that keeps no distance
     with pytest.raises(InvalidValueError, match=r"none of 1 tours .* crosses chair"):

@@ -15,7 +15,6 @@ from slam.days.history import DAY_S, History
 from slam.days.mobility import DaysRaster
 from slam.days.session import Session, keep, read_history
 from slam.errors import InvalidValueError, LogFormatError
-from slam.replay import Track
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker import map_file
 from tests.slam.tracker.test_map_file import rewritten
@@ -216,12 +215,3 @@ def test_the_map_says_how_its_places_change(first) -> None:
     assert told.values.shape == mobility.standing.values.shape
     with pytest.raises(InvalidValueError):
         mobility.probability(np.inf)
-
-
-def test_a_session_is_a_slam_of_the_protocol(first) -> None:
-    track = Track("days", Session.open(first[0], ShuntingSlam, time_s=2.0 * DAY_S))
-    drive = Drive((1.0, 0.6, 2.6), ((0.2, 0.4, 2.0),))
-    for frame in frames(HOME, drive, rate_hz=5.0, spec=laser(181), seed=9):
-        track.take(frame.without_truth())
-    assert track.map() is not None
-    assert track.final() is None or len(track.final()) == len(track.estimates)

@@ -122,9 +122,3 @@ def test_only_beams_that_pass_beyond_prove_absence():
 def test_impossible_configurations_are_refused(changes):
     with pytest.raises(InvalidValueError, match=f"EkfConfig.{next(iter(changes))}"):
         EkfConfig(**changes)
-
-
-def test_presets_take_changes():
-    assert EkfConfig.victoria_park(range_m=50.0).range_m == 50.0
-    assert EkfConfig.corners().confirm_looks == 8
-    assert sum("." not in row.path for row in EkfConfig().rows()) <= 12

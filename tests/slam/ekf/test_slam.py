@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import slam
-from slam import Frame, Odometry, SlamSystem, se2
+from slam import Frame, Odometry, se2
 from slam.ekf.config import EkfConfig
 from slam.ekf.slam import EkfSlam
 from slam.errors import InvalidValueError
@@ -43,13 +43,6 @@ def run(system: EkfSlam, frames: Iterable[Frame]) -> tuple[np.ndarray, np.ndarra
 
 def rmse(errors: np.ndarray) -> float:
     return math.sqrt(np.mean(errors[:, 0] ** 2 + errors[:, 1] ** 2))
-
-
-def test_it_is_registered():
-    system = slam.create("ekf", range_m=20.0)
-    assert isinstance(system, SlamSystem)
-    assert system.config.range_m == 20.0
-    assert "EKF" in slam.system.describe("ekf")
 
 
 def test_the_static_run_with_ipjc_is_accurate_and_consistent():

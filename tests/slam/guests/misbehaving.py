@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import sys
 import time
 
@@ -37,10 +36,6 @@ def misbehave(fault: str, stamp_ns: int) -> bool:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         while True:
             pass
-    elif fault == "family":
-        subprocess.Popen(["sleep", "600"])
-        sys.stderr.write("kin\n")
-        time.sleep(EVER)
     elif fault == "half":
         sys.stdout.write('{"type":')
         sys.stdout.flush()

@@ -7,7 +7,6 @@ A script stands in for the program, so that this needs none: it logs poses as MR
 from __future__ import annotations
 
 import math
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,8 @@ import pytest
 from slam import create
 from slam.errors import SlamFailedError
 from slam.frames import Frame
-from slam.guests import program, rawlog
-from slam.guests.beams import ranges_of
+from slam.guests import wire
+from slam.guests.layers import ranges_of
 from slam.oracle import Oracle
 from slam.replay import Track
 from tests.world2d import World2D, arena, frames, laser, wander
@@ -117,33 +116,10 @@ def test_a_program_that_fails_has_lost_the_run(
 
 def test_a_program_that_hangs_is_ended() -> None:
     with pytest.raises(SlamFailedError, match="hung") as caught:
-        program.run(["sleep", "60"], 0.3)
+        wire.run(["sleep", "60"], 0.3)
     assert caught.value.outcome == "hung"
     with pytest.raises(SlamFailedError, match="cannot start"):
-        program.run(["/nonexistent/program"], 1.0)
-
-
-def test_a_rawlog_holds_each_beam_and_step(stream: list[Frame]) -> None:
-    """By hand, from the format: MRPT itself reads it in ``test_guests``, where it is there."""
-    spec = stream[0].scan.spec  # type: ignore[union-attr]
-    ranges = np.full(spec.n_beams, 3.0)
-    ranges[7] = math.inf
-    text = rawlog.sensed(100, ranges, spec)
-    name = b"mrpt::obs::CSensoryFrame"
-    assert text.startswith(bytes((0x80 | len(name),)) + name + b"\x02" + struct.pack("<I", 1))
-    assert text.endswith(b"\x88\x88")
-    beams = text.index(struct.pack("<I", spec.n_beams)) + 4
-    got = np.frombuffer(text, "<f4", spec.n_beams, beams)
-    valid = np.frombuffer(text, "u1", spec.n_beams, beams + 4 * spec.n_beams)
-    assert got[7] == 0.0
-    assert (got[valid == 1] == 3.0).all()
-    assert valid.sum() == spec.n_beams - 1
-    model = rawlog.MotionModel(
-        m_per_m=0.1, m_per_rad=0.2, rad_per_m=0.3, rad_per_rad=0.4, least_m=0.5, least_rad=0.6
-    )
-    step = rawlog.action(100, np.array([0.1, -0.2, 0.3]), model)
-    assert struct.pack("<3d", 0.1, -0.2, 0.3) in step
-    assert struct.pack("<6f", 0.1, 0.2, 0.3, 0.4, 0.5, 0.6) in step
+        wire.run(["/nonexistent/program"], 1.0)
 
 
 def test_end_points_become_the_ranges_of_their_beams() -> None:

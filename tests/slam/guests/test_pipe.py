@@ -4,9 +4,6 @@
 from __future__ import annotations
 
 import gc
-import os
-import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -126,23 +123,6 @@ def test_a_long_line_is_looked_through_once(stream):
     slam._wire._heard = heard = Counting()
     assert Track("long", slam).survive(stream) is None
     assert 1 << 22 < heard.looked_at < 1 << 23
-
-
-def test_its_children_end_with_it(stream):
-    slam = piped("family", scan_s=0.5)
-    group = slam._wire.pid
-    failure = Track("family", slam).survive(stream)
-    assert failure is not None
-    assert "its last words: 'kin'" in str(failure)
-    left = [p for p in Path("/proc").glob("[0-9]*") if _group(p) == group]
-    assert all(gone(int(p.name)) for p in left)
-
-
-def _group(process: Path) -> int | None:
-    try:
-        return int((process / "stat").read_text().rpartition(")")[2].split()[2])
-    except (OSError, ValueError):
-        return None
 
 
 def test_the_first_scan_may_take_longer(stream):
@@ -341,36 +321,3 @@ def test_the_other_end_answers_whatever_it_is_told(stream):
     nowhere = asked(Server("not_there:X", {}), **hello)
     assert "cannot import 'not_there'" in str(nowhere["message"])
     assert "unexpected keyword" in str(asked(Server("odometry", {"x": 1}), **hello)["message"])
-
-
-def test_a_program_that_ignores_the_end_of_its_input_does_not_outlive_a_killed_mobilia():
-    code = (
-        "import sys; from slam.guests.wire import Wire\n"
-        "wire = Wire(['sh', '-c', 'trap \"\" HUP TERM; sleep 600 & echo $!; wait'])\n"
-        "print(wire.pid, int(wire.ask(b'', 5.0)), flush=True); sys.stdin.read()"
-    )
-    parent = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stdin=subprocess.PIPE
-    )
-    with parent:
-        program, its_child = (int(word) for word in parent.stdout.readline().split())
-        assert not gone(program, within_s=0.2)
-        os.kill(parent.pid, signal.SIGKILL)
-    assert gone(program)
-    assert gone(its_child)
-
-
-def test_a_class_does_not_outlive_a_mobilia_that_was_killed(own):
-    code = (
-        f"import sys; sys.path.insert(0, {str(own)!r})\n"
-        "from slam.guests import guarded\n"
-        "slam = guarded('own_systems:Looping')\n"
-        "print(slam._wire.pid, flush=True); sys.stdin.read()"
-    )
-    parent = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stdin=subprocess.PIPE
-    )
-    with parent:
-        pid = int(parent.stdout.readline())
-        os.kill(parent.pid, signal.SIGKILL)
-    assert gone(pid)

@@ -119,17 +119,6 @@ def test_clutter_makes_jcbb_branch_and_ipjc_not():
     assert (reference > 4.0 * incremental).all()
 
 
-def test_without_ambiguity_both_walk_straight_down():
-    """JCBB tests each pair once. IPJC tests all with all first, then the pairs left at each depth:
-    its tests cost the same at any depth, but are more."""
-    for n in (4, 16):
-        scene = Scene(1, n=n, pose_std=(0.01, 0.01, 1e-4), sensor_std=0.005, side=30.0)
-        for method, nodes, tests in ((jcbb, n + 1, n), (ipjc, n, n * n + n * (n + 1) // 2)):
-            answer = scene.solve(method)
-            np.testing.assert_array_equal(answer.landmarks, scene.truth)
-            assert (answer.effort.nodes, answer.effort.tests) == (nodes, tests)
-
-
 @pytest.mark.parametrize("method", METHODS.values())
 @pytest.mark.parametrize("exact", [np.zeros((2, 2)), np.diag([1e-4, 0.0])])
 def test_a_singular_innovation_is_no_pair(method, exact):

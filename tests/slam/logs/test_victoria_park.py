@@ -14,7 +14,6 @@ from scipy.io import savemat
 from slam import Stream, se2
 from slam.ekf import EkfSlam
 from slam.errors import LogFormatError
-from slam.evaluation.metrics import fit_se2
 from slam.logs import open_log, read_victoria_park
 from slam.logs.victoria_park import read_gps, twist_of
 
@@ -185,10 +184,8 @@ def test_without_data_the_error_says_so(tmp_path):
 
 @pytest.mark.parametrize(
     ("line", "message"),
-    [("1.0 2.0 x 0.3", "bearing: expected .* got .x."), ("1.0 2.0", "4 finite"),
-     ("0.1 2 1 1", "steps back"), ("2.0 -1.0 1.0 0.3", "> 0 m"),
-     ("2.0 nan 1.0 0.3", "range: expected .* got .nan.")],
-)  # fmt: skip
+    [("1.0 2.0", "4 finite"), ("0.1 2 1 1", "steps back"), ("2.0 -1.0 1.0 0.3", "> 0 m")],
+)
 def test_damaged_text_is_refused_with_its_line(tmp_path, line, message):
     (tmp_path / "rfs_measurements.dat").write_text(f"1.0 2.0 1.5 0.3\n{line}\n")
     (tmp_path / "rfs_inputs.dat").write_text("0.9 1.0 0.0\n1.1 1.0 0.0\n")
@@ -230,7 +227,7 @@ def test_the_real_park_is_closed(data_folder):
     )
     kept = np.arange(len(path))
     for _ in range(15):  # fixes that are off by metres must not turn the map
-        T = fit_se2(path[kept], gps.points[kept])
+        T = se2.fit(path[kept], gps.points[kept])
         away = np.linalg.norm(se2.transform(T, path) - gps.points, axis=1)
         kept = np.flatnonzero(away <= np.quantile(away, 0.8))
     assert np.median(away) < 1.5  # 0.94 measured; the optimised graph has 0.96

@@ -21,7 +21,7 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("f7d9e1f0179d", "fee739d1b819")),
+        (ShuntingConfig, [], ("1a3765784250", "fee739d1b819")),
         (OccupancyConfig, ["grid"], ("15c4b126e7e0", "52594c6f1c38")),
     ],
 )

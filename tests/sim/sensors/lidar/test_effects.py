@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from sim.sensors.lidar.device import LaserScanner, ScanResult
-from sim.sensors.lidar.effects import error_function, needed_reflectivity
 from sim.sensors.lidar.models.lms221 import LMS221_SPOT, NEEDED, Lms221Config, RangeEffects
+from sim.sensors.lidar.receiver import error_function, needed_reflectivity
 from sim.sensors.lidar.scanner import Band, Spot
 from sim.sensors.lidar.surfaces import reflectivity_of
 from slam.errors import InvalidValueError

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cards of scanners side by side: their table, and its picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Picture
+
+from scripts.card import page
+from scripts.figures import save, styled
+from slam.evaluation.scanner.card import PLAIN, SCALE, STATISTICS, ScannerCard
+from slam.evaluation.scanner.edges import DEPTH_BINS_M
+from slam.evaluation.scanner.figures import Figure, apart, key_of
+from slam.evaluation.scanner.noise import RANGE_BINS_M
+
+NONE = "–"
+DIFFERS, AGREES = "≠", "="
+COLORS = ("#1f61be", "#168c5a", "#de6e18", "#7a3fb0", "#59616e")
+OURS = "#ce2c3c"
+MARKS = ("s", "^", "D")  # of ours
+APART = 0.11  # of a group's width, from card to card
+SHARES = {
+    "no_return": "no return,\nall beams", "holes": "no return,\nin walls",
+    "edge_lost": "lost beam\nat an edge", "edge_jumps": "edge beams\nthat move 5 cm",
+}  # fmt: skip
+Cards = dict[str, ScannerCard]
+
+
+def cell(figure: Figure, unit: str) -> str:
+    """``value (low to high)`` in that unit; a dash where nothing was measured."""
+    if not math.isfinite(figure.value):
+        return NONE
+    if figure.value == 0.0:
+        return "0"
+    scale = SCALE[unit]
+    digits = 2 if unit == PLAIN or 0.0 < scale * figure.value < 0.1 else 1
+    value, low, high = (
+        f"{scale * number:.{digits}f}" for number in (figure.value, figure.low, figure.high)
+    )
+    return f"{value} ({low} to {high})" if figure.has_interval else value
+
+
+def headings(real: Cards, ours: Cards) -> list[str]:
+    """Of the columns: each real card is followed by its verdict."""
+    return ["", "unit", *(name for log in real for name in (log, "")), *ours]
+
+
+def rows(real: Cards, ours: Cards, *, details: bool = True) -> list[list[str]]:
+    """Every statistic that one of the real cards has; ``details``: also range by range.
+
+    Verdicts are against the first of ours: ≠ where the intervals do not meet, = where they do,
+    empty where one of them has none.
+    """
+    out = []
+    for statistic in STATISTICS:
+        mine = [card.figures[statistic.key] for card in ours.values()]
+        theirs = [card.figures[statistic.key] for card in real.values()]
+        known = any(math.isfinite(figure.value) for figure in theirs)
+        if not known or (statistic.detail and not details):
+            continue
+        row = [statistic.what, statistic.unit]
+        for figure in theirs:
+            verdict = {None: "", True: DIFFERS, False: AGREES}[apart(figure, mine[0])]
+            row += [cell(figure, statistic.unit), verdict]
+        out.append(row + [cell(figure, statistic.unit) for figure in mine])
+    return out
+
+
+def markdown(real: Cards, ours: Cards) -> list[str]:
+    """The lines of the table without details, then what was there to measure."""
+    lines = page.markdown(headings(real, ours), rows(real, ours, details=False))
+    return [*lines, "", *(f"- {name}: {amount(card)}." for name, card in (real | ours).items())]
+
+
+def amount(card: ScannerCard) -> str:
+    """What a card is of, in words."""
+    crept = f"; {card.crept} more not used, as their ranges moved" if card.crept else ""
+    return (
+        f"{card.scans} scans of {card.beams} beams, {math.degrees(card.increment_rad):g}° apart; "
+        f"{card.blocks} blocks while driving; {card.standing_stretches} standing stretches "
+        f"({card.standing_scans} scans){crept}"
+    )
+
+
+@styled({"font.size": 9})
+def draw(path: Path, real: Cards, ours: Cards) -> None:
+    """Noise, deviation about walls, edges and lost beams as a PNG; ours are red."""
+    picture = Picture(figsize=(10.0, 7.2), layout="constrained")
+    panels = picture.subplots(2, 2)
+    for ax, key, title in (
+        (panels[0, 0], "standing", "Noise from scan to scan, robot at rest"),
+        (panels[0, 1], "wall", "Deviation about straight walls"),
+    ):
+        seen = {key_of(key, *ends): f"{ends[0]:g}–{ends[1]:g}" for ends in RANGE_BINS_M}
+        every = (real | ours).values()
+        seen = {bin_: w for bin_, w in seen.items() if any(c.figures[bin_].n for c in every)}
+        _groups(ax, seen, 1e3, real, ours)
+        ax.set(title=title, xlabel="range in m", ylabel="one sigma, mm", ylim=(0.0, None))
+    depths = {key_of("between", *ends): f"{ends[0]:g}–{ends[1]:g}" for ends in DEPTH_BINS_M}
+    _groups(panels[1, 0], depths, 1e2, real, ours)
+    panels[1, 0].set(title="Edges with a range between their sides", ylim=(0.0, None),
+                     xlabel="depth of the edge in m", ylabel="share of edges, %")  # fmt: skip
+    _shares(panels[1, 1], real, ours)
+    handles, names = panels[0, 1].get_legend_handles_labels()
+    picture.legend(handles, names, loc="outside lower center", ncols=4, frameon=False)
+    save(picture, path)
+
+
+def _groups(ax: Axes, words: Mapping[str, str], scale: float, real: Cards, ours: Cards) -> None:
+    """One group of points a key of ``words``."""
+    looks = [(COLORS[k % len(COLORS)], "o") for k in range(len(real))]
+    looks += [(OURS, MARKS[k % len(MARKS)]) for k in range(len(ours))]
+    for k, ((name, card), (color, mark)) in enumerate(
+        zip((real | ours).items(), looks, strict=True)
+    ):
+        at = np.arange(len(words)) + APART * (k - 0.5 * (len(looks) - 1))
+        figures = [card.figures[key] for key in words]
+        value, low, high = scale * np.array([(f.value, f.low, f.high) for f in figures]).T
+        reach = np.nan_to_num(np.maximum([value - low, high - value], 0.0))
+        ax.errorbar(at, value, yerr=reach, capsize=2.5, ms=4.5, lw=1.1, color=color, fmt=mark,
+                    label=name)  # fmt: skip
+    ax.grid(visible=False, axis="x")
+    for i in range(1, len(words)):
+        ax.axvline(i - 0.5, color="#bbbbbb", lw=0.8)
+    ax.set_xlim(-0.5, len(words) - 0.5)
+    ax.set_xticks(range(len(words)), list(words.values()))
+    ax.tick_params(axis="x", length=0)
+
+
+def _shares(ax: Axes, real: Cards, ours: Cards) -> None:
+    _groups(ax, SHARES, 1e2, real, ours)
+    shown: Sequence[Figure] = [c.figures[key] for c in (real | ours).values() for key in SHARES]
+    tallest = max((1e2 * figure.value for figure in shown if figure.n), default=1.0)
+    ax.set(title="Lost beams, and edges that do not stay", ylabel="share, %")
+    ax.set_yscale("symlog", linthresh=0.1)
+    ax.set_ylim(-0.01, 2.0 * max(tallest, 1.0))
+    ax.set_yticks([0.0, 0.1, 1.0, 10.0, *([50.0] if tallest > 25.0 else [])])
+    ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")

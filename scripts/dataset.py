@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A dataset as a whole: the episodes that are missing, on all processes, with a progress bar."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+from rich.progress import Progress
+from rich.table import Table
+
+from scripts import interrupt, workers
+from scripts.console import note, plain_table, progress
+from scripts.options import rate_hz
+from sim.recording.dataset import Dataset, Plan, writing
+from sim.recording.episode import record
+from sim.recording.recipe import RECIPE, Recipe, read_recipe
+
+
+def carry_out(plan: Plan, out: Path, *, jobs: int = 1, cluster: str | None = None) -> Table:
+    """Make what is missing of the dataset in ``out``; a table of what it has then."""
+    with writing(out, plan) as dataset:
+        missing, notes = dataset.missing()
+        for line in notes:
+            note(line)
+        started = time.perf_counter()
+        _make(dataset, missing, jobs, cluster)
+        dataset.finish()
+        spent = time.perf_counter() - started
+    return summary(dataset, len(missing), spent)
+
+
+def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | None) -> None:
+    """Every missing episode, with a bar: episodes, simulated seconds a second, time left."""
+    total, length_s = len(dataset.plan.jobs()), dataset.plan.recipe.seconds
+    alone = cluster is None and (jobs == 1 or len(missing) < 2)
+    with progress() as bar:
+        meter = _Meter(
+            bar,
+            total=total,
+            done=total - len(missing),
+            length_s=length_s,
+            rate_hz=rate_hz(dataset.plan.recipe.scanner),
+        )
+        note_frame = meter.frame if alone else None
+        call = partial(_one, dataset.path, note_frame)
+        for _ in workers.each(call, missing, jobs=jobs, cluster=cluster, shared=dataset.path):
+            meter.episode()
+
+
+def _one(folder: Path, note_frame: Callable[[], None] | None, recipe: Recipe) -> None:
+    """A job, here or in a worker."""
+    record(recipe, folder, note=note_frame or (lambda: None))
+
+
+class _Meter:
+    """The progress bar; counts in simulated seconds."""
+
+    def __init__(
+        self, bar: Progress, *, total: int, done: int, length_s: float, rate_hz: float
+    ) -> None:
+        self._bar, self._total, self._done, self._length_s = bar, total, done, length_s
+        self._frames, self._before, self._started = 0, done, time.perf_counter()
+        self._rate_hz = rate_hz
+        self._task = bar.add_task(
+            "generating", unit="", total=total * length_s, completed=int(done * length_s)
+        )
+
+    def frame(self) -> None:
+        """One more scan of the episode that is being made here."""
+        self._frames += 1
+        if self._frames % 25 == 0:
+            self._show(min(self._frames / self._rate_hz, self._length_s))
+
+    def episode(self) -> None:
+        """One more episode."""
+        self._done, self._frames = self._done + 1, 0
+        self._show(0.0)
+
+    def _show(self, begun_s: float) -> None:
+        interrupt.check()
+        seconds = (self._done - self._before) * self._length_s + begun_s
+        rate = seconds / max(time.perf_counter() - self._started, 1e-3)
+        unit = f"{self._done}/{self._total} episodes, {rate:.1f} s simulated per s"
+        self._bar.update(self._task, completed=self._before * self._length_s + seconds, unit=unit)
+
+
+def summary(dataset: Dataset, made: int, spent_s: float) -> Table:
+    """Episodes, frames, distance, what returns came from, bytes: a row a scene and dynamism."""
+    plan = dataset.plan
+    scenes = plan.scenes or (plan.recipe.scene,)
+    made_now = f"{', '.join(scenes)}: {made} of {len(plan.jobs())} made now"
+    table = plain_table(made_now, caption=f"{spent_s:.1f} s")
+    returns = ("moving", "semi static", "static")
+    table.add_column("scene", overflow="fold")
+    for heading in ("dynamism", "episodes", "frames", "driven, m", *returns, "MB"):
+        longest = max(map(len, heading.split()))
+        table.add_column(heading, justify="right", min_width=longest)
+    for scene, level in product(scenes, plan.dynamisms):
+        jobs = [job for job in plan.jobs() if (job.scene, job.dynamism) == (scene, level)]
+        folders = [dataset.path / name for job in jobs for name in plan.folders(job)]
+        table.add_row(escape(scene), f"{level:g}", *_row(folders))
+    return table
+
+
+def _row(folders: list[Path]) -> list[str]:
+    results: list[Any] = [read_recipe(folder / RECIPE).result for folder in folders]
+    returns = {
+        name: sum(int(result["returns"][name]) for result in results)
+        for name in ("moving", "semi_static", "static")
+    }
+    beams = max(sum(returns.values()), 1)
+    size = sum(file.stat().st_size for folder in folders for file in folder.iterdir())
+    return [
+        str(len(folders)),
+        str(sum(int(result["frames"]) for result in results)),
+        f"{sum(float(result['distance_m']) for result in results):.1f}",
+        *(f"{100.0 * count / beams:.1f} %" for count in returns.values()),
+        f"{size / 1e6:.1f}",
+    ]

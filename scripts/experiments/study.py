@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A matrix of runs: cases x systems -> rows -> a table. An experiment declares one ``Study``.
+
+Each drive that is simulated and each run over it is a job (``scripts.jobs``) in ``--folder``. A
+study that was killed goes on when the same command is given again, and what other code or other
+settings made is made again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import importlib
+import json
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import scenes
+import sim
+import slam
+from scripts.comparison.recording import load, record
+from scripts.experiments.measured import add_options, ended, head, seeds_of, table
+from scripts.experiments.shared import Column, Row, losses
+from scripts.imports import scripts_of, sources
+from scripts.jobs import Job, run_jobs
+from scripts.marks import fill_page
+from scripts.names import file_name
+from scripts.result_files import write
+from sim.core.versions import WORLD
+from sim.recording.recipe import Recipe
+from slam.errors import InvalidValueError
+
+RECORDINGS, ROWS = "recordings", "rows"  # folders of the jobs' files
+ALL = "all"  # in the place of an axis over which a line of the table is pooled
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """What is run, and what is told of it.
+
+    name     of the module, of the results file, and of the mark in the page
+    axes     what is varied, and its values: an option each
+    run      ``run(case)`` or, of a recorded drive, ``run(case, drive)``: the row of a case, which
+             is a value of each axis, ``seed`` and ``seconds``. A function of a module
+    drive    of a case: what is simulated and kept, a recipe and one scan in ``every``; None:
+             ``run`` makes what it needs
+    data     of a case: files that ``run`` reads; with another content it is made again
+    fits     whether a case is run at all
+    lines    axes of which each combination is a line of the table; the rest is pooled
+    hidden   of them, those that the columns tell of
+    pooled   of them, those that have lines over all of their values, too
+    apart    an axis with a table for each of its values
+    columns  heading -> cell, of the rows of a line
+    across, cell  an axis whose values have a column each, and what stands there
+    tell     all that is told of all rows, where that is no such table
+    brief    of a row, what goes into the results file
+    draw     of all rows, the picture written to a path: ``picture``
+    told     one line on how it was made; fields in braces are those of the options
+    page     that holds what is told; None: it is printed
+    results  whether the rows go to ``docs/results``; else into the folder
+    defaults  of the options, where they are others than usual
+    """
+
+    name: str
+    axes: Mapping[str, Sequence[Any]]
+    run: Callable[..., Row]
+    drive: Callable[[Row], Row | None] = lambda case: None
+    data: Callable[[Row], Sequence[Path]] = lambda case: ()
+    fits: Callable[[Row], bool] = lambda case: True
+    lines: Sequence[str] = ()
+    hidden: Sequence[str] = ()
+    pooled: Sequence[str] = ()
+    apart: str = ""
+    columns: Mapping[str, Column] = field(default_factory=dict)
+    across: str = ""
+    cell: Column = losses
+    tell: Column | None = None
+    brief: Callable[[Row], Row] = dict
+    draw: Callable[[Sequence[Row], Path], None] | None = None
+    picture: Path | None = None
+    told: str = "World {world}, {seeds} seeds from {first_seed}, {seconds:g} s."
+    page: Path | None = None
+    results: bool = False
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+
+    def main(self, arguments: Sequence[str] | None = None) -> int:
+        """The command: make what is missing, print the table, write results, picture and page."""
+        wanted = self._parser().parse_args(arguments)
+        return ended(lambda: self._carry_out(wanted, arguments))
+
+    def _parser(self) -> argparse.ArgumentParser:
+        module = sys.modules[self.run.__module__]
+        parser = argparse.ArgumentParser(prog=self.name, description=module.__doc__)
+        for axis, values in self.axes.items():
+            kind = type(values[0])
+            parser.add_argument(f"--{axis}", nargs="+", type=kind, default=list(values))
+        own = Path("out") / self.name
+        parser.add_argument("--folder", type=Path, default=own, help="of recordings and rows")
+        if self.picture:
+            parser.add_argument("--picture", type=Path, default=self.picture)
+        add_options(parser, f"{self.name}.json", self.page or Path())
+        if not self.results:
+            parser.set_defaults(results=own / f"{self.name}.json")
+        parser.set_defaults(**self.defaults)
+        return parser
+
+    def _carry_out(self, wanted: argparse.Namespace, arguments: Sequence[str] | None) -> None:
+        wanted.no_page = wanted.no_page or self.page is None
+        first = head(wanted, self.name, arguments, *self.axes)
+        rows = self.rows(self.cases(wanted), wanted.folder, wanted.jobs)
+        told = self.told.format(world=WORLD, **vars(wanted))
+        text = f"{told}\n\n{self.markdown(rows)}"
+        write(wanted.results, first, {"runs": {self._key(row): self.brief(row) for row in rows}})
+        if self.draw:
+            self.draw(rows, wanted.picture)
+        if not wanted.no_page:
+            fill_page(wanted.page, self.name, text)
+        print(text)
+
+    def cases(self, wanted: argparse.Namespace) -> list[Row]:
+        """Of every value of each axis and every seed, those that fit."""
+        values = [getattr(wanted, axis) for axis in self.axes]
+        cases = [
+            {**dict(zip(self.axes, of, strict=True)), "seed": seed, "seconds": wanted.seconds}
+            for *of, seed in product(*values, seeds_of(wanted))
+        ]
+        if any(case.get("every", 1) < 1 for case in cases):
+            raise InvalidValueError(f"--every must be a whole number >= 1, got {wanted.every}")
+        return [case for case in cases if self.fits(case)]
+
+    def rows(self, cases: Sequence[Row], folder: Path, jobs: int) -> list[Row]:
+        """The row of each case, made where it is not there."""
+        drives = [_recorded(drive) if (drive := self.drive(case)) else None for case in cases]
+        missing = {job.name: job for job in drives if job is not None}
+        if missing:
+            run_jobs(missing.values(), folder / RECORDINGS, processes=jobs, title="drives")
+        cells = [self._job(case, job) for case, job in zip(cases, drives, strict=True)]
+        files = run_jobs(cells, folder / ROWS, processes=jobs, title=self.name)
+        return [json.loads(files[cell.name].read_text()) for cell in cells]
+
+    def _job(self, case: Row, drive: Job | None) -> Job:
+        module = _module(self.run)
+        call = f"{module}:{self.run.__name__}"
+        more = {} if drive is None else {"recording": drive.file_name()}
+        return Job(
+            name=file_name("_".join(str(value) for value in case.values()))[:150] + _short(case),
+            call=cell,
+            arguments={"call": call, "case": case, **more},
+            suffix=".json",
+            code=(*sources(slam, sim, scenes), *_scripts(module), *self.data(case)),
+        )
+
+    def _key(self, row: Row) -> str:
+        return " ".join(str(row[key]) for key in (*self.axes, "seed"))
+
+    def markdown(self, rows: Sequence[Row]) -> str:
+        """The tables."""
+        if self.tell is not None:
+            return self.tell(rows)
+        if not self.apart:
+            return self._table(rows)
+        parts = []
+        for value in dict.fromkeys(row[self.apart] for row in rows):
+            parts += [f"`{value}`:", self._table([r for r in rows if r[self.apart] == value])]
+        return "\n\n".join(parts)
+
+    def _table(self, rows: Sequence[Row]) -> str:
+        shown = [axis for axis in self.lines if axis not in self.hidden]
+        wide = dict.fromkeys(row[self.across] for row in rows) if self.across else {}
+        groups: dict[tuple[Any, ...], list[Row]] = {}
+        for free in product((False, True), repeat=len(self.pooled)):
+            alike = {axis: ALL for axis, over in zip(self.pooled, free, strict=True) if over}
+            for row in rows:
+                told = {**row, **alike}
+                groups.setdefault(tuple(told[axis] for axis in self.lines), []).append(told)
+        lines = []
+        for own in groups.values():
+            cells = [_word(own[0][axis]) for axis in shown]
+            for value in wide:
+                of_it = [row for row in own if row[self.across] == value]
+                cells.append(self.cell(of_it) if of_it else "–")
+            lines.append([*cells, *(tell(own) for tell in self.columns.values())])
+        return table((*shown, *(_word(value) for value in wide), *self.columns), lines)
+
+
+def _word(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _short(case: Any) -> str:
+    """Apart from names that differ where no file name does."""
+    told = json.dumps(case, sort_keys=True, default=str)
+    return "-" + hashlib.sha256(told.encode()).hexdigest()[:6]
+
+
+def _module(call: Callable[..., Row]) -> str:
+    """Dotted, of a module that was started as a command, too."""
+    spec = sys.modules[call.__module__].__spec__
+    return call.__module__ if spec is None else spec.name
+
+
+@cache
+def _scripts(module: str) -> tuple[Path, ...]:
+    return scripts_of(str(importlib.import_module(module).__file__), module)
+
+
+def _recorded(drive: Row) -> Job:
+    """The job that simulates a drive and keeps one scan in ``every``."""
+    every = drive.get("every", 1)
+    recipe = Recipe(**{key: value for key, value in drive.items() if key != "every"})
+    return Job(
+        name=f"{file_name(recipe.scene)}_s{recipe.seed}" + _short(drive),
+        call=record,
+        arguments={**asdict(recipe), "every": every},
+        code=(*sources(sim, scenes), *_scripts(record.__module__)),
+    )
+
+
+def cell(path: Path, *, call: str, case: Row, recording: str = "") -> None:
+    """A job: the row of one case, as JSON."""
+    module, _, name = call.partition(":")
+    run = getattr(importlib.import_module(module), name)
+    found = [load(path.parents[1] / RECORDINGS / recording)] if recording else []
+    path.write_text(json.dumps({**case, **run(case, *found)}))

@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A moment in a scene of viser: what the page of the live view and ``replay.html`` show.
+
+Room and scan lie in the world; map, estimates and paths in the map, which lies where the run began.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from scripts.film import draw
+from scripts.film.draw import Color
+from scripts.film.map_pane import SIGMAS
+from scripts.film.scan_pane import beam_colors, beam_ends
+from sim.view.moment import Moments, Path, Shown, ellipse
+from sim.view.parts import BALL, BOX, Parts, Placed
+from sim.world.world import World
+from slam import se2
+from slam.estimate import Landmarks, Raster
+from slam.frames import Float, Frame
+from slam.maps import raster_image
+
+LIFT_M = 0.03  # of the map and of lines above the floor, that they are seen
+ROBOT_M = 0.45  # height at which the arrow of an estimate floats: above a robot
+POINT_M = 0.05
+PATH_POINTS = 400  # of a path as drawn
+PATH_S = 1.0  # so often of the run it is drawn anew
+MOST_CELLS = 1024  # of the map as drawn, along an edge
+LEVELS = 8  # of a cell of it that are told apart
+STEPS_M, STEPS_TURN = 512.0, 1024.0  # parts of a metre and of a turn that are told apart
+LOG_BOUNDS = (-10.0, -10.0, 10.0, 10.0)  # of what is seen of a log at first, m
+_ARROW = np.array([[0.32, 0.0, 0.0], [-0.22, 0.2, 0.0], [-0.1, 0.0, 0.0], [-0.22, -0.2, 0.0]])
+
+
+class Drawn:
+    """Draws moments into a ``viser.SceneApi``; used by one thread.
+
+    parts   what is seen of the room, None for a log;   bounds  xmin, ymin, xmax, ymax of it, m
+    """
+
+    def __init__(self, scene: Any, moments: Moments, world: World | None = None) -> None:
+        self._scene, self.moments = scene, moments
+        self.parts = None if world is None else Parts(world)
+        self._height_m = 0.0 if world is None else world.scene.scan_height_m
+        self.bounds = LOG_BOUNDS if world is None else world.scene.bounds
+        self._colors = {**draw.colors_of(list(moments.replay.tracks)), "truth": draw.GREEN}
+        self._nodes: dict[str, Any] = {}
+        self._values: dict[str, Any] = {}
+        self._placed: Placed | None = None
+        self._map: tuple[Raster | None, Landmarks | None] = (None, None)
+        self._path_s = -math.inf
+        scene.configure_default_lights(False)
+        scene.configure_environment_map(None)
+        scene.add_light_hemisphere("/light/sky", ground_color=(150, 150, 150), intensity=2.4)
+        scene.add_light_directional("/light/sun", intensity=1.5, position=(-3.0, -6.0, 9.0))
+
+    def draw(self, shown: Shown) -> None:
+        """Make the scene show it."""
+        if "map" not in self._nodes:
+            wxyz, position = _pose(shown.T_world_map)
+            self._nodes["map"] = self._scene.add_frame(
+                "/map", show_axes=False, wxyz=wxyz, position=position
+            )
+        if self.parts is not None and shown.placed is not None:
+            self._room(self.parts, shown.placed)
+        self._scan(shown)
+        if self._map != (shown.raster, shown.landmarks):
+            self._map = shown.raster, shown.landmarks
+            self._cells(shown.raster)
+            self._landmarks(shown.landmarks)
+        renew = abs(shown.seconds - self._path_s) >= PATH_S
+        self._path_s = shown.seconds if renew else self._path_s
+        for name, estimate in shown.estimates.items():
+            self._track(name, estimate.T_map_robot, estimate.covariance)
+        if shown.truth_map is not None:
+            self._track("truth", shown.truth_map, None)
+        if renew:
+            for name, path in self.moments.paths.items():
+                self._path(name, path, shown.number)
+
+    # -- the room -----------------------------------------------------------------------------
+
+    def _room(self, parts: Parts, placed: Placed) -> None:
+        if placed is self._placed:
+            return
+        first, self._placed = self._placed is None, placed
+        parts.place(placed)
+        for k, batch in enumerate(parts.batches):
+            if not (first or batch.moves):
+                continue
+            centres, quats = parts.poses(batch)
+            centres, quats = np.rint(centres * STEPS_M) / STEPS_M, np.rint(quats * STEPS_TURN)
+            quats /= STEPS_TURN
+            name = f"room/{k}_{batch.shape}"
+            if not first:
+                self._set(name, batched_positions=centres, batched_wxyzs=quats)
+                continue
+            vertices, faces = _UNIT[batch.shape]
+            self._nodes[name] = self._scene.add_batched_meshes_simple(
+                f"/{name}", vertices, faces, quats, centres,
+                batched_scales=batch.sizes.astype(np.float32), batched_colors=batch.colors,
+                batched_opacities=batch.opacity if batch.glass else None,
+                flat_shading=batch.shape == BOX, lod="off", cast_shadow=False,
+                receive_shadow=False,
+            )  # fmt: skip
+
+    # -- what is measured and estimated ---------------------------------------------------------
+
+    def _scan(self, shown: Shown) -> None:
+        """Where beams ended: where the robot truly is, in a log where it is believed to be."""
+        here = shown.truth_map
+        if here is None:
+            here = shown.estimates[self.moments.primary].T_map_robot
+        mounted, xy, rgb = beams(shown.frame)
+        wxyz, position = _pose(se2.compose(here, mounted), self._height_m + LIFT_M)
+        points = np.column_stack([xy, np.zeros(len(xy))]).astype(np.float16)
+        if "scan" in self._nodes:
+            self._set("scan", points=points, colors=rgb, wxyz=wxyz, position=position)
+            return
+        self._nodes["scan"] = self._scene.add_point_cloud(
+            "/map/scan", points, rgb, point_size=POINT_M, point_shape="circle",
+            point_shading="flat", wxyz=wxyz, position=position,
+        )  # fmt: skip
+
+    def _cells(self, raster: Raster | None) -> None:
+        """The map in the colours of the pictures; unknown cells are transparent."""
+        if raster is None:
+            return
+        step = -(-max(raster.values.shape) // MOST_CELLS)
+        raster = _coarser(raster, step)
+        levels = np.round(raster.values * LEVELS) / LEVELS  # a picture of few colours is small
+        raster = replace(raster, values=levels.astype(np.float32))
+        cells = np.empty((*raster.values.shape, 4), np.uint8)
+        cells[..., :3] = raster_image(raster)
+        known = np.nan_to_num(raster.values[::-1], nan=-1.0)
+        cells[..., 3] = np.where(known < 0.0, 0.0, 60.0 + 195.0 * np.minimum(known * 2.0, 1.0))
+        high, wide = (float(n * raster.resolution_m) for n in raster.values.shape)
+        middle = se2.compose(raster.T_map_origin, np.array([0.5 * wide, 0.5 * high, 0.0]))
+        (w, _, _, z), position = _pose(middle, LIFT_M)
+        # a picture's second axis goes down: turned half round its first, it lies on its back
+        self._nodes["cells"] = self._scene.add_image(
+            "/map/cells", cells, wide, high, wxyz=(0.0, w, z, 0.0), position=position,
+            cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+
+    def _landmarks(self, landmarks: Landmarks | None) -> None:
+        if landmarks is None:
+            return
+        rings = [
+            point + ellipse(covariance, SIGMAS)
+            for point, covariance in zip(landmarks.points_map, landmarks.covariances, strict=True)
+        ]
+        lines = [_segments(ring, closed=True) for ring in rings]
+        self._lines("landmarks", np.concatenate([np.zeros((0, 2, 3)), *lines]), draw.INK, 0.02)
+
+    def _track(self, name: str, pose: Float, covariance: Float | None) -> None:
+        """A robot as an arrow, with its ellipse."""
+        (wxyz, position), color = _pose(pose), self._colors[name]
+        if name not in self._nodes:
+            node = f"/map/{_node(name)}"
+            self._nodes[name] = self._scene.add_frame(
+                node, show_axes=False, wxyz=wxyz, position=position
+            )
+            self._scene.add_mesh_simple(
+                f"{node}/arrow", _ARROW + np.array([0.0, 0.0, self._height_m + ROBOT_M]),
+                np.array([[0, 1, 2], [0, 2, 3]]), color=color, side="double", cast_shadow=False,
+                receive_shadow=False,
+            )  # fmt: skip
+        self._set(name, wxyz=wxyz, position=position)
+        if covariance is not None:
+            turn = se2.rotation(-float(pose[2]))
+            ring = ellipse(turn @ covariance[:2, :2] @ turn.T, SIGMAS)
+            self._lines(f"{name}/ellipse", _segments(ring, closed=True), color, 0.025)
+
+    def _path(self, name: str, path: Path, number: int) -> None:
+        way = _segments(path.until(number, PATH_POINTS))
+        if len(way):
+            self._lines(f"path/{name}", way, self._colors[name], 0.03)
+
+    def _lines(self, name: str, segments: Float, color: Color, wide_m: float) -> None:
+        segments = np.round(segments, 3).astype(np.float32)
+        colors = np.broadcast_to(np.array(color, np.uint8), segments.shape)
+        if name in self._nodes:
+            self._set(name, points=segments, colors=colors)
+        elif len(segments):
+            self._nodes[name] = self._scene.add_line_segments(
+                f"/map/{'/'.join(map(_node, name.split('/')))}", segments, colors, thickness=wide_m
+            )
+
+    def _set(self, name: str, **values: Any) -> None:
+        """Tell the node what has changed."""
+        node, known = self._nodes[name], self._values.setdefault(name, {})
+        for key, value in values.items():
+            if key not in known or not np.array_equal(known[key], value):
+                known[key] = value
+                setattr(node, key, value)
+
+
+def beams(frame: Frame) -> tuple[Float, Float, Any]:
+    """Where the scanner is on the robot, (n, 2) m in its frame of where beams ended, and (n, 3) RGB
+    by what they hit; the features of a log without scans."""
+    if frame.scan is None:
+        xy = np.zeros((0, 2)) if frame.features is None else frame.features.points_robot
+        return np.zeros(3), xy, np.full((len(xy), 3), 40, np.uint8)
+    valid = frame.scan.valid
+    return frame.scan.spec.T_robot_laser, beam_ends(frame.scan)[valid], beam_colors(frame)[valid]
+
+
+def _pose(pose: Float, z: float = 0.0) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """A turn (w, x, y, z) and a place of a pose on the floor, or above it."""
+    x, y, yaw = (float(value) for value in pose)
+    return (math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0)), (x, y, z)
+
+
+def _segments(xy: Float, *, closed: bool = False) -> Float:
+    """(n, 2, 3) m, the pieces of a line above the floor."""
+    xyz = np.column_stack([xy, np.full(len(xy), LIFT_M + 0.01)])
+    ends = np.roll(xyz, -1, axis=0)
+    pieces: Float = np.stack([xyz, ends], axis=1)
+    return pieces if closed else pieces[:-1]
+
+
+def _coarser(raster: Raster, step: int) -> Raster:
+    """The same map with cells ``step`` times as wide, each as solid as its most solid part."""
+    if step == 1:
+        return raster
+    high, wide = (-(-n // step) * step for n in raster.values.shape)
+    whole = np.full((high, wide), np.nan, np.float32)
+    whole[: raster.values.shape[0], : raster.values.shape[1]] = raster.values
+    tiles = whole.reshape(high // step, step, wide // step, step)
+    values = np.fmax.reduce(np.fmax.reduce(tiles, axis=3), axis=1)
+    return Raster(
+        values=values, resolution_m=raster.resolution_m * step, T_map_origin=raster.T_map_origin
+    )
+
+
+def _node(name: str) -> str:
+    """A track's name as part of a name in the scene."""
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+
+
+def _box() -> tuple[Float, Any]:
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [
+        (4 * k + a, 4 * k + b, 4 * k + c) for k in range(6) for a, b, c in ((0, 1, 2), (0, 2, 3))
+    ]
+    return np.concatenate([corners[list(side)] for side in sides]), np.array(faces)
+
+
+def _turned(radii: Float, heights: Float, around: int = 9) -> tuple[Float, Any]:
+    """A surface of revolution about z through these (radius, height)."""
+    turns = np.linspace(0.0, math.tau, around, endpoint=False)
+    circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    rings = [
+        np.column_stack([r * circle, np.full(around, h)])
+        for r, h in zip(radii, heights, strict=True)
+    ]
+    faces = []
+    for ring in range(len(radii) - 1):
+        for k in range(around):
+            a, b = ring * around + k, ring * around + (k + 1) % around
+            faces += [(a, b, b + around), (a, b + around, a + around)]
+    return np.concatenate(rings), np.array(faces)
+
+
+def _ball() -> tuple[Float, Any]:
+    up = np.linspace(-math.pi / 2.0, math.pi / 2.0, 6)
+    return _turned(0.5 * np.cos(up), 0.5 * np.sin(up))
+
+
+def _cylinder() -> tuple[Float, Any]:
+    """Rims twice, so that sides and lids are shaded apart."""
+    radii, heights = (
+        np.array([0.0, 0.5, 0.5, 0.5, 0.5, 0.0]),
+        np.array([-0.5, -0.5, -0.5, 0.5, 0.5, 0.5]),
+    )
+    return _turned(radii, heights)
+
+
+_UNIT: Mapping[str, tuple[Float, Any]] = {BOX: _box(), BALL: _ball(), "cylinder": _cylinder()}
+
+
+def look_at(camera: Any, bounds: Sequence[float]) -> None:
+    """Where a page's camera is at first: south of the room and above it."""
+    xmin, ymin, xmax, ymax = bounds
+    middle = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 0.0)
+    far = max(0.7 * (xmax - xmin), ymax - ymin)
+    camera.position = (middle[0], middle[1] - 0.75 * far, 0.85 * far)
+    camera.look_at = middle

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options that several verbs have, and what their words mean: each is declared and read here once.
+
+With them: of which axis of ``sim.core.dynamism`` the levels of ``compare`` and ``drive`` are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from scripts.console import note
+from slam.errors import InvalidValueError
+from slam.names import NameFromFile, is_code, refuse_code
+from slam.set_numbers import with_set
+from slam.variants import ORACLE, PIPE, oracle_named
+
+AXES = ("dynamism", "motion", "change")
+MAX_SWEEP = 1000
+LMS221_HZ = 37.5  # the rate for which the usual numbers of scans are chosen
+BETWEEN = re.compile(r",(?![^{]*\}|[^(]*\))")  # a comma outside braces and brackets
+
+Seconds = Annotated[float, typer.Option(help="Length of the simulated tour, s.")]
+DynamismLevel = Annotated[
+    float, typer.Option(help="How much the simulated room moves: 0 nothing, 1 most.")
+]
+Motion = Annotated[
+    float | None,
+    typer.Option(help="What moves now, 0 to 1; default as --dynamism says."),
+]
+Change = Annotated[
+    float | None,
+    typer.Option(
+        help="Of what can move, the share that stands elsewhere when it is seen again, 0 to 1; "
+        "default as --dynamism says."
+    ),
+]
+CrowdOption = Annotated[
+    str | None,
+    typer.Option(
+        "--crowd",
+        help="Who is there besides: none, or like escorts:6,boards:2; default the scene's own at "
+        "this motion (mobilia config crowds).",
+    ),
+]
+MotionLevels = Annotated[
+    list[str] | None, typer.Option("--motion", help="Levels of motion alone, or one to hold.")
+]
+ChangeLevels = Annotated[
+    list[str] | None, typer.Option("--change", help="Levels of change alone, or one to hold.")
+]
+Seed = Annotated[int, typer.Option(help="Seed of the simulated run, whole number >= 0.")]
+ScanHeight = Annotated[
+    float, typer.Option(help="Height of the simulated scanner above the floor, m.")
+]
+Scanner = Annotated[
+    str,
+    typer.Option(
+        help="Which scanner, and which of its errors: utm30lx, tim561:noise, "
+        "'scanner(fov_deg=270, beams=541, rate_hz=20, sigma_m=0.01)'; full, noise (statistical "
+        "only) and ideal are the LMS-221's."
+    ),
+]
+TextFormat = Annotated[
+    Path | None,
+    typer.Option("--format", help="TOML file that says which columns of a text log hold what."),
+]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Refuse a log that would have to be repaired.")
+]
+Oracles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--oracle",
+        help="Also this SLAM without the returns from what can move, by the true labels; "
+        "SLAM,moving: from what moves now. Repeatable.",
+        metavar="SLAM[,moving]",
+    ),
+]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Change a number of a SLAM: --set matching.reward=7. With several SLAMs its name "
+        "comes first: --set ekf.PATH=VALUE. mobilia config SLAM lists all. Repeatable.",
+        metavar="[SLAM.]PATH=VALUE",
+    ),
+]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
+]
+Jobs = Annotated[int, typer.Option(help="Processes of this machine.")]
+Cluster = Annotated[
+    str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
+]
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust", help="Run the code that RUN's files name: module:Class, module:function, pipe:."
+    ),
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """What holds in every run: levels of axes in [0, 1] and the crowd; None: as dynamism says."""
+
+    motion: float | None = None
+    change: float | None = None
+    crowd: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("motion", "change"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 <= value <= 1.0:
+                raise InvalidValueError(f"--{name} must lie in [0, 1], got {value}")
+        if self.crowd is not None:
+            from scenes.crowd import crowd_of
+
+            crowd_of(self.crowd)
+
+    def world(self, scene: str | None, dynamism: float, seed: int) -> dict[str, Any]:
+        """The settings of a room, as ``Simulation`` takes them; what is None is not among them."""
+        given = {name: value for name, value in asdict(self).items() if value is not None}
+        return {"scene": scene, "dynamism": dynamism, **given, "seed": seed}
+
+
+def options_with(crowd: str | None) -> dict[str, Any]:
+    """A crowd among the options of a scene."""
+    return {} if crowd is None else {"crowd": crowd}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """What the levels of a comparison or a drive are of, and what is held.
+
+    name  one of ``AXES``; with "motion" the other, change, is at 0 unless held, and so round
+    """
+
+    name: str = "dynamism"
+    held: Held = Held()
+
+    def __post_init__(self) -> None:
+        if self.name not in AXES:
+            raise InvalidValueError(f"axis must be one of {', '.join(AXES)}, got {self.name!r:.80}")
+        if getattr(self.held, self.name, None) is not None:
+            raise InvalidValueError(f"--{self.name} cannot be held: the levels are of it")
+
+    def at(self, level: float) -> dict[str, Any]:
+        """``dynamism``, ``motion`` and ``change`` at a level, as ``Simulation`` takes them."""
+        held = {"motion": self.held.motion, "change": self.held.change}
+        if self.name == "dynamism":
+            return {"dynamism": level, **held}
+        return {"dynamism": 0.0, **held, self.name: level}
+
+
+def chosen(
+    dynamism: Sequence[float], motion: Sequence[float], change: Sequence[float]
+) -> tuple[str, tuple[float, ...], dict[str, float]]:
+    """The axis, its levels, and what is held, from what was given of each; () for nothing.
+
+    The axis is the one with several levels, else dynamism, motion or change, the first given.
+    """
+    given = {"dynamism": dynamism, "motion": motion, "change": change}
+    several = [name for name, levels in given.items() if len(levels) > 1]
+    if len(several) > 1:
+        raise InvalidValueError(f"several levels of one axis only, got --{' and --'.join(several)}")
+    name = (several or [axis for axis in AXES if given[axis]] or ["dynamism"])[0]
+    if name != "dynamism" and dynamism:
+        raise InvalidValueError(
+            f"--dynamism sets both axes: with levels of --{name} give the other axis instead"
+        )
+    held = {axis: given[axis][0] for axis in ("motion", "change") if axis != name and given[axis]}
+    return name, tuple(given[name]), held
+
+
+def sweep(text: str, option: str = "--dynamism-sweep") -> tuple[float, ...]:
+    """``0:1:0.25`` -> (0, 0.25, 0.5, 0.75, 1); ``InvalidValueError`` for anything else."""
+    try:
+        start, stop, step = (float(word) for word in text.split(":"))
+    except ValueError:
+        raise InvalidValueError(f"{option} must be start:stop:step, got {text!r}") from None
+    if not (step > 0.0 and 0.0 <= start <= stop <= 1.0):
+        raise InvalidValueError(
+            f"{option} needs step > 0 and 0 <= start <= stop <= 1, got {text!r}"
+        )
+    count = int((stop - start) / step + 1e-9) + 1
+    if count > MAX_SWEEP:
+        raise InvalidValueError(f"{option} {text!r}: {count} levels, at most {MAX_SWEEP}")
+    return tuple(round(start + k * step, 9) for k in range(count))
+
+
+def axis_levels(
+    dynamism: list[str] | None, motion: list[str] | None, change: list[str] | None
+) -> tuple[str, tuple[float, ...], dict[str, Any]]:
+    """The axis, its levels and what is held, from the three options; default 0 to 1 dynamism."""
+    given = {"dynamism": dynamism, "motion": motion, "change": change}
+    axis, at, held = chosen(*(levels(values or [], f"--{k}") for k, values in given.items()))
+    return axis, at or levels(["0:1:0.25"]), dict(held)
+
+
+def levels(values: list[str], option: str = "--dynamism") -> tuple[float, ...]:
+    """``["0:1:0.5"]`` or ``["0", "0.5,1"]`` -> (0, 0.5, 1)."""
+    found: list[float] = []
+    for word in named(values):
+        if ":" in word:
+            found += sweep(word, option)
+            continue
+        try:
+            found.append(float(word))
+        except ValueError:
+            raise InvalidValueError(
+                f"{option} must be numbers or start:stop:step, got {word!r}"
+            ) from None
+    return tuple(found)
+
+
+def rate_hz(scanner: str) -> float:
+    """Scans per second; the errors of ``scanner_of`` for a name that is not known."""
+    from sim.sensors.lidar.registry import scanner_of  # numpy, and every model
+
+    return 1.0 / float(scanner_of(scanner).scanner().period_s)
+
+
+def every_of(scanner: str, every: int | None, of_lms221: int) -> int:
+    """One scan in so many: as asked, else as often in time as one in ``of_lms221`` of the LMS."""
+    return every if every is not None else max(1, round(of_lms221 * rate_hz(scanner) / LMS221_HZ))
+
+
+def with_oracles(
+    slams: Sequence[str], oracles: Sequence[str] | None, set_: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Names of the SLAMs and of the oracles, each with the numbers of ``--set`` that are for it.
+
+    Raises ``InvalidValueError`` for what is no oracle, and as ``slam.set_numbers.with_set``.
+    """
+    return with_set([*slams, *map(oracle_named, oracles or ())], set_ or [])
+
+
+def admitted(name: str, what: str, trust: bool) -> str:
+    """``name`` as it may be resolved; with ``trust`` one line says what is about to run.
+
+    what  "SLAM" or "scene"
+    Raises ``UntrustedNameError`` for a name of code that a file holds, without ``trust``.
+    """
+    if not (isinstance(name, NameFromFile) and is_code(name)):
+        return name
+    if not trust:
+        refuse_code(name, what)
+    note(f"--trust: running the {what} {str(name)!r}, which {name.file} names")
+    return name.trusted()
+
+
+def whole(name: str, value: Any, least: int, most: int | None = None) -> None:
+    """``InvalidValueError`` unless ``value`` is a whole number from ``least`` to ``most``."""
+    bad = isinstance(value, bool) or not isinstance(value, int) or value < least
+    if bad or (most is not None and value > most):
+        wanted = f"a whole number >= {least}" if most is None else f"{least} to {most}"
+        raise InvalidValueError(f"{name} must be {wanted}, got {value!r}")
+
+
+def named(values: list[str]) -> tuple[str, ...]:
+    """Words may also be joined by commas, but for the command of a pipe, which may hold some, and
+    inside the braces of a variant and the brackets of an oracle."""
+    whole = (PIPE, ORACLE + PIPE)
+    parts = ([value] if value.startswith(whole) else BETWEEN.split(value) for value in values)
+    return tuple(word for words in parts for word in words if word)

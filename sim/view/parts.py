@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A room as boxes, balls and cylinders to be drawn in 3-D, and where they are at a moment.
+
+What a thing looks like is said once, by the geoms of its model: whoever draws a room in 3-D with
+other means than MuJoCo's renderer (``sim.view.camera``) draws these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.core.bodies import STATIC
+from sim.world.world import World
+from slam.frames import Float
+
+DRAWN_GROUPS = (0, 1, 2)  # of geoms: rooms, things, people; the others are hulls, marks, shadows
+FLOOR_M = 0.004  # thickness of a floor
+CLEAR = 0.99  # opacity; below that a part is glass
+BOX, BALL, CYLINDER = "box", "ball", "cylinder"  # with edges, axes and diameters of 1 m
+_GEOM = mujoco.mjtGeom
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Placed:
+    """Where everything is: what MuJoCo needs to place all bodies."""
+
+    qpos: Float
+    mocap_pos: Float
+    mocap_quat: Float
+
+    @classmethod
+    def of(cls, world: World) -> Placed:
+        """Now."""
+        data = world.data
+        mocap = data.mocap_pos.copy(), data.mocap_quat.copy()
+        return cls(qpos=data.qpos.copy(), mocap_pos=mocap[0], mocap_quat=mocap[1])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Batch:
+    """Parts of one shape that are drawn together.
+
+    moves, glass  whether they can move; whether one sees through them
+    geoms   (n,) of the model;   along  (n,) m of their centres along the geoms' z axes
+    sizes   (n, 3) m;   colors  (n, 3) RGB;   opacity  (n,) 0 to 1
+    owners  (n,) row of the mover, ``STATIC`` for the room
+    """
+
+    shape: str
+    moves: bool
+    glass: bool
+    geoms: NDArray[np.int64]
+    along: Float
+    sizes: Float
+    colors: NDArray[np.uint8]
+    opacity: Float
+    owners: NDArray[np.int64]
+
+
+class Parts:
+    """Everything that is seen of a world. ``batches`` say what it is, ``poses`` where."""
+
+    def __init__(self, world: World) -> None:
+        self._model, self._data = world.model, mujoco.MjData(world.model)
+        self._bounds = world.scene.bounds
+        self.names = world.mover_names
+        self._owner = owner = world.bodies.mover_of_body[self._model.geom_bodyid]
+        found: dict[tuple[str, bool, bool], list[tuple[int, float, tuple[float, ...]]]] = {}
+        for geom in np.flatnonzero(np.isin(self._model.geom_group, DRAWN_GROUPS)).tolist():
+            glass = self._rgba(geom)[3] < CLEAR
+            for shape, along, size in self._shapes(geom):
+                key = shape, bool(owner[geom] != STATIC), bool(glass)
+                found.setdefault(key, []).append((geom, along, size))
+        self.batches = tuple(self._batch(key, parts, owner) for key, parts in sorted(found.items()))
+
+    @property
+    def moving(self) -> int:
+        """How many of them can move."""
+        return sum(len(batch.geoms) for batch in self.batches if batch.moves)
+
+    def place(self, placed: Placed) -> None:
+        """Put everything where it was; ``poses`` are of then."""
+        data = self._data
+        data.qpos[:] = placed.qpos
+        data.mocap_pos[:], data.mocap_quat[:] = placed.mocap_pos, placed.mocap_quat
+        mujoco.mj_kinematics(self._model, data)
+
+    def poses(self, batch: Batch) -> tuple[Float, Float]:
+        """(n, 3) m and (n, 4) w, x, y, z of the parts' centres."""
+        turns = self._data.geom_xmat[batch.geoms]
+        centres: Float = self._data.geom_xpos[batch.geoms] + batch.along[:, None] * turns[:, 2::3]
+        quats = np.empty((len(turns), 4))
+        for turn, quat in zip(turns, quats, strict=True):
+            mujoco.mju_mat2Quat(quat, turn)
+        if batch.shape == BALL:
+            quats[np.ptp(batch.sizes, axis=1) == 0.0] = (1.0, 0.0, 0.0, 0.0)  # looks no different
+        return centres, quats
+
+    def hit(self, origin: Sequence[float], direction: Sequence[float]) -> tuple[str, Float] | None:
+        """Name of the mover, "" for the room, and place (m) where a ray meets something first."""
+        group = np.isin(np.arange(6), DRAWN_GROUPS).astype(np.uint8)
+        start, way = np.array(origin, np.float64), np.array(direction, np.float64)
+        geom = np.full(1, -1, np.int32)
+        far = mujoco.mj_ray(self._model, self._data, start, way, group, 1, -1, geom)
+        if far < 0.0:
+            return None
+        row = int(self._owner[geom[0]])
+        return ("" if row == STATIC else self.names[row]), start + far * way
+
+    def _shapes(self, geom: int) -> list[tuple[str, float, tuple[float, ...]]]:
+        """Shape, m along the geom's z axis, and size of all that a geom is drawn with."""
+        kind = int(self._model.geom_type[geom])
+        x, y, z = self._model.geom_size[geom].tolist()
+        if kind == _GEOM.mjGEOM_PLANE:
+            xmin, ymin, xmax, ymax = self._bounds
+            ground = max(x, y) > max(xmax - xmin, ymax - ymin) or x <= 0.0  # far beyond the room
+            return [] if ground else [(BOX, 0.0, (2.0 * x, 2.0 * y, FLOOR_M))]
+        if kind == _GEOM.mjGEOM_BOX:
+            return [(BOX, 0.0, (2.0 * x, 2.0 * y, 2.0 * z))]
+        if kind == _GEOM.mjGEOM_SPHERE:
+            return [(BALL, 0.0, (2.0 * x, 2.0 * x, 2.0 * x))]
+        if kind == _GEOM.mjGEOM_ELLIPSOID:
+            return [(BALL, 0.0, (2.0 * x, 2.0 * y, 2.0 * z))]
+        if kind == _GEOM.mjGEOM_CYLINDER:
+            return [(CYLINDER, 0.0, (2.0 * x, 2.0 * x, 2.0 * y))]
+        if kind == _GEOM.mjGEOM_CAPSULE:
+            ends = [(BALL, along, (2.0 * x, 2.0 * x, 2.0 * x)) for along in (-y, y)]
+            return [(CYLINDER, 0.0, (2.0 * x, 2.0 * x, 2.0 * y)), *ends]
+        return []
+
+    def _rgba(self, geom: int) -> Float:
+        """Of its material, paper of a texture blended in, else its own."""
+        model, material = self._model, int(self._model.geom_matid[geom])
+        rgba: Float = model.geom_rgba[geom].astype(np.float64)
+        if material < 0:
+            return rgba
+        rgba = model.mat_rgba[material].astype(np.float64)
+        texture = int(model.mat_texid[material].max())
+        if texture >= 0:
+            start, n = int(model.tex_adr[texture]), int(model.tex_nchannel[texture])
+            pixels = int(model.tex_height[texture]) * int(model.tex_width[texture])
+            whole = model.tex_data[start : start + pixels * n].reshape(-1, n)
+            rgba[:3] *= whole[:, :3].mean(axis=0) / 255.0
+        return rgba
+
+    def _batch(
+        self,
+        key: tuple[str, bool, bool],
+        parts: list[tuple[int, float, tuple[float, ...]]],
+        owner: NDArray[np.int64],
+    ) -> Batch:
+        geoms = np.array([geom for geom, _, _ in parts])
+        rgba = np.array([self._rgba(geom) for geom in geoms.tolist()])
+        return Batch(
+            shape=key[0],
+            moves=key[1],
+            glass=key[2],
+            geoms=geoms,
+            along=np.array([along for _, along, _ in parts]),
+            sizes=np.array([size for _, _, size in parts]),
+            colors=np.round(255.0 * np.clip(rgba[:, :3], 0.0, 1.0)).astype(np.uint8),
+            opacity=rgba[:, 3],
+            owners=owner[geoms],
+        )
