@@ -52,7 +52,7 @@ def test_exact_measurements_give_the_exact_poses() -> None:
     poses, weights = optimise(start + 0.01, edges)
     np.testing.assert_allclose(
         [se2.between(poses[0], p) for p in poses], [se2.between(truth[0], p) for p in truth],
-        atol=1e-6,
+        atol=1e-5,  # poses have six digits, and yaw carries its last one over 10 m
     )  # fmt: skip
     assert weights.min() == 1.0
 

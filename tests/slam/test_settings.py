@@ -142,6 +142,7 @@ STAY = {
     "frontend/odometry_prior.py": "SINGULAR, a guard against singular matrices",
     "frontend/odometry_steps.py": "guards on what comes in",
     "frontend/polar.py": "a bound on an error of rounding; no result depends on it",
+    "frontend/range_error.py": "digits that do not follow the processor's algebra",
     "frontend/seen_space.py": "how the work is laid out; no result depends on it",
     "frontend/surfaces.py": "layout of a byte; AWAY, from the tree",
     "shunting/featured.py": "PAPER_REWARD, which makes a preset",
