@@ -30,7 +30,7 @@ DEFINED = {
         "3.11": "version of Python that is needed",
         "3.14": "version of Python that is needed",
     },
-    "docs/films.md": {},
+    "docs/films.md": {"120 s": "a replay plays in real time up to here"},
     "docs/comparing.md": {
         "4.7 Hz": "a scanner of 37.5 scans a second, one in 8 kept",
         "0.5 m": "threshold of a lost run",
