@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many rooms as Stable-Baselines3 takes them (the extra ``rl``).
 
-    rooms = learning_rooms("mobilia/ArenaGoal-v2", 8)
-    PPO("MlpPolicy", rooms).learn(150_000)
+rooms = learning_rooms("mobilia/ArenaGoal-v2", 8)
+PPO("MlpPolicy", rooms).learn(150_000)
 """
 
 from __future__ import annotations
