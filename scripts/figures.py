@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FormatStrFormatter, FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
@@ -140,7 +140,7 @@ def errors(path: Path, tracks: Mapping[str, Trajectory], truth: Trajectory) -> N
     log_axis(axes[0])
     axes[1].set(ylabel="heading error in degrees", xlabel="time in s")
     axes[1].set_yscale("symlog", linthresh=LINEAR_DEG)  # its sign matters, and it passes 0
-    axes[1].yaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axes[1].yaxis.set_major_formatter(FuncFormatter(lambda v, _at: f"{v:g}".replace("-", "−")))
     axes[0].legend(frameon=False)
     save(figure, path)
 
@@ -223,16 +223,22 @@ def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float
 
 @styled()
 def changes_picture(path: Path, raster: Raster, changes: Changes, track: Trajectory) -> None:
-    """Recent changes over the present map: appeared green, gone red, the rest grey."""
+    """Recent changes over the present map: appeared green, gone red, the rest grey.
+
+    Where nothing has changed there is no picture.
+    """
+    layers = []
+    for layer, least, cmap, label in (
+        (changes.gone, CHANGED, "Reds", "gone: in long-term memory, seen empty"),
+        (changes.appeared, NEW, "Greens", "new: seen, hardly in long-term memory"),
+    ):
+        thick = maximum_filter(np.nan_to_num(layer.values), size=3)  # a chair's leg: two cells
+        if (thick > least).any():
+            layers.append((np.where(thick > least, thick, np.nan), cmap, label))
+    if not layers:
+        return
     with _over_map(path, raster, track, "Recent changes of the map") as ax:
         ax.set_facecolor("#fafaf8")
         draw_raster(ax, raster, vmax=2.0, interpolation="nearest")
-        for layer, least, cmap, label in (
-            (changes.gone, CHANGED, "Reds", "gone: in long-term memory, seen empty"),
-            (changes.appeared, NEW, "Greens", "new: seen, hardly in long-term memory"),
-        ):
-            thick = maximum_filter(np.nan_to_num(layer.values), size=3)  # a chair's leg: two cells
-            if (thick > least).any():
-                _coloured(ax, raster, np.where(thick > least, thick, np.nan), cmap, label, 0.02)
-            else:
-                ax.plot([], [], "s", color="none", label=f"nothing is {label.partition(':')[0]}")
+        for values, cmap, label in layers:
+            _coloured(ax, raster, values, cmap, label, 0.02)

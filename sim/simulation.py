@@ -180,16 +180,33 @@ class Simulation:
 
     def sense(self) -> ScanResult:
         """As ``observe``, without the frame, which ``frame`` makes when it is asked for."""
+        self.live()
+        return self.look()
+
+    def live(self) -> None:
+        """Let one scan's worth of time pass: ``look`` or ``blink`` comes next, and only once."""
         if self._kidnapping is not None:
             self._kidnapping.carried(self.world)
         self.rearranged = self._changed_out_of_sight()
         self._stamp_ns = self._sweep.over_scan(self.world, self.laser, self._tags)
-        self._scan, self._frame = self.laser.finish(), None
         self.contacts = self.world.take_contacts()
-        self.world.saw(self._scan.bodies)
         self._sweep.timing.roll(self.encoders, self._sweep.travel, bool(self.contacts))
+
+    def look(self) -> ScanResult:
+        """The scan of the time that ``live`` let pass."""
+        self._scan, self._frame = self.laser.finish(), None
+        self.world.saw(self._scan.bodies)
         self._labels = self._labeller.label(self._scan) if self._labeller else None
         return self._scan
+
+    def blink(self) -> None:
+        """Instead of ``look``: nobody wants that scan. The noise of later scans is the same.
+
+        What that scan would have shown counts as unseen, so with ``change`` things may be put
+        elsewhere that it would have kept in their place.
+        """
+        if self._labeller is not None or not self.laser.blink():
+            self.look()
 
     @property
     def frame(self) -> Frame | None:

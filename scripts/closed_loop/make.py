@@ -69,6 +69,16 @@ def _write(out: Path, plan: Plan, runs: list[Driven]) -> list[dict[str, Any]]:
     return summary
 
 
+def said(plan: Plan, rows: list[dict[str, Any]]) -> list[str]:
+    """Goals reached by each SLAM at the lowest and the highest level."""
+    lines = []
+    for level in dict.fromkeys((plan.levels[0], plan.levels[-1])):
+        own = [row for row in rows if row["dynamism"] == level]
+        told = ", ".join(f"`{r['slam']}` reached {r['reached']} of {r['goals']} goals" for r in own)
+        lines.append(f"At {plan.axis} {level:g} {told}.")
+    return lines
+
+
 def success_table(plan: Plan, rows: list[dict[str, Any]]) -> Table:
     """Success and precision, to be printed."""
     at = {(row["dynamism"], row["slam"]): row for row in rows}

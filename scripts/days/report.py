@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,14 +15,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from scripts.console import plain_table
 from scripts.days.lifelong import Building
 from scripts.days.sessions import Drive
 from scripts.days.truth import LEAST_M, ChangeScore, changed_spots, scored
 from scripts.figures import save, styled
+from scripts.metrics.row import minus
+from scripts.pages.page import Part
 from sim.recording.tables import table
 from slam.days.changes import Change, between
 from slam.days.evidence import Snapshot
-from slam.days.history import DAY_S, History, dense
+from slam.days.history import DAY_S, dense
 from slam.days.mobility import MobilityMap
 from slam.days.session import read_history
 from slam.estimate import Raster
@@ -33,16 +38,23 @@ _COLUMNS = (
 )  # fmt: skip
 
 
-def changes_page(
-    folder: Path, building: Building, drives: Mapping[int, Drive]
-) -> tuple[str, dict[str, Any] | None]:
-    """Pictures and changes.csv into ``folder``; the page's part on one SLAM's changes, the score.
+@dataclass(frozen=True, kw_only=True)
+class Changed:
+    """What changed in a building: in words, as parts of its page, and what of it is true."""
+
+    said: str = ""
+    parts: Sequence[Part] = ()
+    score: dict[str, Any] | None = None
+
+
+def changes_of(folder: Path, building: Building, drives: Mapping[int, Drive]) -> Changed:
+    """Pictures and changes.csv into ``folder``.
 
     Each session is compared with the one before that fitted; scored where it was simulated.
     """
     history = read_history(building.map) if building.map.exists() else None
     if history is None or len(building.snapshots) < 2:
-        return "", None
+        return Changed()
     numbers = sorted(building.snapshots)
     found, scores = {}, []
     for first, second in pairwise(numbers):
@@ -52,12 +64,38 @@ def changes_page(
         scores += [] if score is None else [score]
     write_text(folder / "changes.csv", table(_COLUMNS, _rows(found)))
     mobility_picture(folder / "mobility.png", MobilityMap(history), HOURS)
-    last = max(found)
-    pair = building.snapshots[last[0]], building.snapshots[last[1]]
-    titles = f"session {last[0]}", f"session {last[1]}"
-    changes_picture(folder / "changes.png", pair, titles, history.cell_m, found[last])
-    words = _words(building.name, last, found[last], scores, history)
-    return words, added(scores) if scores else None
+    last, every = max(found), [change for changes in found.values() for change in changes]
+    shown = [change for change in found[last] if change.confidence >= LEAST]
+    if shown:
+        pair = building.snapshots[last[0]], building.snapshots[last[1]]
+        titles = f"session {last[0]}", f"session {last[1]}"
+        changes_picture(folder / "changes.png", pair, titles, history.cell_m, shown)
+    return Changed(
+        said=operator(shown, every), score=added(scores) if scores else None,
+        parts=_parts(last, shown, scores, len(history)),
+    )  # fmt: skip
+
+
+def operator(shown: Sequence[Change], every: Sequence[Change]) -> str:
+    """What is otherwise than the time before, for who looks after the building.
+
+    Doors are numbered by where they are among ``every`` change so far.
+    """
+    hinges: list[tuple[float, float]] = []
+    for change in every:
+        near = any(math.dist(change.at, hinge) < SAME_M for hinge in hinges)
+        hinges += [change.at] if change.kind == "door" and not near else []
+    hinges.sort()
+    told = []
+    for change in shown:
+        if change.kind == "door":
+            number = 1 + min(range(len(hinges)), key=lambda k: math.dist(change.at, hinges[k]))
+            told.append(f"door {number} turned by {abs(change.angle_deg):.0f}°")
+    for kind, words in (("moved", "moved"), ("appeared", "appeared"), ("gone", "gone")):
+        count = sum(change.kind == kind for change in shown)
+        things = "thing" if count == 1 else "things"
+        told += [f"{count} {things} {words}"] if count else []
+    return ", ".join(told) or "nothing changed that it could tell"
 
 
 def added(scores: Sequence[ChangeScore]) -> dict[str, Any]:
@@ -115,36 +153,37 @@ def summed(scores: Sequence[ChangeScore]) -> str:
     )
 
 
-def _words(
-    name: str,
-    numbers: tuple[int, int],
-    changes: Sequence[Change],
-    scores: Sequence[ChangeScore],
-    history: History,
-) -> str:
-    text = f"\n## What changed, by {name}\n\n"
-    if scores:
-        text += "From each session to the next, precision of all that is listed, recall of things "
-        text += f"of at least {LEAST_M:g} m: {summed(scores)}.\n\n"
-    text += f"From session {numbers[0]} to session {numbers[1]}:\n\n"
-    text += "![before and after](changes.png)\n\n"
-    text += "| change | at, m | size, m | confidence |\n|---|---|---|---|\n"
+def _parts(
+    numbers: tuple[int, int], changes: Sequence[Change], scores: Sequence[ChangeScore], n: int
+) -> list[Part]:
+    """What changed last, how true such lists are, and how places change in ``n`` sessions."""
+    listed = plain_table("the list")
+    for heading in ("change", "at, m", "from, m", "size, m", "confidence"):
+        listed.add_column(heading)
     for c in changes:
-        came = "" if c.before is None else f" from {c.before[0]:.2f}, {c.before[1]:.2f}"
+        came = "" if c.before is None else f"{c.before[0]:.2f}, {c.before[1]:.2f}"
         turned = f", by {c.angle_deg:+.0f}°" if c.kind == "door" else ""
-        text += (
-            f"| {c.kind}{turned} | {c.at[0]:.2f}, {c.at[1]:.2f}{came} | {c.size_m:.2f} "
-            f"| {c.confidence:.2f} |\n"
-        )
-    text += (
-        f"\n## How its places change, from {len(history)} sessions\n\n![mobility](mobility.png)\n"
+        words = (f"{c.kind}{turned}", f"{c.at[0]:.2f}, {c.at[1]:.2f}", came, f"{c.size_m:.2f}")
+        listed.add_row(*map(minus, words), f"{c.confidence:.2f}")
+    true = (
+        "From each session to the next, precision of all that is listed, recall of things "
+        f"of at least {LEAST_M:g} m: {summed(scores)}."
     )
-    return text
+    return [
+        Part(
+            title=f"What changed from session {numbers[0]} to session {numbers[1]}",
+            picture="changes.png" if changes else "", note=true if scores else "",
+            table=listed if changes else None, legend={**COLOURS_OF_PAGE, UNSEEN: "not seen"},
+        ),
+        Part(title=f"How its places change, from {n} sessions", picture="mobility.png"),
+    ]  # fmt: skip
 
 
 COLOURS = {"appeared": "#1b7f4d", "gone": "#c0392b", "moved": "#2457a6", "door": "#b8860b"}
 UNSEEN = "#b0b4b8"
-_LEAST = 0.05  # a confidence below is not drawn
+COLOURS_OF_PAGE = {colour: kind for kind, colour in COLOURS.items()}
+LEAST = 0.05  # of the confidence of a change that is told
+SAME_M = 0.7  # two hinges so near are one door's
 
 
 def _draw(ax: Axes, snapshot: Snapshot, cell_m: float, title: str) -> None:
@@ -174,8 +213,6 @@ def changes_picture(
         for ax, snapshot, title in zip(axes, snapshots, titles, strict=True):
             _draw(ax, snapshot, cell_m, title)
         for change in changes:
-            if change.confidence < _LEAST:
-                continue
             colour, radius = COLOURS[change.kind], 0.5 * change.size_m + 0.15
             old = change.kind in ("gone", "door", "moved")
             new = change.kind in ("appeared", "door", "moved")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ``mobilia lifelong`` prints and writes: a table, lifelong.csv, lifelong.json, a page."""
+"""What ``mobilia lifelong`` prints and writes: a table, lifelong.csv, lifelong.json."""
 
 from __future__ import annotations
 
@@ -45,13 +45,14 @@ def words(column: str, value: object) -> str:
     return "" if value is None else _FORMS.get(column, "{}").format(value)
 
 
-def printed(slam: str, rows: Sequence[Row]) -> Table:
-    """One SLAM's sessions."""
+def printed(slam: str, rows: Sequence[Row], *, whole: bool = False) -> Table:
+    """One SLAM's sessions; ``whole``: with every column that a page has room for."""
     found = plain_table(slam)
-    for heading in _PRINTED.values():
+    shown = {column: column.replace("_", " ") for column in _SHOWN} if whole else _PRINTED
+    for heading in shown.values():
         found.add_column(heading, no_wrap=True)
     for row in rows:
-        cells = {column: words(column, row[column]) for column in _PRINTED}
+        cells = {column: words(column, row[column]) for column in shown}
         cells["map"] = _APART.sub(r"apart \1", cells["map"])
         found.add_row(*map(escape, cells.values()))
     return found
@@ -80,20 +81,32 @@ def verdict(rows: Sequence[Row], failure: str | None = None) -> str:
     return text + end
 
 
+def last_session(rows: Sequence[Row], changed: str) -> str:
+    """The last session for who looks after the building; ``changed`` what is otherwise there."""
+    row = rows[-1]
+    head = f"Session {row['session']}: {changed or 'no map of before to compare with'}; "
+    if row["place"] == "failed":
+        return f"{head}`{row['slam']}` failed."
+    if row["found_after_s"] is None:
+        known = "not found in the map" if row["map"] != "anew" else "without a map of before"
+        return f"{head}`{row['slam']}` drove {known}."
+    held = row["tracked"]
+    lost = "never lost" if held == 1.0 else f"in doubt in {100.0 * (1.0 - held):.0f} % of the scans"
+    place = ", at a wrong place" if row["place"] == "wrong" else ""
+    return f"{head}found in {row['found_after_s']:.0f} s{place}, {lost}."
+
+
 def write(
     folder: Path,
     rows: Sequence[Row],
     settings: Mapping[str, Any],
-    changes: tuple[str, Mapping[str, Any] | None],
+    score: Mapping[str, Any] | None,
     aged: Sequence[Row] = (),
-    failures: Mapping[str, str] | None = None,
 ) -> None:
-    """lifelong.csv, lifelong.json, lifelong.md, and ages.csv if there are ``aged`` rows.
+    """lifelong.csv, lifelong.json, and ages.csv if there are ``aged`` rows.
 
-    ``changes`` is the page's part on them, and what of them is true (``report.changes_page``),
-    ``failures`` by SLAM what it said when it first failed.
+    ``score``: what of the changes is true (``report.changes_of``).
     """
-    part, score = changes
     cells = [[words_exactly(row[column]) for column in COLUMNS] for row in rows]
     write_text(folder / "lifelong.csv", table(COLUMNS, cells))
     whole = {
@@ -107,23 +120,6 @@ def write(
     if aged:
         old = [[words_exactly(row[column]) for column in AGE_COLUMNS] for row in aged]
         write_text(folder / "ages.csv", table(AGE_COLUMNS, old))
-    write_text(folder / "lifelong.md", page(rows, settings, failures) + ages_part(aged) + part)
-
-
-def ages_part(aged: Sequence[Row]) -> str:
-    """The page's table of the last session in older maps; "" without any."""
-    if not aged:
-        return ""
-    number = aged[0]["session"]
-    shown = [c for c in AGE_COLUMNS if c != "session"]
-    return f"\n## Session {number} in a map some sessions old\n\n{_markdown(shown, aged)}"
-
-
-def _markdown(columns: Sequence[str], rows: Sequence[Row]) -> str:
-    heads = [column.replace("_", " ") for column in columns]
-    cells = [[words(column, row[column]) for column in columns] for row in rows]
-    lines = ["| " + " | ".join(line) + " |\n" for line in (heads, *cells)]
-    return "".join([lines[0], "|" + "---|" * len(heads) + "\n", *lines[1:]])
 
 
 def words_exactly(value: object) -> str:
@@ -131,14 +127,12 @@ def words_exactly(value: object) -> str:
     return "" if value is None else repr(value) if isinstance(value, float) else str(value)
 
 
-def page(
-    rows: Sequence[Row], settings: Mapping[str, Any], failures: Mapping[str, str] | None = None
-) -> str:
-    """The tables of all SLAMs as Markdown."""
-    building = ", ".join(f"{key} {value}" for key, value in settings.items())
-    parts = [f"# A building over {len({r['session'] for r in rows})} sessions\n\n{building}\n"]
-    for slam in dict.fromkeys(row["slam"] for row in rows):
-        own = [row for row in rows if row["slam"] == slam]
-        said = verdict(own, (failures or {}).get(slam))
-        parts.append(f"\n## {slam}\n\n{said}\n\n{_markdown(_SHOWN, own)}")
-    return "".join(parts)
+def ages_table(aged: Sequence[Row]) -> Table:
+    """The last session in older maps."""
+    shown = [column for column in AGE_COLUMNS if column != "session"]
+    found = plain_table(f"session {aged[0]['session']} in a map some sessions old")
+    for column in shown:
+        found.add_column(column.replace("_", " "))
+    for row in aged:
+        found.add_row(*(escape(words(column, row[column])) for column in shown))
+    return found

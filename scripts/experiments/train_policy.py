@@ -266,7 +266,8 @@ def _trained(wanted: argparse.Namespace) -> None:
             train(wanted)
     except ImportError as error:
         raise MissingDependencyError(
-            f"{error}: install the extra rl, pip install 'mobilia[rl]'"
+            f"{error}: install the extra rl, pip install 'mobilia[rl]' "
+            "--extra-index-url https://download.pytorch.org/whl/cpu"
         ) from error
 
 

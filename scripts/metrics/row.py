@@ -88,6 +88,11 @@ class Metric:
         return digits(value * self.factor, sign=sign)
 
 
+def minus(text: str) -> str:
+    """A formatted number with the minus sign that all of ours have."""
+    return text.replace("-", "−")
+
+
 def digits(value: float, *, sign: bool = False) -> str:
     """Three significant digits without an exponent; ∞ for what failed."""
     mark = "−" if value < 0.0 else "+" if sign and value > 0.0 else ""
@@ -97,6 +102,6 @@ def digits(value: float, *, sign: bool = False) -> str:
     if size == 0.0:
         return "0"
     if size < 1e-4 or size >= 1e6:
-        return mark + f"{size:.1e}"
+        return minus(mark + f"{size:.1e}")
     places = max(0, 2 - math.floor(math.log10(float(f"{size:.2e}"))))
     return mark + f"{size:.{places}f}"

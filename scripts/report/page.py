@@ -4,19 +4,16 @@
 from __future__ import annotations
 
 import math
-import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
-
-import jinja2
 
 from scripts.closed_loop.folder import Driven
 from scripts.comparison.plan import Run
 from scripts.comparison.schema import LATER, settings
 from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, of_section
+from scripts.pages.page import Cell, Table, template
 from scripts.report import answer, closed, curves, pictures, score_tables, style, tables, words
 from scripts.report.study import LEAST_RUNS, Study
 from sim.recording.sums import add_to_sums
@@ -24,7 +21,6 @@ from slam.files import write_text
 
 REPORT = "report.html"
 ANSWERED = ("finished", "lost")  # how a run ends in which nothing failed
-TEMPLATE = Path(__file__).with_name("page.html")
 
 
 def write(study: Study, drives: Sequence[Driven] = ()) -> Path:
@@ -39,11 +35,10 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
     """The page as text: everything is in it, it asks for nothing."""
     slams = list(dict.fromkeys([*study.slams, *(s for drive in drives for s in drive.slams)]))
     scenes = [_scene(study, scene) for scene in study.scenes]  # first: these read the runs
-    return _template().render(
+    return template("page.html", Path(__file__).parent).render(
         study=study,
         marks={slam: (style.glyph(slam, slams), style.color(slam, slams)) for slam in slams},
         drives=[(drive, curves.of_drive(drive, slams), closed.table(drive)) for drive in drives],
-        css=TEMPLATE.with_name("page.css").read_text(encoding="utf-8"),
         settings=study.compared.settings,
         answers=answers(study),
         controls=_controls(study),
@@ -92,15 +87,6 @@ def blame_command(study: Study, row: dict[str, Any], folder: str = "FOLDER") -> 
     return shlex.join(["mobilia", "blame", path, "--slam", str(row["slam"])])
 
 
-@cache
-def _template() -> jinja2.Template:
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters["parts"] = lambda name: re.findall(r"[^:/_.]*[:/_.]?", name)[:-1]
-    return environment.from_string(TEMPLATE.read_text(encoding="utf-8"))
-
-
 def _there(study: Study, keys: Iterable[str]) -> list[str]:
     return [key for key in keys if study.has(key)]
 
@@ -130,20 +116,20 @@ def _curves(study: Study) -> list[tuple[str, list[tuple[str, str]]]]:
     ]
 
 
-def _differences(study: Study) -> list[tuple[str, list[tables.Table]]]:
+def _differences(study: Study) -> list[tuple[str, list[Table]]]:
     """For each scene the tables of the subject against everybody."""
     found = [METRICS[key] for key in _there(study, PAIRED)]
     return [(scene, tables.of_pairs(study, scene, found)) for scene in study.scenes]
 
 
-def _levels(study: Study, keys: Iterable[str]) -> list[tuple[str, list[tables.Table]]]:
+def _levels(study: Study, keys: Iterable[str]) -> list[tuple[str, list[Table]]]:
     """For each scene the tables of those measures that are there."""
     found = [METRICS[key] for key in keys]
     groups = [(scene, tables.of_levels(study, scene, found)) for scene in study.scenes]
     return [(scene, made) for scene, made in groups if made]
 
 
-def _days(study: Study) -> list[tuple[str, list[str], tables.Table]]:
+def _days(study: Study) -> list[tuple[str, list[str], Table]]:
     """Of the buildings of each scene and level: where, a sentence a SLAM, and the table."""
     return [
         (score_tables.where(group), score_tables.sentences(own), _scores(own))
@@ -151,14 +137,14 @@ def _days(study: Study) -> list[tuple[str, list[str], tables.Table]]:
     ]
 
 
-def _scores(rows: Sequence[Mapping[str, Any]]) -> tables.Table:
+def _scores(rows: Sequence[Mapping[str, Any]]) -> Table:
     names = score_tables.slams_of(rows)
     lines = [
-        [tables.Cell(text=heading), *(tables.Cell(text=text, small=small) for text, small in cells)]
+        [Cell(text=heading), *(Cell(text=text, small=small) for text, small in cells)]
         for heading, cells in score_tables.table(rows)
     ]
     caption = score_tables.size(rows)
-    return tables.Table(caption=caption, head=["score", *names], rows=lines, slams=names)
+    return Table(caption=caption, head=["score", *names], rows=lines, slams=names)
 
 
 def _scene(study: Study, scene: str) -> dict[str, Any]:

@@ -217,11 +217,11 @@ _OTHERS = {
     "mobilia render {folder} films this run",
     "drive": "is of mobilia drive. It is a part of the report on a comparison: "
     "mobilia report COMPARISON --drive {folder}",
-    "benchmark": "is of mobilia benchmark: leaderboard.md there is its report; "
+    "benchmark": "is of mobilia benchmark: index.html there is its page; "
     "each track has one, mobilia report {folder}/TRACK",
     "days": "is of the benchmark's section over days: days.csv has its scores",
-    "lifelong": "is of mobilia lifelong: lifelong.md there is its report",
-    "blame": "is of mobilia blame: blame.png there is its report",
+    "lifelong": "is of mobilia lifelong: index.html there is its page",
+    "blame": "is of mobilia blame: index.html there is its page",
 }
 _DATASET = (
     "is a dataset of mobilia generate. A report is about a comparison: " + MAKE + "; "

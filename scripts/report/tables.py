@@ -7,38 +7,19 @@ import math
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 from scripts.comparison.csv_files import Row
 from scripts.comparison.schema import OUTCOMES
 from scripts.comparison.tables import by_seed, number
 from scripts.metrics.row import Metric, digits
 from scripts.metrics.table import METRICS
+from scripts.pages.page import Cell, Table
 from scripts.report.answer import percent
 from scripts.report.study import LEAST_RUNS, Study, verdict
 from slam.evaluation.statistics import quantile, ratio_interval
 from slam.variants import ORACLE
 
 _MARKS = {1: "better", -1: "worse", 0: ""}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cell:
-    """``text`` with ``small`` print after it; ``mark`` is "better", "worse", "best" or ""."""
-
-    text: str
-    small: str = ""
-    mark: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Table:
-    """``slams`` are the heads that name one, for its colour; the first column names the row."""
-
-    caption: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[Cell]]
-    slams: Sequence[str] = field(default_factory=tuple)
 
 
 def of_levels(study: Study, scene: str, metrics: Sequence[Metric]) -> list[Table]:

@@ -11,8 +11,8 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
-from scripts.console import console
 from scripts.metrics.judged import Judged
+from scripts.metrics.row import digits, minus
 from scripts.metrics.table import IN_RUN
 from slam.replay import Replay, Track
 from slam.trajectory import Trajectory
@@ -62,27 +62,44 @@ def _block(judged: Judged, section: str = "") -> dict[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
 
 
-def print_table(outcome: Mapping[str, Any], title: str) -> None:
+def said(outcome: Mapping[str, Any], primary: str) -> list[str]:
+    """What came out for the SLAM ``primary``, beside odometry, and how often it was in doubt."""
+    own, others = outcome["slams"][primary], dict(outcome["slams"])
+    if "ate_unaligned_m" in own:
+        off = {name: 100.0 * block["end_error_m"] for name, block in others.items()}
+        beside = "".join(f", `{k}` by {digits(v)} cm" for k, v in off.items() if k != primary)
+        first = (
+            f"`{primary}` was off by {digits(100.0 * own['ate_unaligned_m'])} cm on average (RMSE) "
+            f"over {outcome['distance_m']:.0f} m; at the end by {digits(off[primary])} cm{beside}."
+        )
+    else:
+        first = f"`{primary}` ran through {own['scans']} scans. This log has no truth: no errors."
+    doubted = own.get("not_converged", 0)
+    scans = f"{doubted} of {own['scans']} scans" if doubted else "every scan: it was never in doubt"
+    return [first, f"It {'did not trust' if doubted else 'trusted'} {scans}."]
+
+
+def table(outcome: Mapping[str, Any], title: str) -> Table:
     """One column for each SLAM (and one for its final trajectory), one row for each number."""
     columns: list[tuple[str, Mapping[str, Any], str]] = []
     for name, block in outcome["slams"].items():
         columns.append((name, block, ""))
         if "ate_unaligned_m_final" in block:
             columns.append((f"{name}, final", block, "_final"))
-    table = Table(title=escape(title), title_justify="left", caption=_caption(outcome))
-    table.add_column("online; unaligned: in the frame of the first pose")
-    table.add_column("unit")
+    found = Table(title=escape(title), title_justify="left", caption=_caption(outcome))
+    found.add_column("online; unaligned: in the frame of the first pose")
+    found.add_column("unit")
     for heading, _, _ in columns:
-        table.add_column(escape(heading), justify="right")
+        found.add_column(escape(heading), justify="right")
     for metric in IN_RUN:
         key = metric.in_run
         cells = [
-            metric.form.format(block[key + suffix]) if key + suffix in block else ""
+            minus(metric.form.format(block[key + suffix])) if key + suffix in block else ""
             for _, block, suffix in columns
         ]
         if any(cells):
-            table.add_row(metric.label, metric.unit, *cells)
-    console.print(table)
+            found.add_row(metric.label, metric.unit, *cells)
+    return found
 
 
 def _caption(outcome: Mapping[str, Any]) -> str:

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import imageio.v2 as imageio
-from rich.markup import escape
+from rich.table import Table
 
 from scripts import figures
-from scripts.console import note, say, working
+from scripts.console import console, note, say, working
 from scripts.film import FPS
 from scripts.film.encode import Pace, film, require_ffmpeg
 from scripts.film.render import shoot, watched
@@ -25,6 +25,8 @@ from scripts.live.replay import Recorder
 from scripts.machine import machine
 from scripts.names import file_name
 from scripts.output import whole_folder, write_recipe
+from scripts.pages import page as pages
+from scripts.pages.page import Page, Part, command
 from scripts.single_run import score
 from scripts.single_run.costs import FILM, MAP, PICTURES, SLAM, Costs, in_words
 from scripts.single_run.small_maps import Drawn, drawn, for_file
@@ -50,6 +52,12 @@ class Outputs:
     costs: Costs | None = None  # what reading has cost; None: counted from here on
 
 
+# What the colours of the pictures mean.
+MAP_LEGEND = {"#800026": "stands there for long", "#fd8d3c": "seen lately, or now and then",
+              "#fafaf8": "empty or never seen", "#1f61be": "the last scan"}  # fmt: skip
+CHANGES_LEGEND = {"#238b45": "new: seen, hardly in long-term memory",
+                  "#cb181d": "gone: in long-term memory, seen empty",
+                  "#888": "as before"}  # fmt: skip
 Writer = Callable[[Path, Show], None]
 _files: dict[str, Writer] = {}
 
@@ -109,9 +117,12 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         results["cost"] = costs.block(replay)
         write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
         write_recipe(folder, outputs.command, outputs.settings)
-    score.print_table(results, show.title)
+        table = score.table(results, show.title)
+        page = _page(outputs, show, results, table)
+        pages.write(folder, page)
+    console.print(table)
     say(in_words(results["cost"]), highlight=False)
-    _tell(outputs)
+    pages.tell(outputs.folder, page)
     return results
 
 
@@ -159,24 +170,29 @@ def _draw(folder: Path, show: Show, found: Drawn | None) -> None:
         figures.changes_picture(folder / "changes.png", found.map, found.changes, own)
 
 
-_WORTH_OPENING = (
-    "replay.html",
-    "film.mp4",
-    "map.png",
-    "changes.png",
-    "trajectories.png",
-    "errors.png",
-)
-
-
-def _tell(outputs: Outputs) -> None:
-    """What to open first, of what is really there."""
-    there = [name for name in _WORTH_OPENING if (outputs.folder / name).exists()]
-    others = ["results.json has every number", "trajectory_*.tum is for evo"]
-    if (outputs.folder / "map.yaml").exists():
-        others.append("map.yaml for map_server")
-    if (outputs.folder / "map.npz").exists():
-        others.append("map.npz for the SLAM's load()")
-    first = escape(str(outputs.folder / there[0]))
-    then = f", then {', '.join(there[1:])} beside it" if there[1:] else ""
-    say(f"Open [bold]{first}[/bold] first{then}; {', '.join(others)}.")
+def _page(outputs: Outputs, show: Show, results: Mapping[str, Any], table: Table) -> Page:
+    """What the run's page says."""
+    parts = [
+        Part(title="Map", picture="map.png", legend=MAP_LEGEND),
+        Part(title="What changed", picture="changes.png", legend=CHANGES_LEGEND),
+        Part(title="Paths", picture="trajectories.png"),
+        Part(title="Error over time", picture="errors.png"),
+        Part(title="Numbers", table=table),
+    ]
+    folder, settings = outputs.folder, outputs.settings
+    then = {"Go on in this map:": command(
+        "run", show.primary, "--log", "LOG", "--map-in", folder / "map.npz", "--map-out", "NEXT.npz"
+    )}  # fmt: skip
+    if "scene" in settings:
+        levels = ("--scene", settings["scene"], "--dynamism", "0:1:0.5", "--seeds", "6")
+        then = {
+            "What misled it, if anything did:": command("blame", folder),
+            "From how much motion on is it lost?": command(
+                "compare", "--slam", show.primary, *levels, "--out", "out/compare"
+            ),
+            "Drive and disturb it yourself:": command("live", "--scene", settings["scene"]),
+        }
+    return Page(
+        title=show.title, said=score.said(results, show.primary), parts=parts, next=then,
+        settings={key: value for key, value in settings.items() if key != "log_facts"},
+    )  # fmt: skip

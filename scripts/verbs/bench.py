@@ -41,6 +41,7 @@ def bench(
         world.scanner,
         world.physics,
         world.environments,
+        world.learning,
         crowds.rows,
         world.pictures,
         bench_slam.updates,

@@ -139,6 +139,7 @@ def _opened(path: Path, train: bool) -> SealedSeeds:
 
 def _tell(board: Board, out: Path, spent_s: float) -> None:
     from scripts.benchmark.board import lost_from_words
+    from scripts.pages.page import Page, Part, command, publish
 
     table = Table(
         title="level from which half of the runs are lost", title_justify="left",
@@ -160,15 +161,19 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
         note(f"{name} was submitted, as SLAM {one['slam']}: its results are the submitter's word")
     for failure in board.failures():
         note(failure)
-    for line in board.said():
-        say(escape(line))
     if board.days_page:
         _tell_days(out)
-    more = ", days.csv, days.json" if board.days_page else ""
-    say(
-        f"{escape(str(out))}: leaderboard.md, leaderboard.csv, leaderboard.json{more} "
-        f"({spent_s:.0f} s)"
-    )
+    reports = [command("report", out / track.name) for track in board.tracks[:3]]
+    publish(out, Page(
+        title=f"{board.subject} on {len(board.tracks)} tracks", said=board.said(),
+        parts=[Part(title="Lost from which level", note=f"{table.caption}.", table=table)],
+        next={
+            "A track run by run, and what misled it:": "\n".join(reports),
+            "Hand it in:": command("benchmark", "--slam", board.subject, "--submit", "NAME"),
+        },
+        settings={key: board.head[key] for key in ("seeds_of", "seeds", "levels_run", "world")},
+    ))  # fmt: skip
+    say(f"{escape(str(out))} ({spent_s:.0f} s)")
 
 
 def _tell_days(out: Path) -> None:

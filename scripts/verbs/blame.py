@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.markup import escape
 
 from scripts.console import console, say
 from scripts.debugger.question import Question
@@ -115,7 +114,7 @@ def blame(
     if at is not None and not 0.0 <= at <= case.seconds:
         raise InvalidValueError(f"--at must lie in 0..{case.seconds:g} s, got {at:g}")
     folder = out or Path("out") / f"blame-{file_name(name)}-{file_name(case.slam)}"
-    _tell(carry_out(case, question, folder, overwrite=overwrite), folder)
+    _tell(carry_out(case, question, folder, overwrite=overwrite), folder, run)
 
 
 def _world(world: dict[str, Any], options: list[str], scanner: str) -> dict[str, Any]:
@@ -128,22 +127,32 @@ def _world(world: dict[str, Any], options: list[str], scanner: str) -> dict[str,
     return settings if scanner == "full" else settings | {"laser": laser}
 
 
-def _tell(found: Inquest, folder: Path) -> None:
+def _tell(found: Inquest, folder: Path, run: Path | None) -> None:
     from scripts.debugger.words import FIXED, headline, table
+    from scripts.pages.page import Page, Part, command, publish
 
     says = headline(found)
-    if found.trials:
-        console.print(table(found))
-    else:
-        console.print(escape(says[0]), style="bold")
-    say(escape(says[1]), highlight=False)
-    if found.trials:
-        say(
-            f"Held fixed: {FIXED}. The robot's path differs by at most {_path_m(found):.3f} m; "
-            "'others' is how far other movers ended from where they did.",
-            highlight=False,
-        )
-    say(f"Open [bold]{escape(str(folder / 'blame.png'))}[/bold].")
+    shown = table(found) if found.trials else None
+    fixed = (
+        f"Held fixed: {FIXED}. The robot's path differs by at most {_path_m(found):.3f} m; "
+        "'others' is how far other movers ended from where they did."
+    )
+    if shown is not None:
+        console.print(shown)
+        say(fixed, highlight=False)
+    case = found.tape.case
+    parts = [
+        Part(title="What happened, and what would have", picture="blame.png"),
+        *([] if shown is None else [Part(title="The world again", note=fixed, table=shown)]),
+    ]
+    then = {"The whole run as a film:": command("render", run)}
+    if run is None:
+        world = [f"--{name}={case.settings[name]}" for name in ("scene", "dynamism", "seed")]
+        then = {"The whole run as a film:": command("run", case.slam, *world)}
+    told = {"slam": case.slam, "seconds": case.seconds, "every": case.every, **case.settings}
+    publish(folder, Page(
+        title=f"What misled {case.slam}?", said=says, parts=parts, next=then, settings=told
+    ))  # fmt: skip
 
 
 def _path_m(found: Inquest) -> float:

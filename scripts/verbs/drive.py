@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -65,8 +66,9 @@ def drive(
     slams = with_set(named(slam), set_ or [])
     check(slams, scene)
     from scripts import workers
-    from scripts.closed_loop.make import carry_out, success_table
+    from scripts.closed_loop.make import carry_out, said, success_table
     from scripts.closed_loop.plan import Plan
+    from scripts.pages.page import Page, Part, command, publish
     from sim.loop.config import LoopConfig
 
     workers.check_jobs(jobs)
@@ -85,11 +87,23 @@ def drive(
     )
     started = time.perf_counter()
     rows = carry_out(plan, out, jobs=jobs)
-    console.print(success_table(plan, rows))
-    say(
-        f"{escape(str(out))}: closed_loop.png, paths.png, goals.csv, runs.csv, levels.csv "
-        f"({time.perf_counter() - started:.0f} s)"
-    )
+    table = success_table(plan, rows)
+    console.print(table)
+    parts = [
+        Part(title="Goals reached", picture="closed_loop.png", table=table),
+        Part(title="Ways driven", picture="paths.png"),
+    ]
+    publish(out, Page(
+        title=f"{scene}: steered by its SLAM", said=said(plan, rows), parts=parts,
+        next={
+            "The same rooms on a tour that its errors do not steer:": command(
+                "compare", "--slam", *slams, "--scene", scene, "--out", "out/compare"
+            ),
+            "Both in one report:": command("report", "out/compare", "--drive", out),
+        },
+        settings=asdict(plan),
+    ))  # fmt: skip
+    say(f"{escape(str(out))} ({time.perf_counter() - started:.0f} s)")
 
 
 def _seeds(words: tuple[str, ...]) -> tuple[int, ...]:

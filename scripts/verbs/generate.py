@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
 from scenes import registry
-from scripts.console import console, say
+from scripts.console import console
 from scripts.names import check
 from scripts.options import (
     Change,
@@ -24,6 +23,11 @@ from scripts.options import (
     sweep,
 )
 from slam.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from sim.recording.dataset import Plan
 
 
 def generate(
@@ -99,5 +103,38 @@ def generate(
     workers.check_jobs(jobs)
     for name in scene:  # a wrong name is told, and a module found, before anything starts
         registry.find(name)
-    console.print(carry_out(plan, out, jobs=jobs, cluster=cluster))
-    say(f"{escape(str(out))}: check it with [bold]mobilia verify[/bold]")
+    table = carry_out(plan, out, jobs=jobs, cluster=cluster)
+    console.print(table)
+    _page(plan, out, table)
+
+
+def _page(plan: Plan, out: Path, table: Table) -> None:
+    """What was made, a plan of the first episode at its start, and what it is good for."""
+    from scripts.pages.page import Page, Part, command, inline, tell, write
+    from sim.simulation import Simulation
+    from sim.view.pictures import MapPicture
+
+    names, first = list(plan.planned()), plan.jobs()[0]
+    room = Simulation(**first.simulation())
+    room.sense()
+    start = inline(MapPicture(room, (1080, 720))(room))
+    about = {key: value for key, value in first.words().items() if value not in (None, {})}
+    page = Page(
+        title=f"Episodes of {', '.join(plan.scenes or (first.scene,))}",
+        said=[
+            f"{len(names)} episodes of {first.seconds:g} s: bags of ROS 2 with odometry, scans and "
+            "the truth of every beam."
+        ],
+        parts=[
+            Part(title="The first one at its start", picture=start),
+            Part(title="Episode by episode", table=table),
+        ],
+        next={
+            "Is every byte still there?": command("verify", out),
+            "A SLAM on the first of them:": command("run", "shunting", "--log", out / names[0]),
+            "The first of them as a film:": command("render", out / names[0]),
+        },
+        settings=about,
+    )
+    write(out, page)
+    tell(out, page)

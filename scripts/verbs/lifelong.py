@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from scripts.console import console, note, say, working
+from scripts.console import console, say, working
 from scripts.names import check
 from scripts.options import CrowdOption, Motion, Overwrite, Scanner, options_with
 from slam.errors import InvalidValueError
@@ -97,8 +97,10 @@ def _write(
 ) -> None:
     from scripts.days import lifelong as life
     from scripts.days import tables
-    from scripts.days.report import changes_page
+    from scripts.days.report import Changed, changes_of
     from scripts.output import whole_folder, write_recipe
+    from scripts.pages.page import Page, Part, command, tell
+    from scripts.pages.page import write as write_page
 
     settings = {"slams": names, **settings}
     path = out or Path("out") / "lifelong"
@@ -111,15 +113,35 @@ def _write(
         with working("living through the sessions"):
             rows, aged = life.lived(buildings, _noted(drives, kept))
         living = next((b for b in buildings if not b.anew), None)
-        changes = ("", None) if living is None else changes_page(folder, living, kept)
+        changed = Changed() if living is None else changes_of(folder, living, kept)
         failures = {b.name: b.failures[0] for b in buildings if b.failures}
-        tables.write(folder, rows, settings, changes, aged, failures)
+        tables.write(folder, rows, settings, changed.score, aged)
+        by_slam = {name: [row for row in rows if row["slam"] == name] for name in names}
+        lives = [
+            Part(
+                title=f"The life of {name}", note=tables.verdict(own, failures.get(name)),
+                table=tables.printed(name, own, whole=True),
+            )
+            for name, own in by_slam.items()
+        ]  # fmt: skip
+        older = [Part(title="Older maps", table=tables.ages_table(aged))] if aged else []
+        first = names[0] if living is None else living.name
+        page = Page(
+            title=f"A building over {len(kept)} sessions",
+            said=[tables.last_session(by_slam[first], changed.said)],
+            parts=[*changed.parts, *lives, *older], settings=settings,
+            next={} if living is None else {
+                "A session of your own in this map:": command(
+                    "run", first, "--log", "LOG", "--map-in", path / living.map.name
+                )
+            },
+        )  # fmt: skip
         write_recipe(folder, "lifelong", settings)
-    for name in names:
-        own = [row for row in rows if row["slam"] == name]
+        write_page(folder, page)
+    for name, own in by_slam.items():
         console.print(tables.printed(name, own))
         say(escape(tables.verdict(own, failures.get(name))))
-    note(f"open {escape(str(path / 'lifelong.md'))} first")
+    tell(path, page)
 
 
 def _noted(drives: Iterator[Drive], kept: dict[int, Drive]) -> Iterator[Drive]:

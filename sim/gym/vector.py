@@ -107,8 +107,9 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
                 f"option reset_mask must be ({self.num_envs},) bool with one true, got {mask!r}"
             )
         seeds = self._seeds(seed)
-        for i in np.flatnonzero(mask).tolist():
-            self._restart(i, seeds[i], own)
+        chosen = np.flatnonzero(mask).tolist()
+        run = map if self._pool is None else self._pool.map
+        list(run(lambda i: self._restart(i, seeds[i], own), chosen))
         self._ended[mask] = False
         return self._observations(), self._infos()
 

@@ -149,6 +149,22 @@ class VectorGoalVector(VectorObservationWrapper):
         return self._vector(observations)
 
 
+def goal_rooms(
+    id_: str, num_envs: int = 8, *, n_sectors: int = SECTORS, **settings: Any
+) -> VectorEnv[Any, Any, Any]:
+    """Rooms that a small network learns in fast, each seen as ``GoalVector(LidarMinPooling)``.
+
+    settings  of ``sim.gym.vector.MobiliaVectorEnv``. Unless they say otherwise, a step takes one
+              scan (``scans="last"``), the rooms step on two threads, and whoever steps them resets
+              those that have ended (``autoreset_mode="disabled"``).
+    """
+    usual = {"autoreset_mode": "disabled", "n_threads": 2, "scans": "last"}
+    rooms: Any = gymnasium.make_vec(
+        id_, num_envs=num_envs, vectorization_mode="vector_entry_point", **{**usual, **settings}
+    )
+    return VectorGoalVector(VectorLidarMinPooling(rooms, n_sectors))
+
+
 class DynamismCurriculum(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Each episode has a dynamism of its own, drawn evenly from 0 to ``level``.
 

@@ -25,6 +25,7 @@ from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import PART, is_part, make_folder, reason, write_text
 
 PLAN = "dataset.json"
+PAGE = "index.html"  # of who looks at it: no part of the data, so no hash is kept
 SCHEMA = 1
 MAX_EPISODES = 1_000_000
 MAX_BYTES = 1 << 20  # of dataset.json
@@ -282,7 +283,7 @@ def _against(
 
 def _strangers(path: Path, planned: set[str], files: Sequence[str]) -> list[Fault]:
     """What lies beside the episodes."""
-    there = set(os.listdir(path)) - {*files, SUMS}
+    there = set(os.listdir(path)) - {*files, SUMS, PAGE}
     return foreign(path, there, planned)
 
 

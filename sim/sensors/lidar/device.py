@@ -139,6 +139,12 @@ class LaserScanner:
             self.caster.mirror(self._polished, self._mirrored)
         return self._signal.scan(self.caster.hits, self._mirrored)
 
+    def blink(self) -> bool:
+        """Leave out the scan that was begun, with its draws; False where the next one needs it."""
+        if self.window.repeats:
+            self._signal.blink(self.spec.n_beams)
+        return self.window.repeats
+
     def skip(self) -> None:
         """Go on to the window of the next scan without one: for who only wants the times."""
         self.phase = self.window.next

@@ -117,16 +117,14 @@ class SignalModel:
         """One scan from the caster's ``hits`` and what was mirrored, (n,) or (0,) each."""
         n = hits[0].shape[1]
         places, seen, marks = np.empty((3, n)), np.empty(n, np.int64), np.empty((2, n), np.bool_)
+        chances, normal, lost = self._draws(n)
         if self._ruler:
             measure(hits, (places, seen, marks))
         else:
-            chances = self.streams[1].random((n,)) if self._switches[2] > 0.0 else self._nothing
             receive(
                 hits, mirrored, self._surface, self._weights, self._switches, self._needed,
                 chances, (places, seen, marks),
             )  # fmt: skip
-        normal = self.streams[0].standard_normal((n,)) if len(self._bands) else self._nothing
-        lost = self.streams[2].random((n,)) if self._errors[0] > 0.0 else self._nothing
         ranges, whose = np.empty(n, dtype=np.float32), np.empty((2, n), dtype=np.int32)
         send(
             (places, seen), self._surface[0], self._owner, self._error, (normal, lost),
@@ -137,6 +135,20 @@ class SignalModel:
             geoms=whose[col.GEOM_ID], bodies=whose[col.BODY_ID],
             mixed=marks[col.MIXED], ghost=marks[col.GHOST],
         )  # fmt: skip
+
+    def blink(self, n: int) -> None:
+        """The draws of a scan of ``n`` beams that nobody looks at."""
+        self._draws(n)
+
+    def _draws(self, n: int) -> tuple[Float, Float, Float]:
+        """Chances of mixed pixels, normal noise and chances of a loss, of ``n`` beams each."""
+        noise, mixed, lost = self.streams
+        with_mixed = not self._ruler and self._switches[2] > 0.0
+        return (
+            mixed.random((n,)) if with_mixed else self._nothing,
+            noise.standard_normal((n,)) if len(self._bands) else self._nothing,
+            lost.random((n,)) if self._errors[0] > 0.0 else self._nothing,
+        )
 
 
 def analog_noise(scanner: Scanner) -> Float:

@@ -8,7 +8,7 @@ import pytest
 
 from scripts.days.lifelong import COLUMNS
 from scripts.days.report import summed
-from scripts.days.tables import page, verdict
+from scripts.days.tables import last_session, printed, verdict
 from scripts.days.truth import Spot, Still, scored, stands_there
 from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
 from slam.days.changes import Change
@@ -72,11 +72,12 @@ def test_the_verdict_counts_sessions_found_and_the_last_error_against_the_first(
     said = verdict(rows)
     assert said.startswith("2 of 3 sessions found, 1 within 10 s, 0 at a wrong place")
     assert "1.50 of the first's" in said
-    assert "| 3 |" in page(rows, {"scene": "office"})
+    (session, *_) = printed("s", rows, whole=True).columns
+    assert "3" in list(session.cells)
     alone = [row(0, map="anew"), row(1, map="anew", place="failed")]
     said = "in a frame of its own; failed in 1 of 2 sessions, first: `scan 3: 'x'`"
     assert verdict(alone, "scan 3: `x`\nmore").endswith(said)
-    assert said in page(alone, {}, {"s": "scan 3: `x`"})
+    assert last_session(alone, "1 thing moved") == "Session 1: 1 thing moved; `s` failed."
     assert verdict(alone[:1]).endswith("in a frame of its own")
 
 

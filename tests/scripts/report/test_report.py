@@ -106,7 +106,7 @@ def test_a_win_is_an_interval_beside_zero_of_enough_runs(low, high, n, said):
 @pytest.mark.parametrize(
     ("value", "shown"),
     [(0.0, "0"), (1.0, "1.00"), (-0.01234, "−0.0123"), (99.96, "100"), (1234.5, "1234"),
-     (9.996, "10.0"), (math.inf, "∞"), (1e-7, "1.0e-07")],
+     (9.996, "10.0"), (math.inf, "∞"), (1e-7, "1.0e−07")],
 )  # fmt: skip
 def test_numbers_are_shown_with_three_digits(value, shown):
     assert digits(value) == shown
@@ -370,10 +370,10 @@ def other_folder(tmp_path: Path, kind: str) -> Path:
         ("dataset", "is a dataset of mobilia generate"),
         ("episode", "is an episode of mobilia generate"),
         ("drive", "mobilia report COMPARISON --drive"),
-        ("benchmark", "leaderboard.md there is its report"),
+        ("benchmark", "index.html there is its page"),
         ("days", "days.csv has its scores"),
-        ("lifelong", "lifelong.md there is its report"),
-        ("blame", "blame.png there is its report"),
+        ("lifelong", "index.html there is its page"),
+        ("blame", "index.html there is its page"),
         ("compare", "is unfinished: the same mobilia compare again goes on"),
         ("empty", "holds no comparison: mobilia compare --slam A B --out DIR"),
     ],

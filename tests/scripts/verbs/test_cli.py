@@ -51,11 +51,11 @@ def test_the_demo_leaves_everything_it_promises(finished):
         "film.mp4", "replay.html", "map.png", "map.pgm", "map.yaml", "trajectories.png",
         "errors.png",
         "trajectory_shunting.tum", "trajectory_odometry.tum", "trajectory_truth.tum",
-        "recipe.json", "results.json", "changes.png", "map.npz",
+        "recipe.json", "results.json", "index.html", "map.npz",
     }  # fmt: skip
     assert promised <= {p.name for p in out.iterdir()}
     assert all(p.stat().st_size > 0 for p in out.iterdir())
-    assert "replay.html first" in printed.replace("\n", " ")
+    assert "index.html first" in printed.replace("\n", " ")
     assert "ATE, unaligned" in printed
 
 

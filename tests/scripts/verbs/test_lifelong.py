@@ -85,7 +85,9 @@ def test_a_small_building_is_lived_in(called, tmp_path):
     assert rows[2]["place"] == "right"
     assert float(rows[2]["rmse_m"]) < 0.1
     assert json.loads((out / "lifelong.json").read_text())["settings"]["change"] == 0.2
-    assert {"changes.csv", "changes.png", "mobility.png", "lifelong.md", "map_shunting.npz"} <= {
+    assert {"changes.csv", "changes.png", "mobility.png", "index.html", "map_shunting.npz"} <= {
         p.name for p in out.iterdir()
     }
-    assert "every session starts anew" in (out / "lifelong.md").read_text()
+    page = (out / "index.html").read_text()
+    assert "every session starts anew" in page
+    assert "Session 1: " in page

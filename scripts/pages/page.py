@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``index.html`` of every folder: what came out, the film or picture, the files, what to do next.
+
+A page opens from disk and asks for nothing elsewhere. ``base.html`` is every page's head, style
+and macros; the report of a comparison is another page of it.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatch
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+import jinja2
+import numpy as np
+from numpy.typing import NDArray
+from rich.markup import escape
+from rich.table import Table as Printed
+from rich.text import Text
+
+from scripts.console import fact, say
+from sim.recording.sums import SUMS, add_to_sums
+from slam.files import write_text
+
+INDEX, INLINE = "index.html", "data:image/png;base64,"
+HERE = Path(__file__).parent
+ABOUT: dict[str, str] = {  # what each file is, in the order in which they are listed
+    "replay.html": "the run in 3-D, to turn and to scrub",
+    "replays/*.html": "a run in 3-D, to turn and to scrub",
+    "film.mp4": "the run as a film", "poster.png": "a moment of the film",
+    "report.html": "the report of this comparison",
+    "map.png": "the map", "changes.png": "what changed in the map",
+    "map.yaml": "the map for nav2_map_server, with map.pgm", "map.pgm": "the map's cells",
+    "map*.npz": "the SLAM's own map, for --map-in and load()",
+    "trajectories.png": "the paths over the map", "errors.png": "the error over time",
+    "trajectory_*.tum": "poses for evo: time x y z qx qy qz qw",
+    "mobility.png": "how often each place changes",
+    "closed_loop.png": "goals reached at each level", "paths.png": "the paths driven",
+    "blame.png": "the run, the culprit and the re-runs", "blame.json": "every re-run in numbers",
+    "results.json": "every number", "lifelong.csv": "a row for each session and SLAM",
+    "lifelong.json": "the same with its settings", "changes.csv": "what changed each time",
+    "ages.csv": "the last session in older maps", "goals.csv": "a row for each goal",
+    "leaderboard.csv": "a row for each track and SLAM", "leaderboard.json": "the same for programs",
+    "leaderboard.md": "the leaderboard as a page of documentation", "days.csv": "scores over days",
+    "submission_*.json": "a submission to the leaderboard",
+    "runs.csv": "a row for each run", "levels.csv": "a row for each level", "runs.json": "all runs",
+    "dataset.json": "the plan of the dataset", "relations.txt": "which episodes are of one place",
+    "*.txt": "a list of episodes", "recipe.json": "what makes this folder again",
+    "SHA256SUMS": "hashes of all files, for mobilia verify",
+}  # fmt: skip
+LISTED = 24  # files of a kind beyond these are counted
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """``text`` with ``small`` print after it; ``mark`` is "better", "worse", "best" or ""."""
+
+    text: str
+    small: str = ""
+    mark: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """``slams`` are the heads that name one, for its colour; the first column names the row."""
+
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    slams: Sequence[str] = field(default_factory=tuple)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """A section: a picture, words, a table as it was printed, what a colour means."""
+
+    title: str
+    picture: str = ""  # name of a file there, or what ``inline`` gives
+    note: str = ""
+    table: Printed | None = None
+    legend: Mapping[str, str] = field(default_factory=dict)  # words by colour
+
+
+@dataclass(frozen=True, kw_only=True)
+class Page:
+    """A page of a folder; ``said`` in backticks is a name, ``next`` has commands by their purpose.
+
+    settings  how it was made, at the end of the page
+    """
+
+    title: str
+    said: Sequence[str]
+    parts: Sequence[Part] = ()
+    next: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+def write(folder: Path, page: Page) -> Path:
+    """``index.html`` among the files of ``folder``, which are listed; its path."""
+    path = folder / INDEX
+    parts = [one for one in page.parts if _there(folder, one.picture)]
+    text = template("folder.html").render(
+        page=page, marks={}, files=_files(folder),
+        parts=[(one, None if one.table is None else of_printed(one.table)) for one in parts],
+        film=(folder / "film.mp4").exists(), replay=(folder / "replay.html").exists(),
+    )  # fmt: skip
+    write_text(path, text)
+    return path
+
+
+def publish(folder: Path, page: Page) -> None:
+    """Write the page of a folder that is there already, and say what it says."""
+    add_to_sums(write(folder, page))
+    tell(folder, page)
+
+
+def tell(folder: Path, page: Page) -> None:
+    """What came out, and where the page is."""
+    for line in page.said:
+        fact(line)
+    say(f"Open [bold]{escape(str(folder / INDEX))}[/bold] first.", highlight=False)
+
+
+def command(*words: object) -> str:
+    """A command line of ``mobilia``, to be copied."""
+    return shlex.join(["mobilia", *map(str, words)])
+
+
+def of_printed(table: Printed) -> Table:
+    """A table of the console for a page."""
+    columns = [[Text.from_markup(str(c)).plain for c in one.cells] for one in table.columns]
+    rows = [[Cell(text=text) for text in row] for row in zip(*columns, strict=True)]
+    head = [Text.from_markup(str(one.header)).plain for one in table.columns]
+    caption = Text.from_markup(str(table.title or "")).plain
+    return Table(caption=caption, head=head, rows=rows)
+
+
+@cache
+def template(name: str, folder: Path = HERE) -> jinja2.Template:
+    """A template of ``folder``, which may extend or import those here."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader([folder, HERE]), autoescape=True,
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters["parts"] = lambda name: re.findall(r"[^:/_.]*[:/_.]?", name)[:-1]
+    return environment.get_template(name)
+
+
+def inline(picture: NDArray[np.uint8]) -> str:
+    """An RGB picture (height, width, 3) that lies in the page itself, as PNG."""
+    _, png = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+    return INLINE + base64.b64encode(png.tobytes()).decode()
+
+
+def _there(folder: Path, picture: str) -> bool:
+    return not picture or picture.startswith(INLINE) or (folder / picture).exists()
+
+
+def _names(folder: Path, pattern: str = "*") -> list[str]:
+    return [p.relative_to(folder).as_posix() for p in folder.glob(pattern) if p.is_file()]
+
+
+def _files(folder: Path) -> list[tuple[str, str]]:
+    """Names that are there, and what each is."""
+    last = {SUMS} if (folder / "dataset.json").exists() else {SUMS, "recipe.json"}  # written later
+    there = sorted({*_names(folder), *_names(folder, "replays/*.html"), *last})
+    found = {}
+    for pattern, about in ABOUT.items():
+        own = [name for name in there if fnmatch(name, pattern) and name not in found]
+        found |= dict.fromkeys(own[:LISTED], about)
+    return list(found.items())
