@@ -29,7 +29,7 @@ NAMES = ("leaderboard.json", "leaderboard.csv", "leaderboard.md")
 NEVER = "never"  # not at any level, nor does the interval hold one
 ABOVE = f"> {LEVELS[-1]:g}"
 CM, PERCENT = 100.0, 100.0
-OWN_ORACLE = "oracle(shunting)"  # of every track its own, in one column
+OWN_ORACLE = "oracle()"  # of every track the one that holds best, in one column
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,16 +132,16 @@ class Board:
         """The answer over all tracks that count: each of their rooms is one run at each level."""
         names = [track.name for track in self._counting]
         where = names[0] if len(names) == 1 else f"the {len(names)} tracks that count"
-        rows = [
-            row | {
-                "scene": where, "seed": f"{track.name} {row['seed']}",
-                "slam": OWN_ORACLE if row["slam"] == track.oracle else row["slam"],
-            }
-            for track in self._counting
-            for row in self.runs[track.name]
-            if row["slam"] in (self.subject, ODOMETRY, track.oracle)
-        ]  # fmt: skip
-        return answer(standing(rows, self.subject, where, "level", len(names)))
+        rows = []
+        for track in self._counting:
+            oracle = self.fair[track.name]["oracle"]
+            names = {self.subject: self.subject, ODOMETRY: ODOMETRY, oracle: OWN_ORACLE}
+            rows += [
+                row | {"scene": where, "seed": f"{track.name} {row['seed']}", "slam": slam}
+                for row in self.runs[track.name]
+                if (slam := names.get(row["slam"]))
+            ]
+        return answer(standing(rows, self.subject, where, "level", len(self._counting)))
 
     def _place(self) -> str:
         """Among contestants on the same runs; "" where there are no others."""
@@ -293,7 +293,7 @@ class Board:
         fair = self.fair[track.name]
         of_oracle = (
             f"It {'counts' if fair['counts'] else 'does not count'}:",
-            f"`{track.oracle}` was lost in {fair['oracle_lost']} of {fair['oracle_runs']} runs,",
+            f"`{fair['oracle']}` was lost in {fair['oracle_lost']} of {fair['oracle_runs']} runs,",
             f"and off by {digits(CM * fair['oracle_error_m'])} cm at its worst level.",
         )  # fmt: skip
         decided = (f"It {'counts' if fair['counts'] else 'does not count'}.",)

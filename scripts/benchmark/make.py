@@ -86,11 +86,11 @@ class Wanted:
             return self.sealed.seeds
         return track.train if self.train else track.test
 
-    def plan(self, track: Track, oracle: bool = True) -> Plan:
-        """The comparison of a track, with its oracle or without."""
+    def plan(self, track: Track, oracles: bool = True) -> Plan:
+        """The comparison of a track, with its oracles or without."""
         seeds = self.seeds_of(track)[: self.seeds]
         return track.plan(
-            self.slams, seeds, levels=self.levels, seconds=self.seconds, oracle=oracle
+            self.slams, seeds, levels=self.levels, seconds=self.seconds, oracles=oracles
         )
 
     @property
@@ -155,7 +155,7 @@ def carry_out(
     """
     shared = shared if wanted.public else None
     plans = {  # all, before any is made
-        track.name: wanted.plan(track, shared is None or not _has_oracle(shared, wanted, track))
+        track.name: wanted.plan(track, shared is None or not _has_oracles(shared, wanted, track))
         for track in wanted.tracks
     }
     _check_alike(merge, wanted, {name for plan in plans.values() for name in plan.slams})
@@ -188,9 +188,9 @@ def carry_out(
     return made
 
 
-def _has_oracle(shared: Published, wanted: Wanted, track: Track) -> bool:
+def _has_oracles(shared: Published, wanted: Wanted, track: Track) -> bool:
     asked = [(run.dynamism, run.seed) for run in wanted.plan(track).runs()]
-    return track.counts is not None and shared.has(track.name, asked, track.oracle)
+    return all(shared.has(track.name, asked, oracle) for oracle in track.oracles)
 
 
 def _told_of_others(shared: Published, digests: Digests) -> None:

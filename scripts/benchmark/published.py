@@ -13,6 +13,7 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from scripts.comparison.rules import MAX_DEPTH, Rule, check_keys, is_shallow, nu
 from scripts.machine import machine, versions
 from scripts.result_files import finite, load, write
 from sim.core.versions import WORLD, world_of
-from slam.errors import LogFormatError, MobiliaError
+from slam.errors import InvalidValueError, LogFormatError, MobiliaError
 
 FILE = Path(__file__).with_name("published.json")
 SCHEMA, WHAT = 1, "published runs of the benchmark of mobilia"
@@ -113,10 +114,13 @@ def digests(plan: Plan, folder: Path) -> dict[tuple[float, int], str]:
     return {(run.dynamism, run.seed): digest(file) for run, file in files.items()}
 
 
-def write_from(folder: Path, path: Path, commit: str) -> Published:
-    """Of a folder of ``mobilia benchmark``, all tracks that are whole in it."""
+def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
+    """Of folders of ``mobilia benchmark``, all tracks that are whole in them.
+
+    Raises ``InvalidValueError`` for two folders whose recordings differ.
+    """
     runs, hashes = dict[str, Row](), dict[str, str]()
-    for track in TRACKS.values():
+    for folder, track in product(folders, TRACKS.values()):
         if not (folder / track.name / "recipe.json").exists():
             continue
         done = compared(folder / track.name)
@@ -126,7 +130,11 @@ def write_from(folder: Path, path: Path, commit: str) -> Published:
         for at, scans in digests(plan, folder / track.name).items():
             own = {r["slam"]: [finite(r.get(k)) for k in COLUMNS]
                    for r in rows if (r["dynamism"], r["seed"]) == at}  # fmt: skip
-            runs[f"{track.name} {at[0]:g} {at[1]}"] = {"recording": scans, "slams": own}
+            key = f"{track.name} {at[0]:g} {at[1]}"
+            there = runs.setdefault(key, {"recording": scans, "slams": {}})
+            if there["recording"] != scans:
+                raise InvalidValueError(f"{folder}: {key}: other scans than in another folder")
+            there["slams"] |= own
     made = {"commit": commit, "versions": versions(), "machine": machine()}
     head = {"schema": SCHEMA, "what": WHAT, "world": WORLD, "made_with": made, "columns": COLUMNS}
     write(path, head, {"tracks": hashes, "runs": runs})
@@ -155,12 +163,12 @@ _RUN: Mapping[str, Rule] = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the file."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="of mobilia benchmark")
+    parser.add_argument("folders", type=Path, nargs="+", help="of mobilia benchmark")
     parser.add_argument("--out", type=Path, default=FILE)
     parser.add_argument("--commit", required=True, help="of the code that ran")
     wanted = parser.parse_args(arguments)
     try:
-        made = write_from(wanted.folder, wanted.out, wanted.commit)
+        made = write_from(wanted.folders, wanted.out, wanted.commit)
     except (MobiliaError, OSError) as error:
         print(error, file=sys.stderr)
         return 1

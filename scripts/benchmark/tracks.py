@@ -21,6 +21,7 @@ from scripts.comparison.rules import LEVEL
 from scripts.report.answer import ODOMETRY
 from sim.core import versions
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+from slam.variants import MAP_ORACLE
 
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of every track, from nothing to all that it has
 TRAIN = tuple(range(20))  # seeds to tune on; those that the SLAMs here were tuned on
@@ -41,8 +42,8 @@ class Track:
     scene    by name
     axis     what a level is, in words, and ``says`` what each of the five is
     sets     what each of them sets: fields of ``sim.recording.recipe.Recipe``, options of the scene
-    oracle   the SLAM that is shown no returns from what moves: while it is not lost, and at most 2
-             cm off, the track is fair
+    oracle   the SLAM that is shown no returns from what moves: while it, or ``oracle(map)``, is not
+             lost, and at most 2 cm off, the track is fair
     every    one scan in so many is kept, of a scanner of 37.5 scans a second
     counts   whether its runs count, decided once from many seeds (docs/benchmark.md); None: not
              decided, the oracle of each run says
@@ -80,7 +81,12 @@ class Track:
     @property
     def controls(self) -> tuple[str, ...]:
         """The SLAMs that are in every table."""
-        return (ODOMETRY, self.oracle)
+        return (ODOMETRY, *self.oracles)
+
+    @property
+    def oracles(self) -> tuple[str, ...]:
+        """Either of them may show that the track is fair; they share no code."""
+        return (self.oracle, MAP_ORACLE)
 
     @property
     def family(self) -> str:
@@ -110,11 +116,11 @@ class Track:
         *,
         levels: tuple[float, ...] = LEVELS,
         seconds: float | None = None,
-        oracle: bool = True,
+        oracles: bool = True,
     ) -> Plan:
         """The comparison of these SLAMs and the controls; ``seconds`` as the track has them.
 
-        oracle  False: without it, where its runs are published
+        oracles  False: without them, where their runs are published
 
         Raises ``InvalidValueError`` for a level that is none of ``LEVELS``, ``WorldVersionError``
         for a track of another world: its seeds give other scans here.
@@ -125,7 +131,7 @@ class Track:
                 known = ", ".join(f"{one:g}" for one in LEVELS)
                 raise InvalidValueError(f"the level of a track must be one of {known}, got {level}")
         return Plan(
-            slams=tuple(dict.fromkeys((*slams, *self.controls[: 2 if oracle else 1]))),
+            slams=tuple(dict.fromkeys((*slams, *self.controls[: None if oracles else 1]))),
             scenes=(self.scene,),
             axis=LEVEL,
             levels=levels,

@@ -90,7 +90,7 @@ def test_a_second_call_makes_nothing_again(outside: Path):
     line = f"mobilia benchmark --slam odometry {SHORT}"
     call(line)
     files = {f: f.stat().st_mtime_ns for f in outside.rglob("[re]*s/*.npz") if "runs" not in str(f)}
-    assert len(files) == 9  # three recordings; the control and the oracle on each
+    assert len(files) == 12  # three recordings; the control and two oracles on each
     call(line)
     assert {f: f.stat().st_mtime_ns for f in files} == files
 

@@ -116,6 +116,8 @@ def test_a_published_track_says_itself_whether_it_counts_and_any_other_its_oracl
     far = [r | {"error_tracking_m": 0.021} if r["dynamism"] == 0.75 else r for r in good]
     assert not scores.fairness(OPEN, far)["counts"]  # at one level is enough
     assert scores.fairness(OPEN, far)["oracle_error_m"] == 0.021
+    other = scores.fairness(OPEN, [*lost, *runs("oracle(map)", KEPT)])
+    assert (other["counts"], other["oracle"]) == (True, "oracle(map)")  # either may hold
 
 
 def board(mine: list[dict], track: Track = TRACK, oracle: list[list[int]] = KEPT) -> Board:
