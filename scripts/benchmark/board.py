@@ -29,7 +29,7 @@ NAMES = ("leaderboard.json", "leaderboard.csv", "leaderboard.md")
 NEVER = "never"  # not at any level, nor does the interval hold one
 ABOVE = f"> {LEVELS[-1]:g}"
 CM, PERCENT = 100.0, 100.0
-OWN_ORACLE = "oracle()"  # of every track the one that holds best, in one column
+OWN_ORACLE = "oracle(shunting)"  # of every track the one that holds best, in one column
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
