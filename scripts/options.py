@@ -78,8 +78,8 @@ Oracles = Annotated[
     typer.Option(
         "--oracle",
         help="Also this SLAM without the returns from what can move, by the true labels; "
-        "SLAM,moving: from what moves now. Repeatable.",
-        metavar="SLAM[,moving]",
+        "SLAM,moving: from what moves now; map: scan matching to the true map. Repeatable.",
+        metavar="SLAM[,moving]|map",
     ),
 ]
 Set = Annotated[

@@ -14,7 +14,8 @@ Who wants one of these asks whether it is there (``slam.replay.Track``), never f
 ``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class,
 ``create("pipe:./my_slam --option")`` a program in any language (``slam.guests.pipe``).
 ``create("shunting{matching.reward=7}")`` sets numbers of its config (``slam.variants``).
-``create("oracle(shunting)")`` shows it no returns from movers (``slam.oracle``).
+``create("oracle(shunting)")`` shows it no returns from movers (``slam.oracle``), and
+``create("oracle(map)")`` is shown the true map instead (``slam.oracle_map``).
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from slam.frames import Float, Frame
 from slam.names import first_line, join_folders, refuse_code
 from slam.settings import Settings
 from slam.trajectory import Trajectory
-from slam.variants import inside, oracle_of, parsed
+from slam.variants import MAP_ORACLE, inside, oracle_of, parsed
 
 __all__ = [
     "CanSave", "Changes", "ChangesInParts", "Estimate", "HasChanges", "HasLandmarks", "Landmarks",
@@ -215,7 +216,7 @@ def describe(name: str) -> str:
 def check_name(name: str) -> None:
     """Raise what ``create`` raises for a name that nothing is registered under; import nothing."""
     base = parsed(inside(name))[0]
-    if ":" in base or base in OWN or base in _registry:
+    if ":" in base or base in OWN or base in _registry or name == MAP_ORACLE:
         return
     near = difflib.get_close_matches(base, names(), n=1)
     hint = f" Did you mean '{near[0]}'?" if near else ""
@@ -248,6 +249,9 @@ def create(name: str, **config: Any) -> SlamSystem:
     ``UntrustedNameError`` for a name of code that was read from a file (``slam.names``).
     """
     refuse_code(name, "SLAM")
+    if name == MAP_ORACLE:
+        by_map: SlamSystem = importlib.import_module("slam.oracle_map").MapOracle()
+        return by_map
     if (wanted := oracle_of(name)) is not None:
         oracle: SlamSystem = importlib.import_module("slam.oracle").Oracle(
             create(wanted[0], **config), wanted[1]

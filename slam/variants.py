@@ -16,6 +16,7 @@ from slam.errors import InvalidValueError
 
 PIPE = "pipe:"  # what follows is a command, which may hold braces of its own
 ORACLE = "oracle("
+MAP_ORACLE = "oracle(map)"  # no SLAM in it: scan matching to the true map (slam.oracle_map)
 TAKEN_OUT = ("movable", "moving")  # returns that an oracle takes out, the default first
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,22 +11,25 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark.scores import COLUMNS, SILENT, TRACKING, Row, scores
+from scripts.benchmark.scores import COLUMNS, RANKED, SILENT, TRACKING, Row, ranking, scores
 from scripts.benchmark.tracks import LEVELS, Track
 from scripts.comparison.csv_files import write_csv
 from scripts.comparison.schema import FAILED
 from scripts.metrics.row import digits
 from scripts.report.answer import ODOMETRY, against, answer, standing
 from scripts.report.study import LEAST_RUNS
+from scripts.report.words import listed
 from scripts.result_files import write as write_results
 from slam.evaluation.lost import EXCUSED_S, LOST_RULE
 from slam.files import write_text
+from slam.variants import ORACLE
 
 SCHEMA = 1
 NAMES = ("leaderboard.json", "leaderboard.csv", "leaderboard.md")
 NEVER = "never"  # not at any level, nor does the interval hold one
 ABOVE = f"> {LEVELS[-1]:g}"
 CM, PERCENT = 100.0, 100.0
+OWN_ORACLE = "oracle(shunting)"  # of every track the one that holds best, in one column
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,25 +93,100 @@ class Board:
                     told = str(own[0]["failure"]).partition("\n")[0][:300]
                     yield f"{slam} failed in {len(own)} runs of {track}", told
 
+    @cached_property
+    def ranking(self) -> list[Row]:
+        """A row for each SLAM that made the same runs as the subject, where tracks count."""
+        return ranking({t.name: self.runs[t.name] for t in self._counting}, self.subject)
+
+    @property
+    def _counting(self) -> list[Track]:
+        return [track for track in self.tracks if self.fair[track.name]["counts"]]
+
+    def is_control(self, slam: str) -> bool:
+        """Whether it is shown what no contestant is, or looks at nothing."""
+        return slam != self.subject and (slam == ODOMETRY or slam.startswith(ORACLE))
+
+    def cite(self) -> str:
+        """In one line what was run."""
+        hashes = " ".join(f"{track.name} {track.sha256}" for track in self._counting)
+        short = hashlib.sha256(hashes.encode()).hexdigest()[:12]
+        about = self.head.get
+        return (
+            f"mobilia benchmark, world {about('world')}, {len(self._counting)} tracks that count "
+            f"({short}), levels {_list(about('levels_run'))}, {about('seeds_of')} seeds "
+            f"{_list(about('seeds'))}"
+        )
+
     def said(self) -> list[str]:
-        """What the reader asked: from which level the subject is lost, on which track."""
+        """What the reader asked: whether the subject is lost, where, and which place it has."""
         every = self._of(self.subject)
         few = min((row["seeds"] for row in every), default=0)
-        own = [row for row in every if row["counts"]]
+        over = [self._over_all(), self._place()] if self._counting else self._each_track()
         if few < LEAST_RUNS:
-            return self._seen(few)
+            where = [self._lost_where()] if self._counting else []
+            few_words = f"{LEAST_RUNS} seeds tell from which level on, track by track; these are"
+            return [*filter(None, [*over, *where]), f"{few_words} {few}."]
+        return [*filter(None, over), *self._by_track(every)]
+
+    def _over_all(self) -> str:
+        """The answer over all tracks that count: each of their rooms is one run at each level."""
+        names = [track.name for track in self._counting]
+        where = names[0] if len(names) == 1 else f"the {len(names)} tracks that count"
+        rows = []
+        for track in self._counting:
+            oracle = self.fair[track.name]["oracle"]
+            names = {self.subject: self.subject, ODOMETRY: ODOMETRY, oracle: OWN_ORACLE}
+            rows += [
+                row | {"scene": where, "seed": f"{track.name} {row['seed']}", "slam": slam}
+                for row in self.runs[track.name]
+                if (slam := names.get(row["slam"]))
+            ]
+        return answer(standing(rows, self.subject, where, "level", len(self._counting)))
+
+    def _place(self) -> str:
+        """Among contestants on the same runs; "" where there are no others."""
+        named = [row["slam"] for row in self.ranking if not self.is_control(row["slam"])]
+        if self.subject not in named or len(named) < 2:
+            return ""
+        at, runs = named.index(self.subject), self.ranking[0]["runs"]
+        before = f"behind `{named[at - 1]}`" if at else ""
+        after = f"before `{named[at + 1]}`" if at + 1 < len(named) else ""
+        return (
+            f"It is number {at + 1} of {len(named)} on these {runs} runs, "
+            f"{' and '.join(filter(None, (before, after)))}."
+        )
+
+    def _lost_where(self) -> str:
+        """The tracks and levels at which it was lost."""
+        said = []
+        for track in self._counting:
+            own = [r for r in self.runs[track.name] if r["slam"] == self.subject and r["lost"]]
+            levels = sorted({row["dynamism"] for row in own})
+            if levels:
+                said.append(f"{track.name} at {listed([f'{level:g}' for level in levels])}")
+        return f"It was lost on {'; '.join(said)}." if said else ""
+
+    def _each_track(self) -> list[str]:
+        return [
+            answer(standing([row | {"scene": track} for row in rows], self.subject, track, "level"))
+            for track, rows in self.runs.items()
+            if any(row["slam"] == self.subject for row in rows)
+        ]
+
+    def _by_track(self, every: Sequence[Row]) -> list[str]:
+        own = [row for row in every if row["counts"]]
         out = []
         lost = sorted((r for r in own if math.isfinite(r["lost_from"])), key=_lost_from)
         if lost:
-            listed = "; ".join(f"{r['track']} from level {_from(r)} on" for r in lost)
-            out.append(f"`{self.subject}` is lost half of the time in {listed}.")
+            told = "; ".join(f"{r['track']} from level {_from(r)} on" for r in lost)
+            out.append(f"`{self.subject}` is lost in half of the runs in {told}.")
         if kept := [row["track"] for row in own if math.isinf(row["lost_from_low"])]:
             so = "It is" if lost else f"`{self.subject}` is"
-            out.append(f"{so} not lost half of the time at any level of {', '.join(kept)}.")
+            out.append(f"{so} not lost in half of the runs at any level of {', '.join(kept)}.")
         open_ = [r for r in own if math.isinf(r["lost_from"]) and math.isfinite(r["lost_from_low"])]
         if open_:
-            listed = ", ".join(f"{r['track']} {_from(r)}" for r in open_)
-            out.append(f"Whether half of its runs are lost cannot be told in {listed}.")
+            told = ", ".join(f"{r['track']} {_from(r)}" for r in open_)
+            out.append(f"Whether half of its runs are lost cannot be told in {told}.")
         worse = [row["track"] for row in own if self._worse_than_wheels(row["track"])]
         if worse and self.subject != ODOMETRY:
             out.append(
@@ -115,19 +194,8 @@ class Board:
                 "what moves is not its problem there."
             )
         if unfair := [row["track"] for row in every if not row["counts"]]:
-            out.append(
-                f"Left out, because its oracle was lost or more than 2 cm off: {', '.join(unfair)}."
-            )
+            out.append(f"Left out, because no oracle holds there: {', '.join(unfair)}.")
         return out
-
-    def _seen(self, few: int) -> list[str]:
-        """Of too few runs for an interval of the level: what was seen in each track."""
-        said = [
-            answer(standing([row | {"scene": track} for row in rows], self.subject, track, "level"))
-            for track, rows in self.runs.items()
-            if any(row["slam"] == self.subject for row in rows)
-        ]
-        return [*said, f"{LEAST_RUNS} seeds tell from which level on; these are {few}."]
 
     def _worse_than_wheels(self, track: str) -> bool:
         rows = [row for row in self.runs[track] if row["dynamism"] == LEVELS[0]]
@@ -139,7 +207,7 @@ class Board:
         head = {
             "schema": SCHEMA, **self.head, "subject": self.subject, "said": self.said(),
             "lost_rule": LOST_RULE, "excused_s": EXCUSED_S, "missing": dict(self.missing),
-            "merged": dict(self.merged),
+            "merged": dict(self.merged), "cite": self.cite(),
         }  # fmt: skip
         tracks = {
             t.name: {
@@ -155,6 +223,7 @@ class Board:
         }  # fmt: skip
         tables: dict[str, Mapping[str, Any]] = {
             "tracks": tracks, "leaderboard": rows, "lost_shares": shares,
+            "ranking": {row["slam"]: {k: row[k] for k in RANKED} for row in self.ranking},
         }  # fmt: skip
         if self.days:
             tables["days"] = self.days
@@ -172,7 +241,11 @@ class Board:
 
     def markdown(self) -> str:
         """The page."""
-        parts = ["# Leaderboard", *self.said(), *self._notes(), "## Lost from which level", _LOST]
+        parts = ["# Leaderboard", *self.said(), *self._notes()]
+        if self.ranking:
+            parts += [f"## On the same {self.ranking[0]['runs']} runs", _RANKED]
+            parts.append(markdown_table(RANKED_HEADS, self.ranked(), left=2))
+        parts += ["## Lost from which level", _LOST]
         heads = ["track", "counts", *self.slams]
         lines = [
             [t.name, "yes" if self.fair[t.name]["counts"] else "no",
@@ -185,8 +258,21 @@ class Board:
         parts += [self.days_page] if self.days_page else []
         return "\n\n".join(parts) + "\n"
 
+    def ranked(self) -> list[list[str]]:
+        """The table of ``ranking`` in words: controls have no place."""
+        table, place = list[list[str]](), 0
+        for row in self.ranking:
+            control = self.is_control(row["slam"])
+            place += not control
+            table.append([
+                "–" if control else str(place), row["slam"], _from(row | {"seeds": LEAST_RUNS}),
+                f"{row['lost_runs']} of {row['runs']}", _number(TRACKING, CM)(row),
+            ])  # fmt: skip
+        return table
+
     def _notes(self) -> list[str]:
         lines = [f"- {key}: {value}" for key, value in self.head.items() if key in _SHOWN]
+        lines.append(f"- to cite: {self.cite()}")
         lines += [f"- not installed: `{name}` ({why})" for name, why in self.missing.items()]
         silent = [s for s in self.slams if all(row[SILENT] is None for row in self._of(s))]
         if silent:
@@ -205,14 +291,18 @@ class Board:
 
     def _section(self, track: Track) -> list[str]:
         fair = self.fair[track.name]
+        of_oracle = (
+            f"It {'counts' if fair['counts'] else 'does not count'}:",
+            f"`{fair['oracle']}` was lost in {fair['oracle_lost']} of {fair['oracle_runs']} runs,",
+            f"and off by {digits(CM * fair['oracle_error_m'])} cm at its worst level.",
+        )  # fmt: skip
+        decided = (f"It {'counts' if fair['counts'] else 'does not count'}.",)
         sentences = (
             f"{track.about[0].upper()}{track.about[1:]} (scene {track.scene}).",
             f"Level: {track.axis};",
             ", ".join(f"{at:g} = {word}" for at, word in zip(LEVELS, track.says, strict=True))
             + ".",
-            f"It {'counts' if fair['counts'] else 'does not count'}:",
-            f"`{track.oracle}` was lost in {fair['oracle_lost']} of {fair['oracle_runs']} runs,",
-            f"and off by {digits(CM * fair['oracle_error_m'])} cm at its worst level.",
+            *(of_oracle if fair["oracle_runs"] else decided),
         )
         rows = [row for slam in self.slams if (row := self.row(track.name, slam))]
         lines = [[row["slam"], *(show(row) for _, show in _CELLS)] for row in rows]
@@ -223,17 +313,30 @@ class Board:
         ]
 
 
+def _list(values: Sequence[Any] | None) -> str:
+    """Numbers, or the first and last of many in a row."""
+    found = list(values or ())
+    if len(found) > 2 and found == list(range(int(found[0]), int(found[0]) + len(found))):
+        return f"{found[0]} to {found[-1]}"
+    return " ".join(f"{value:g}" for value in found)
+
+
 def _code(words: str) -> str:
     """Somebody else's words in Markdown, as they are: nothing in them is a link, tag or picture."""
     return "`" + " ".join(words.replace("`", "'").split()) + "`"
 
 
 _SHOWN = ("seeds", "world", "quick", "seconds")
+RANKED_HEADS = ("place", "SLAM", "lost from", "lost runs", "error while not lost, cm")
+_RANKED = (
+    "By the level from which half of the runs are lost, over all tracks that count, then by the "
+    "runs lost, then by the error. Controls have no place."
+)
 _LOST = (
     "The level from which half of the runs are lost, with its 95 % interval (bootstrap over the "
     "seeds, isotonic regression); levels go from 0 to 1. It is `never` where the whole interval is "
     f"above 1, and has no interval with fewer than {LEAST_RUNS} seeds. A track "
-    "counts while its oracle is never lost, and at most 2 cm off."
+    "counts where an oracle is never lost, and at most 2 cm off."
 )
 
 

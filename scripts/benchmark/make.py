@@ -8,15 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark import days, submission
+from scripts.benchmark import days, published, submission
 from scripts.benchmark.board import Board
+from scripts.benchmark.published import Published
 from scripts.benchmark.sealed import SealedSeeds
 from scripts.benchmark.submission import Submission
 from scripts.benchmark.tracks import LEVELS, TEST, TRACKS, TRAIN, Track
 from scripts.comparison.folder import Compared
 from scripts.comparison.make import carry_out as compare
-from scripts.comparison.plan import RECORDINGS, Plan
-from scripts.comparison.recording import digest
+from scripts.comparison.plan import Plan
 from scripts.console import note
 from scripts.days.buildings import DAYS, Buildings
 from scripts.days.buildings import carry_out as live
@@ -28,7 +28,7 @@ from slam import system
 from slam.errors import InvalidValueError, MissingDependencyError
 
 COMMAND = "benchmark"
-SEEDS, QUICK_SEEDS = 6, 2
+SEEDS, QUICK_SEEDS = 6, 1
 QUICK_LEVELS = (0.0, 0.5, 1.0)
 _ALIKE = ("seeds", "levels", "seconds")
 Digests = dict[str, dict[tuple[float, int], str]]  # of recordings, by track, level and seed
@@ -86,10 +86,17 @@ class Wanted:
             return self.sealed.seeds
         return track.train if self.train else track.test
 
-    def plan(self, track: Track) -> Plan:
-        """The comparison of a track."""
+    def plan(self, track: Track, oracles: bool = True) -> Plan:
+        """The comparison of a track, with its oracles or without."""
         seeds = self.seeds_of(track)[: self.seeds]
-        return track.plan(self.slams, seeds, levels=self.levels, seconds=self.seconds)
+        return track.plan(
+            self.slams, seeds, levels=self.levels, seconds=self.seconds, oracles=oracles
+        )
+
+    @property
+    def public(self) -> bool:
+        """Whether these are runs that can have been published."""
+        return not self.train and self.sealed is None and self.seconds is None
 
     def buildings(self) -> Buildings:
         """Of the section over days."""
@@ -136,14 +143,21 @@ def carry_out(
     jobs: int = 1,
     cluster: str | None = None,
     merge: Sequence[Submission] = (),
+    shared: Published | None = None,
 ) -> Board:
     """Make what is missing in ``out``, a folder of ``compare`` for each track; the leaderboard.
 
-    merge  submissions of others: they get rows beside those that ran here
+    merge   submissions of others: they get rows beside those that ran here
+    shared  runs of others on public seeds, beside those on the very same recordings; oracles that
+            are among them do not run
 
     Raises ``InvalidValueError`` for a submission that ran on other scans.
     """
-    plans = {track.name: wanted.plan(track) for track in wanted.tracks}  # all, before any is made
+    shared = shared if wanted.public else None
+    plans = {  # all, before any is made
+        track.name: wanted.plan(track, shared is None or not _has_oracles(shared, wanted, track))
+        for track in wanted.tracks
+    }
     _check_alike(merge, wanted, {name for plan in plans.values() for name in plan.slams})
     out = out.absolute()
     settings = {**wanted.head(), "machine": machine()}
@@ -152,13 +166,18 @@ def carry_out(
         for name, plan in plans.items():
             note(f"{name}: {TRACKS[name].about}")
             runs[name] = compare(plan, out / name, jobs=jobs, cluster=cluster)
-        digests = {name: _digests(plan, out / name) for name, plan in plans.items()}
+        digests = {name: published.digests(plan, out / name) for name, plan in plans.items()}
         lives = wanted.buildings() if wanted.days else None
         aged = [] if lives is None else live(lives, out / DAYS, jobs=jobs, cluster=cluster)
         own = None if wanted.submit is None else _submission(wanted, runs, digests, out)
         for one in merge:
             for name in plans:
                 runs[name] = runs[name] + _on_the_same_scans(one, name, digests[name])
+        if shared is not None:
+            _told_of_others(shared, digests)
+            for name in plans:
+                there = {row["slam"] for row in runs[name]}
+                runs[name] = runs[name] + shared.rows(name, digests[name], tuple(there))
         with written() as staged:
             made = _board(wanted, runs, merge, aged)
             made.write(staged)
@@ -169,6 +188,22 @@ def carry_out(
     return made
 
 
+def _has_oracles(shared: Published, wanted: Wanted, track: Track) -> bool:
+    asked = [(run.dynamism, run.seed) for run in wanted.plan(track).runs()]
+    return all(shared.has(track.name, asked, oracle) for oracle in track.oracles)
+
+
+def _told_of_others(shared: Published, digests: Digests) -> None:
+    """A note where the recordings here are others than the published ones."""
+    here = sum(map(len, digests.values()))
+    if others := sum(shared.others(name, own) for name, own in digests.items()):
+        note(
+            f"{others} of {here} recordings are others here than those of the published runs (made "
+            "by another version of MuJoCo or NumPy, or on another kind of processor): the SLAMs "
+            "published have no rows there. --slam YOURS A B C runs them here"
+        )
+
+
 def _board(wanted: Wanted, runs: Runs, merge: Sequence[Submission], aged: Sequence[Row]) -> Board:
     head = {**wanted.head(), "versions": versions(), "machine": machine()}
     return Board(
@@ -176,13 +211,6 @@ def _board(wanted: Wanted, runs: Runs, merge: Sequence[Submission], aged: Sequen
         merged={one.name: one.origin() for one in merge},
         days=days.summary(aged), days_page=days.section(aged) if aged else "",
     )  # fmt: skip
-
-
-def _digests(plan: Plan, folder: Path) -> dict[tuple[float, int], str]:
-    """Of the recording of each level and seed."""
-    jobs = plan.recordings()
-    files = {run: folder / RECORDINGS / jobs[run.name].file_name() for run in plan.runs()}
-    return {(run.dynamism, run.seed): digest(file) for run, file in files.items()}
 
 
 def _submission(wanted: Wanted, runs: Runs, digests: Digests, out: Path) -> Submission:

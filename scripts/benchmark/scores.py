@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -172,22 +173,83 @@ def _median(values: Sequence[float]) -> float | None:
 
 
 def fairness(track: Track, rows: Sequence[Row]) -> Row:
-    """Whether the track counts, by the runs of its oracle: error at the worst level, runs lost."""
-    own = [row for row in rows if row["slam"] == track.oracle]
-    worst = max(by_level(own, TRACKING).values(), default=math.inf)
-    lost = sum(int(row["lost"]) for row in own)
+    """Whether the track counts, and the runs of the oracle that holds best: lost, error at worst.
+
+    A published track says itself whether it counts; of any other the oracles' runs do.
+    """
+    best = min((_oracle(name, rows) for name in track.oracles), key=_badness)
+    holds = best["oracle_runs"] > 0 and _badness(best) <= (0, FAIR_M)
+    return best | {"counts": holds if track.counts is None else track.counts}
+
+
+def _oracle(name: str, rows: Sequence[Row]) -> Row:
+    own = [row for row in rows if row["slam"] == name]
     return {
-        "oracle": track.oracle,
+        "oracle": name,
         "oracle_runs": len(own),
-        "oracle_error_m": worst,
-        "oracle_lost": lost,
-        "counts": bool(own) and lost == 0 and worst <= FAIR_M,
+        "oracle_error_m": max(by_level(own, TRACKING).values(), default=math.inf),
+        "oracle_lost": sum(int(row["lost"]) for row in own),
     }
 
 
+def _badness(of: Row) -> tuple[int, float]:
+    return of["oracle_lost"], of["oracle_error_m"]
+
+
 def scores(track: Track, rows: Sequence[Row]) -> tuple[Row, list[Row]]:
-    """``fairness`` of the track, and a row for each SLAM in the order of their first run."""
+    """``fairness`` of the track, and a row for each SLAM that made all its runs, in their order."""
     fair = fairness(track, rows)
-    slams = dict.fromkeys(row["slam"] for row in rows)
+    every = {slam: {_run(row) for row in rows if row["slam"] == slam}
+             for slam in dict.fromkeys(row["slam"] for row in rows)}  # fmt: skip
+    most = set().union(*every.values())
+    slams = [slam for slam, own in every.items() if own == most]
     table = [score(track, s, [row for row in rows if row["slam"] == s]) for s in slams]
     return fair, [row | {"counts": fair["counts"]} for row in table]
+
+
+def _run(row: Row) -> tuple[float, int]:
+    return float(row["dynamism"]), int(row["seed"])
+
+
+RANKED = (
+    "slam", "runs", "lost_runs", "lost_from", "lost_from_low", "lost_from_high",
+    TRACKING, f"{TRACKING}_runs",
+)  # fmt: skip
+
+
+def ranking(runs: Mapping[str, Sequence[Row]], subject: str) -> list[Row]:
+    """SLAMs on the same runs, by the level they are lost from, then by the error while not lost.
+
+    runs  rows by track. Those that count here are the subject's that half of the SLAMs made too.
+          Who lacks one of them has no place
+    """
+    made: dict[str, dict[tuple[str, float, int], Row]] = {}
+    for track, rows in runs.items():
+        for row in rows:
+            made.setdefault(row["slam"], {})[track, *_run(row)] = row
+    times = Counter(run for own in made.values() for run in own)
+    same = sorted(run for run in made.get(subject, ()) if 2 * times[run] > len(made))
+    of = [_ranked(slam, [(run, own[run]) for run in same])
+          for slam, own in made.items() if same and own.keys() >= set(same)]  # fmt: skip
+    return sorted(of, key=lambda row: (-row["lost_from"], row["lost_runs"], _nearest(row)))
+
+
+def _nearest(row: Row) -> float:
+    return math.inf if row[TRACKING] is None else float(row[TRACKING])
+
+
+def _ranked(slam: str, runs: Sequence[tuple[tuple[str, float, int], Row]]) -> Row:
+    levels = sorted({run[1] for run, _ in runs})
+    rooms = sorted({(run[0], run[2]) for run, _ in runs})  # a track's seed is drawn whole
+    table = np.full((len(rooms), len(levels)), np.nan)
+    for (track, level, seed), row in runs:
+        table[rooms.index((track, seed)), levels.index(level)] = row["lost"]
+    whole = table[~np.isnan(table).any(axis=1)]
+    low, high = lost_from_interval(levels, whole)
+    errors = _values([row for _, row in runs], TRACKING)
+    return {
+        "slam": slam, "runs": len(runs), "lost_runs": int(np.nansum(table)),
+        "lost_from": lost_from(levels, np.nanmean(table, axis=0)),
+        "lost_from_low": low, "lost_from_high": high,
+        TRACKING: quantile(errors, 0.5) if errors else None, f"{TRACKING}_runs": len(errors),
+    }  # fmt: skip

@@ -219,7 +219,7 @@ def _runs(path: Path, track: str, runs: Any, wanted: set[tuple[float, int]]) -> 
         if not isinstance(run, dict) or set(run) != _WORDS:
             raise LogFormatError(path, f"{track}: a run must have {', '.join(sorted(_WORDS))}")
         where = f"{track}, level {run['level']!r:.20}, seed {run['seed']!r:.20}: "
-        check_keys(path, where, run, _RUN)
+        check_keys(path, where, run, RUN)
         check_keys(path, where, run, _FINISHED if run["outcome"] == "finished" else _LOST)
     if {(run["level"], run["seed"]) for run in runs} != wanted:
         raise LogFormatError(path, f"{track}: its runs are not each level and seed once")
@@ -228,7 +228,7 @@ def _runs(path: Path, track: str, runs: Any, wanted: set[tuple[float, int]]) -> 
 
 _SEED, _POSITIVE = number(most=MAX_SEED, whole=True), number(most=MOST)
 _LEVEL = Rule(f"of {LEVELS}", lambda value: is_number(value) and value in LEVELS)
-_SHA256 = Rule("a SHA-256", lambda value: isinstance(value, str) and bool(_DIGEST.fullmatch(value)))
+SHA256 = Rule("a SHA-256", lambda value: isinstance(value, str) and bool(_DIGEST.fullmatch(value)))
 SEEDS = Rule(
     f"whole numbers, 0 to {MAX_SEED}",
     lambda value: many(_SEED).holds(value) and len(value) <= MAX_SEEDS,
@@ -252,8 +252,8 @@ _HEAD: Mapping[str, Rule] = {
         lambda value: isinstance(value, dict) and is_shallow(value),
     ),
 }
-_RUN: Mapping[str, Rule] = {
-    "level": _LEVEL, "seed": _SEED, "recording": _SHA256, "poses": _SHA256,
+RUN: Mapping[str, Rule] = {
+    "level": _LEVEL, "seed": _SEED, "recording": SHA256, "poses": SHA256,
     "outcome": word(among=OUTCOMES), "failure": word(most=MAX_WORDS, optional=True),
     **{
         key: number(most=1.0 if key.endswith(_SHARES) else MOST, optional=True) for key in NUMBERS

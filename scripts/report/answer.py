@@ -7,10 +7,12 @@ the room can be trusted, ``failed`` who raised, hung or gave no answer. All of t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from scripts.comparison.rules import LEVEL
 from scripts.comparison.schema import FAILED
 from scripts.comparison.tables import by_seed, number
 from scripts.report.study import LEAST_RUNS, verdict
@@ -74,6 +76,7 @@ class Standing:
     """What the runs of a room tell of one SLAM. ``levels`` ascend.
 
     own_oracle  the oracle is that SLAM's own: if it fails too, the room may be fair all the same
+    runs_a_seed  at each level: rooms, such as the tracks of a benchmark
     """
 
     subject: str
@@ -81,6 +84,7 @@ class Standing:
     axis: str
     levels: tuple[Level, ...]
     own_oracle: bool = False
+    runs_a_seed: int = 1
 
     def place(self, levels: Sequence[float]) -> str:
         """Such as "dynamism 0.5 and 1"."""
@@ -100,7 +104,9 @@ def _worst(counts: Sequence[Lost]) -> Lost:
     return max(counts, key=lambda one: one.lost / max(one.runs, 1))
 
 
-def standing(rows: Sequence[Row], subject: str, scene: str, axis: str = "dynamism") -> Standing:
+def standing(
+    rows: Sequence[Row], subject: str, scene: str, axis: str = "dynamism", runs_a_seed: int = 1
+) -> Standing:
     """Of the rows of ``runs.csv``. The oracle is the one that is lost least."""
     rows = [row for row in rows if row["scene"] == scene]
     slams = list(dict.fromkeys(str(row["slam"]) for row in rows))
@@ -121,7 +127,10 @@ def standing(rows: Sequence[Row], subject: str, scene: str, axis: str = "dynamis
             )
         )
     own = oracle is not None and (oracle_of(oracle) or ("",))[0] == subject
-    return Standing(subject=subject, scene=scene, axis=axis, levels=tuple(levels), own_oracle=own)
+    return Standing(
+        subject=subject, scene=scene, axis=axis, levels=tuple(levels), own_oracle=own,
+        runs_a_seed=runs_a_seed,
+    )  # fmt: skip
 
 
 def _lost(rows: Sequence[Row], slam: str) -> Lost:
@@ -203,7 +212,8 @@ def _to_decide(of: Standing) -> str:
     at = "" if len(of.levels) == 1 else " at " + listed([f"{level.at:g}" for level in open_])
     if not all(wanted):
         return f"that is too near to one half{at} for {MOST_SEEDS} seeds to tell"
-    return f"`--seeds {max(wanted)}` would tell whether more than half are lost{at}"
+    seeds = math.ceil(max(wanted) / of.runs_a_seed)
+    return f"`--seeds {seeds}` would tell whether more than half are lost{at}"
 
 
 def _is_open(seen: Lost) -> bool:
@@ -224,7 +234,8 @@ def _seeds_to_tell(seen: Lost) -> int:
 def _first_level(of: Standing) -> str:
     """What the lowest level tells: a SLAM that is bad there has another problem than the axis."""
     low = of.levels[0]
-    so = f", so {of.axis} is not its problem" if low.at == 0.0 else ""
+    what = "what moves" if of.axis == LEVEL else of.axis
+    so = f", so {what} is not its problem" if low.at == 0.0 else ""
     if low.against == -1:
         return f"at {low.at:g} it is already worse than its own odometry{so}"
     if low.subject.half and so:

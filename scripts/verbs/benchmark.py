@@ -44,7 +44,8 @@ def benchmark(
     quick: Annotated[
         bool,
         typer.Option(
-            "--quick", help="Three levels, two seeds, the subject alone: minutes, not a night."
+            "--quick",
+            help="Three levels and one seed of the tracks that count, the subject alone: minutes.",
         ),
     ] = False,
     train: Annotated[
@@ -59,7 +60,7 @@ def benchmark(
         typer.Option(help="Only draw secret seeds, write them here, and print their hash."),
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(help="Seeds at every level; default 6, with --quick 2.")
+        int | None, typer.Option(help="Seeds at every level; default 6, with --quick 1.")
     ] = None,
     seconds: Annotated[
         float | None, typer.Option(help="Length of a run, s, to try out; default the track's own.")
@@ -73,7 +74,8 @@ def benchmark(
         typer.Option(metavar="NAME", help="Also write OUT/submission_NAME.json of the subject."),
     ] = None,
     merge: Annotated[
-        list[Path] | None, typer.Option(help="Submissions of others to put into the leaderboard.")
+        list[Path] | None,
+        typer.Option(help="Submissions of others, or published runs, to put into the leaderboard."),
     ] = None,
     jobs: Jobs = 1,
     cluster: Cluster = None,
@@ -95,25 +97,30 @@ def benchmark(
     slams = named(slam or [])
     check((*slams, *([subject] if subject else [])))
     from scripts import workers
-    from scripts.benchmark import submission
+    from scripts.benchmark import published, submission
     from scripts.benchmark.make import QUICK_SEEDS, SEEDS, carry_out, wanted_of
     from scripts.benchmark.tracks import chosen
 
     workers.check_jobs(jobs)
-    others = [submission.read(path) for path in merge or ()]
+    shared = [path for path in merge or () if published.is_one(path)]
+    others = [submission.read(path) for path in merge or () if path not in shared]
+    ship = published.read(shared[-1] if shared else published.FILE)
     drawn = None if sealed is None else _opened(sealed, train)
     most = SEEDS if drawn is None else len(drawn.seeds)
     count = seeds if seeds is not None else min(QUICK_SEEDS if quick else most, most)
     runs = tuple(dict.fromkeys((*slams, *([subject] if subject else []))))
     numbered = dict(zip(runs, with_set(runs, set_ or []), strict=True))
+    asked = chosen(named(tracks or []))
+    if quick and not tracks:
+        asked = tuple(track for track in asked if track.counts is not False)
     wanted = wanted_of(
-        chosen(named(tracks or [])), [numbered[name] for name in slams],
+        asked, [numbered[name] for name in slams],
         None if subject is None else numbered[subject],
         train=train, sealed=drawn, seeds=count, quick=quick, seconds=seconds, submit=submit,
         days=days,
     )  # fmt: skip
     started = time.perf_counter()
-    board = carry_out(wanted, out, jobs=jobs, cluster=cluster, merge=others)
+    board = carry_out(wanted, out, jobs=jobs, cluster=cluster, merge=others, shared=ship)
     _tell(board, out, time.perf_counter() - started)
 
 
@@ -143,7 +150,7 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
 
     table = Table(
         title="level from which half of the runs are lost", title_justify="left",
-        caption="* does not count: its oracle was lost or more than 2 cm off",
+        caption="* does not count: no oracle holds there",
         caption_justify="left",
     )  # fmt: skip
     table.add_column("track", no_wrap=True)
@@ -161,12 +168,20 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
         note(f"{name} was submitted, as SLAM {one['slam']}: its results are the submitter's word")
     for failure in board.failures():
         note(failure)
+    parts = [Part(title="Lost from which level", note=f"{table.caption}.", table=table)]
+    places = _places(board)
+    if places is not None:
+        console.print(places)
+        parts.insert(0, Part(title=f"Ranking {places.title}", table=places))
+    for line in board.said():
+        say(escape(line))
+    say(f"To cite: {escape(board.cite())}")
     if board.days_page:
         _tell_days(out)
     reports = [command("report", out / track.name) for track in board.tracks[:3]]
     publish(out, Page(
         title=f"{board.subject} on {len(board.tracks)} tracks", said=board.said(),
-        parts=[Part(title="Lost from which level", note=f"{table.caption}.", table=table)],
+        parts=parts,
         next={
             "A track run by run, and what misled it:": "\n".join(reports),
             "Hand it in:": command("benchmark", "--slam", board.subject, "--submit", "NAME"),
@@ -174,6 +189,20 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
         settings={key: board.head[key] for key in ("seeds_of", "seeds", "levels_run", "world")},
     ))  # fmt: skip
     say(f"{escape(str(out))} ({spent_s:.0f} s)")
+
+
+def _places(board: Board) -> Table | None:
+    from scripts.benchmark.board import RANKED_HEADS
+
+    rows = board.ranked()
+    if len(rows) < 2:
+        return None
+    table = Table(title=f"on the same {board.ranking[0]['runs']} runs", title_justify="left")
+    for k, head in enumerate(RANKED_HEADS):
+        table.add_column(head, justify="left" if k == 1 else "right")
+    for row in rows:
+        table.add_row(*map(escape, row), style="bold" if row[1] == board.subject else None)
+    return table
 
 
 def _tell_days(out: Path) -> None:

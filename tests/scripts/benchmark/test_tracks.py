@@ -34,6 +34,7 @@ PUBLISHED = {  # what is published is added, and nothing here ever changes
     "kidnapped-in-a-crowd-v1": "e73cb0e804eb",
     "no-walls-v1": "d11c3e575a0a",
 }
+NOT_COUNTING = {"warehouse-shift-v1", "ward-round-v1", "kidnapped-in-a-crowd-v1"}
 NOW = [track for track in newest().values() if track.world == WORLD]
 ONE = TRACKS["tour-guide-v1"]
 
@@ -53,6 +54,14 @@ def test_a_published_track_never_changes():
     for name, said in BOARD["tracks"].items():
         assert said["sha256"] == TRACKS[name].sha256
         assert name in PUBLISHED
+
+
+def test_which_tracks_count_is_decided_once_and_a_new_version_is_open_again():
+    """Not by each reader's oracle, and it is no part of the hash: the runs stay what they are."""
+    assert {name for name in PUBLISHED if not TRACKS[name].counts} == NOT_COUNTING
+    assert ONE.counts
+    assert ONE.later().counts is None
+    assert ONE.later(counts=True).sha256 == ONE.later().sha256
 
 
 def test_another_world_moves_no_hash_and_runs_no_track_of_this_one(
@@ -87,6 +96,7 @@ def test_tuning_has_seeds_of_its_own():
         assert track.scanner == "noise"
         assert track.controls[0] == "odometry"
         assert track.controls[1].startswith("oracle(shunting")
+        assert track.controls[2] == "oracle(map)"
 
 
 @pytest.mark.parametrize("track", NOW, ids=lambda track: track.name)

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The runs that ship with the package: what every SLAM did on the public seeds, run by run.
+
+A reader's SLAM gets a row between the others on the same recordings, without running the others.
+Each recording is named by its digest, so that nothing is compared on other scans.
+
+    python -m scripts.benchmark.published out/benchmark --commit HASH   # writes published.json
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from scripts.benchmark.submission import RUN, SHA256
+from scripts.benchmark.tracks import LEVELS, TRACKS, check_known
+from scripts.comparison.folder import read as compared
+from scripts.comparison.plan import RECORDINGS, Plan
+from scripts.comparison.recording import digest
+from scripts.comparison.rules import MAX_DEPTH, Rule, check_keys, is_shallow, number
+from scripts.machine import machine, versions
+from scripts.result_files import finite, load, write
+from sim.core.versions import WORLD, world_of
+from slam.errors import InvalidValueError, LogFormatError, MobiliaError
+
+FILE = Path(__file__).with_name("published.json")
+SCHEMA, WHAT = 1, "published runs of the benchmark of mobilia"
+COLUMNS = (
+    "outcome", "lost", "lost_at_s", "error_tracking_m", "ate_unaligned_m", "rpe_m_per_m",
+    "silent_share",
+)  # fmt: skip
+MAX_SLAMS = 100
+Row = dict[str, Any]
+Digests = Mapping[tuple[float, int], str]  # of recordings, by level and seed
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Published:
+    """Runs by track, then by level and seed: the digest of the recording, and a row of each SLAM.
+
+    made_with  commit, versions, machine
+    """
+
+    runs: Mapping[str, Mapping[tuple[float, int], tuple[str, Mapping[str, Row]]]]
+    made_with: Mapping[str, Any]
+
+    def has(self, track: str, digests: Digests | Sequence[tuple[float, int]], slam: str) -> bool:
+        """Whether that SLAM made all these runs."""
+        own = self.runs.get(track, {})
+        return all(run in own and slam in own[run][1] for run in digests)
+
+    def rows(self, track: str, digests: Digests, without: Sequence[str]) -> list[Row]:
+        """Rows as of ``runs.csv`` of the runs on these very recordings, but for some SLAMs."""
+        own = self.runs.get(track, {})
+        there = [run for run, digest in digests.items() if run in own and own[run][0] == digest]
+        return [
+            {"slam": slam, "dynamism": run[0], "seed": run[1], "failure": None, **row}
+            for run in there
+            for slam, row in own[run][1].items()
+            if slam not in without
+        ]
+
+    def others(self, track: str, digests: Digests) -> int:
+        """How many of these recordings have another digest here."""
+        own = self.runs.get(track, {})
+        return sum(run in own and own[run][0] != digest for run, digest in digests.items())
+
+
+def read(path: Path = FILE) -> Published:
+    """Inverse of ``write_from``; ``LogFormatError`` for a file that is something else."""
+    data = load(path, WHAT, SCHEMA)
+    if data.get("what") != WHAT:
+        raise LogFormatError(path, f"no {WHAT}")
+    try:
+        check_known(path, world_of(path, data), data["tracks"])
+        check_keys(path, "", data, _HEAD)
+        runs: dict[str, dict[tuple[float, int], tuple[str, dict[str, Row]]]] = {}
+        for key, told in data["runs"].items():
+            track, level, seed = key.split(" ")
+            at = (float(level), int(seed))
+            check_keys(path, f"{key}: ", {"level": at[0], "seed": at[1], **told}, _RUN)
+            if track not in data["tracks"]:
+                raise LogFormatError(path, f"{key}: a track without its hash")
+            rows = {slam: _row(path, f"{key}, {slam}: ", of) for slam, of in told["slams"].items()}
+            runs.setdefault(track, {})[at] = (told["recording"], rows)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise LogFormatError(path, f"no {WHAT}: {type(error).__name__}: {error}") from error
+    return Published(runs=runs, made_with=data["made_with"])
+
+
+def is_one(path: Path) -> bool:
+    """Whether it says that it holds published runs; False for whatever cannot be read."""
+    try:
+        return bool(load(path, WHAT, SCHEMA).get("what") == WHAT)
+    except LogFormatError:
+        return False
+
+
+def _row(path: Path, where: str, cells: Sequence[Any]) -> Row:
+    row: Row = dict(zip(COLUMNS, cells, strict=True))
+    check_keys(path, where, row, {name: _CELLS[name] for name in COLUMNS})
+    return row
+
+
+def digests(plan: Plan, folder: Path) -> dict[tuple[float, int], str]:
+    """Of the recording of each level and seed of a comparison in ``folder``."""
+    jobs = plan.recordings()
+    files = {run: folder / RECORDINGS / jobs[run.name].file_name() for run in plan.runs()}
+    return {(run.dynamism, run.seed): digest(file) for run, file in files.items()}
+
+
+def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
+    """Of folders of ``mobilia benchmark``, all tracks that are whole in them.
+
+    Raises ``InvalidValueError`` for two folders whose recordings differ.
+    """
+    runs, hashes = dict[str, Row](), dict[str, str]()
+    for folder, track in product(folders, TRACKS.values()):
+        if not (folder / track.name / "recipe.json").exists():
+            continue
+        done = compared(folder / track.name)
+        rows, asked = done.runs, done.settings
+        hashes[track.name] = track.sha256
+        plan = track.plan(asked["slams"], tuple(asked["seeds"]), levels=tuple(asked["levels"]))
+        for at, scans in digests(plan, folder / track.name).items():
+            own = {r["slam"]: [finite(r.get(k)) for k in COLUMNS]
+                   for r in rows if (r["dynamism"], r["seed"]) == at}  # fmt: skip
+            key = f"{track.name} {at[0]:g} {at[1]}"
+            there = runs.setdefault(key, {"recording": scans, "slams": {}})
+            if there["recording"] != scans:
+                raise InvalidValueError(f"{folder}: {key}: other scans than in another folder")
+            there["slams"] |= own
+    made = {"commit": commit, "versions": versions(), "machine": machine()}
+    head = {"schema": SCHEMA, "what": WHAT, "world": WORLD, "made_with": made, "columns": COLUMNS}
+    write(path, head, {"tracks": hashes, "runs": runs})
+    return read(path)
+
+
+_HEAD: Mapping[str, Rule] = {
+    "columns": Rule(", ".join(COLUMNS), lambda value: value == list(COLUMNS)),
+    "made_with": Rule(
+        f"an object, at most {MAX_DEPTH} deep",
+        lambda value: isinstance(value, dict) and is_shallow(value),
+    ),
+}
+_CELLS: Mapping[str, Rule] = {**RUN, "lost": number(most=1.0, whole=True)}
+_RUN: Mapping[str, Rule] = {
+    "level": Rule(f"of {LEVELS}", lambda value: value in LEVELS),
+    "seed": RUN["seed"],
+    "recording": SHA256,
+    "slams": Rule(
+        f"an object of up to {MAX_SLAMS}",
+        lambda value: isinstance(value, dict) and len(value) <= MAX_SLAMS,
+    ),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folders", type=Path, nargs="+", help="of mobilia benchmark")
+    parser.add_argument("--out", type=Path, default=FILE)
+    parser.add_argument("--commit", required=True, help="of the code that ran")
+    wanted = parser.parse_args(arguments)
+    try:
+        made = write_from(wanted.folders, wanted.out, wanted.commit)
+    except (MobiliaError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    print(f"{wanted.out}: {sum(map(len, made.runs.values()))} recordings")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

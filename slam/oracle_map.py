@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The second oracle: scan matching to the true map of what never moves. It is told no labels.
+
+It shares no code with ``shunting`` but the geometry of a beam and of a pose. Where it holds, what
+stands still tells where the robot is, whatever any SLAM makes of it. ``create("oracle(map)")``.
+
+A likelihood field (Thrun, Burgard, Fox 2005, section 6.4): the distance of each end point from the
+nearest wall, least squares with a kernel that lets go of what is far from all walls (Geman and
+McClure 1987), from odometry's prior.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from slam import se2
+from slam.errors import InvalidValueError
+from slam.estimate import Estimate, Raster
+from slam.frames import Float, Frame, Odometry
+from slam.frontend.deskew import end_points
+from slam.path import PosePath
+from slam.trajectory import Trajectory
+
+KERNELS_M = (0.2, 0.1, 0.05)  # half weight at 0.64 of it; coarse to fine
+STEPS = 4  # of Gauss and Newton with each kernel
+SIGMA_M = 0.1  # of a distance to the map: neighbouring beams err alike, so each counts for less
+FLOOR_M, FLOOR_RAD = 0.01, math.radians(0.3)  # least spread of odometry's prior a step
+ENOUGH = 20  # beams on walls; with fewer the pose is odometry's
+ASSUMED = (0.05, 0.05, math.radians(3.0))  # spread of a step whose odometry states none, m, m, rad
+
+
+class MapOracle:
+    """A control, no contestant: it must be shown the true map (``know``) before the first frame.
+
+    Raises ``InvalidValueError`` for frames without a scan or out of order, or without a map.
+    """
+
+    def __init__(self) -> None:
+        self._field: tuple[Float, float, Float] | None = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the path; the map stays."""
+        self._before: Odometry | None = None
+        self._T_map_robot: Float = np.zeros(3)
+        self._spread: Float = np.zeros((3, 3))
+        self._path = PosePath()
+
+    def know(self, world: Raster, T_world_start: Float) -> None:
+        """The true map of what never moves, in a world where the first frame is at that pose."""
+        occupied = np.pad(world.values > 0.5, 1)
+        if not occupied.any():
+            raise InvalidValueError("oracle(map): nothing stands in the true map")
+        outside = distance_transform_edt(~occupied) - 0.5  # cells, from centre to edge
+        inside = distance_transform_edt(occupied) - 0.5
+        metres = world.resolution_m * np.where(occupied, -inside, outside)
+        corner = world.resolution_m * np.array([0.5, 0.5])  # of the padding, from its cell's centre
+        origin = se2.compose(se2.inverse(T_world_start), world.T_map_origin)
+        centre = se2.compose(origin, np.array([-corner[0], -corner[1], 0.0]))
+        self._field = metres, world.resolution_m, se2.inverse(centre)
+
+    def update(self, frame: Frame) -> Estimate:
+        """Odometry's guess, then the pose nearby at which most of the scan lies on walls."""
+        if frame.scan is None:
+            raise InvalidValueError("oracle(map) needs a laser scan in every frame")
+        if self._field is None:
+            raise InvalidValueError(
+                "oracle(map) needs the true map, which mobilia compare and benchmark show it"
+            )
+        self._path.check_order(frame.stamp_ns)
+        pose, spread = self._predicted(frame.odometry)
+        twist = frame.odometry.twist
+        spec, valid = frame.scan.spec, frame.scan.valid
+        points = end_points(
+            frame.scan.ranges.astype(np.float64)[valid], spec.angles[valid],
+            spec.beam_time_offsets[valid], spec.T_robot_laser,
+            np.zeros(3) if twist is None else np.asarray(twist),
+        )  # fmt: skip
+        self._T_map_robot, self._spread, walls = self._matched(pose, spread, points)
+        self._before = frame.odometry
+        self._path.add(frame.stamp_ns, self._T_map_robot)
+        return Estimate(
+            stamp_ns=frame.stamp_ns, T_map_robot=self._T_map_robot, covariance=self._spread,
+            converged=walls >= ENOUGH, diagnostics={"on_walls": walls},
+        )  # fmt: skip
+
+    def map(self) -> Raster | None:
+        """None: the map was given."""
+        return None
+
+    def trajectory(self) -> Trajectory:
+        """The online poses."""
+        return self._path.trajectory()
+
+    def _predicted(self, now: Odometry) -> tuple[Float, Float]:
+        """Pose and covariance (3, 3) by odometry."""
+        if self._before is None:
+            return self._T_map_robot, self._spread
+        step = se2.between(self._before.T_odom_robot, now.T_odom_robot)
+        stated = now.increment_covariance
+        noise = np.diag(np.square(ASSUMED)) if stated is None else np.asarray(stated)
+        noise = noise + np.diag([FLOOR_M**2, FLOOR_M**2, FLOOR_RAD**2])
+        spread = se2.propagate(self._spread, self._T_map_robot, step, noise)
+        return se2.compose(self._T_map_robot, step), spread
+
+    def _matched(self, prior: Float, spread: Float, points: Float) -> tuple[Float, Float, int]:
+        """Pose, covariance, and how many points lie on walls; the prior's where these are few."""
+        if self._before is None or len(points) < ENOUGH:
+            return prior, spread, len(points)
+        sure, pose, told = np.linalg.inv(spread), prior, np.zeros((3, 3))
+        walls = 0
+        for kernel_m in KERNELS_M:
+            for _ in range(STEPS):
+                told, pull, walls = self._normal(pose, points, kernel_m)
+                off = pose - prior
+                off[2] = se2.wrap(float(off[2]))
+                step = np.linalg.solve(told + sure, pull - (sure * off).sum(axis=1))
+                pose = pose + step
+        if walls < ENOUGH:
+            return prior, spread, walls
+        pose[2] = se2.wrap(float(pose[2]))
+        found = np.linalg.inv(told + sure)
+        return pose, 0.5 * (found + found.T), walls
+
+    def _normal(self, pose: Float, points: Float, kernel_m: float) -> tuple[Float, Float, int]:
+        """Normal equations (3, 3) and (3,) of the distances to walls, and how many are near."""
+        assert self._field is not None
+        field, cell_m, T_field_map = self._field
+        at_map = se2.transform(pose, points)
+        at = se2.transform(T_field_map, at_map) / cell_m
+        column, row = np.floor(at).astype(np.int64).T
+        known = (column >= 0) & (row >= 0) & (column < field.shape[1] - 1)
+        known &= row < field.shape[0] - 1
+        at, at_map, column, row = at[known], at_map[known], column[known], row[known]
+        u, v = (at - np.stack([column, row], axis=1)).T
+        a, b = field[row, column], field[row, column + 1]
+        c, d = field[row + 1, column], field[row + 1, column + 1]
+        far = (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * c + u * d)
+        across = np.stack([(1 - v) * (b - a) + v * (d - c), (1 - u) * (c - a) + u * (d - b)], 1)
+        slope = across / cell_m  # in the field's frame
+        turn = -float(T_field_map[2])
+        gx = math.cos(turn) * slope[:, 0] - math.sin(turn) * slope[:, 1]
+        gy = math.sin(turn) * slope[:, 0] + math.cos(turn) * slope[:, 1]
+        arm = at_map - pose[:2]
+        lines = (gx, gy, gy * arm[:, 0] - gx * arm[:, 1])
+        square = kernel_m * kernel_m
+        weight = (square / (square + far * far)) ** 2 / SIGMA_M**2
+        told = np.array([[(weight * p * q).sum() for q in lines] for p in lines])
+        pull = -np.array([(weight * p * far).sum() for p in lines])
+        return told, pull, int((np.abs(far) < kernel_m).sum())
