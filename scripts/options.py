@@ -48,6 +48,13 @@ CrowdOption = Annotated[
         "this motion (mobilia config crowds).",
     ),
 ]
+EventsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--events",
+        help="TOML file of what happens when: pushes, doors, people who enter, the robot carried.",
+    ),
+]
 MotionLevels = Annotated[
     list[str] | None, typer.Option("--motion", help="Levels of motion alone, or one to hold.")
 ]
@@ -133,6 +140,15 @@ class Held:
 def options_with(crowd: str | None) -> dict[str, Any]:
     """A crowd among the options of a scene."""
     return {} if crowd is None else {"crowd": crowd}
+
+
+def events_in(path: Path | None) -> dict[str, Any]:
+    """The events of a file, as ``Simulation`` takes them."""
+    if path is None:
+        return {}
+    from sim.world.script import read_events
+
+    return {"events": read_events(path)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,6 +26,7 @@ from sim.sensors.odometry.encoders import WheelOdometry
 from sim.sensors.tag_cameras import TagCameras, TagReading
 from sim.world.kidnapping import Kidnapping
 from sim.world.labels import BeamLabeller
+from sim.world.script import Script, cues_of, visitors
 from sim.world.sweep import Sweep
 from sim.world.world import World
 from slam.errors import InvalidValueError
@@ -43,6 +44,7 @@ from slam.frames import (
 # Of a state, by their words in it.
 _PARTS = {
     "tags": "ceiling cameras are", "kidnaps": "kidnaps are", "changed": "a moment of change is",
+    "events": "events are",
 }  # fmt: skip
 MOST_FRAMES = 1 << 31  # of one simulation: almost two years
 
@@ -62,6 +64,7 @@ class Simulation:
     session    number of a session of the same building (``sim.world.sessions``)
     kidnap_every_s  s after which the robot is carried elsewhere, again and again
                (``sim.world.kidnapping``); None: never
+    events     what happens at stated times, as rows of ``sim.world.script``; None: nothing
     laser      a scanner by name ("utm30lx", "lms221:noise"; ``sim.sensors.lidar.registry``), a
                ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
@@ -88,6 +91,7 @@ class Simulation:
         change_at_s: float | None = None,
         session: int | None = None,
         kidnap_every_s: float | None = None,
+        events: Sequence[Mapping[str, Any]] | None = None,
         laser: ScannerConfig | str | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
@@ -99,10 +103,12 @@ class Simulation:
     ) -> None:
         drive = drive or DriveConfig()
         rates = Dynamism.of(dynamism, moving_share, motion=motion, change=change)
+        cues = cues_of(events or ())
         self.world = World(
             scene, seed=seed, dynamism=rates, change=change, session=session, drive=drive,
-            start=start, chairs=chairs, **options,
+            start=start, chairs=chairs, visitors=visitors(cues), **options,
         )  # fmt: skip
+        self._script = Script(cues, self.world) if cues else None
         self.odometry_preset, self.session = odometry, session
         seeds = self.world.seeds
         self._change_at_s = checked_moment(change_at_s, session)
@@ -182,6 +188,8 @@ class Simulation:
         """As ``observe``, without the frame, which ``frame`` makes when it is asked for."""
         if self._kidnapping is not None:
             self._kidnapping.carried(self.world)
+        if self._script is not None:
+            self._script.happen(self.world)
         self.rearranged = self._changed_out_of_sight()
         self._stamp_ns = self._sweep.over_scan(self.world, self.laser, self._tags)
         self._scan, self._frame = self.laser.finish(), None
@@ -231,6 +239,7 @@ class Simulation:
                 "scanner": self.laser.scanner.name,
                 **({} if kidnaps is None else {"kidnaps": kidnaps}),
                 **({} if self._change_at_s is None else {"changed": self._changed}),
+                **({} if self._script is None else {"events": self._script.done}),
             },
         )  # fmt: skip
 
@@ -241,6 +250,8 @@ class Simulation:
         self._changed = bool(words.get("changed", False))
         if self._kidnapping is not None:
             self._kidnapping.load(arrays, words["kidnaps"])
+        if self._script is not None:
+            self._script.done = [bool(each) for each in words["events"]]
         own = {k.removeprefix("scan."): v for k, v in arrays.items() if k.startswith("scan.")}
         self.laser.load(own, words.get("scan", {}))
         self.world.load_state(arrays["world"].tobytes())
@@ -268,7 +279,8 @@ class Simulation:
                 f"the state is of scanner '{words.get('scanner')}', expected '{own_name}'"
             )
         for what, own_part in (
-            ("tags", self._tags), ("kidnaps", self._kidnapping), ("changed", self._change_at_s)
+            ("tags", self._tags), ("kidnaps", self._kidnapping), ("changed", self._change_at_s),
+            ("events", self._script),
         ):  # fmt: skip
             if (words.get(what) is None) != (own_part is None):
                 raise InvalidValueError(f"{_PARTS[what]} in the state or in the simulation only")

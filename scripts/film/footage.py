@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 # Of a run's settings.
 KNOBS = ("motion", "change", "crowd")
-SIMULATED = ("scene", "seconds", "seed", "dynamism", *KNOBS, "scan_height_m", "laser")
+SIMULATED = ("scene", "seconds", "seed", "dynamism", *KNOBS, "scan_height_m", "laser", "events")
 
 
 @dataclass(eq=False, kw_only=True)

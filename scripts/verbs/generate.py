@@ -16,10 +16,12 @@ from scripts.options import (
     Change,
     Cluster,
     CrowdOption,
+    EventsOption,
     Held,
     Jobs,
     Motion,
     Scanner,
+    events_in,
     options_with,
     sweep,
 )
@@ -65,6 +67,7 @@ def generate(
     jobs: Jobs = 1,
     cluster: Cluster = None,
     scanner: Scanner = "full",
+    events: EventsOption = None,
 ) -> None:
     """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
 
@@ -90,6 +93,7 @@ def generate(
     first = Recipe(
         scene=scene[0], seed=seed, dynamism=levels[0], motion=motion, change=change,
         seconds=seconds, scanner=scanner, options=options_with(crowd),
+        **events_in(events),
     )  # fmt: skip
     plan = Plan(
         recipe=first, dynamisms=levels, twins=twins, sessions=sessions, split=parts,

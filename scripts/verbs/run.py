@@ -13,6 +13,7 @@ from scripts.options import (
     Change,
     CrowdOption,
     DynamismLevel,
+    EventsOption,
     Held,
     Motion,
     Oracles,
@@ -24,6 +25,7 @@ from scripts.options import (
     Set,
     Strict,
     TextFormat,
+    events_in,
     with_oracles,
 )
 from slam.errors import InvalidValueError
@@ -55,6 +57,7 @@ def run(
     motion: Motion = None,
     change: Change = None,
     crowd: CrowdOption = None,
+    events: EventsOption = None,
     seed: Seed = 0,
     scan_height: ScanHeight = 0.36,
     scanner: Scanner = "full",
@@ -96,7 +99,7 @@ def run(
         outputs = Outputs(folder=folder, command="run", overwrite=overwrite, film=film)
         held = Held(motion=motion, change=change, crowd=crowd)
         settings = held.world(scene, dynamism, seed) | {
-            "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
+            "seconds": seconds, "scan_height_m": scan_height, "laser": scanner, **events_in(events),
         }  # fmt: skip
         on_scene(slams, settings, outputs)
     elif log is not None:
