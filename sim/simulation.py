@@ -65,6 +65,7 @@ class Simulation:
     kidnap_every_s  s after which the robot is carried elsewhere, again and again
                (``sim.world.kidnapping``); None: never
     events     what happens at stated times, as rows of ``sim.world.script``; None: nothing
+    robot      another than the scene's, by name or from its tables (``sim.world.robots``)
     laser      a scanner by name ("utm30lx", "lms221:noise"; ``sim.sensors.lidar.registry``), a
                ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
@@ -92,6 +93,7 @@ class Simulation:
         session: int | None = None,
         kidnap_every_s: float | None = None,
         events: Sequence[Mapping[str, Any]] | None = None,
+        robot: str | Mapping[str, Any] | None = None,
         laser: ScannerConfig | str | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
@@ -101,12 +103,11 @@ class Simulation:
         labels: bool = False,
         **options: Any,
     ) -> None:
-        drive = drive or DriveConfig()
         rates = Dynamism.of(dynamism, moving_share, motion=motion, change=change)
         cues = cues_of(events or ())
         self.world = World(
             scene, seed=seed, dynamism=rates, change=change, session=session, drive=drive,
-            start=start, chairs=chairs, visitors=visitors(cues), **options,
+            start=start, chairs=chairs, visitors=visitors(cues), robot=robot, **options,
         )  # fmt: skip
         self._script = Script(cues, self.world) if cues else None
         self.odometry_preset, self.session = odometry, session
@@ -117,7 +118,8 @@ class Simulation:
         if kidnap_every_s is not None:
             self._kidnapping = Kidnapping(kidnap_every_s, seeds)
         self.laser = LaserScanner(self.world.model, laser, seeds.generator("lidar"))
-        self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=drive.track)
+        track = self.world.drive_config.track
+        self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=track)
         self._labeller = BeamLabeller(self.world) if labels else None
         self._tags = self._tag_cameras(tags)
         self._stamp_ns = 0

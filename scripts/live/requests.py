@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sim.world.requests import FAR_M, Kidnap, MoveDoor, Push, three, within, word
+from sim.core.checks import FAR_M, three, within, word
+from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError
 
 MOST_TWIST = 1e3  # m/s and rad/s; the drive clips to what it can do

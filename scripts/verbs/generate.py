@@ -20,9 +20,10 @@ from scripts.options import (
     Held,
     Jobs,
     Motion,
+    RobotOption,
     Scanner,
-    events_in,
     options_with,
+    staged,
     sweep,
 )
 from slam.errors import InvalidValueError
@@ -68,6 +69,7 @@ def generate(
     cluster: Cluster = None,
     scanner: Scanner = "full",
     events: EventsOption = None,
+    robot: RobotOption = None,
 ) -> None:
     """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
 
@@ -93,7 +95,7 @@ def generate(
     first = Recipe(
         scene=scene[0], seed=seed, dynamism=levels[0], motion=motion, change=change,
         seconds=seconds, scanner=scanner, options=options_with(crowd),
-        **events_in(events),
+        **staged(events, robot),
     )  # fmt: skip
     plan = Plan(
         recipe=first, dynamisms=levels, twins=twins, sessions=sessions, split=parts,

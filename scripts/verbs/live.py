@@ -20,9 +20,10 @@ from scripts.options import (
     EventsOption,
     Held,
     Motion,
+    RobotOption,
     Scanner,
     Set,
-    events_in,
+    staged,
 )
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
@@ -49,6 +50,7 @@ def live(
     change: Change = None,
     crowd: CrowdOption = None,
     events: EventsOption = None,
+    robot: RobotOption = None,
     seed: Annotated[int, typer.Option(help="Seed of the scene, whole number >= 0.")] = 0,
     scanner: Scanner = "full",
     paused: Annotated[bool, typer.Option("--paused", help="Wait for play.")] = False,
@@ -86,7 +88,7 @@ def live(
     allowed = [gate.origin_of(text) for text in allow_origin or []]
     served.require()
     held = Held(motion=motion, change=change, crowd=crowd)
-    world = {**held.world(scene, dynamism, seed), "laser": scanner, **events_in(events)}
+    world = {**held.world(scene, dynamism, seed), "laser": scanner, **staged(events, robot)}
     opener = opened.Opener(
         slams=slams, path=path, settings=world if path is None else {}, seconds=seconds
     )

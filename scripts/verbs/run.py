@@ -18,6 +18,7 @@ from scripts.options import (
     Motion,
     Oracles,
     Overwrite,
+    RobotOption,
     ScanHeight,
     Scanner,
     Seconds,
@@ -25,7 +26,7 @@ from scripts.options import (
     Set,
     Strict,
     TextFormat,
-    events_in,
+    staged,
     with_oracles,
 )
 from slam.errors import InvalidValueError
@@ -58,6 +59,7 @@ def run(
     change: Change = None,
     crowd: CrowdOption = None,
     events: EventsOption = None,
+    robot: RobotOption = None,
     seed: Seed = 0,
     scan_height: ScanHeight = 0.36,
     scanner: Scanner = "full",
@@ -99,7 +101,8 @@ def run(
         outputs = Outputs(folder=folder, command="run", overwrite=overwrite, film=film)
         held = Held(motion=motion, change=change, crowd=crowd)
         settings = held.world(scene, dynamism, seed) | {
-            "seconds": seconds, "scan_height_m": scan_height, "laser": scanner, **events_in(events),
+            "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
+            **staged(events, robot),
         }  # fmt: skip
         on_scene(slams, settings, outputs)
     elif log is not None:

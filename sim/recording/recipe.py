@@ -28,6 +28,7 @@ from sim.sensors.odometry.config import PRESETS
 from sim.simulation import Simulation, checked_moment
 from sim.twins.twins import TWINS
 from sim.world.kidnapping import Kidnapping
+from sim.world.robots import robot_of
 from sim.world.script import cues_of
 from sim.world.times_of_day import checked
 from sim.world.world import World
@@ -42,7 +43,7 @@ MAX_BYTES = 1 << 16
 MAX_SECONDS = 86_400.0
 _AXES = ("motion", "change")
 # Added since the first recipes: without a word where they are None.
-_LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s", "events")
+_LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s", "events", "robot")
 # Words for some of these in the name of an episode.
 _WORDS = {"share": "moving_share", "at": "change_at_s", "kidnap": "kidnap_every_s"}
 _DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "rosbags")
@@ -72,6 +73,7 @@ class Recipe:
     change_at_s  the one moment, s, at which things out of sight are put elsewhere; None: all along
     kidnap_every_s  s after which the robot is carried elsewhere, again and again; None: never
     events      what happens at stated times (``sim.world.script``); None: nothing
+    robot       tables of another robot than the scene's (``sim.world.robots``); None: its own
     """
 
     scene: str
@@ -90,6 +92,7 @@ class Recipe:
     change_at_s: float | None = None
     kidnap_every_s: float | None = None
     events: Sequence[Mapping[str, Any]] | None = None
+    robot: Mapping[str, Any] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -131,6 +134,8 @@ class Recipe:
                 raise InvalidValueError(
                     f"Recipe.kidnap_every_s and twin exclude each other: {self.twin}"
                 )
+        if self.robot is not None:
+            robot_of(self.robot)
         if self.events is not None:
             cues_of(self.events)
             if self.twin:
@@ -191,6 +196,8 @@ class Recipe:
         level = "".join(f"-{letter}{at:.4g}" for letter, at in levels if at is not None)
         more = [(word, getattr(self, field)) for word, field in _WORDS.items()]
         level += "".join(f"-{word}{at:.9g}" for word, at in more if at is not None)
+        if self.robot is not None:
+            level += "-" + re.sub(r"[^A-Za-z0-9]+", "-", self.robot["name"])
         if self.events is not None:
             level += f"-events{zlib.crc32(json.dumps(self.events, sort_keys=True).encode()):08x}"
         return f"{scene}{level}-s{self.seed:04d}{session}{twin}"

@@ -5,15 +5,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
+from sim.core.checks import FAR_M, three, within, word
 from sim.world import hands
 from sim.world.hands import MOST_HOLD_S, MOST_SPEED
 from sim.world.world import World
-from slam.errors import InvalidValueError
-
-MOST_LETTERS = 100  # of a name
-FAR_M = 1e6  # no place of a scene is farther away
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,29 +92,3 @@ def _door(world: World, request: MoveDoor) -> str:
     name = request.name or hands.nearest(world, world.doors.names, rx, ry)[0]
     hands.hold_door(world, name, opened=request.opened, seconds=request.seconds)
     return f"{name} is held {'open' if request.opened else 'shut'} for {request.seconds:g} s"
-
-
-def word(what: str, value: Any) -> str:
-    """A name; ``InvalidValueError`` for anything else."""
-    if not isinstance(value, str) or len(value) > MOST_LETTERS or not value.isprintable():
-        raise InvalidValueError(
-            f"{what} must be a name of up to {MOST_LETTERS} letters, got {value!r:.60}"
-        )
-    return value
-
-
-def three(what: str, value: Any) -> None:
-    """Three finite numbers that a place may have; ``InvalidValueError`` for anything else."""
-    if not isinstance(value, tuple) or len(value) != 3:
-        raise InvalidValueError(f"{what} must be three numbers, got {value!r:.60}")
-    for number in value:
-        within(what, number, -FAR_M, FAR_M)
-
-
-def within(what: str, value: Any, low: float, high: float) -> float:
-    """A finite number in [low, high]; ``InvalidValueError`` for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
-        raise InvalidValueError(f"{what} must be a number, got {value!r:.60}")
-    if not low <= value <= high:
-        raise InvalidValueError(f"{what} must lie in [{low:g}, {high:g}], got {value!r:.60}")
-    return float(value)

@@ -23,9 +23,10 @@ from typing import Any
 import numpy as np
 
 from scenes.assembly import hull_radius
+from sim.core.checks import FAR_M, within, word
 from sim.world import hands
 from sim.world.populated import VISITOR
-from sim.world.requests import FAR_M, Kidnap, MoveDoor, Push, carry_out, within, word
+from sim.world.requests import Kidnap, MoveDoor, Push, carry_out
 from sim.world.world import World
 from slam.bounded import text_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError

@@ -31,6 +31,7 @@ from sim.core.engine import engine
 from sim.core.seeds import Seeds
 from sim.world import sessions, substeps
 from sim.world.populated import crowd_for, crowded, populated, with_visitors
+from sim.world.robots import robot_of, with_robot
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from sim.world.times_of_day import time_of
 from slam.errors import InvalidValueError
@@ -58,6 +59,7 @@ class World:
     start     (x m, y m, heading rad) of the robot instead of the scene's; a crowd that is put into
               the scene is put around it, one that is in a built ``Scene`` stays where it is
     chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.castors``)
+    robot     another than the scene's (``sim.world.robots``), by its name or from its tables
     visitors  people who are outside until ``admit`` lets them in
     options   passed on to ``scenes.build`` when the scene is given by name, e.g. ``n_chairs=10``;
               ``scan_height_m`` and ``crowd`` are some that every scene has; the crowd is the
@@ -80,6 +82,7 @@ class World:
         start: Sequence[float] | None = None,
         chairs: str = "planar",
         visitors: int = 0,
+        robot: str | Mapping[str, Any] | None = None,
         **options: Any,
     ) -> None:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
@@ -95,6 +98,9 @@ class World:
             built = crowded(opened, crowd, start, session, as_many_as_fit=given is None)
             change = 0.0
         built = with_visitors(built, visitors)
+        self.robot = None if robot is None else robot_of(robot)
+        if self.robot is not None:
+            built, drive = with_robot(built, self.robot), drive or self.robot.drive
         self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
         self.model: mujoco.MjModel = self.scene.compile()
         self.data = mujoco.MjData(self.model)
