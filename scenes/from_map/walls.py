@@ -23,14 +23,14 @@ DOTS, ROW_M, GAP_M = 6, 0.6, 0.35  # cells of a dotted wall, its least length, i
 DENSE = 0.75  # share of a dotted wall that is within ROW_REACH_M of its cells
 ROW_REACH_M = 0.05  # as REACH_M, of a dotted wall
 COVER_M = 0.05  # a cell so near to a box is built
-ENOUGH = 0.965  # share of the cells that is
+ENOUGH = 0.97  # share of the cells that is
 BRIDGE_M = 0.13  # gaps up to that, in a wall seen now and then, are closed
 
 
 def disc(metres: float, cell_m: float) -> NDArray[np.uint8]:
     """A disc of that diameter for OpenCV's morphology."""
     n = max(1, 2 * round(0.5 * metres / cell_m) + 1)
-    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (n, n)), dtype=np.uint8)
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (n, n)).astype(np.uint8)
 
 
 def bridged(occupied: Mask, cell_m: float) -> Mask:
