@@ -7,6 +7,7 @@ A plan with another mark, or with too few words in one, is refused: it would be 
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -30,6 +31,7 @@ WRITTEN = {
     "seat": "seat:KIND:N",
     "spot": "spot:KIND:N",
     "bin": "bin:ROOM:N",
+    "bounds": "bounds:NAME",
 }
 NEEDED = ("room", "start")
 
@@ -54,7 +56,7 @@ def marks(spec: mujoco.MjSpec) -> tuple[Mark, ...]:
     return tuple(
         Mark(
             words=tuple(site.name.split(":")),
-            pose=(float(site.pos[0]), float(site.pos[1]), _yaw(site)),
+            pose=(float(site.pos[0]), float(site.pos[1]), yaw_of(site)),
             half=(float(site.size[0]), float(site.size[1])),
         )
         for site in spec.sites
@@ -99,9 +101,8 @@ def check_marks(source: str, found: Sequence[Mark], parts: Collection[str]) -> N
         )
 
 
-def _yaw(site: mujoco.MjsSite) -> float:
-    return (
-        float(site.alt.euler[2])
-        if site.alt.type == mujoco.mjtOrientation.mjORIENTATION_EULER
-        else 0.0
-    )
+def yaw_of(element: mujoco.MjsSite | mujoco.MjsGeom) -> float:
+    """rad by which what lies flat is turned, however its file says so."""
+    if element.alt.type == mujoco.mjtOrientation.mjORIENTATION_EULER:
+        return float(element.alt.euler[2])
+    return 2.0 * math.atan2(float(element.quat[3]), float(element.quat[0]))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scenes import look
 from scenes.assembly import Assembly, moved, part_marks, quaternion
 from scenes.kinds import KINDS
-from scenes.marks import Mark, check_marks, check_written, marks
+from scenes.marks import Mark, check_marks, check_written, marks, yaw_of
 from scenes.mjcf import check_materials, ours, parsed
 from scenes.scene import Pose
 from scenes.views import add_cameras
@@ -68,8 +68,8 @@ class Plan:
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """xmin, ymin, xmax, ymax of all rooms, m."""
-        rects = [mark.rect for mark in self.find("room")]
+        """xmin, ymin, xmax, ymax of all rooms, m; or of the mark ``bounds:NAME``, where one is."""
+        rects = [m.rect for m in self.find("bounds")] or [m.rect for m in self.find("room")]
         low = [min(rect[i] for rect in rects) for i in (0, 1)]
         high = [max(rect[i] for rect in rects) for i in (2, 3)]
         return low[0], low[1], high[0], high[1]
@@ -80,7 +80,7 @@ class Plan:
         if self._boxes is not None:
             return self._boxes
         walls = [
-            [geom.pos[0], geom.pos[1], geom.size[0], geom.size[1], 0.0]
+            [geom.pos[0], geom.pos[1], geom.size[0], geom.size[1], yaw_of(geom)]
             for geom in self.spec.geoms
             if geom.name.partition(":")[0] in look.WALLS
         ]
@@ -131,13 +131,16 @@ class Plan:
             side = JAMB_OFFSET if mark.words[2] == "right" else -JAMB_OFFSET
             self.furnish("door_frame", moved(mark.pose, (0.0, side, 0.0)))
 
-    def wall(self, name: str, pos: tuple[float, float], half: tuple[float, float]) -> None:
-        """A wall of its usual height, along x or y."""
+    def wall(
+        self, name: str, pos: tuple[float, float], half: tuple[float, float], yaw: float = 0.0
+    ) -> None:
+        """A wall of its usual height."""
         self.spec.worldbody.add_geom(
             name=f"wall:{name}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
             pos=[*pos, 0.5 * WALL_HEIGHT],
             size=[*half, 0.5 * WALL_HEIGHT],
+            quat=quaternion(yaw),
             material="wall",
             contype=1,
             conaffinity=0,

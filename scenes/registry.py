@@ -7,9 +7,11 @@ import difflib
 import importlib
 import inspect
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from scenes import SCAN_HEIGHT
+from slam.bounded import check_file
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.names import first_line, join_folders, refuse_code
 
@@ -66,7 +68,8 @@ def build(
     crowd: str = "none",
     **options: Any,
 ) -> Scene:
-    """The scene of that name and seed; ``module:function`` names any recipe.
+    """The scene of that name and seed; ``module:function`` names any recipe,
+    and the path of a TOML or MJCF file the scene that it describes (``scenes.from_file``).
 
     scan_height_m  of the robot's scanner above the floor, 0.05 to 1 m
     crowd          who is there besides, like "escorts:6,boards:2" (``scenes.crowd``)
@@ -95,18 +98,30 @@ def build(
 
 def find(name: str) -> Recipe:
     """What makes the scene of that name; raises as ``build`` does for names."""
+    if is_file(name):
+        from scenes.from_file import recipe  # MuJoCo
+
+        return recipe(name)
     refuse_code(name, "scene")
     return _load(name) if ":" in name else _find(name)
 
 
+def is_file(name: str) -> bool:
+    """Whether a name of a scene is the path of its file."""
+    return name.endswith((".toml", ".xml"))
+
+
 def check_name(name: str) -> None:
     """Raise what ``build`` raises for a name that nothing is registered under; import nothing."""
+    if is_file(name):
+        check_file(Path(name))
+        return
     if ":" in name or name in OWN or name in _recipes:
         return
     near = difflib.get_close_matches(name, names(), n=1)
     hint = f" Did you mean '{near[0]}'?" if near else ""
     raise UnknownNameError(
-        f"no scene is called '{name}'.{hint} Known: {', '.join(names())}, or module:function."
+        f"no scene is called '{name}'.{hint} Known: {', '.join(names())}, module:function, or a file (.toml, .xml)."
     )
 
 

@@ -35,7 +35,7 @@ VERBS: dict[str, type[Verb]] = {
     "demo": Verb, "run": Verb, "render": Verb, "generate": Verb, "verify": Verb, "export": Verb,
     "list": Verb, "config": Verb, "bench": Verb, "doctor": Verb, "sensor-card": Verb,
     "reproduce": Verb, "compare": ManyValues, "benchmark": ManyValues, "drive": ManyValues,
-    "blame": ManyValues, "live": ManyValues, "report": Verb, "lifelong": Verb,
+    "blame": ManyValues, "live": ManyValues, "report": Verb, "lifelong": Verb, "twin": Verb,
 }  # fmt: skip
 for _name, _kind in VERBS.items():
     _own = {"list": "listing"}.get(_name, _name.replace("-", "_"))

@@ -48,6 +48,20 @@ CrowdOption = Annotated[
         "this motion (mobilia config crowds).",
     ),
 ]
+EventsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--events",
+        help="TOML file of what happens when: pushes, doors, people who enter, the robot carried.",
+    ),
+]
+RobotOption = Annotated[
+    str | None,
+    typer.Option(
+        "--robot",
+        help="Another robot than the scene's: turtlebot3, pioneer3dx, f1tenth, or a TOML file.",
+    ),
+]
 MotionLevels = Annotated[
     list[str] | None, typer.Option("--motion", help="Levels of motion alone, or one to hold.")
 ]
@@ -133,6 +147,15 @@ class Held:
 def options_with(crowd: str | None) -> dict[str, Any]:
     """A crowd among the options of a scene."""
     return {} if crowd is None else {"crowd": crowd}
+
+
+def staged(events: Path | None, robot: str | None) -> dict[str, Any]:
+    """The events of a file and the tables of a robot, as ``Simulation`` takes them."""
+    from sim.world.robots import read_robot
+    from sim.world.script import read_events
+
+    given = {} if events is None else {"events": read_events(events)}
+    return given if robot is None else {**given, "robot": read_robot(robot)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,6 +26,7 @@ from sim.sensors.odometry.encoders import WheelOdometry
 from sim.sensors.tag_cameras import TagCameras, TagReading
 from sim.world.kidnapping import Kidnapping
 from sim.world.labels import BeamLabeller
+from sim.world.script import Script, cues_of, visitors
 from sim.world.sweep import Sweep
 from sim.world.world import World
 from slam.errors import InvalidValueError
@@ -43,6 +44,7 @@ from slam.frames import (
 # Of a state, by their words in it.
 _PARTS = {
     "tags": "ceiling cameras are", "kidnaps": "kidnaps are", "changed": "a moment of change is",
+    "events": "events are",
 }  # fmt: skip
 MOST_FRAMES = 1 << 31  # of one simulation: almost two years
 
@@ -62,6 +64,8 @@ class Simulation:
     session    number of a session of the same building (``sim.world.sessions``)
     kidnap_every_s  s after which the robot is carried elsewhere, again and again
                (``sim.world.kidnapping``); None: never
+    events     what happens at stated times, as rows of ``sim.world.script``; None: nothing
+    robot      another than the scene's, by name or from its tables (``sim.world.robots``)
     laser      a scanner by name ("utm30lx", "lms221:noise"; ``sim.sensors.lidar.registry``), a
                ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
@@ -88,6 +92,8 @@ class Simulation:
         change_at_s: float | None = None,
         session: int | None = None,
         kidnap_every_s: float | None = None,
+        events: Sequence[Mapping[str, Any]] | None = None,
+        robot: str | Mapping[str, Any] | None = None,
         laser: ScannerConfig | str | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
@@ -97,12 +103,13 @@ class Simulation:
         labels: bool = False,
         **options: Any,
     ) -> None:
-        drive = drive or DriveConfig()
         rates = Dynamism.of(dynamism, moving_share, motion=motion, change=change)
+        cues = cues_of(events or ())
         self.world = World(
             scene, seed=seed, dynamism=rates, change=change, session=session, drive=drive,
-            start=start, chairs=chairs, **options,
+            start=start, chairs=chairs, visitors=visitors(cues), robot=robot, **options,
         )  # fmt: skip
+        self._script = Script(cues, self.world) if cues else None
         self.odometry_preset, self.session = odometry, session
         seeds = self.world.seeds
         self._change_at_s = checked_moment(change_at_s, session)
@@ -111,7 +118,8 @@ class Simulation:
         if kidnap_every_s is not None:
             self._kidnapping = Kidnapping(kidnap_every_s, seeds)
         self.laser = LaserScanner(self.world.model, laser, seeds.generator("lidar"))
-        self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=drive.track)
+        track = self.world.drive_config.track
+        self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=track)
         self._labeller = BeamLabeller(self.world) if labels else None
         self._tags = self._tag_cameras(tags)
         self._stamp_ns = 0
@@ -187,6 +195,8 @@ class Simulation:
         """Let one scan's worth of time pass: ``look`` or ``blink`` comes next, and only once."""
         if self._kidnapping is not None:
             self._kidnapping.carried(self.world)
+        if self._script is not None:
+            self._script.happen(self.world)
         self.rearranged = self._changed_out_of_sight()
         self._stamp_ns = self._sweep.over_scan(self.world, self.laser, self._tags)
         self.contacts = self.world.take_contacts()
@@ -248,6 +258,7 @@ class Simulation:
                 "scanner": self.laser.scanner.name,
                 **({} if kidnaps is None else {"kidnaps": kidnaps}),
                 **({} if self._change_at_s is None else {"changed": self._changed}),
+                **({} if self._script is None else {"events": self._script.done}),
             },
         )  # fmt: skip
 
@@ -258,6 +269,8 @@ class Simulation:
         self._changed = bool(words.get("changed", False))
         if self._kidnapping is not None:
             self._kidnapping.load(arrays, words["kidnaps"])
+        if self._script is not None:
+            self._script.done = [bool(each) for each in words["events"]]
         own = {k.removeprefix("scan."): v for k, v in arrays.items() if k.startswith("scan.")}
         self.laser.load(own, words.get("scan", {}))
         self.world.load_state(arrays["world"].tobytes())
@@ -285,7 +298,8 @@ class Simulation:
                 f"the state is of scanner '{words.get('scanner')}', expected '{own_name}'"
             )
         for what, own_part in (
-            ("tags", self._tags), ("kidnaps", self._kidnapping), ("changed", self._change_at_s)
+            ("tags", self._tags), ("kidnaps", self._kidnapping), ("changed", self._change_at_s),
+            ("events", self._script),
         ):  # fmt: skip
             if (words.get(what) is None) != (own_part is None):
                 raise InvalidValueError(f"{_PARTS[what]} in the state or in the simulation only")

@@ -36,7 +36,17 @@ if TYPE_CHECKING:
 
 # Of a run's settings.
 KNOBS = ("motion", "change", "crowd")
-SIMULATED = ("scene", "seconds", "seed", "dynamism", *KNOBS, "scan_height_m", "laser")
+SIMULATED = (
+    "scene",
+    "seconds",
+    "seed",
+    "dynamism",
+    *KNOBS,
+    "scan_height_m",
+    "laser",
+    "events",
+    "robot",
+)
 
 
 @dataclass(eq=False, kw_only=True)

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlsplit
 
-from scripts.live.requests import MOST_LETTERS
+from sim.core.checks import MOST_LETTERS
 from slam.errors import InvalidValueError
 
 log = logging.getLogger(__name__)

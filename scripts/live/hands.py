@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
-from scripts.live.requests import Drive, Kidnap, MoveDoor, OnWorld, Push, Touch, Tour
+from scripts.live.requests import Drive, OnWorld, Touch, Tour
 from sim.driving.pilot import Pilot
 from sim.moments import Moment, observed
 from sim.simulation import Simulation, n_frames
 from sim.world import hands
+from sim.world.requests import MoveDoor, Push, carry_out
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S
 
@@ -56,32 +56,9 @@ class Hands:
         if isinstance(request, Tour):
             self.client_drives = False
             return "the built-in driver drives"
-        if isinstance(request, Push):
-            return self._push(request)
-        if isinstance(request, MoveDoor):
-            return self._door(request)
         if isinstance(request, Touch):
             return self._touch(request)
-        return self._kidnap(request)
-
-    def _push(self, request: Push) -> str:
-        world = self.simulation.world
-        rx, ry, _ = world.robot_pose().tolist()
-        name = request.name or hands.nearest(world, hands.pushable(world), rx, ry)[0]
-        heading = request.heading
-        if heading is None:
-            rows = [k for k, own in enumerate(world.mover_names) if own == name]
-            x, y = world.mover_poses()[rows[0], :2].tolist() if rows else (rx, ry)
-            heading = math.atan2(y - ry, x - rx)
-        speed = hands.push(world, name, request.speed, heading)
-        return f"{name} is pushed at {speed:.2g} m/s to {math.degrees(heading):.0f} deg"
-
-    def _door(self, request: MoveDoor) -> str:
-        world = self.simulation.world
-        rx, ry, _ = world.robot_pose().tolist()
-        name = request.name or hands.nearest(world, world.doors.names, rx, ry)[0]
-        hands.hold_door(world, name, opened=request.opened, seconds=request.seconds)
-        return f"{name} is held {'open' if request.opened else 'shut'} for {request.seconds:g} s"
+        return carry_out(self.simulation.world, request)
 
     def _touch(self, request: Touch) -> str:
         world = self.simulation.world
@@ -95,11 +72,5 @@ class Hands:
                 f"({request.x:.2f}, {request.y:.2f})"
             )
         if name in doors:
-            return self._door(MoveDoor(opened=True, name=name))
-        return self._push(Push(name=name))
-
-    def _kidnap(self, request: Kidnap) -> str:
-        world = self.simulation.world
-        pose = request.pose or hands.free_goal(world, request.goal)
-        hands.carry(world, pose)
-        return f"the robot is carried to ({pose[0]:.2f}, {pose[1]:.2f})"
+            return carry_out(world, MoveDoor(opened=True, name=name))
+        return carry_out(world, Push(name=name))

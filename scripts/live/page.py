@@ -23,9 +23,6 @@ from scripts.live.requests import (
     Anew,
     Click,
     Drive,
-    Kidnap,
-    MoveDoor,
-    Push,
     Request,
     Run,
     Seek,
@@ -35,6 +32,7 @@ from scripts.live.requests import (
 )
 from scripts.live.session import Session
 from sim.view.moment import Shown
+from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import MobiliaError
 from slam.system import names as slams
 

@@ -3,15 +3,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Any
 
-from sim.world.hands import MOST_HOLD_S, MOST_SPEED
+from sim.core.checks import FAR_M, three, within, word
+from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError
 
-MOST_LETTERS = 100  # of a name
-FAR_M = 1e6  # no place of a scene is farther away
 MOST_TWIST = 1e3  # m/s and rad/s; the drive clips to what it can do
 MOST_SCANS = 1000  # of a step
 
@@ -34,33 +31,6 @@ class Tour:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Push:
-    """Push a thing; "" for the nearest to the robot. ``heading`` rad, None: away from the robot."""
-
-    name: str = ""
-    speed: float = 1.0
-    heading: float | None = None
-
-    def __post_init__(self) -> None:
-        word("push: name", self.name)
-        within("push: speed", self.speed, 0.05, MOST_SPEED)
-        within("push: heading", self.heading or 0.0, -100.0, 100.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class MoveDoor:
-    """Hold a door, "" for the nearest to the robot, open or shut for so long, s."""
-
-    opened: bool
-    name: str = ""
-    seconds: float = 20.0
-
-    def __post_init__(self) -> None:
-        word("door: name", self.name)
-        within("door: seconds", self.seconds, 0.1, MOST_HOLD_S)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Touch:
     """A click at (x, y) m in the world: push the thing there away from the robot, open the door.
 
@@ -75,19 +45,6 @@ class Touch:
         word("touch: name", self.name)
         for axis, value in (("x", self.x), ("y", self.y)):
             within(f"touch: {axis}", value, -FAR_M, FAR_M)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Kidnap:
-    """Carry the robot to a pose (m, m, rad) in the world, to a goal, or to the farthest goal."""
-
-    pose: tuple[float, float, float] | None = None
-    goal: str = ""
-
-    def __post_init__(self) -> None:
-        word("kidnap: goal", self.goal)
-        if self.pose is not None:
-            three("kidnap: pose", self.pose)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,29 +125,3 @@ class Anew:
 OnWorld = Drive | Tour | Push | MoveDoor | Touch | Kidnap
 OnView = Run | Step | Seek | Speed
 Request = OnWorld | OnView | Click | Anew
-
-
-def word(what: str, value: Any) -> str:
-    """A name; ``InvalidValueError`` for anything else."""
-    if not isinstance(value, str) or len(value) > MOST_LETTERS or not value.isprintable():
-        raise InvalidValueError(
-            f"{what} must be a name of up to {MOST_LETTERS} letters, got {value!r:.60}"
-        )
-    return value
-
-
-def three(what: str, value: Any) -> None:
-    """Three finite numbers that a place may have; ``InvalidValueError`` for anything else."""
-    if not isinstance(value, tuple) or len(value) != 3:
-        raise InvalidValueError(f"{what} must be three numbers, got {value!r:.60}")
-    for number in value:
-        within(what, number, -FAR_M, FAR_M)
-
-
-def within(what: str, value: Any, low: float, high: float) -> float:
-    """A finite number in [low, high]; ``InvalidValueError`` for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
-        raise InvalidValueError(f"{what} must be a number, got {value!r:.60}")
-    if not low <= value <= high:
-        raise InvalidValueError(f"{what} must lie in [{low:g}, {high:g}], got {value!r:.60}")
-    return float(value)

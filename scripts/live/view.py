@@ -16,7 +16,6 @@ from scripts.live.requests import (
     Anew,
     Click,
     Drive,
-    Kidnap,
     OnView,
     OnWorld,
     Request,
@@ -26,6 +25,7 @@ from scripts.live.requests import (
 )
 from scripts.live.served import Served
 from sim.view.moment import Shown
+from sim.world.requests import Kidnap
 from slam.errors import InvalidValueError, MobiliaError
 
 IDLE_S = 0.05  # between two looks at the inbox while nothing moves

@@ -15,11 +15,14 @@ from scripts.options import (
     Change,
     Cluster,
     CrowdOption,
+    EventsOption,
     Held,
     Jobs,
     Motion,
+    RobotOption,
     Scanner,
     options_with,
+    staged,
     sweep,
 )
 from slam.errors import InvalidValueError
@@ -69,6 +72,8 @@ def generate(
     jobs: Jobs = 1,
     cluster: Cluster = None,
     scanner: Scanner = "full",
+    events: EventsOption = None,
+    robot: RobotOption = None,
 ) -> None:
     """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
 
@@ -94,6 +99,7 @@ def generate(
     first = Recipe(
         scene=scene[0], seed=seed, dynamism=levels[0], motion=motion, change=change,
         seconds=seconds, scanner=scanner, options=options_with(crowd),
+        **staged(events, robot),
     )  # fmt: skip
     plan = Plan(
         recipe=first, dynamisms=levels, twins=twins, sessions=sessions, split=parts,

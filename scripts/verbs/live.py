@@ -13,7 +13,18 @@ from rich.markup import escape
 from scripts.console import note, say
 from scripts.live import FASTEST, SLOWEST
 from scripts.names import check
-from scripts.options import Change, CrowdOption, DynamismLevel, Held, Motion, Scanner, Set
+from scripts.options import (
+    Change,
+    CrowdOption,
+    DynamismLevel,
+    EventsOption,
+    Held,
+    Motion,
+    RobotOption,
+    Scanner,
+    Set,
+    staged,
+)
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
@@ -38,6 +49,8 @@ def live(
     motion: Motion = None,
     change: Change = None,
     crowd: CrowdOption = None,
+    events: EventsOption = None,
+    robot: RobotOption = None,
     seed: Annotated[int, typer.Option(help="Seed of the scene, whole number >= 0.")] = 0,
     scanner: Scanner = "full",
     paused: Annotated[bool, typer.Option("--paused", help="Wait for play.")] = False,
@@ -75,7 +88,7 @@ def live(
     allowed = [gate.origin_of(text) for text in allow_origin or []]
     served.require()
     held = Held(motion=motion, change=change, crowd=crowd)
-    world = {**held.world(scene, dynamism, seed), "laser": scanner}
+    world = {**held.world(scene, dynamism, seed), "laser": scanner, **staged(events, robot)}
     opener = opened.Opener(
         slams=slams, path=path, settings=world if path is None else {}, seconds=seconds
     )

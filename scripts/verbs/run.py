@@ -13,10 +13,12 @@ from scripts.options import (
     Change,
     CrowdOption,
     DynamismLevel,
+    EventsOption,
     Held,
     Motion,
     Oracles,
     Overwrite,
+    RobotOption,
     ScanHeight,
     Scanner,
     Seconds,
@@ -24,6 +26,7 @@ from scripts.options import (
     Set,
     Strict,
     TextFormat,
+    staged,
     with_oracles,
 )
 from slam.errors import InvalidValueError
@@ -55,6 +58,8 @@ def run(
     motion: Motion = None,
     change: Change = None,
     crowd: CrowdOption = None,
+    events: EventsOption = None,
+    robot: RobotOption = None,
     seed: Seed = 0,
     scan_height: ScanHeight = 0.36,
     scanner: Scanner = "full",
@@ -97,6 +102,7 @@ def run(
         held = Held(motion=motion, change=change, crowd=crowd)
         settings = held.world(scene, dynamism, seed) | {
             "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
+            **staged(events, robot),
         }  # fmt: skip
         on_scene(slams, settings, outputs)
     elif log is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The differential drive: commanded twist, ramped wheel speeds, true rolled wheel travel.
+"""The drive, differential or car-like: commanded twist, ramped wheel speeds, true wheel travel.
 
 Wheels turn exactly as commanded (a stiff motor loop) and pull the robot through tyre servos whose
 force is limited by grip. So ``travel_m`` is what a perfect encoder counts, and it parts from the
@@ -33,6 +33,7 @@ class DriveConfig:
     v_max, omega_max  m/s, rad/s; commands beyond are clipped
     accel, alpha      m/s2, rad/s2 of the ramp
     track             m between the wheels
+    turn_radius       m, of the tightest turn of a car; 0: it turns on the spot
     """
 
     v_max: float = 1.0
@@ -40,6 +41,7 @@ class DriveConfig:
     accel: float = 1.0
     alpha: float = 3.0
     track: float = 0.33
+    turn_radius: float = 0.0
 
     def __post_init__(self) -> None:
         check_types(self)
@@ -47,6 +49,8 @@ class DriveConfig:
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
                 raise InvalidValueError(f"DriveConfig.{name} must be > 0, got {value}")
+        if not 0.0 <= self.turn_radius < math.inf:
+            raise InvalidValueError(f"DriveConfig.turn_radius must be >= 0, got {self.turn_radius}")
 
 
 @njit
@@ -56,11 +60,19 @@ def toward(value: float, target: float, step: float) -> float:
 
 
 @njit
+def steered(v: float, omega: float, turn_radius: float) -> float:
+    """``omega`` as far as wheels that steer no tighter than ``turn_radius`` m can turn; 0: all."""
+    if turn_radius <= 0.0:
+        return omega
+    return min(max(omega, -abs(v) / turn_radius), abs(v) / turn_radius)
+
+
+@njit
 def ramp(drive: Record, limits: NDArray[np.float64]) -> None:
     """One tick of the ramp, and the wheel speeds that follow; ``limits`` as ``Drive.limits``."""
-    speed_step, turn_step, half = limits
+    speed_step, turn_step, half, turn_radius = limits
     drive.v = toward(drive.v, drive.asked_v, speed_step)
-    drive.omega = toward(drive.omega, drive.asked_omega, turn_step)
+    drive.omega = steered(drive.v, toward(drive.omega, drive.asked_omega, turn_step), turn_radius)
     drive.left, drive.right = drive.v - half * drive.omega, drive.v + half * drive.omega
 
 
@@ -76,7 +88,8 @@ class Drive:
 
     state   (1,) of ``STATE``
     tyres   (2,) actuators left, right, which take the wheels' surface speeds
-    limits  (3,) change of v and omega in a tick of ``tick`` s at most, half the track m
+    limits  (4,) change of v and omega in a tick of ``tick`` s at most, half the track m, tightest
+            turn m
     """
 
     def __init__(self, model: mujoco.MjModel, config: DriveConfig, tick: float) -> None:
@@ -84,7 +97,9 @@ class Drive:
         self.state = np.zeros(1, STATE)
         names = ("robot/tyre_l", "robot/tyre_r")
         self.tyres = np.array([model.actuator(name).id for name in names], dtype=np.int64)
-        self.limits = np.array([config.accel * tick, config.alpha * tick, 0.5 * config.track])
+        self.limits = np.array(
+            [config.accel * tick, config.alpha * tick, 0.5 * config.track, config.turn_radius]
+        )
 
     def command(self, v: float, omega: float) -> None:
         """Ask for a twist, m/s and rad/s; clipped to the limits, reached by the ramp."""

@@ -13,6 +13,8 @@ import numpy as np
 
 from slam.errors import InvalidValueError
 
+MOST_LETTERS = 100  # of a name
+FAR_M = 1e6  # no place of a scene is farther away
 _NUMBER = (float, int, np.floating, np.integer)
 # annotation -> what it says in words, and the types that will do
 _PLAIN = MappingProxyType(
@@ -117,3 +119,29 @@ def switch(name: str, value: Any) -> None:
     """``InvalidValueError`` unless ``value`` is True or False, NumPy's too."""
     if not isinstance(value, (bool, np.bool_)):
         raise InvalidValueError(f"{name} must be True or False, got {value!r}")
+
+
+def word(what: str, value: Any) -> str:
+    """A name; ``InvalidValueError`` for anything else."""
+    if not isinstance(value, str) or len(value) > MOST_LETTERS or not value.isprintable():
+        raise InvalidValueError(
+            f"{what} must be a name of up to {MOST_LETTERS} letters, got {value!r:.60}"
+        )
+    return value
+
+
+def three(what: str, value: Any) -> None:
+    """Three finite numbers that a place may have; ``InvalidValueError`` for anything else."""
+    if not isinstance(value, tuple) or len(value) != 3:
+        raise InvalidValueError(f"{what} must be three numbers, got {value!r:.60}")
+    for number in value:
+        within(what, number, -FAR_M, FAR_M)
+
+
+def within(what: str, value: Any, low: float, high: float) -> float:
+    """A finite number in [low, high]; ``InvalidValueError`` for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
+        raise InvalidValueError(f"{what} must be a number, got {value!r:.60}")
+    if not low <= value <= high:
+        raise InvalidValueError(f"{what} must lie in [{low:g}, {high:g}], got {value!r:.60}")
+    return float(value)

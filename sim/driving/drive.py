@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.actors.config import ACTORS
+from sim.actors.robot import steered
 from sim.core.checks import check_types
 from sim.driving.navgrid import NavGrid
 from slam._jit import njit
@@ -38,6 +39,7 @@ class TourConfig:
     robot_radius_m              clearance kept to walls and discs (Pioneer 3-DX: 0.26 m + margin)
     goal_radius_m               a goal counts as visited within this distance
     patience_s                  without progress for this long, the next goal is tried
+    turn_radius_m               of the tightest turn of a car; 0: it turns on the spot
     """
 
     v_max_mps: float = 0.7
@@ -45,11 +47,13 @@ class TourConfig:
     robot_radius_m: float = 0.285
     goal_radius_m: float = 0.5
     patience_s: float = 6.0
+    turn_radius_m: float = 0.0
 
     def __post_init__(self) -> None:
         check_types(self)
         for name in self.__dataclass_fields__:
-            if not getattr(self, name) > 0.0:
+            value = getattr(self, name)
+            if not (value > 0.0 or (value == 0.0 and name == "turn_radius_m")):
                 raise InvalidValueError(f"TourConfig.{name} must be > 0, got {getattr(self, name)}")
 
 
@@ -91,11 +95,12 @@ def _nearest_disc(discs: NDArray[np.float64], x: float, y: float, t: float) -> f
 
 
 @njit
-def _score(
+def _score(  # noqa: PLR0913 (kernel)
     pose: NDArray[np.float64],
     now: NDArray[np.float64],
     v_asked: float,
     omega_asked: float,
+    turn_radius: float,
     discs: NDArray[np.float64],
     grid: tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, float, float],
 ) -> float:
@@ -112,6 +117,7 @@ def _score(
         t = _STEP_S * step
         v += min(max(v_asked - v, -_ACCEL * _STEP_S), _ACCEL * _STEP_S)
         omega += min(max(omega_asked - omega, -_ALPHA * _STEP_S), _ALPHA * _STEP_S)
+        omega = steered(v, omega, turn_radius)
         x += _STEP_S * v * math.cos(theta + 0.5 * _STEP_S * omega)
         y += _STEP_S * v * math.sin(theta + 0.5 * _STEP_S * omega)
         theta += _STEP_S * omega
@@ -137,12 +143,12 @@ def _score(
 def _choose(
     pose: NDArray[np.float64],
     now: NDArray[np.float64],
-    limits: tuple[float, float],
+    limits: tuple[float, float, float],
     discs: NDArray[np.float64],
     grid: tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, float, float],
 ) -> tuple[float, float, float]:
     """The best (v, omega) of the window, and its score."""
-    v_max, omega_max = limits
+    v_max, omega_max, turn_radius = limits
     best_v, best_omega, best = 0.0, 0.0, -_FAR
     for a in range(-1, 7):
         v = v_max * a / 6.0
@@ -152,7 +158,7 @@ def _choose(
             omega = omega_max * b / 6.0
             if a < 0 and abs(b) > 3:
                 continue
-            score = _score(pose, now, v, omega, discs, grid)
+            score = _score(pose, now, v, omega, turn_radius, discs, grid)
             if a <= 0:
                 score -= _STANDING
             if score > best:
@@ -215,7 +221,7 @@ class Driver:
         v, omega, _ = _choose(
             np.asarray(T_world_robot, dtype=np.float64),
             np.asarray(velocity, dtype=np.float64),
-            (self.config.v_max_mps, self.config.omega_max_radps),
+            (self.config.v_max_mps, self.config.omega_max_radps, self.config.turn_radius_m),
             np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 5),
             (self._walls.clearance, to_go, grid.x0, grid.y0, grid.cell, radius, self.look_ahead_m),
         )

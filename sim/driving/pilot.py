@@ -8,6 +8,7 @@ loop steers ``sim.driving.drive.Driver`` with an estimate instead.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from scenes.kinds import kind_of
 from sim.actors.config import ACTORS
 from sim.driving.drive import Driver, TourConfig, tour
 from sim.driving.navgrid import NavGrid
+from sim.world.robots import Robot
 from sim.world.world import World
 from slam import se2
 from slam._jit import njit
@@ -26,8 +28,26 @@ SIGHT_M, AJAR, REPLAN_S, DECIDE_S = _D.sight_m, _D.ajar_rad, _D.replan_s, _D.dec
 LEAF_DISCS, LEAF_M = _D.leaf_discs, _D.leaf_m
 BODY, DOOR, ROBOT = 0, 1, 2
 PARTS = 3  # discs of what is long: its middle and its two ends
+SPARE_M = 0.005  # of the clearance beyond the footprint
 LEAP_M = 0.5  # m beyond what the wheels can do; a robot that got so far was carried
 LEAP_MPS = 10.0  # m/s; what is faster was put there by hand (``sim.actors.rearranging``)
+
+
+def tour_of(robot: Robot | None) -> TourConfig:
+    """How a robot drives round a room, None the scenes' own: at its pace, but not above the usual.
+
+    Its clearance is that of the disc about its axle that holds its footprint.
+    """
+    usual = TourConfig()
+    if robot is None:
+        return usual
+    return replace(
+        usual,
+        v_max_mps=min(usual.v_max_mps, robot.drive.v_max),
+        omega_max_radps=min(usual.omega_max_radps, robot.drive.omega_max),
+        robot_radius_m=round(robot.radius + abs(robot.ahead_m) + SPARE_M, 9),
+        turn_radius_m=robot.drive.turn_radius,
+    )
 
 
 class Pilot:
@@ -41,7 +61,7 @@ class Pilot:
     ) -> None:
         self.world = world
         scene = world.scene
-        config = config or TourConfig()
+        config = config or tour_of(world.robot)
         self._doors = np.array([m.group == "door" for m in scene.movers], dtype=np.bool_)
         self._closed = world.bodies.hinges([m.name for m in scene.movers if m.group == "door"])[
             :, 2

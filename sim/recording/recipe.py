@@ -9,7 +9,8 @@ import json
 import os
 import platform
 import re
-from collections.abc import Mapping
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import metadata
 from pathlib import Path
@@ -27,6 +28,8 @@ from sim.sensors.odometry.config import PRESETS
 from sim.simulation import Simulation, checked_moment
 from sim.twins.twins import TWINS
 from sim.world.kidnapping import Kidnapping
+from sim.world.robots import robot_of
+from sim.world.script import cues_of
 from sim.world.times_of_day import checked
 from sim.world.world import World
 from slam.bounded import text_of
@@ -40,7 +43,7 @@ MAX_BYTES = 1 << 16
 MAX_SECONDS = 86_400.0
 _AXES = ("motion", "change")
 # Added since the first recipes: without a word where they are None.
-_LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s")
+_LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s", "events", "robot")
 # Words for some of these in the name of an episode.
 _WORDS = {"share": "moving_share", "at": "change_at_s", "kidnap": "kidnap_every_s"}
 _DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "rosbags")
@@ -69,6 +72,8 @@ class Recipe:
     moving_share  in [0, 1]: of chairs and loads, on the move at any time; None: as motion says
     change_at_s  the one moment, s, at which things out of sight are put elsewhere; None: all along
     kidnap_every_s  s after which the robot is carried elsewhere, again and again; None: never
+    events      what happens at stated times (``sim.world.script``); None: nothing
+    robot       tables of another robot than the scene's (``sim.world.robots``); None: its own
     """
 
     scene: str
@@ -86,6 +91,8 @@ class Recipe:
     moving_share: float | None = None
     change_at_s: float | None = None
     kidnap_every_s: float | None = None
+    events: Sequence[Mapping[str, Any]] | None = None
+    robot: Mapping[str, Any] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -127,6 +134,12 @@ class Recipe:
                 raise InvalidValueError(
                     f"Recipe.kidnap_every_s and twin exclude each other: {self.twin}"
                 )
+        if self.robot is not None:
+            robot_of(self.robot)
+        if self.events is not None:
+            cues_of(self.events)
+            if self.twin:
+                raise InvalidValueError(f"Recipe.events and twin exclude each other: {self.twin}")
         if self.session is not None:
             checked(self.session)
             if self.twin:
@@ -173,7 +186,8 @@ class Recipe:
         """Of the episode's folder: ``office-d0.5-m0.2-c0-s0001``; at the end the twin's name.
 
         ``-m`` is motion and ``-c`` change, where they are given; so are ``-share`` for
-        ``moving_share``, ``-at`` for ``change_at_s`` and ``-kidnap`` for ``kidnap_every_s``.
+        ``moving_share``, ``-at`` for ``change_at_s`` and ``-kidnap`` for ``kidnap_every_s``, and
+        ``-events`` with a checksum of them.
         """
         scene = re.sub(r"[^A-Za-z0-9_.]+", "-", self.scene).strip("-.")
         twin = f"-{self.twin}" if self.twin else ""
@@ -182,6 +196,10 @@ class Recipe:
         level = "".join(f"-{letter}{at:.4g}" for letter, at in levels if at is not None)
         more = [(word, getattr(self, field)) for word, field in _WORDS.items()]
         level += "".join(f"-{word}{at:.9g}" for word, at in more if at is not None)
+        if self.robot is not None:
+            level += "-" + re.sub(r"[^A-Za-z0-9]+", "-", self.robot["name"])
+        if self.events is not None:
+            level += f"-events{zlib.crc32(json.dumps(self.events, sort_keys=True).encode()):08x}"
         return f"{scene}{level}-s{self.seed:04d}{session}{twin}"
 
     def words(self) -> dict[str, Any]:

@@ -105,20 +105,29 @@ def carry(world: World, pose: Sequence[float]) -> None:
     world.carry((x, y, yaw))
 
 
-def in_the_way(world: World, x: float, y: float) -> str:
-    """What keeps the robot from standing at (x, y) m; "" for nothing."""
+def walled(world: World, x: float, y: float, radius: float | None = None) -> str:
+    """What keeps a disc from ever standing at (x, y) m; "" for nothing. Default the robot's."""
     robot = world.bodies.robot
     if robot is None:
         return "the scene has no robot"
-    own = float(world.bodies.radius[robot])
+    own = float(world.bodies.radius[robot]) if radius is None else radius
     xmin, ymin, xmax, ymax = world.scene.bounds
     if not (xmin + own <= x <= xmax - own and ymin + own <= y <= ymax - own):
         return f"the floor reaches from ({xmin:g}, {ymin:g}) to ({xmax:g}, {ymax:g})"
     boxes = np.ascontiguousarray(world.scene.obstacles, dtype=np.float64)
     if box_clearance(x, y, boxes) < own:
         return "a wall or furniture is there"
+    return ""
+
+
+def in_the_way(world: World, x: float, y: float, radius: float | None = None) -> str:
+    """What keeps a disc, default the robot's, from standing at (x, y) m now; "" for nothing."""
+    taken, robot = walled(world, x, y, radius), world.bodies.robot
+    if taken or robot is None:
+        return taken
+    own = float(world.bodies.radius[robot]) if radius is None else radius
     for mover, place in zip(world.scene.movers, world.mover_poses().tolist(), strict=True):
-        if mover.group == "robot":
+        if mover.group == "robot" and radius is None:
             continue
         long = mover.group == "door" or kind_of(mover.kind).half_length_m > 0.0
         for at, radius in _discs(mover.kind, mover.group, place, mover.radius, long):

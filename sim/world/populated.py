@@ -8,14 +8,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from scenes import build
+import mujoco
+import numpy as np
+
+from scenes import build, look
+from scenes.assembly import Assembly, hull_radius
+from scenes.builder import stand
 from scenes.crowd import Crowd, crowd_of, mix
 from scenes.crowd_kinds import with_crowd
-from scenes.scene import Scene
+from scenes.scene import Mover, Scene
+from sim.actors.rearranging import place_out
 from sim.core.checks import instance, numbers
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from slam.errors import InvalidValueError
+
+VISITOR = "visitor"  # their names begin so
+_STREAM = 101  # of a scene's seed, for their clothes; that of its crowd is 100
 
 
 def populated(
@@ -68,3 +77,29 @@ def _begun(scene: Scene, start: Sequence[float] | None) -> Scene:
     if not math.isfinite(x + y + yaw):
         return scene  # what is wrong is said where the robot is placed
     return replace(scene, start=(x, y, yaw), initial={**scene.initial, "robot": (x, y, yaw)})
+
+
+def with_visitors(scene: Scene, n: int) -> Scene:
+    """The scene with ``n`` people more, who are out of the building until they enter."""
+    if n == 0:
+        return scene
+    rng, parts = np.random.default_rng([scene.seed, _STREAM]), Assembly()
+    movers, initial = [], {}
+    for k in range(n):
+        name, pose = f"{VISITOR}{k}", place_out(len(scene.movers) + k, scene.bounds)
+        paint = look.dress(rng)
+
+        def prepare(child: mujoco.MjSpec, paint: Any = paint, pose: Any = pose) -> None:
+            for geom in child.geoms:
+                geom.material = paint.get(geom.material, geom.material)
+            stand(child, pose)
+
+        parts.put("person", name, (0.0, 0.0, 0.0), prepare)
+        movers.append(Mover(name=name, kind="person", radius=hull_radius("person")))
+        initial[name] = pose
+    spec = scene.spec.copy()
+    parts.into(spec)
+    return replace(
+        scene, spec=spec, movers=(*scene.movers[:-1], *movers, scene.movers[-1]),
+        initial={**scene.initial, **initial},
+    )  # fmt: skip

@@ -54,7 +54,7 @@ class Robot(NamedTuple):
     push       ``qfrc_constraint``: anything but 0 at the robot's dofs is a touch
     touches    where these are collected
     drive      (1,) state, see ``sim.actors.robot``; tyres  (2,) actuators left, right
-    limits     (3,) largest change of speed m/s and turn rate rad/s in a tick, half the track m
+    limits     (4,) of ``sim.actors.robot.Drive``
     """
 
     at: tuple[int, int]

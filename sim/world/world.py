@@ -30,7 +30,8 @@ from sim.core.dynamism import Dynamism
 from sim.core.engine import engine
 from sim.core.seeds import Seeds
 from sim.world import sessions, substeps
-from sim.world.populated import crowd_for, crowded, populated
+from sim.world.populated import crowd_for, crowded, populated, with_visitors
+from sim.world.robots import robot_of, with_robot
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from sim.world.times_of_day import time_of
 from slam.errors import InvalidValueError
@@ -58,6 +59,8 @@ class World:
     start     (x m, y m, heading rad) of the robot instead of the scene's; a crowd that is put into
               the scene is put around it, one that is in a built ``Scene`` stays where it is
     chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.castors``)
+    robot     another than the scene's (``sim.world.robots``), by its name or from its tables
+    visitors  people who are outside until ``admit`` lets them in
     options   passed on to ``scenes.build`` when the scene is given by name, e.g. ``n_chairs=10``;
               ``scan_height_m`` and ``crowd`` are some that every scene has; the crowd is the
               scene's mix at this motion (``scenes.crowd``) where none is given
@@ -78,6 +81,8 @@ class World:
         drive: DriveConfig | None = None,
         start: Sequence[float] | None = None,
         chairs: str = "planar",
+        visitors: int = 0,
+        robot: str | Mapping[str, Any] | None = None,
         **options: Any,
     ) -> None:
         self.seeds = seed if isinstance(seed, Seeds) else Seeds(seed)
@@ -92,6 +97,10 @@ class World:
             crowd = crowd_for(scene, given, self.rates)
             built = crowded(opened, crowd, start, session, as_many_as_fit=given is None)
             change = 0.0
+        built = with_visitors(built, visitors)
+        self.robot = None if robot is None else robot_of(robot)
+        if self.robot is not None:
+            built, drive = with_robot(built, self.robot), drive or self.robot.drive
         self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
         self.model: mujoco.MjModel = self.scene.compile()
         self.data = mujoco.MjData(self.model)
@@ -109,7 +118,7 @@ class World:
         self.scene.place(self.model, self.data)
         if start is not None:
             self.bodies.place_robot(self.data, start)
-        self.people.start(self.data)
+        self.people.start(self.data, waiting=visitors)
         mujoco.mj_forward(self.model, self.data)
         self._pinned = substeps.loose()
         self._room = self._tables()
@@ -247,6 +256,14 @@ class World:
             raise InvalidValueError(f"scene '{self.scene.name}' has no robot")
         self.bodies.put(self.data, [self.bodies.robot], np.array([pose], dtype=np.float64))
         self._drive.halt()
+
+    def admit(self, names: Sequence[str], poses: Float) -> None:
+        """Let people who are outside stand at (k, 3) poses and go where they like from now on."""
+        rows = self.bodies.rows(names)
+        self.bodies.put(self.data, rows.tolist(), poses)
+        for name in names:
+            self.people.enter(self.data, name, self.step_count / SUBSTEPS_PER_S)
+        self.bodies.put(self.data, rows.tolist(), poses)  # with their limbs under them
 
     def robot_pose(self) -> Float:
         """(3,) ``T_world_robot``: x m, y m, heading rad (not wrapped)."""

@@ -142,8 +142,11 @@ class People:
                     state["turn_rate"][i] = ACTORS.holding.turn_most
         return leaders_of([planar.index(name) for name in leaders], lines.rows)
 
-    def start(self, data: mujoco.MjData) -> None:
-        """Draw who everyone is, and put their feet under them where ``data`` says they stand."""
+    def start(self, data: mujoco.MjData, *, waiting: int = 0) -> None:
+        """Draw who everyone is, and put their feet under them where ``data`` says they stand.
+
+        waiting  so many, the last ones, stay where they are until they ``enter``
+        """
         state, task, draws = self.crowd.state, self.crowd.task, self.crowd.draws
         for i in range(len(self.names)):
             numbers = ACTORS.walking
@@ -157,7 +160,16 @@ class People:
             n_goals = max(len(self.table.field.times), 1)
             goal = int(uniform(draws, i) * n_goals)
             task["goal"][i] = goal
+        state["stay_until"][len(self.names) - waiting :] = math.inf
         self.stand(data)
+
+    def enter(self, data: mujoco.MjData, name: str, time_s: float) -> None:
+        """Somebody who waited stands where ``data`` says and sets off."""
+        i, t = self.names.index(name), self.table
+        self.crowd.state["stay_until"][i] = time_s
+        gait.stand(data.qpos, t.torsos[i : i + 1], self.feet[i : i + 1])
+        physics, mocap = (data.qpos, data.qvel), (data.mocap_pos, data.mocap_quat)
+        gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.sitting, mocap)
 
     def dress(self) -> None:
         """Let the model follow who sits: hulls that meet no chair, torsos lowered."""

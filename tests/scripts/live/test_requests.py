@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scripts.live.requests import Anew, Click, Drive, Kidnap, MoveDoor, Push, Seek, Step, Touch
+from scripts.live.requests import Anew, Click, Drive, Seek, Step, Touch
+from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError
 
 KINDS = (Anew, Click, Drive, Kidnap, MoveDoor, Push, Seek, Step, Touch)

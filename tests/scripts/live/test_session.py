@@ -11,13 +11,14 @@ import pytest
 
 from scripts.live.hands import Hands
 from scripts.live.opened import Opener
-from scripts.live.requests import Anew, Drive, Kidnap, MoveDoor, Push, Touch
+from scripts.live.requests import Anew, Drive, Touch
 from sim.moments import toured
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe
 from sim.simulation import Simulation
 from sim.view.moment import Path
 from sim.view.parts import STATIC, Parts, Placed
+from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError, NeedsLabelsError, UnknownNameError
 from slam.frames import Frame
 

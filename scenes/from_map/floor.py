@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Free floor as rooms, spots to visit and passages between rooms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import njit
+from slam.errors import InvalidValueError
+
+Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Rect = tuple[float, float, float, float]
+Point = tuple[float, float]
+
+ROBOT_M = 0.36  # from the robot's middle to what it must not touch, as in ``scenes.arrangement``
+START_M, GOAL_M = 0.7, 0.6  # of floor round the robot's start, round a spot to visit
+ROOM_M = 0.65  # half the width of floor that is no passage
+GOALS_M = 4.0  # from one spot to visit to the next
+MAX_GOALS = 60
+LEAST_M2 = 2.0  # of floor that the robot can reach
+WALLED = 0.4  # share of a room's edge that is wall
+CELL_M = 0.1  # on which rooms are cut into rectangles
+RECT_M = 0.4  # least side of such a rectangle
+MAX_RECTS, ROOM_RECTS = 300, 60  # rectangles of a plan, of a room
+
+
+@dataclass(frozen=True, kw_only=True)
+class Passage:
+    """A way from one room to another that is narrower than both.
+
+    at       x m, y m of its middle; rad of the line from side to side
+    wide_m   between its sides          rooms  the two it connects
+    """
+
+    at: tuple[float, float, float]
+    wide_m: float
+    rooms: tuple[int, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Floor:
+    """What was found, in the frame of the map.
+
+    rooms  (room, its rectangles)     goals  (x, y) m
+    """
+
+    start: tuple[float, float, float]
+    goals: tuple[Point, ...]
+    rooms: tuple[tuple[Rect, ...], ...]
+    passages: tuple[Passage, ...]
+    area_m2: float
+
+
+def clearance(free: Mask, cell_m: float) -> Float:
+    """m from each cell to what is not free; beyond the picture nothing is."""
+    padded = np.pad(free.astype(np.uint8), 1)
+    far = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+    return np.asarray(np.maximum(far.astype(np.float64) - 0.5, 0.0) * cell_m)
+
+
+def reachable(clear: Float, at: tuple[int, int]) -> Mask:
+    """Cells that the robot's middle can get to from a cell."""
+    _, labels = cv2.connectedComponents((clear >= ROBOT_M).astype(np.uint8), connectivity=4)
+    return np.asarray(labels == labels[at]) if labels[at] else np.zeros(clear.shape, dtype=bool)
+
+
+def start_cell(clear: Float, wanted: tuple[int, int] | None, source: str) -> tuple[int, int]:
+    """Where the robot starts: there if there is room, else the middle of the largest floor."""
+    if wanted is not None and clear[wanted] >= ROBOT_M:
+        return wanted
+    n, labels, stats, _ = cv2.connectedComponentsWithStats(
+        (clear >= ROBOT_M).astype(np.uint8), connectivity=4
+    )
+    if n < 2:
+        raise InvalidValueError(
+            f"{source}: no free floor where a robot of {ROBOT_M} m radius has room; expected rooms "
+            "of free cells inside walls of occupied ones (is it a map, are its thresholds right?)"
+        )
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    own = np.where(labels == largest, clear, 0.0)
+    row, column = np.unravel_index(int(np.argmax(own)), own.shape)
+    return int(row), int(column)
+
+
+def spots(
+    clear: Float, floor: Mask, first: tuple[int, int], cell_m: float
+) -> list[tuple[int, int]]:
+    """Cells to visit, wide places first, each some metres from the others and from the start."""
+    left = np.where(floor & (clear >= GOAL_M), np.minimum(clear, 2.0), 0.0)
+    if not left.any():
+        left = np.where(floor, clear, 0.0)
+    found: list[tuple[int, int]] = []
+    away = round(GOALS_M / cell_m)
+    _clear_around(left, first, away // 2)
+    while len(found) < MAX_GOALS and left.any():
+        row, column = np.unravel_index(int(np.argmax(left)), left.shape)
+        found.append((int(row), int(column)))
+        _clear_around(left, found[-1], away)
+    if not found:  # one small room: its far end
+        rows, columns = np.nonzero(floor)
+        k = int(np.argmax((rows - first[0]) ** 2 + (columns - first[1]) ** 2))
+        found.append((int(rows[k]), int(columns[k])))
+    return found
+
+
+def _clear_around(field: Float, at: tuple[int, int], n: int) -> None:
+    """Set a disc of ``n`` cells to 0."""
+    i, j = at
+    rows, columns = slice(max(i - n, 0), i + n + 1), slice(max(j - n, 0), j + n + 1)
+    part = field[rows, columns]
+    y, x = np.ogrid[: part.shape[0], : part.shape[1]]
+    part[(y + rows.start - i) ** 2 + (x + columns.start - j) ** 2 <= n * n] = 0.0
+
+
+def rooms_of(clear: Float, floor: Mask) -> NDArray[np.int32]:
+    """A number for each cell of floor: of the wide place that it drains to; 0 elsewhere."""
+    wide = ((clear >= ROOM_M) & floor).astype(np.uint8)
+    n, seeds = cv2.connectedComponents(wide, connectivity=8)
+    if n < 2:
+        return floor.astype(np.int32)
+    markers = seeds.astype(np.int32) + 1
+    markers[(seeds == 0) & floor] = 0
+    markers[~floor] = 1
+    steep = np.uint8(255) - np.minimum(clear / ROOM_M * 254.0, 254.0).astype(np.uint8)
+    cv2.watershed(cv2.merge([steep, steep, steep]), markers)
+    labels = np.where(markers > 1, markers - 1, 0).astype(np.int32)
+    # watershed leaves lines of -1: give them to a neighbour
+    lines = (markers == -1) & floor
+    grown = cv2.dilate(labels.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
+    labels[lines] = grown[lines]
+    return labels
+
+
+def outdoors(labels: NDArray[np.int32], built: Mask) -> list[int]:
+    """Rooms whose edge is wall for less than ``WALLED`` of its length: what is seen through a gap.
+
+    None where all are so.
+    """
+    n = int(labels.max()) + 1
+    near = cv2.dilate(built.astype(np.uint8), np.ones((3, 3), np.uint8))
+    edge, walled = np.zeros(n), np.zeros(n)
+    for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        next_ = np.roll(labels, (dy, dx), axis=(0, 1))
+        rim = (labels > 0) & (next_ == 0)
+        edge += np.bincount(labels[rim], minlength=n)
+        walled += np.bincount(labels[rim & (near > 0)], minlength=n)
+    known = np.flatnonzero(edge > 0)
+    found = [k for k in known.tolist() if walled[k] < WALLED * edge[k]]
+    return found if len(found) < len(known) else []
+
+
+def rectangles(
+    inside: Mask, least: int, most: int, share: float
+) -> list[tuple[int, int, int, int]]:
+    """Largest rectangles of set cells, (row, column, row, column) half open, until most is covered."""
+    left, found = inside.copy(), []
+    total = int(inside.sum())
+    while len(found) < most and left.sum() > (1.0 - share) * total:
+        r0, c0, r1, c1 = _largest(left)
+        if min(r1 - r0, c1 - c0) < least:
+            break
+        found.append((r0, c0, r1, c1))
+        left[r0:r1, c0:c1] = False
+    return found
+
+
+@njit
+def _largest(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """The largest rectangle of set cells, by the heights of columns above each row."""
+    rows, columns = mask.shape
+    height = np.zeros(columns + 1, dtype=np.int64)
+    stack = np.zeros(columns + 1, dtype=np.int64)
+    best, found = 0, (0, 0, 0, 0)
+    for i in range(rows):
+        for j in range(columns):
+            height[j] = height[j] + 1 if mask[i, j] else 0
+        depth = 0
+        for j in range(columns + 1):
+            while depth > 0 and height[stack[depth - 1]] >= height[j]:
+                depth -= 1
+                high = height[stack[depth]]
+                left = stack[depth - 1] + 1 if depth > 0 else 0
+                if high * (j - left) > best:
+                    best = high * (j - left)
+                    found = (i - high + 1, left, i + 1, j)
+            stack[depth] = j
+            depth += 1
+    return found
+
+
+def passages_of(labels: NDArray[np.int32], clear: Float, cell_m: float) -> Sequence[Passage]:
+    """Where two rooms meet."""
+    found = []
+    edge = np.zeros(labels.shape, dtype=np.uint8)
+    pairs = np.zeros((*labels.shape, 2), dtype=np.int32)
+    for shift in ((0, 1), (1, 0)):
+        a = labels[: labels.shape[0] - shift[0], : labels.shape[1] - shift[1]]
+        b = labels[shift[0] :, shift[1] :]
+        meet = (a != b) & (a > 0) & (b > 0)
+        part = edge[: a.shape[0], : a.shape[1]]
+        part[meet] = 1
+        low, high = np.minimum(a, b), np.maximum(a, b)
+        pairs[: a.shape[0], : a.shape[1]][meet] = np.stack([low[meet], high[meet]], axis=1)
+    n, lines, stats, _ = cv2.connectedComponentsWithStats(edge, connectivity=8)
+    for k in range(1, n):
+        x, y, w, h = stats[k, :4].tolist()
+        rows, columns = np.nonzero(lines[y : y + h, x : x + w] == k)
+        rows, columns = rows + y, columns + x
+        widest = int(np.argmax(clear[rows, columns]))
+        row, column = int(rows[widest]), int(columns[widest])
+        points = np.column_stack([columns, rows]).astype(np.float64)
+        across = points - points.mean(axis=0)
+        xx, yy, xy = (across[:, 0] ** 2).sum(), (across[:, 1] ** 2).sum(), across.prod(axis=1).sum()
+        yaw = 0.5 * float(np.arctan2(2.0 * xy, xx - yy))
+        wide = 2.0 * float(clear[row, column])
+        rooms = tuple(int(v) for v in pairs[row, column])
+        at = ((column + 0.5) * cell_m, (row + 0.5) * cell_m, yaw)
+        found.append(Passage(at=at, wide_m=wide, rooms=(rooms[0], rooms[1])))
+    return found

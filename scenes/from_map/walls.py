@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Occupied cells as few long boxes."""
+
+from __future__ import annotations
+
+import heapq
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.from_map.thin import chains, thinned
+
+Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SHELL_M = 0.08  # of what is solid, only so much below its surface is built: nothing sees the rest
+REACH_M = 0.10  # cells that far to the side of a line are of its wall
+THIN_M, THICK_M = 0.02, 0.08  # half thickness of a wall
+LONG_M = 0.3  # a box that is longer is no dot of a dotted wall
+DOTS, ROW_M, GAP_M = 6, 0.6, 0.35  # cells of a dotted wall, its least length, its widest gap
+DENSE = 0.75  # share of a dotted wall that is within ROW_REACH_M of its cells
+ROW_REACH_M = 0.05  # as REACH_M, of a dotted wall
+COVER_M = 0.05  # a cell so near to a box is built
+ENOUGH = 0.97  # share of the cells that is
+BRIDGE_M = 0.13  # gaps up to that, in a wall seen now and then, are closed
+
+
+def disc(metres: float, cell_m: float) -> NDArray[np.uint8]:
+    """A disc of that diameter for OpenCV's morphology."""
+    n = max(1, 2 * round(0.5 * metres / cell_m) + 1)
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (n, n)).astype(np.uint8)
+
+
+def bridged(occupied: Mask, cell_m: float) -> Mask:
+    """Occupied cells, and the gaps of dotted walls between them."""
+    ones = np.pad(occupied.astype(np.uint8), 8)
+    closed = cv2.morphologyEx(ones, cv2.MORPH_CLOSE, disc(BRIDGE_M, cell_m))
+    return np.asarray(closed[8:-8, 8:-8] > 0)
+
+
+def boxes_of(occupied: Mask, cell_m: float, tolerance_m: float) -> Float:
+    """(n, 5) boxes cx, cy, half length, half thickness m, yaw rad, in the frame of the cells.
+
+    The middle lines of walls, straightened until they would be off by ``tolerance_m``; each box
+    then takes the place and the thickness of the cells beside it.
+    """
+    whole = bridged(occupied, cell_m)
+    n = round(SHELL_M / cell_m)
+    inner = cv2.erode(np.pad(whole.astype(np.uint8), 1), disc(2 * SHELL_M, cell_m))[1:-1, 1:-1]
+    hollow = whole & ~cv2.erode(inner, np.ones((3, 3), np.uint8)).astype(bool) if n else whole
+    around = _Around(occupied, cell_m)
+    found = []
+    for chain in chains(thinned(hollow)):
+        points = np.array(chain, dtype=np.int32)[:, ::-1].reshape(-1, 1, 2)
+        for share in (0.5, 1.0, 1.5):
+            corners = cv2.approxPolyDP(points, share * tolerance_m / cell_m, closed=False)
+            line = (corners.reshape(-1, 2) + 0.5) * cell_m
+            if len(line) == 1:
+                line = np.vstack([line, line])
+            for a, b in zip(line[:-1], line[1:], strict=True):
+                box = around.box(a, b)
+                if box is not None:
+                    found.append(box)
+    drawn = np.array(found, dtype=np.float64).reshape(-1, 5)
+    dotted = _dotted(drawn, around, occupied, cell_m)
+    return _needed(np.vstack([drawn, dotted]), occupied, cell_m)
+
+
+def _dotted(boxes: Float, around: _Around, occupied: Mask, cell_m: float) -> Float:
+    """Boxes along straight rows of cells, with gaps, that no long box covers."""
+    left = occupied.astype(np.uint8)
+    for box in boxes[2.0 * boxes[:, 2] > LONG_M]:
+        window, inside = footprint(box, left.shape, cell_m, COVER_M)
+        left[window] &= 1 - inside
+    lines = cv2.HoughLinesP(
+        left, 1, math.pi / 360.0, DOTS, minLineLength=ROW_M / cell_m, maxLineGap=GAP_M / cell_m
+    )
+    if lines is None:
+        return np.zeros((0, 5))
+    ends = (np.asarray(lines, dtype=np.float64).reshape(-1, 2, 2) + 0.5) * cell_m
+    near = cv2.dilate(occupied.astype(np.uint8), disc(2.0 * ROW_REACH_M, cell_m))
+    rows = []
+    for a, b in ends:
+        box = around.box(a, b, ROW_REACH_M)
+        if box is None:
+            continue
+        window, inside = footprint(np.array(box), left.shape, cell_m)
+        if (near[window] & inside).sum() >= DENSE * inside.sum():
+            rows.append(box)
+    return np.array(rows).reshape(-1, 5)
+
+
+def _needed(boxes: Float, occupied: Mask, cell_m: float) -> Float:
+    """The fewest of those boxes that cover ``ENOUGH`` of the cells: the best of the rest each time."""
+    number = np.full(occupied.shape, -1)
+    number[occupied] = np.arange(int(occupied.sum()))
+    cells, covered = [], np.zeros(int(occupied.sum()), dtype=bool)
+    for box in boxes:
+        window, inside = footprint(box, number.shape, cell_m, COVER_M)
+        under = number[window][inside > 0]
+        cells.append(under[under >= 0])
+    queue = [(-len(own), k) for k, own in enumerate(cells)]
+    heapq.heapify(queue)
+    kept: list[int] = []
+    while queue and covered.sum() < ENOUGH * len(covered):
+        _, k = heapq.heappop(queue)
+        gain = int((~covered[cells[k]]).sum())
+        if queue and -gain > queue[0][0]:  # another one has become better
+            if gain:
+                heapq.heappush(queue, (-gain, k))
+            continue
+        covered[cells[k]] = True
+        kept.append(k)
+    return boxes[sorted(kept)]
+
+
+def footprint(
+    box: Float, shape: tuple[int, ...], cell_m: float, more_m: float = 0.0
+) -> tuple[tuple[slice, slice], NDArray[np.uint8]]:
+    """Rows and columns around a box that is larger by ``more_m``, and which cells of them it holds."""
+    x, y, a, b, yaw = box.tolist()
+    c, s, a, b = math.cos(yaw), math.sin(yaw), a + more_m, b + more_m
+    reach = np.array([abs(a * c) + abs(b * s), abs(a * s) + abs(b * c)])
+    low = np.floor((np.array([x, y]) - reach) / cell_m).astype(int)
+    high = np.ceil((np.array([x, y]) + reach) / cell_m).astype(int)
+    rows = slice(max(int(low[1]), 0), max(min(int(high[1]), shape[0]), 0))
+    columns = slice(max(int(low[0]), 0), max(min(int(high[0]), shape[1]), 0))
+    i, j = np.ogrid[rows, columns]
+    dx, dy = (j + 0.5) * cell_m - x, (i + 0.5) * cell_m - y
+    inside = (abs(c * dx + s * dy) <= a) & (abs(c * dy - s * dx) <= b)
+    return (rows, columns), inside.astype(np.uint8)
+
+
+class _Around:
+    """Occupied cells by place."""
+
+    def __init__(self, occupied: Mask, cell_m: float) -> None:
+        self._occupied, self._cell = occupied, cell_m
+
+    def box(self, a: Float, b: Float, reach_m: float = REACH_M) -> list[float] | None:
+        """The box of the cells along a line from ``a`` to ``b``; None where there are none."""
+        length = math.hypot(*(b - a).tolist())
+        ahead = (b - a) / length if length > 0.0 else np.array([1.0, 0.0])
+        left = np.array([-ahead[1], ahead[0]])
+        low = np.floor((np.minimum(a, b) - reach_m) / self._cell).astype(int)
+        high = np.ceil((np.maximum(a, b) + reach_m) / self._cell).astype(int)
+        x0, y0 = max(int(low[0]), 0), max(int(low[1]), 0)
+        rows, columns = np.nonzero(self._occupied[y0 : int(high[1]), x0 : int(high[0])])
+        cells = (np.column_stack([columns + x0, rows + y0]) + 0.5) * self._cell - a
+        u, v = (cells * ahead).sum(axis=1), (cells * left).sum(axis=1)
+        end = 0.5 * self._cell
+        own = (abs(v) <= reach_m) & (u >= -end) & (u <= length + end)
+        if not own.any():
+            return None
+        u, v = u[own], v[own]
+        slope = _slope(u, v) if length > 0.4 else 0.0
+        offsets = v - slope * (u - 0.5 * length)
+        near, far = np.percentile(offsets, [12.0, 88.0]).tolist()
+        half = min(max(0.5 * (far - near) + 0.3 * self._cell, THIN_M), THICK_M)
+        middle = a + 0.5 * length * ahead + 0.5 * (near + far) * left
+        yaw = math.atan2(ahead[1], ahead[0]) + math.atan(slope)
+        return [*middle.tolist(), 0.5 * length + end, half, yaw]
+
+
+def _slope(u: Float, v: Float) -> float:
+    """Of the straight line through (u, v), least squares."""
+    du = u - u.mean()
+    spread = float((du * du).sum())
+    return float((du * (v - v.mean())).sum()) / spread if spread > 0.0 else 0.0

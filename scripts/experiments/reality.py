@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Does simulation predict reality? SLAMs on real logs and on the logs' twins, rank against rank.
+
+python -m scripts.experiments.reality predict --data DATA
+python -m scripts.experiments.reality real --data DATA
+python -m scripts.experiments.reality page
+
+``predict`` runs every SLAM on every twin and writes the errors down. ``real`` needs that file,
+which it does not change, and runs the same on the logs. ``page`` sets them side by side.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import rankdata, spearmanr
+
+from scripts.console import note
+from scripts.log_twin.make import REFERENCE, made, recorded
+from slam import create
+from slam.errors import InvalidValueError, MobiliaError
+from slam.evaluation.metrics import ate
+from slam.files import write_text
+from slam.frames import Frame
+from slam.replay import Replay
+from slam.trajectory import Trajectory
+
+LOGS = {
+    "intel": "intel/intel-corrected.log.xz",
+    "fhw": "fhw_museum/fhw-corrected.log.xz",
+    "csail": "mit_csail/csail-corrected.log.xz",
+    "belgioioso": "belgioioso/belgioioso-corrected.log.xz",
+    "freiburg-101": "freiburg_101/freiburg-101-corrected.log.xz",
+    "seattle": "seattle/seattle-corrected.log.xz",
+    "edmonton": "edmonton/edmonton-corrected.log.xz",
+}
+SLAMS = (
+    "shunting", "occupancy", "shunting-features", "ekf", "kiss-icp", "genz-icp", "small-gicp",
+    "karto", "odometry",
+)  # fmt: skip
+SEEDS = (0, 1)
+FOLDER = Path("docs/results")
+PREDICTED, REAL = FOLDER / "reality_predicted.json", FOLDER / "reality_real.json"
+DRAWS = 2000  # of the bootstrap over logs
+Errors = dict[str, dict[str, float | None]]
+
+
+def error_of(name: str, frames: Sequence[Frame]) -> float | None:
+    """ATE of the online poses, aligned, m; None for a SLAM that failed."""
+    replay = Replay.of({name: create(name)})
+    try:
+        for _ in replay.run(frame.without_truth() for frame in frames):
+            pass
+        online = replay.tracks[name].online()
+    except MobiliaError as error:
+        note(f"{name}: {error}")
+        return None
+    truth = Trajectory(
+        stamps_ns=np.array([frame.stamp_ns for frame in frames]),
+        poses=np.array([frame.truth for frame in frames]),
+    )
+    return round(float(ate(online, truth, align="se2").value), 4)
+
+
+def predict(data: Path, logs: Sequence[str], slams: Sequence[str]) -> None:
+    """Errors on the twins, the mean of the logarithms over seeds; kept log by log."""
+    if REAL.exists():
+        raise InvalidValueError(f"{REAL} is there: a prediction comes before what it predicts")
+    found: dict[str, Any] = json.loads(PREDICTED.read_text()) if PREDICTED.exists() else {}
+    for log in logs:
+        read = recorded(data / LOGS[log], REFERENCE)
+        row = found.setdefault(log, {"errors_m": {}, "twin": {}})
+        for seed in SEEDS:
+            with tempfile.TemporaryDirectory() as folder:
+                twin = made(read, Path(folder), seed=seed)
+            row["twin"] = twin.words["beside"]
+            frames = list(twin.stream)
+            for slam in slams:
+                errors = row["errors_m"].setdefault(slam, {})
+                if str(seed) not in errors:
+                    started = time.process_time()
+                    errors[str(seed)] = error_of(slam, frames)
+                    spent = time.process_time() - started
+                    note(f"{log} twin {seed} {slam}: {errors[str(seed)]} m, {spent:.0f} s")
+                    write_text(PREDICTED, json.dumps(found, indent=1) + "\n")
+
+
+def real(data: Path, logs: Sequence[str], slams: Sequence[str]) -> None:
+    """Errors on the logs that have been predicted, against their references."""
+    if not PREDICTED.exists():
+        raise InvalidValueError(f"{PREDICTED} is missing: predict first")
+    predicted = json.loads(PREDICTED.read_text())
+    found: Errors = json.loads(REAL.read_text()) if REAL.exists() else {}
+    for log in logs:
+        if log not in predicted:
+            raise InvalidValueError(f"{log} has no prediction in {PREDICTED}")
+        frames = recorded(data / LOGS[log], REFERENCE).frames
+        row = found.setdefault(log, {})
+        for slam in slams:
+            if slam not in row:
+                row[slam] = error_of(slam, frames)
+                note(f"{log} real {slam}: {row[slam]} m")
+                write_text(REAL, json.dumps(found, indent=1) + "\n")
+
+
+def of_seeds(errors: Mapping[str, float | None]) -> float | None:
+    """The geometric mean over seeds; None where one failed."""
+    values = list(errors.values())
+    if not values or any(value is None for value in values):
+        return None
+    return float(np.exp(np.mean(np.log([max(value, 1e-4) for value in values if value]))))
+
+
+def correlation(pairs: Mapping[str, Sequence[tuple[float, float]]]) -> tuple[float, float, float]:
+    """Mean over logs of Spearman's rank correlation, and its 95 % interval: logs drawn again."""
+    by_log = np.array([spearmanr(np.array(rows)).statistic for rows in pairs.values()])
+    draws = np.random.default_rng(0).integers(len(by_log), size=(DRAWS, len(by_log)))
+    low, high = np.quantile(by_log[draws].mean(axis=1), (0.025, 0.975))
+    return float(by_log.mean()), float(low), float(high)
+
+
+def table() -> list[str]:
+    """The page's table: a row a log, in each cell the error on the twin and on the log."""
+    predicted, measured = json.loads(PREDICTED.read_text()), json.loads(REAL.read_text())
+    slams = [s for s in SLAMS if any(s in row for row in measured.values())]
+    lines = ["| log | " + " | ".join(f"`{s}`" for s in slams) + " | ranks |"]
+    lines.append("|---|" + "---|" * (len(slams) + 1))
+    pairs: dict[str, list[tuple[float, float]]] = {}
+    for log, row in measured.items():
+        both = [(of_seeds(predicted[log]["errors_m"].get(s, {})), row.get(s)) for s in slams]
+        pairs[log] = [(a, b) for a, b in both if a is not None and b is not None]
+        rho = spearmanr(np.array(pairs[log])).statistic
+        cells = [" / ".join("–" if v is None else f"{v:.2g}" for v in pair) for pair in both]
+        lines.append(f"| {log} | " + " | ".join(cells) + f" | {rho:+.2f} |")
+    mean, low, high = correlation(pairs)
+    best = [
+        bool(np.argmin([a for a, _ in rows]) == np.argmin([b for _, b in rows]))
+        for rows in pairs.values()
+    ]
+    close = {
+        log: [(a, b) for (a, b), r in zip(rows, rankdata([a for a, _ in rows]), strict=True) if r]
+        for log, rows in pairs.items()
+    }
+    without = {log: [p for p in rows if p[0] < 1.0 and p[1] < 1.0] for log, rows in close.items()}
+    kept = {log: rows for log, rows in without.items() if len(rows) > 3}
+    lines += ["", f"Rank correlation: {mean:+.2f} (95 %: {low:+.2f} to {high:+.2f}), the mean of "
+              f"{len(pairs)} logs, logs drawn again {DRAWS} times. The best on the twin is the "
+              f"best on the log in {sum(best)} of {len(best)}."]  # fmt: skip
+    if kept:
+        mean, low, high = correlation(kept)
+        lines += ["", f"Among SLAMs that are within 1 m on both: {mean:+.2f} ({low:+.2f} to "
+                  f"{high:+.2f}), {len(kept)} logs."]  # fmt: skip
+    return lines
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """One step."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("step", choices=("predict", "real", "page"))
+    parser.add_argument("--data", type=Path, default=Path("data"), help="folder of the logs")
+    parser.add_argument("--logs", nargs="+", choices=tuple(LOGS), default=tuple(LOGS))
+    parser.add_argument("--slams", nargs="+", default=SLAMS)
+    given = parser.parse_args(arguments)
+    if given.step == "page":
+        sys.stdout.write("\n".join(table()) + "\n")
+        return 0
+    step = predict if given.step == "predict" else real
+    step(given.data, given.logs, given.slams)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A log's twin: its building, its way, its scanner, odometry as wrong as its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenes import filled
+from scenes.crowd import crowd_of
+from scenes.crowd_kinds import with_crowd
+from scenes.scene import Scene
+from scripts.log_twin.building import written_building
+from sim.core.dynamism import Dynamism
+from sim.sensors.odometry.fit import OdometryFit, fitted
+from sim.twins.log import Drive, LogTwin, scanner_like
+from slam import create
+from slam.errors import InvalidValueError
+from slam.evaluation.beside import Beside, beside
+from slam.evaluation.scanner.card import measure
+from slam.frames import Float, Frame, LaserSpec, Stream, StreamMetadata
+from slam.logs import open_log
+from slam.replay import Replay
+
+REFERENCE = "reference"
+LEAST_SCANS = 30
+SIGMA_M = 0.01  # of a log from which nothing can be measured: a SICK LMS's
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recorded:
+    """A log, read: its frames with scans, and where they were taken.
+
+    poses  (n, 3) of the robot: the log's reference, or those of a SLAM;  whose  of which
+    """
+
+    stream: Stream
+    frames: list[Frame]
+    poses: Float
+    whose: str
+
+    @property
+    def spec(self) -> LaserSpec:
+        """Of all its scans."""
+        scan = self.frames[0].scan
+        assert scan is not None
+        return scan.spec
+
+    @property
+    def odometry(self) -> Float:
+        """(n, 3) as the log has it."""
+        return np.array([frame.odometry.T_odom_robot for frame in self.frames])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Made:
+    """A twin: its frames, what they were made with, and the log beside it."""
+
+    stream: Stream
+    scene: Scene
+    fit: OdometryFit
+    beside: Beside
+    words: dict[str, Any] = field(default_factory=dict)
+
+
+def recorded(path: Path, slam: str) -> Recorded:
+    """The log at ``path``; where it has no reference, a SLAM says where its scans were taken.
+
+    Raises ``InvalidValueError`` for a log of too few scans, ``LogFormatError`` for no log.
+    """
+    stream = open_log(path)
+    frames = [frame for frame in stream if frame.scan is not None]
+    if len(frames) < LEAST_SCANS:
+        raise InvalidValueError(f"{path}: {len(frames)} scans, at least {LEAST_SCANS} are needed")
+    if slam == REFERENCE and all(frame.truth is not None for frame in frames):
+        poses = np.array([frame.truth for frame in frames])
+        return Recorded(stream=stream, frames=frames, poses=poses, whose=REFERENCE)
+    name = "shunting" if slam == REFERENCE else slam
+    replay = Replay.of({name: create(name)})
+    list(replay.run(frame.without_truth() for frame in frames))
+    replay.tracks[name].finish()
+    track = replay.tracks[name].final() or replay.tracks[name].online()
+    return Recorded(stream=stream, frames=frames, poses=np.array(track.poses), whose=name)
+
+
+def made(
+    log: Recorded,
+    folder: Path,
+    *,
+    seed: int = 0,
+    crowd: str = "none",
+    motion: float = 0.0,
+    scene: Path | None = None,
+) -> Made:
+    """The twin of a log; its building is written into ``folder``, or read from ``scene``."""
+    plan = scene or written_building(log.frames, log.poses, folder / "building.xml")
+    built = with_crowd(filled(plan, seed), crowd_of(crowd), as_many_as_fit=True)
+    fit, sigma_m, unit_m = fitted(log.odometry, log.poses), *_noise(log.stream)
+    rng = np.random.default_rng([seed, 1])
+    drive = Drive(
+        stamps_ns=np.array([frame.stamp_ns for frame in log.frames]),
+        poses=log.poses,
+        odometry=fit.drawn(log.poses, rng),
+    )
+    lives = motion > 0.0
+    twin = LogTwin(
+        built, drive, log.spec, scanner_like(log.spec, sigma_m, unit_m), seed=seed,
+        rates=Dynamism.of(Dynamism.at(0.0), motion=motion) if lives else None,
+    )  # fmt: skip
+    frames = list(twin.frames())
+    settings = {
+        "seed": seed, "crowd": crowd, "motion": motion, "poses": log.whose,
+        "sigma_m": sigma_m, "range_step_m": unit_m, "odometry": fit.words(),
+    }  # fmt: skip
+    found = beside(log.frames, frames, log.poses)
+    return Made(
+        stream=_stream(frames, log.spec, settings), scene=built, fit=fit, beside=found,
+        words={**settings, "beside": found.words()},
+    )  # fmt: skip
+
+
+def _noise(stream: Stream) -> tuple[float, float]:
+    """(one sigma m, step m of the ranges) by the log's own sensor card."""
+    card = measure(stream)
+    values = [card.figures[key].value for key in ("standing", "wall") if key in card.figures]
+    sigma = next((value for value in values if math.isfinite(value)), SIGMA_M)
+    step = card.figures["step"].value
+    return round(float(sigma), 5), round(float(step), 6) if math.isfinite(step) else 0.0
+
+
+def _stream(frames: list[Frame], spec: LaserSpec, extra: Mapping[str, Any]) -> Stream:
+    metadata = StreamMetadata(
+        source="simulation", laser=spec, truth="simulator", extra={"twin": dict(extra)}
+    )
+    return Stream(metadata=metadata, frames=lambda: frames, length=len(frames))

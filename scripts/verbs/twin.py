@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia twin``: a log driven again in simulation, in its own building."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from scripts.console import console, plain_table, say, working
+from scripts.names import check, run_name
+from scripts.options import Seed
+from slam.errors import InvalidValueError
+
+SHOWN = ("beams", "median_m", "within_5_cm", "within_10_cm")
+
+
+def twin(
+    log: Annotated[Path, typer.Argument(help="A log of any format that run --log takes.")],
+    out: Annotated[Path | None, typer.Option(help="Folder; default out/twin-<log>.")] = None,
+    poses: Annotated[
+        str,
+        typer.Option(
+            help="Where its scans were taken: the log's reference, or the final poses of a SLAM "
+            "(default where it has no reference: shunting)."
+        ),
+    ] = "reference",
+    scene: Annotated[
+        Path | None, typer.Option(help="The building, a plan in MJCF; default made of the log.")
+    ] = None,
+    crowd: Annotated[
+        str, typer.Option(help="Who is there besides: none, or like streams:6,groups:4.")
+    ] = "none",
+    motion: Annotated[float, typer.Option(help="How much they move, 0 to 1; with --crowd.")] = 0.0,
+    seed: Seed = 0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the folder's.")] = False,
+) -> None:
+    """Make the twin of a log: its building, its way at its times, its scanner, such odometry.
+
+    Writes twin.log, a recording for every verb that takes a log; building.xml, the plan;
+    twin.json and differences.png, which lay the scans of both side by side.
+
+    [bold]mobilia twin intel.log.xz --out out/intel[/bold]
+
+    [bold]mobilia run shunting --log out/intel/twin.log[/bold]
+    """
+    if poses != "reference":
+        check([poses])
+    if (crowd != "none") != (motion > 0.0) or not 0.0 <= motion <= 1.0:
+        raise InvalidValueError(
+            f"--crowd needs a --motion above 0 and up to 1, and the reverse: {crowd}, {motion:g}"
+        )
+    folder = out or Path("out") / f"twin-{run_name(log)}"
+    if (folder / "twin.json").exists() and not overwrite:
+        raise InvalidValueError(f"{folder} has a twin already: --overwrite replaces it")
+    from scripts.log_twin import make, picture
+    from slam.files import write_text
+    from slam.logs import write_carmen
+
+    folder.mkdir(parents=True, exist_ok=True)
+    with working(f"reading {log.name}"):
+        read = make.recorded(log, poses)
+    with working("building and driving its twin"):
+        made = make.made(read, folder, seed=seed, crowd=crowd, motion=motion, scene=scene)
+    write_carmen(folder / "twin.log", made.stream)
+    words = json.dumps({"log": log.name, **made.words}, indent=1)
+    write_text(folder / "twin.json", words + "\n")
+    title = f"{run_name(log)}: the twin's returns beside the log's"
+    picture.differences(folder / "differences.png", made.beside, read.poses, title)
+    table = plain_table(f"{log.name} and its twin", caption=f"poses: {read.whose}")
+    for heading in ("beams on what", *SHOWN):
+        table.add_column(heading.replace("_", " "), justify="right")
+    for name, part in made.beside.words().items():
+        table.add_row(name, *(f"{part.get(key, float('nan')):g}" for key in SHOWN))
+    console.print(table)
+    say(f"{escape(str(folder))}: look at differences.png, run SLAMs with --log twin.log")

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Other robots than the scenes' own: footprint, drive and the scanner's place, from a small TOML.
+
+A robot is a name of ``sim/robots`` or the tables of such a file (``docs/robots.md``).
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from scenes import SCAN_HEIGHT
+from scenes.scene import Scene, at_scan_height
+from sim.actors.robot import DriveConfig
+from sim.core.checks import within, word
+from slam.bounded import text_of
+from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+
+FOLDER = Path(__file__).parents[1] / "robots"
+MOST_BYTES = 1 << 14
+KINDS = ("differential", "car")
+MASS_KG = 22.0  # of the scenes' robot, to which its tyres' stiffness and grip belong
+# table -> field -> (least, most), and what is so where it is not said; None: it must be said
+_FIELDS: dict[str, dict[str, tuple[float, float, float | None]]] = {
+    "": {"mass_kg": (0.1, 500.0, None), "inertia_kgm2": (1e-4, 500.0, 0.0)},
+    "footprint": {
+        "radius_m": (0.05, 1.0, 0.0), "length_m": (0.05, 2.0, 0.0), "width_m": (0.05, 2.0, 0.0),
+        "ahead_m": (-1.0, 1.0, 0.0),
+    },
+    "drive": {
+        "track_m": (0.02, 2.0, None), "turn_radius_m": (0.05, 10.0, 0.0),
+        "v_max_mps": (0.05, 5.0, None), "omega_max_radps": (0.05, 10.0, None),
+        "accel_mps2": (0.05, 20.0, 1.0), "alpha_radps2": (0.05, 50.0, 3.0),
+    },
+    "scanner": {
+        "x_m": (-1.0, 1.0, 0.0), "y_m": (-1.0, 1.0, 0.0), "yaw_deg": (-180.0, 180.0, 0.0),
+        "height_m": (0.05, 1.0, SCAN_HEIGHT),
+    },
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robot:
+    """A robot on wheels.
+
+    half_m   (half length, half width) m of a box, or (radius,) of a circle
+    ahead_m  of the footprint's middle before the axle's, about which the robot turns
+    scanner  x m, y m, yaw rad in the robot's frame, and height m above the floor
+    """
+
+    name: str
+    mass_kg: float
+    inertia_kgm2: float
+    half_m: tuple[float, ...]
+    ahead_m: float
+    drive: DriveConfig
+    scanner: tuple[float, float, float, float]
+
+    @property
+    def radius(self) -> float:
+        """m, of the disc about the footprint's middle that holds it."""
+        return math.hypot(*self.half_m)
+
+
+def names() -> list[str]:
+    """Robots that come with the project."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def read_robot(name: str) -> dict[str, Any]:
+    """The tables of a robot by its name, or of a file; checked.
+
+    Raises ``UnknownNameError`` for neither, ``LogFormatError`` that names the file and the field.
+    """
+    path = Path(name)
+    if name in names():
+        path = FOLDER / f"{name}.toml"
+    elif path.suffix != ".toml":
+        raise UnknownNameError(
+            f"no robot is called {name!r:.80}. Known: {', '.join(names())}; or a .toml file."
+        )
+    try:
+        tables = tomllib.loads(text_of(path, MOST_BYTES))
+        robot_of(tables)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise LogFormatError(path, f"is no TOML: {error}") from error
+    except InvalidValueError as error:
+        raise LogFormatError(path, str(error)) from error
+    return tables
+
+
+def robot_of(given: str | Mapping[str, Any] | Robot) -> Robot:
+    """A robot by its name, or from its tables; ``InvalidValueError`` names the table and field."""
+    if isinstance(given, Robot):
+        return given
+    tables: Any = read_robot(given) if isinstance(given, str) else given
+    if not isinstance(tables, Mapping):
+        raise InvalidValueError(f"robot must be a name or its tables, got {tables!r:.80}")
+    own, foot = _numbers("", tables, {"name"}), _numbers("footprint", tables, {"shape"})
+    drive, place = _numbers("drive", tables, {"kind"}), _numbers("scanner", tables, set())
+    shape, kind = tables["footprint"].get("shape"), tables["drive"].get("kind")
+    sizes = {"circle": ("radius_m",), "box": ("length_m", "width_m")}
+    if shape not in sizes:
+        raise InvalidValueError(f"robot: footprint.shape must be circle or box, got {shape!r:.60}")
+    if kind not in KINDS:
+        raise InvalidValueError(
+            f"robot: drive.kind must be one of {', '.join(KINDS)}, got {kind!r:.60}"
+        )
+    for size in ("radius_m", "length_m", "width_m"):
+        if (foot[size] > 0.0) != (size in sizes[shape]):
+            raise InvalidValueError(
+                f"robot: a {shape} has {' and '.join(sizes[shape])}, see footprint.{size}"
+            )
+    if (kind == "car") != (drive["turn_radius_m"] > 0.0):
+        raise InvalidValueError("robot: drive.turn_radius_m is what a car has, and no other")
+    half = tuple(foot[s] if shape == "circle" else 0.5 * foot[s] for s in sizes[shape])
+    by_shape = 0.5 * half[0] ** 2 if shape == "circle" else (half[0] ** 2 + half[1] ** 2) / 3.0
+    return Robot(
+        name=word("robot: name", tables.get("name")),
+        mass_kg=own["mass_kg"],
+        inertia_kgm2=own["inertia_kgm2"] or own["mass_kg"] * by_shape,
+        half_m=half,
+        ahead_m=foot["ahead_m"],
+        drive=DriveConfig(
+            v_max=drive["v_max_mps"], omega_max=drive["omega_max_radps"],
+            accel=drive["accel_mps2"], alpha=drive["alpha_radps2"], track=drive["track_m"],
+            turn_radius=drive["turn_radius_m"],
+        ),
+        scanner=(place["x_m"], place["y_m"], math.radians(place["yaw_deg"]), place["height_m"]),
+    )  # fmt: skip
+
+
+def _numbers(name: str, tables: Mapping[str, Any], words: set[str]) -> dict[str, float]:
+    """The numbers of a table, with what is so where nothing is said."""
+    table = tables if not name else tables.get(name)
+    where, known = f"robot: {name}." if name else "robot: ", _FIELDS[name]
+    if not isinstance(table, Mapping):
+        raise InvalidValueError(f"robot: {name} must be a table, got {table!r:.60}")
+    unknown = sorted(set(table) - set(known) - words - (set() if name else set(_FIELDS)))
+    if unknown:
+        raise InvalidValueError(
+            f"{where}{unknown[0]:.40} is not known, only {', '.join([*sorted(words), *known])}"
+        )
+    out = {}
+    for field, (least, most, default) in known.items():
+        if field not in table and default is not None:
+            out[field] = default
+        else:
+            out[field] = within(f"{where}{field}", table.get(field), least, most)
+    return out
+
+
+def with_robot(scene: Scene, robot: Robot) -> Scene:
+    """The scene with that robot in the place of its own; the given one is left as it is."""
+    raised = at_scan_height(scene, robot.scanner[3])
+    spec = raised.spec.copy()
+    body = spec.body("robot/base")
+    share, inertia = robot.mass_kg / MASS_KG, robot.inertia_kgm2
+    body.mass, body.ipos = robot.mass_kg, [robot.ahead_m, 0.0, body.ipos[2]]
+    body.inertia = [inertia, inertia, inertia]
+    for tyre, side in (("wl", 0.5), ("wr", -0.5)):
+        site = spec.site(f"robot/{tyre}")
+        site.pos = [0.0, side * robot.drive.track, site.pos[2]]
+    for name in ("tyre_l", "tyre_r", "side"):
+        actuator = spec.actuator(f"robot/{name}")
+        actuator.forcerange = [share * limit for limit in actuator.forcerange]
+        actuator.gainprm[0] *= share
+        actuator.biasprm[2] *= share
+    laser, (x, y, yaw, height) = spec.site("robot/laser"), robot.scanner
+    laser.pos = [x, y, laser.pos[2]]
+    laser.quat = [math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)]
+    _footprint(spec, robot, (x, y, height))
+    movers = tuple(
+        replace(m, radius=robot.radius) if m.kind == "robot" else m for m in raised.movers
+    )
+    return replace(raised, spec=spec, movers=movers)
+
+
+def _footprint(spec: mujoco.MjSpec, robot: Robot, scanner: tuple[float, float, float]) -> None:
+    """The hull in its shape, and a plain body and scanner in place of the picture."""
+    box, half_height = len(robot.half_m) == 2, max(0.02, 0.5 * scanner[2] - 0.03)
+    kind = mujoco.mjtGeom.mjGEOM_BOX if box else mujoco.mjtGeom.mjGEOM_CYLINDER
+    for geom in list(spec.body("robot/base").geoms):
+        if geom.name == "robot/hull":
+            geom.pos = [robot.ahead_m, 0.0, geom.pos[2]]
+            if box:
+                geom.type, geom.size = kind, [*robot.half_m, 0.1]
+            else:
+                geom.size = [robot.half_m[0], *geom.size[1:]]
+            continue
+        spec.delete(geom)
+    size = [*robot.half_m, half_height][:3] if box else [robot.half_m[0], half_height, 0.0]
+    bodies = ((kind, size, [robot.ahead_m, 0.0, half_height + 0.01], "paint_red"),)
+    device = (mujoco.mjtGeom.mjGEOM_CYLINDER, [0.035, 0.03, 0.0], list(scanner), "plastic_black")
+    for shape, half, pos, material in (*bodies, device):
+        spec.body("robot/base").add_geom(
+            type=shape, size=half, pos=pos, material=material, mass=0.0, group=1,
+            contype=0, conaffinity=0,
+        )  # fmt: skip

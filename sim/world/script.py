@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What happens at stated times: a chair is pushed, a door opened, people enter, the robot carried.
+
+[[event]]
+at_s = 12
+push = "chair3"
+towards_m = [2.0, 1.0]
+
+Each event has ``at_s`` and one of ``push``, ``open``, ``shut``, ``enter`` and ``carry``
+(``docs/scenes.md``). It happens before the first scan from then on; the robot is carried, and
+people enter, as soon as the place is free.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenes.assembly import hull_radius
+from sim.core.checks import FAR_M, within, word
+from sim.world import hands
+from sim.world.populated import VISITOR
+from sim.world.requests import Kidnap, MoveDoor, Push, carry_out
+from sim.world.world import World
+from slam.bounded import text_of
+from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+from slam.frames import NS_PER_S
+
+MOST_EVENTS, MOST_BYTES = 1000, 1 << 18
+MOST_ENTER = 20  # people, of one event
+RINGS_M, ROUND = (0.9, 1.3, 1.7, 2.1, 2.5, 2.9), 16  # where people enter around a door or a goal
+_KEYS = {
+    "push": {"towards_m", "heading_deg", "speed_mps"}, "open": {"for_s"}, "shut": {"for_s"},
+    "enter": {"by"}, "carry": {"heading_deg"},
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Enter:
+    """``n`` people come in by a door or a goal, or at a place (x m, y m)."""
+
+    n: int
+    by: str | tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cue:
+    """A request and its time, s of the world."""
+
+    at_s: float
+    request: Push | MoveDoor | Kidnap | Enter
+
+
+def read_events(path: str | Path) -> list[dict[str, Any]]:
+    """The ``[[event]]`` tables of a TOML file, checked.
+
+    Raises ``LogFormatError`` that names the file, the event and its field.
+    """
+    path = Path(path)
+    try:
+        tables = tomllib.loads(text_of(path, MOST_BYTES))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise LogFormatError(path, f"is no TOML: {error}") from error
+    rows = tables.get("event")
+    if set(tables) != {"event"} or not isinstance(rows, list) or not rows:
+        raise LogFormatError(
+            path, f"expected [[event]] tables alone, got {', '.join(tables)!r:.80}"
+        )
+    try:
+        cues_of(rows)
+    except InvalidValueError as error:
+        raise LogFormatError(path, str(error)) from error
+    return rows
+
+
+def cues_of(rows: Sequence[Mapping[str, Any]]) -> tuple[Cue, ...]:
+    """Events in the order of their times; ``InvalidValueError`` names the event and its field."""
+    if not isinstance(rows, list | tuple) or len(rows) > MOST_EVENTS:
+        raise InvalidValueError(f"events must be at most {MOST_EVENTS} tables, got {rows!r:.80}")
+    cues = [_cue(f"event {k + 1}", row) for k, row in enumerate(rows)]
+    return tuple(sorted(cues, key=lambda cue: cue.at_s))
+
+
+def _cue(where: str, row: Mapping[str, Any]) -> Cue:
+    does = [key for key in _KEYS if isinstance(row, Mapping) and key in row]
+    if len(does) != 1:
+        raise InvalidValueError(f"{where} must have one of {', '.join(_KEYS)}, got {row!r:.80}")
+    known = {"at_s", does[0], *_KEYS[does[0]]}
+    unknown = sorted(set(row) - known)
+    if unknown:
+        raise InvalidValueError(
+            f"{where}: {unknown[0]!r:.40} is no field of {does[0]}, "
+            f"known: {', '.join(sorted(known))}"
+        )
+    at_s = within(f"{where}: at_s", row.get("at_s"), 0.0, 1e6)
+    try:
+        return Cue(at_s=at_s, request=_request(does[0], row))
+    except InvalidValueError as error:
+        raise InvalidValueError(f"{where}: {error}") from error
+
+
+def _request(does: str, row: Mapping[str, Any]) -> Push | MoveDoor | Kidnap | Enter:
+    what = row[does]
+    heading_deg = row.get("heading_deg")
+    if heading_deg is not None:
+        within("heading_deg", heading_deg, -360.0, 360.0)
+    heading = None if heading_deg is None else math.radians(heading_deg)
+    if does == "push":
+        towards = None if "towards_m" not in row else _place("towards_m", row["towards_m"])
+        if towards is not None and heading is not None:
+            raise InvalidValueError("towards_m and heading_deg exclude each other")
+        return Push(name=what, speed=row.get("speed_mps", 1.0), heading=heading, towards=towards)
+    if does in ("open", "shut"):
+        return MoveDoor(opened=does == "open", name=what, seconds=row.get("for_s", 20.0))
+    if does == "carry":
+        if isinstance(what, str):
+            return Kidnap(goal=what)
+        return Kidnap(pose=(*_place("carry", what), heading or 0.0))
+    if isinstance(what, bool) or not isinstance(what, int) or not 1 <= what <= MOST_ENTER:
+        raise InvalidValueError(f"enter must be 1 to {MOST_ENTER} people, got {what!r:.60}")
+    by = row.get("by")
+    return Enter(n=what, by=word("by", by) if isinstance(by, str) else _place("by", by))
+
+
+def _place(what: str, value: Any) -> tuple[float, float]:
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise InvalidValueError(f"{what} must be a name or [x, y] in m, got {value!r:.60}")
+    x, y = (within(what, number, -FAR_M, FAR_M) for number in value)
+    return x, y
+
+
+def visitors(cues: Sequence[Cue]) -> int:
+    """How many people enter."""
+    return sum(cue.request.n for cue in cues if isinstance(cue.request, Enter))
+
+
+class Script:
+    """Lets the events of a world happen.
+
+    Raises ``UnknownNameError`` for a thing, door or goal that the world does not have, and
+    ``InvalidValueError`` for a robot that would be carried into a wall.
+    """
+
+    def __init__(self, cues: Sequence[Cue], world: World) -> None:
+        self._cues, self.done = tuple(cues), [False] * len(cues)
+        guests = [name for name in world.people.names if name.startswith(VISITOR)]
+        self._guests: list[list[str]] = []
+        for k, cue in enumerate(cues):
+            try:
+                _check(cue.request, world)
+            except (UnknownNameError, InvalidValueError) as error:
+                raise type(error)(f"event at {cue.at_s:g} s: {error}") from error
+            n, first = visitors([cue]), visitors(cues[:k])
+            self._guests.append(guests[first : first + n])
+
+    def happen(self, world: World) -> None:
+        """Between two scans: what is due and can be done."""
+        for k, cue in enumerate(self._cues):
+            if self.done[k] or world.time_ns < round(cue.at_s * NS_PER_S):
+                continue
+            if isinstance(cue.request, Enter):
+                self.done[k] = _enter(world, self._guests[k], cue.request)
+                continue
+            try:
+                carry_out(world, cue.request)
+            except InvalidValueError:
+                if not isinstance(cue.request, Kidnap):
+                    raise
+                continue  # somebody stands there: at the next scan
+            self.done[k] = True
+
+
+def _check(request: Push | MoveDoor | Kidnap | Enter, world: World) -> None:
+    if isinstance(request, Push):
+        _known(request.name, hands.pushable(world), "thing to push")
+    elif isinstance(request, MoveDoor):
+        _known(request.name, world.doors.names, "door")
+    elif isinstance(request, Enter):
+        if isinstance(request.by, str):
+            _known(request.by, [*world.doors.names, *world.scene.goals], "door or goal")
+        if not _free(world, request.by, 1):
+            raise InvalidValueError(f"nobody finds room to enter by {request.by}")
+    elif request.pose is not None:
+        taken = hands.walled(world, *request.pose[:2])
+        if taken:
+            raise InvalidValueError(f"the robot cannot be carried to {request.pose[:2]}: {taken}")
+    else:
+        _known(request.goal, list(world.scene.goals), "goal")
+
+
+def _known(name: str, names: Sequence[str], what: str) -> None:
+    if name not in names and (name or not names):
+        raise UnknownNameError(
+            f"there is no {what} '{name:.80}' here, only: {', '.join(names) or 'none'}"
+        )
+
+
+def _enter(world: World, guests: Sequence[str], request: Enter) -> bool:
+    """Put people where they enter; whether there is room for all of them."""
+    places = _free(world, request.by, len(guests))
+    if len(places) < len(guests):
+        return False
+    world.admit(guests, np.array(places[: len(guests)]))
+    return True
+
+
+def _free(world: World, by: str | tuple[float, float], n: int) -> list[tuple[float, float, float]]:
+    """Up to ``n`` free poses around a door, goal or place, on the robot's side, nearest first."""
+    rx, ry, _ = world.robot_pose().tolist()
+    if isinstance(by, str) and by in world.doors.names:
+        x, y = world.doors.middles[world.doors.names.index(by)].tolist()
+    else:
+        x, y = world.scene.goals[by] if isinstance(by, str) else by
+    radius = hull_radius("person")
+    found: list[tuple[float, float, float]] = []
+    for ring in RINGS_M:
+        for step in range(ROUND):
+            angle = math.tau * step / ROUND
+            px, py = x + ring * math.cos(angle), y + ring * math.sin(angle)
+            facing = (px - x) * (rx - x) + (py - y) * (ry - y) >= 0.0
+            apart = all(math.hypot(px - ox, py - oy) > 2.0 * radius + 0.1 for ox, oy, _ in found)
+            if facing and apart and not hands.in_the_way(world, px, py, radius):
+                found.append((px, py, angle))
+            if len(found) == n:
+                return found
+    return found

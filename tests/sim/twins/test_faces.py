@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Faces of walls move to where returns lie; a wall that is askew turns."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sim.twins.faces import moved_to
+
+ANGLES = np.radians(np.arange(-60.0, 61.0))
+LASERS = np.array([[0.0, 0.1 * k, 0.0] for k in range(-5, 6)])
+
+
+def _ranges(tilt: float) -> np.ndarray:
+    """To a plane through (3, 0) whose normal is turned by ``tilt`` from -x."""
+    normal = np.array([math.cos(tilt), math.sin(tilt)])
+    rows = []
+    for x, y, heading in LASERS:
+        way = np.column_stack([np.cos(heading + ANGLES), np.sin(heading + ANGLES)])
+        rows.append((normal @ np.array([3.0 - x, -y])) / (way @ normal))
+    return np.array(rows)
+
+
+def test_a_face_moves_to_its_returns_and_the_other_stays() -> None:
+    box = moved_to(np.array([[3.1, 0.0, 0.2, 5.0, 0.0]]), LASERS, _ranges(0.0), ANGLES)[0]
+    assert box[0] - box[2] == pytest.approx(3.0, abs=2e-3)
+    assert box[0] + box[2] == pytest.approx(3.3, abs=2e-3)
+
+
+def test_a_wall_turns_with_its_returns() -> None:
+    box = moved_to(np.array([[3.1, 0.0, 0.1, 5.0, 0.0]]), LASERS, _ranges(0.02), ANGLES)[0]
+    assert box[4] == pytest.approx(0.02, abs=4e-3)

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Other robots: the scenes' own by name changes no byte; a car turns no tighter than it can."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim.simulation import Simulation, tour
+from sim.world.robots import names, read_robot, robot_of
+from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+
+
+def _driven(seconds: float, **more: object) -> tuple[Simulation, list]:
+    simulation = Simulation("arena", seed=4, dynamism=0.3, laser="tim561:noise", **more)
+    return simulation, list(tour(simulation, seconds))
+
+
+def test_the_scenes_own_robot_by_its_name_gives_the_same_bytes() -> None:
+    for ours, named in zip(_driven(3.0)[1], _driven(3.0, robot="pioneer3dx")[1], strict=True):
+        np.testing.assert_array_equal(ours.scan.ranges, named.scan.ranges)
+        np.testing.assert_array_equal(ours.odometry.T_odom_robot, named.odometry.T_odom_robot)
+
+
+def test_a_car_turns_no_tighter_than_it_can() -> None:
+    simulation, frames = _driven(6.0, robot="f1tenth", odometry="ideal")
+    poses = np.array([frame.truth for frame in frames])
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    turns = np.abs(np.diff(np.unwrap(poses[:, 2])))
+    assert steps.sum() > 1.0
+    assert (turns <= 1.1 * steps / 0.742 + 2e-3).all()
+    assert simulation.spec.T_robot_laser[0] == pytest.approx(0.27)
+    assert simulation.world.scene.scan_height_m == pytest.approx(0.15)
+
+
+def test_a_small_robot_keeps_its_own_pace_and_clearance() -> None:
+    simulation, frames = _driven(3.0, robot="turtlebot3")
+    poses = np.array([frame.truth for frame in frames])
+    assert np.hypot(*(poses[-1] - poses[0])[:2]) < 0.22 * 3.0
+    row = simulation.world.bodies.robot
+    assert simulation.world.bodies.radius[row] == pytest.approx(0.1126, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        (("drive", "kind"), "omni", "drive.kind must be one of"),
+        (("drive", "track_m"), -1.0, "drive.track_m must lie in"),
+        (("drive", "turn_radius_m"), 0.4, "turn_radius_m is what a car has"),
+        (("footprint", "radius_m"), 0.1, "see footprint.radius_m"),
+        (("scanner", "pitch_deg"), 1.0, "scanner.pitch_deg is not known"),
+    ],
+)
+def test_a_wrong_field_is_named(path: tuple[str, str], value: object, said: str) -> None:
+    tables = copy.deepcopy(read_robot("turtlebot3"))
+    tables[path[0]][path[1]] = value
+    with pytest.raises(InvalidValueError, match=said):
+        robot_of(tables)
+
+
+def test_robots_by_name_or_file(tmp_path: Path) -> None:
+    assert {"turtlebot3", "pioneer3dx", "f1tenth"} <= set(names())
+    with pytest.raises(UnknownNameError, match="no robot is called 'husky'"):
+        read_robot("husky")
+    (tmp_path / "mine.toml").write_text('name = "mine"\nmass_kg = 0\n')
+    with pytest.raises(LogFormatError, match="mass_kg must lie in"):
+        read_robot(str(tmp_path / "mine.toml"))
