@@ -8,9 +8,10 @@ import math
 import cv2
 import numpy as np
 
-from scripts.film import draw
-from scripts.film.draw import Color, Picture
-from scripts.film.map_pane import View, draw_ellipse
+from scripts.film.map_pane import draw_ellipse
+from sim.view import draw
+from sim.view.draw import Color, Picture, View
+from sim.view.moment import SIGMAS
 from slam import se2
 from slam.frames import Float
 
@@ -31,7 +32,7 @@ class CloseUp:
     def paint(self, T_view_robot: Float, T_view_truth: Float | None, covariance: Float) -> Picture:
         """A fresh picture; ``covariance`` (2, 2) m^2 in the frame of the view."""
         width, height = self._size
-        reach = 1.15 * 3.0 * math.sqrt(max(float(np.trace(covariance)), 0.0))
+        reach = 1.15 * SIGMAS * math.sqrt(max(float(np.trace(covariance)), 0.0))
         if T_view_truth is not None:
             reach = max(reach, 1.25 * math.dist(T_view_robot[:2], T_view_truth[:2]))
         self._radius = _grown(self._radius, reach)
@@ -69,8 +70,7 @@ class CloseUp:
         if not (np.abs(ends) < 1e4).all():
             return
         draw.polyline(picture, ends, color, max(1, round(2 * self._unit)))
-        x, y = np.round(ends[0] * 16.0).astype(int).tolist()
-        cv2.circle(picture, (x, y), round(4 * self._unit * 16), color, cv2.FILLED, cv2.LINE_AA, 4)
+        draw.dots(picture, ends[:1], [color], 4 * self._unit)
 
 
 def off_by(error: Float, covariance: Float) -> str:

@@ -10,58 +10,14 @@ import math
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from scripts.film import draw
-from scripts.film.draw import Color, Picture
+from sim.view import draw
+from sim.view.draw import Picture
+from sim.view.scans import LEGEND, beam_colors, beam_ends
 from slam import se2
-from slam.frames import BeamClass, Float, Frame, Scan
+from slam.frames import Float, Frame
 
-LEGEND: tuple[tuple[str, Color], ...] = (
-    ("static", draw.AZURE),
-    ("semi-static", draw.TEAL),
-    ("moving", draw.MAGENTA),
-    ("mixed pixel", draw.VIOLET),
-    ("no return", draw.GRAY),
-)
-_BY_KIND = {
-    BeamClass.STATIC: draw.AZURE,
-    BeamClass.SEMI_STATIC: draw.TEAL,
-    BeamClass.MOVING: draw.MAGENTA,
-}
-SILENT_M = 1.2  # how long a beam without return is drawn
 _RINGS_M = (1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0)
-
-
-def beam_colors(frame: Frame) -> NDArray[np.uint8]:
-    """(n_beams, 3) RGB by what each beam hit; the colour of raw LIDAR where nothing says."""
-    assert frame.scan is not None
-    colors = np.empty((frame.scan.spec.n_beams, 3), np.uint8)
-    colors[:] = draw.BLUE
-    if frame.labels is not None:
-        for kind, color in _BY_KIND.items():
-            colors[frame.labels.kind == kind] = color
-        colors[frame.labels.mixed] = draw.VIOLET
-    colors[~frame.scan.valid] = draw.GRAY
-    return colors
-
-
-def beam_ends(scan: Scan) -> Float:
-    """(n_beams, 2) m in the laser frame, NaN without a return (not de-skewed)."""
-    ranges = np.where(scan.valid, scan.ranges.astype(np.float64), np.nan)
-    angles = scan.spec.angles
-    return np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
-
-
-def points_robot(scan: Scan) -> Float:
-    """(k, 2) m, end points of the valid beams in the robot frame (not de-skewed)."""
-    return se2.transform(scan.spec.T_robot_laser, beam_ends(scan)[scan.valid])
-
-
-def silent_ends(scan: Scan) -> Float:
-    """(k, 2) m in the laser frame: where the marks of beams without a return are."""
-    angles = scan.spec.angles[~scan.valid]
-    return SILENT_M * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
 def legend(picture: Picture, at: tuple[int, int], unit: float) -> None:
@@ -99,13 +55,9 @@ class RobotScan:
         origin = self._pixels(spec.T_robot_laser[None, :2], wide)
         known = ~np.isnan(pixels[:, 0])
         fan = np.vstack([origin, pixels[known]])
-        cv2.fillPoly(picture, [_fixed(fan)], (255, 236, 214), cv2.LINE_AA, 4)
+        draw.polygon(picture, fan, (255, 236, 214))
         self._rings(picture, wide)
-        colors = beam_colors(frame)
-        for (x, y), color in zip(
-            _fixed(pixels[known]).tolist(), colors[known].tolist(), strict=True
-        ):
-            cv2.circle(picture, (x, y), round(2.0 * self._unit * 16), color, -1, cv2.LINE_AA, 4)
+        draw.dots(picture, pixels[known], beam_colors(frame)[known], 2.0 * self._unit)
         self._robot(picture, wide)
         return picture
 
@@ -121,7 +73,7 @@ class RobotScan:
     def _rings(self, picture: Picture, wide: bool) -> None:
         center, edge = self._pixels(np.array([[0.0, 0.0], [1.0, 0.0]]), wide)
         scale = float(center[1] - edge[1])
-        middle = tuple(_fixed(center[None])[0].tolist())
+        middle = tuple(draw.fixed(center).tolist())
         shown = [r for r in _RINGS_M if r <= self._reach][-3:]
         for meters in shown:
             radius = round(meters * scale * 16.0)
@@ -132,7 +84,7 @@ class RobotScan:
     def _robot(self, picture: Picture, wide: bool) -> None:
         size = max(0.3, self._reach * 0.03)
         body = size * np.array([[1.0, 0.0], [-0.7, 0.65], [-0.7, -0.65]])
-        cv2.fillPoly(picture, [_fixed(self._pixels(body, wide))], draw.INK, cv2.LINE_AA, 4)
+        draw.polygon(picture, self._pixels(body, wide), draw.INK)
 
     def _landmarks(self, picture: Picture, frame: Frame) -> None:
         """Of a log that holds point features instead of scans."""
@@ -141,10 +93,6 @@ class RobotScan:
             farthest = float(np.hypot(points[:, 0], points[:, 1]).max())
             self._reach = max(self._reach, min(1.05 * farthest, 80.0))
         self._rings(picture, wide=False)
-        for x, y in _fixed(self._pixels(points, wide=False)).tolist():
-            cv2.circle(picture, (x, y), round(4.0 * self._unit * 16), draw.BLUE, -1, cv2.LINE_AA, 4)
+        pixels = self._pixels(points, wide=False)
+        draw.dots(picture, pixels, [draw.BLUE] * len(pixels), 4.0 * self._unit)
         self._robot(picture, wide=False)
-
-
-def _fixed(pixels: Float) -> NDArray[np.int32]:
-    return np.round(pixels * 16.0).astype(np.int32)

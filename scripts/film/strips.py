@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from scripts.film import draw
-from scripts.film.draw import Picture
+from sim.view import draw
+from sim.view.draw import Picture
 from slam.errors import InvalidValueError
 from slam.files import replacing
 

@@ -121,7 +121,7 @@ class View:
 
     def _at(self, request: OnView) -> str:
         done = self.playback.do(request)
-        self.session.moments.every = self.playback.speed
+        self.session.every = max(1.0, self.playback.speed)
         self._pace.restart()
         if isinstance(request, Seek):
             self._due = None

@@ -125,7 +125,7 @@ def _render(
         for frame in watched(shoot(footage.stream, show, reel), footage.stream, show.title):
             snapshots.note(frame)
             if recorder is not None:
-                recorder.note(frame, footage.stage.placed)
+                recorder.note(show.shown)
         if strip_to is not None:
             columns = min(3, len(moments))
             strip(snapshots.finish(), moments, strip_to, columns=columns, legend=show.legend())

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from sim.simulation import Simulation
 from sim.view.camera import Camera
 from sim.view.mapview import MapView
-from slam import se2
 
 VIEWS = ("top", "follow", "persp")
 
@@ -57,15 +56,7 @@ class MapPicture:
 
     def __call__(self, simulation: Simulation) -> NDArray[np.uint8]:
         """(height, width, 3) uint8 RGB."""
-        frame = simulation.frame
-        scan = None
-        if frame is not None and frame.scan is not None and frame.truth is not None:
-            T_world_laser = se2.compose(frame.truth, frame.scan.spec.T_robot_laser)
-            ranges = np.where(frame.scan.valid, frame.scan.ranges, np.nan)[:, None]
-            angles = frame.scan.spec.angles
-            directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-            scan = T_world_laser, se2.transform(T_world_laser, ranges * directions)
-        return self._view.draw(simulation.world.mover_poses(), scan=scan)
+        return self._view.draw(simulation.world.mover_poses(), simulation.frame)
 
     def close(self) -> None:
         """Nothing to free; every picture maker has it."""

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from scripts.film.close_up import CloseUp, off_by
-from scripts.film.draw import GREEN, INK, PAPER, RED
-from scripts.film.map_pane import MAX_TRAIL, Trail, View, draw_trail, raster_picture, scale_bar
+from scripts.film.map_pane import draw_trail, raster_picture
+from sim.view.draw import GREEN, INK, PAPER, RED, View, scale_bar
+from sim.view.moment import MOST_POINTS, Path
 from slam import se2
 from slam.system import Raster
 
@@ -40,13 +41,14 @@ def test_unknown_is_paper_and_trails_end_in_a_robot():
 
 
 def test_a_long_trail_keeps_its_ends():
-    trail = Trail()
-    for k in range(4 * MAX_TRAIL + 1):
-        trail.add(np.array([float(k), -float(k), 0.0]))
-    points = trail.points()
-    assert len(points) <= MAX_TRAIL + 1
+    path = Path()
+    for k in range(4 * MOST_POINTS + 1):
+        path.add(np.array([float(k), -float(k), 0.0]))
+    points = path.points()
+    assert len(points) <= MOST_POINTS + 1
     assert points[0].tolist() == [0.0, 0.0]
-    assert points[-1].tolist() == [4.0 * MAX_TRAIL, -4.0 * MAX_TRAIL]
+    assert points[-1].tolist() == [4.0 * MOST_POINTS, -4.0 * MOST_POINTS]
+    assert path.points(number=7).tolist() == [[float(k), -float(k)] for k in range(8)]
 
 
 def test_the_close_up_shows_truth_and_estimate_however_far_apart():

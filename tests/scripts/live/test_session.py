@@ -106,7 +106,7 @@ def test_a_page_asks_for_another_world_and_keeps_the_seed():
 
 def test_every_part_of_a_room_is_where_mujoco_has_it_and_a_ray_finds_it():
     world = Simulation("arena", dynamism=0.5).world
-    parts = Parts(world)
+    parts = Parts(world.scene, world.model)
     parts.place(Placed.of(world))
     chair = next(k for k, name in enumerate(world.mover_names) if name.startswith("chair"))
     around = world.mover_poses()[chair, :2]
@@ -127,8 +127,8 @@ def test_a_path_is_thinned_and_ends_where_the_robot_is():
     path = Path()
     for k in range(5000):
         path.add(np.array([k, math.nan if k == 7 else 0.0, 0.0]))
-    assert path.until(3, 100)[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0]
-    thin = path.until(4321, 100)
+    assert path.points(100, 3)[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0]
+    thin = path.points(100, 4321)
     assert len(thin) <= 103
     assert thin[-1, 0] == 4321.0
 
