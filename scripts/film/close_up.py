@@ -41,28 +41,17 @@ class CloseUp:
             (x - self._radius, y - self._radius, x + self._radius, y + self._radius), width, height
         )
         picture: Picture = np.full((height, width, 3), 255, np.uint8)
-        self._grid(picture, view)
+        for k in (1, 2, 3):
+            x, y = round(width * k / 4), round(height * k / 4)
+            cv2.line(picture, (x, 0), (x, height), draw.GRID, 1)
+            cv2.line(picture, (0, y), (width, y), draw.GRID, 1)
+        draw.scale_bar(picture, view, self._unit)
         if T_view_truth is not None:
             self._arrow(picture, view, T_view_truth, draw.GREEN)
         draw_ellipse(picture, view, T_view_robot, covariance, self._color)
         self._arrow(picture, view, T_view_robot, self._color)
         cv2.rectangle(picture, (0, 0), (width - 1, height - 1), draw.GRID, 1)
         return picture
-
-    def _grid(self, picture: Picture, view: View) -> None:
-        """Lines half a radius apart, one of them with its length."""
-        width, height = self._size
-        for k in (1, 2, 3):
-            x, y = round(width * k / 4), round(height * k / 4)
-            cv2.line(picture, (x, 0), (x, height), draw.GRID, 1)
-            cv2.line(picture, (0, y), (width, y), draw.GRID, 1)
-        step = round(width / 4)
-        y, x = height - round(9 * self._unit), round(width / 2)
-        thick = max(1, round(2 * self._unit))
-        picture[y : y + thick, x : x + step] = draw.INK
-        word, size = draw.length(self._radius / 2.0), round(11 * self._unit)
-        left = x + (step - draw.text_width(word, size)) // 2
-        draw.text(picture, word, (left, y - round(15 * self._unit)), size, draw.INK)
 
     def _arrow(self, picture: Picture, view: View, T_view_robot: Float, color: Color) -> None:
         tip = np.array([[0.0, 0.0], [22.0 * self._unit / view.scale, 0.0]])

@@ -59,16 +59,6 @@ def raster_picture(raster: Raster, view: View, T_view_map: Float) -> Picture:
     return picture
 
 
-def draw_trail(
-    picture: Picture, view: View, points: Float, T_view_robot: Float, color: Color, thickness: int
-) -> None:
-    """The path so far and a triangle for the robot now, both in the frame of the view."""
-    draw.polyline(picture, view.pixels(points), color, thickness)
-    size = max(1.0, 9.0 / (0.28 * view.scale))  # never smaller than 9 px
-    body = np.array([[0.28, 0.0], [-0.2, 0.19], [-0.2, -0.19]]) * size
-    draw.polygon(picture, view.pixels(se2.transform(T_view_robot, body)), color)
-
-
 def draw_points(picture: Picture, view: View, points: Float, color: Color) -> None:
     """Scan end points as dots."""
     x, y = np.round(view.pixels(points)).astype(int).T
@@ -143,7 +133,8 @@ class MapPane:
         for path, color, width in paths:
             points = se2.transform(T_view_map, path.points())
             pose = se2.compose(T_view_map, path.pose)
-            draw_trail(picture, view, points, pose, color, max(1, round(width * self.unit)))
+            draw.polyline(picture, view.pixels(points), color, max(1, round(width * self.unit)))
+            draw.robot(picture, view, pose, color)
         draw_points(picture, view, se2.transform(T_view_map, points_map), draw.BLUE)
         own, color, _ = paths[-1]
         turn = se2.rotation(float(T_view_map[2]))

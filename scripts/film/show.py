@@ -20,13 +20,12 @@ from scripts.film.close_up import CloseUp, off_by
 from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.layout import Box, Layout
 from scripts.film.map_pane import MapPane
-from scripts.film.scan_pane import legend
 from scripts.film.stage import Stage
 from sim.events import Event
 from sim.view import draw
 from sim.view.draw import Color, Picture
 from sim.view.moment import SIGMAS, Moments, Shown
-from sim.view.scans import LEGEND, points_robot
+from sim.view.scans import LEGEND, beams
 from slam import se2
 from slam.frames import Float, Frame, Scan
 from slam.frontend.seen_space import SeenSpace
@@ -103,8 +102,9 @@ class Show:
         """(k, 2) m, what the last scan saw where the primary track believes it was."""
         if self.shown is None or self.shown.frame.scan is None:
             return np.zeros((0, 2))
+        T_robot_laser, ends, _ = beams(self.shown.frame)
         here = self.shown.estimates[self.primary].T_map_robot
-        return se2.transform(here, points_robot(self.shown.frame.scan))
+        return se2.transform(se2.compose(here, T_robot_laser), ends)
 
     def note(self, frame: Frame) -> Shown:
         """Remember this frame's poses and errors; call for every frame, painted or not."""
@@ -267,7 +267,13 @@ class _Panes:
             at = (box.x, box.y - round(20 * unit))
             end = draw.text(canvas, title, at, round(13 * unit), draw.MUTED)
             if box is layout.scan and labelled:
-                legend(canvas, (end + round(10 * unit), at[1]), unit)
+                x = end + round(10 * unit)
+                for word, color in LEGEND:
+                    radius = max(2, round(4 * unit))
+                    middle = [[x + radius, at[1] + round(8 * unit)]]
+                    draw.dots(canvas, np.array(middle), [color], radius)
+                    x = draw.text(canvas, word, (x + round(13 * unit), at[1]), round(12 * unit))
+                    x += round(11 * unit)
         return canvas
 
     def _holds(self) -> str:

@@ -11,10 +11,10 @@ from sim.events import Event, EventWatch
 from sim.moments import Moment
 from sim.simulation import Simulation
 from sim.view import gl
+from sim.view.camera import Camera
 from sim.view.draw import Picture
 from sim.view.mapview import MapView
 from sim.view.parts import Placed
-from sim.view.pictures import CameraPicture
 from sim.world.world import World
 from slam.frames import Frame
 
@@ -74,14 +74,14 @@ class Room(Stage):
         self, simulation: Simulation, moments: Callable[[], Iterator[Moment]], view: str | None
     ) -> None:
         super().__init__(labelled=True)
-        self._simulation, self._moments, self._angle = simulation, moments, view
+        self._moments, self._angle = moments, view
         self.world, self.placed = simulation.world, Placed.of(simulation.world)
         self.bounds = self.world.scene.bounds
         self._watch = EventWatch(self.world)
         self.lanes = self._watch.kinds
         self.camera = view is not None and gl.find().backend is not None
         self.no_camera = "" if self.camera or view is None else gl.find().reason
-        self._camera: CameraPicture | None = None
+        self._camera: Camera | None = None
 
     def frames(self) -> Iterator[Frame]:
         """The frames of a run; the stage shows the moment of the one given last."""
@@ -97,8 +97,7 @@ class Room(Stage):
         """Make what paints the panes."""
         self._map = MapView(self.world.scene, *layout.scan.size)
         if layout.camera is not None and self._angle is not None:
-            size = layout.camera.size
-            self._camera = CameraPicture(self._simulation, size, self._angle, shadows=False)
+            self._camera = Camera(self.world.model, *layout.camera.size, shadows=False)
 
     def scan(self, frame: Frame) -> Picture:
         """The room from above, the scan in it, beams by what they hit."""
@@ -107,7 +106,8 @@ class Room(Stage):
     def view(self) -> Picture:
         """What the 3D camera sees."""
         assert self._camera is not None
-        return self._camera(self._simulation)
+        assert self._angle is not None
+        return self._camera.render(self.world.data, self._angle)
 
     def events(self) -> Sequence[Event]:
         """As ``Stage.events``."""

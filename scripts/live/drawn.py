@@ -17,11 +17,11 @@ from sim.view import draw
 from sim.view.draw import Color
 from sim.view.moment import Moments, Path, Shown, ellipse
 from sim.view.parts import BOX, Parts, Placed, mesh
-from sim.view.scans import beam_colors, beam_ends
+from sim.view.scans import beams
 from sim.world.world import World
 from slam import se2
 from slam.estimate import Landmarks, Raster
-from slam.frames import Float, Frame
+from slam.frames import Float
 from slam.maps import raster_image
 
 LIFT_M = 0.03  # of the map and of lines above the floor, that they are seen
@@ -201,16 +201,6 @@ class Drawn:
             if key not in known or not np.array_equal(known[key], value):
                 known[key] = value
                 setattr(node, key, value)
-
-
-def beams(frame: Frame) -> tuple[Float, Float, Any]:
-    """Where the scanner is on the robot, (n, 2) m in its frame of where beams ended, and (n, 3) RGB
-    by what they hit; the features of a log without scans."""
-    if frame.scan is None:
-        xy = np.zeros((0, 2)) if frame.features is None else frame.features.points_robot
-        return np.zeros(3), xy, np.full((len(xy), 3), 40, np.uint8)
-    valid = frame.scan.valid
-    return frame.scan.spec.T_robot_laser, beam_ends(frame.scan)[valid], beam_colors(frame)[valid]
 
 
 def _pose(pose: Float, z: float = 0.0) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -114,7 +114,7 @@ def _render(
 ) -> None:
     from scripts.film.encode import film
     from scripts.film.render import Snapshots, shoot, watched
-    from scripts.film.strips import strip
+    from scripts.film.strips import strips
     from scripts.live.replay import Recorder
 
     started = time.perf_counter()
@@ -128,7 +128,8 @@ def _render(
                 recorder.note(show.shown)
         if strip_to is not None:
             columns = min(3, len(moments))
-            strip(snapshots.finish(), moments, strip_to, columns=columns, legend=show.legend())
+            rows = {"": snapshots.finish()}
+            strips(rows, moments, strip_to, columns=columns, legend=show.legend())
     wall_s = time.perf_counter() - started
     if reel is not None and out is not None:
         long_s = reel.frames / show.pace.fps

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from slam import se2
 from slam.frames import Float
 
 Picture = NDArray[np.uint8]
@@ -37,6 +38,37 @@ VIOLET: Color = (140, 84, 206)  # a mixed pixel
 GRAY: Color = (164, 168, 176)  # no return
 SHIFT = 4  # fractional bits of pixel coordinates given to OpenCV
 _TRACKS: tuple[Color, ...] = (RED, BLUE, (122, 63, 176))
+
+
+@dataclass(frozen=True)
+class View:
+    """The part of the plane a pane shows: lower left corner (m), pixels per metre, size (px)."""
+
+    x: float
+    y: float
+    scale: float
+    width: int
+    height: int
+
+    @classmethod
+    def fitting(cls, bounds: tuple[float, float, float, float], width: int, height: int) -> View:
+        """The largest scale at which ``bounds`` (xmin, ymin, xmax, ymax) fit, centred."""
+        xmin, ymin, xmax, ymax = bounds
+        scale = min(width / (xmax - xmin), height / (ymax - ymin))
+        return cls(
+            x=(xmin + xmax) / 2.0 - width / scale / 2.0,
+            y=(ymin + ymax) / 2.0 - height / scale / 2.0,
+            scale=scale,
+            width=width,
+            height=height,
+        )
+
+    def pixels(self, points: Float) -> Float:
+        """(n, 2) m to (n, 2) px, x right and y down."""
+        out = np.empty((len(points), 2))
+        out[:, 0] = (points[:, 0] - self.x) * self.scale
+        out[:, 1] = self.height - (points[:, 1] - self.y) * self.scale
+        return out
 
 
 @lru_cache(maxsize=8)
@@ -110,19 +142,6 @@ def darker(color: Color, share: float) -> Color:
     return red, green, blue
 
 
-def paste(image: Picture, part: Picture, at: tuple[int, int], size: tuple[int, int]) -> None:
-    """Put ``part`` into the box ``at`` + ``size`` (x, y; width, height), letterboxed on paper."""
-    (x, y), (width, height) = at, size
-    scale = min(width / part.shape[1], height / part.shape[0])
-    if abs(scale - 1.0) > 1e-3:
-        shape = (max(1, round(part.shape[1] * scale)), max(1, round(part.shape[0] * scale)))
-        how = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
-        part = cv2.resize(part, shape, interpolation=how)
-    h, w = part.shape[:2]
-    left, top = x + (width - w) // 2, y + (height - h) // 2
-    image[top : top + h, left : left + w] = part
-
-
 def fixed(pixels: Float) -> NDArray[np.int32]:
     """Pixel coordinates as OpenCV's fixed point of ``SHIFT`` bits."""
     return np.round(np.asarray(pixels) * float(1 << SHIFT)).astype(np.int32)
@@ -146,42 +165,18 @@ def dots(image: Picture, pixels: Float, colors: Any, radius: float) -> None:
         cv2.circle(image, at, wide, color, cv2.FILLED, cv2.LINE_AA, SHIFT)
 
 
+def robot(image: Picture, view: View, T_view_robot: Float, color: Color) -> None:
+    """A triangle, never smaller than 9 px."""
+    size = max(1.0, 9.0 / (0.28 * view.scale))
+    body = np.array([[0.28, 0.0], [-0.2, 0.19], [-0.2, -0.19]]) * size
+    polygon(image, view.pixels(se2.transform(T_view_robot, body)), color)
+
+
 def colors_of(names: Sequence[str]) -> dict[str, Color]:
     """A colour for each track and "truth"; odometry is always orange."""
     rest = [name for name in names if name != "odometry"]
     found = {name: _TRACKS[k % len(_TRACKS)] for k, name in enumerate(rest)}
     return {**found, "odometry": ORANGE, "truth": GREEN}
-
-
-@dataclass(frozen=True)
-class View:
-    """The part of the plane a pane shows: lower left corner (m), pixels per metre, size (px)."""
-
-    x: float
-    y: float
-    scale: float
-    width: int
-    height: int
-
-    @classmethod
-    def fitting(cls, bounds: tuple[float, float, float, float], width: int, height: int) -> View:
-        """The largest scale at which ``bounds`` (xmin, ymin, xmax, ymax) fit, centred."""
-        xmin, ymin, xmax, ymax = bounds
-        scale = min(width / (xmax - xmin), height / (ymax - ymin))
-        return cls(
-            x=(xmin + xmax) / 2.0 - width / scale / 2.0,
-            y=(ymin + ymax) / 2.0 - height / scale / 2.0,
-            scale=scale,
-            width=width,
-            height=height,
-        )
-
-    def pixels(self, points: Float) -> Float:
-        """(n, 2) m to (n, 2) px, x right and y down."""
-        out = np.empty((len(points), 2))
-        out[:, 0] = (points[:, 0] - self.x) * self.scale
-        out[:, 1] = self.height - (points[:, 1] - self.y) * self.scale
-        return out
 
 
 def scale_bar(picture: Picture, view: View, unit: float) -> None:

@@ -22,7 +22,7 @@ from sim.core.bodies import STATIC
 from sim.view import draw
 from sim.view.draw import Color, Picture, View
 from sim.view.parts import Parts
-from sim.view.scans import beam_colors, beam_ends, silent_ends
+from sim.view.scans import FAN, beam_colors, beam_ends, silent_ends
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame
@@ -35,7 +35,6 @@ MARGIN_M = 0.3
 FOOT_PX = 28  # row of the scale bar below the room
 LOW_PX = 160  # a picture that is lower has no such row, and no bar
 LEAST_PX = 1.0  # of what is drawn of a mover
-FAN: Color = (96, 168, 255)
 FAN_SHARE = 0.34
 AROUND = 24  # corners of a circle
 DOT_M, LEAST_DOT = 0.022, 1.7  # radius of a hit, m, and px at least

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from sim.view import draw
 from sim.view.draw import Color
-from slam import se2
 from slam.frames import BeamClass, Float, Frame, Scan
 
 LEGEND: tuple[tuple[str, Color], ...] = (
@@ -23,6 +22,7 @@ _BY_KIND = {
     BeamClass.SEMI_STATIC: draw.TEAL,
     BeamClass.MOVING: draw.MAGENTA,
 }
+FAN: Color = (96, 168, 255)  # what a scan sweeps over, see-through
 SILENT_M = 1.2  # how long a beam without return is drawn
 
 
@@ -46,12 +46,17 @@ def beam_ends(scan: Scan) -> Float:
     return np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
 
 
-def points_robot(scan: Scan) -> Float:
-    """(k, 2) m, end points of the valid beams in the robot frame (not de-skewed)."""
-    return se2.transform(scan.spec.T_robot_laser, beam_ends(scan)[scan.valid])
-
-
 def silent_ends(scan: Scan) -> Float:
     """(k, 2) m in the laser frame: where the marks of beams without a return are."""
     angles = scan.spec.angles[~scan.valid]
     return SILENT_M * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def beams(frame: Frame) -> tuple[Float, Float, NDArray[np.uint8]]:
+    """Where the scanner is on the robot, (n, 2) m in its frame of where beams ended, and (n, 3) RGB
+    by what they hit; the features of a log without scans."""
+    if frame.scan is None:
+        xy = np.zeros((0, 2)) if frame.features is None else frame.features.points_robot
+        return np.zeros(3), xy, np.full((len(xy), 3), 40, np.uint8)
+    valid = frame.scan.valid
+    return frame.scan.spec.T_robot_laser, beam_ends(frame.scan)[valid], beam_colors(frame)[valid]

@@ -212,9 +212,9 @@ def test_the_server_behind_the_gate_knows_the_gate_only(view: View):
     version = [f"viser-v{sys.modules['viser'].__version__}"]
     forged = {"X-Mobilia-Gate": "guess"}
     inner, own = f"ws://{behind[0]}:{behind[1]}", f"ws://127.0.0.1:{view.served.port}"
-    for url, headers in ((inner, {}), (inner, forged), (own, forged)):
+    for headers in ({}, forged):
         with (
-            connect(url, subprotocols=version, additional_headers=headers) as client,
+            connect(inner, subprotocols=version, additional_headers=headers) as client,
             pytest.raises(closed),
         ):
             client.recv(timeout=30.0)
