@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One row a kind of thing that moves: a part in ``parts/<kind>.xml`` and its row here are all.
 
-The physics reads ``group`` and ``feet``, the bag ``height_m``, pictures ``icon`` and ``z_order``.
+The physics reads ``group`` and ``feet``, the bag ``height_m``; pictures draw the part itself.
 """
 
 from __future__ import annotations
@@ -38,8 +38,6 @@ class KindOfMover:
     group     what moves it: "chair", "bin" and "load" are pushed at their own rates, the others
               have a will of their own
     height_m  of its marker in the bag
-    z_order   of its drawing from above; higher covers lower
-    icon      its drawing, one of ``sim.view.icons.DRAWINGS``
     feet      None: it slides in the plane at every level
     part      path of its MJCF file; "" for ``parts/<kind>.xml``
     half_length_m  0: round, one hull. Else its hulls stand in a row along its x axis, and this is
@@ -48,8 +46,6 @@ class KindOfMover:
 
     group: Group
     height_m: float
-    z_order: int
-    icon: str
     feet: Feet | None = None
     part: str = ""
     half_length_m: float = 0.0
@@ -65,34 +61,34 @@ class KindOfMover:
 
 KINDS = {
     "chair_swivel": KindOfMover(
-        group="chair", height_m=0.95, z_order=1, icon="chair_swivel",
+        group="chair", height_m=0.95,
         feet=Feet(number=5, circle_m=0.30, first_rad=0.0, radius_m=0.028),
     ),
     "chair_visitor": KindOfMover(
-        group="chair", height_m=0.85, z_order=1, icon="chair_visitor",
+        group="chair", height_m=0.85,
         feet=Feet(number=4, circle_m=0.295, first_rad=0.75, radius_m=0.012),
     ),
-    "bin": KindOfMover(group="bin", height_m=0.4, z_order=0, icon="bin"),
-    "trolley": KindOfMover(group="load", height_m=1.0, z_order=1, icon="trolley"),
-    "pallet": KindOfMover(group="load", height_m=0.15, z_order=0, icon="pallet"),
-    "crate": KindOfMover(group="load", height_m=0.6, z_order=1, icon="trolley"),
+    "bin": KindOfMover(group="bin", height_m=0.4),
+    "trolley": KindOfMover(group="load", height_m=1.0),
+    "pallet": KindOfMover(group="load", height_m=0.15),
+    "crate": KindOfMover(group="load", height_m=0.6),
     "board": KindOfMover(
-        group="load", height_m=1.8, z_order=1, icon="board", half_length_m=0.55
+        group="load", height_m=1.8, half_length_m=0.55
     ),
     "hospital_bed": KindOfMover(
-        group="load", height_m=1.0, z_order=1, icon="hospital_bed", half_length_m=0.55
+        group="load", height_m=1.0, half_length_m=0.55
     ),
-    "couch": KindOfMover(group="load", height_m=0.8, z_order=1, icon="couch", half_length_m=0.37),
-    "person": KindOfMover(group="person", height_m=1.75, z_order=4, icon="person"),
-    "person_coat": KindOfMover(group="person", height_m=1.75, z_order=4, icon="person"),
-    "door": KindOfMover(group="door", height_m=2.0, z_order=2, icon="door"),
+    "couch": KindOfMover(group="load", height_m=0.8, half_length_m=0.37),
+    "person": KindOfMover(group="person", height_m=1.75),
+    "person_coat": KindOfMover(group="person", height_m=1.75),
+    "door": KindOfMover(group="door", height_m=2.0),
     "door_sliding": KindOfMover(
-        group="door", height_m=2.0, z_order=2, icon="door_sliding", part="door_sliding"
+        group="door", height_m=2.0, part="door_sliding"
     ),
     "door_lift": KindOfMover(
-        group="door", height_m=2.0, z_order=2, icon="door_sliding", part="door_sliding"
+        group="door", height_m=2.0, part="door_sliding"
     ),
-    "robot": KindOfMover(group="robot", height_m=0.45, z_order=3, icon="robot"),
+    "robot": KindOfMover(group="robot", height_m=0.45),
 }  # fmt: skip
 
 

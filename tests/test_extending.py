@@ -284,7 +284,7 @@ def test_film_pane(outside: Path):
 def test_a_pane_of_another_size_is_refused_by_name(outside: Path):
     panes.pane("small")(lambda show, frame, size: panes.blank((2, 2)))
     with pytest.raises(InvalidValueError, match="'small'"):
-        panes.registered()[-1](None, None, (20, 10))
+        panes.painted("small", None, None, (20, 10))
 
 
 @pytest.mark.parametrize("heading", ["Dynamism rate", "Lost rule", "Loop gate", "Number of a SLAM"])

@@ -21,7 +21,7 @@ from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.sensors.lidar.windows import note
 from sim.simulation import Simulation, n_frames, tour
 from sim.view import gl
-from sim.view.pictures import CameraPicture
+from sim.view.camera import Camera
 from sim.world.substeps import SUBSTEPS_PER_S, unseen
 from sim.world.world import World
 from slam._jit import njit
@@ -208,8 +208,8 @@ def pictures(seconds: float) -> Iterator[Row]:
         return
     room = Simulation("office", seed=SEED, dynamism=DYNAMISM)
     for shadows, target in ((True, "≤ 110"), (False, "")):
-        with CameraPicture(room, (1280, 720), "persp", shadows=shadows) as picture:
-            picture(room)
-            spent = [timed(lambda picture=picture: picture(room)) for _ in range(10)]  # type: ignore[misc]
+        with Camera(room.world.model, 1280, 720, shadows=shadows) as camera:
+            camera.render(room.world.data)
+            spent = [timed(lambda c=camera: c.render(room.world.data)) for _ in range(10)]  # type: ignore[misc]
         what = "picture 1280 × 720, office, " + ("with shadows" if shadows else "no shadows")
         yield row(what, float(np.median(spent)) * 1e3, "ms", target, "all threads; software GL")

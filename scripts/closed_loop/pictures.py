@@ -16,9 +16,10 @@ import scenes
 from scenes.scene import Scene
 from scripts.closed_loop.runs import Driven
 from scripts.figures import COLORS, color_of, save, styled
-from sim.view.floorplan import FloorPlan
-from sim.view.mapview import Float, MapView, Picture
+from sim.view.draw import Picture
+from sim.view.mapview import MapView
 from sim.world.world import World
+from slam.frames import Float
 
 Row = dict[str, Any]
 PX_PER_M = 40
@@ -86,8 +87,8 @@ def paths(path: Path, rows: Sequence[Sequence[Driven]], axis: str = "dynamism") 
     for r, runs in enumerate(rows):
         world = World(runs[0].identity["scene"], seed=runs[0].identity["seed"], dynamism=0.0)
         size = (round((xmax - xmin + 0.6) * PX_PER_M), round((ymax - ymin + 0.6) * PX_PER_M))
-        room = _room(MapView(world.scene, *size), world.mover_poses())
-        plan = FloorPlan(world.scene, *size)
+        plan = MapView(world.scene, *size)
+        room = _room(plan, world.mover_poses())
         for c, run in enumerate(runs):
             _panel(axes[r, c], run, room, plan, world.scene)
             who = run.identity
@@ -104,7 +105,7 @@ def _room(view: MapView, poses: Float) -> Picture:
     return np.round(still + PALE * (whole - still)).astype(np.uint8)
 
 
-def _panel(ax: Axes, run: Driven, room: Any, plan: FloorPlan, scene: Scene) -> None:
+def _panel(ax: Axes, run: Driven, room: Any, plan: MapView, scene: Scene) -> None:
     ax.imshow(room, interpolation="antialiased", alpha=0.75)
     for name, style in (("believed", ":"), ("true", "-")):
         if len(run.arrays[name]):

@@ -208,16 +208,18 @@ def _survive(building: Building, drive: Drive, track: Track) -> SlamFailedError 
     if building.replays is None:
         return track.survive(drive.frames)
     from scripts.live.replay import Recorder
+    from sim.view.moment import Moments
 
     truth = drive.frames[0].truth
     seconds = (drive.frames[-1].stamp_ns - drive.frames[0].stamp_ns) / NS_PER_S
+    T_map_world = None if truth is None else building.T_map_world
+    T_world_map = None if T_map_world is None else se2.inverse(T_map_world)
+    moments = Moments(Replay({building.name: track}), T_world_map)
     with Recorder.writing(
         building.replays / f"{file_name(building.name)}-{drive.number:02}.html",
-        Replay({building.name: track}),
+        moments,
         title=f"{building.name} · session {drive.number}, {drive.time_of_day}",
         seconds=seconds,
-        T_world_map=None if truth is None or building.T_map_world is None
-        else se2.inverse(building.T_map_world),
     ) as recorder:  # fmt: skip
         return track.survive(recorder.noting(drive.frames))
 

@@ -24,10 +24,10 @@ from scripts.debugger.counterfactual import CURED, Inquest, Trial
 from scripts.debugger.recording import Strip, simulate
 from scripts.debugger.words import headline, who
 from scripts.figures import styled
-from scripts.film import draw
-from scripts.film.draw import Picture
 from scripts.film.strips import strips
 from sim.twins.absence import Change
+from sim.view import draw
+from sim.view.draw import Picture
 from sim.view.mapview import MapView
 from slam import se2
 from slam.files import replacing
@@ -104,9 +104,9 @@ class _Camera:
         low, high = np.min(points, axis=0), np.max(points, axis=0)
         most = SIDE_M[1] if found.moment is not None else math.inf  # the whole path of a good run
         side = min(max(float((high - low).max()) + 2.0, SIDE_M[0]), most)
-        half = 0.5 * side * self._view.plan.scale
+        half = 0.5 * side * self._view.scale
         x, y = self._view.to_pixels([0.5 * (low + high)])[0]
-        width = self._view.plan.picture.shape[1]
+        width = self._view.room.shape[1]
         height = self._foot  # below it is the plan's own scale
         x = min(max(x, half), max(width - half, 0.5 * width))
         y = min(max(y, half), max(height - half, 0.5 * height))
@@ -145,7 +145,7 @@ class _Camera:
             words.append(self._label(picture, at, first_of, label, words))
         x0, y0, x1, y1 = self._window
         cell = np.ascontiguousarray(picture[y0:y1, x0:x1])
-        left, low, metre = 14, len(cell) - 14, round(self._view.plan.scale)
+        left, low, metre = 14, len(cell) - 14, round(self._view.scale)
         for color, thick in ((draw.PAPER, 3 * THICK), (draw.INK, THICK)):
             cv2.line(cell, (left, low), (left + metre, low), color, thick, cv2.LINE_AA)
         _write(cell, "1 m", (left, low - 26), draw.INK)
@@ -166,7 +166,7 @@ class _Camera:
         reach = 0.3
         nose = pose[:2] + 1.5 * reach * np.array([math.cos(pose[2]), math.sin(pose[2])])
         centre, tip = self._view.to_pixels([pose[:2], nose]).round().astype(int).tolist()
-        radius = round(reach * self._view.plan.scale)
+        radius = round(reach * self._view.scale)
         cv2.circle(picture, centre, radius, draw.BLUE, THICK, cv2.LINE_AA)
         cv2.line(picture, centre, tip, draw.BLUE, THICK, cv2.LINE_AA)
 
@@ -181,7 +181,7 @@ class _Camera:
         """The word beside the first of those named, within the cell and clear of the ``others``;
         x, y, width, height (px) of it."""
         x, y = self._view.to_pixels([poses[m][:2]])[0].round().astype(int).tolist()
-        side = round((self._radii[m] + 0.2) * self._view.plan.scale)
+        side = round((self._radii[m] + 0.2) * self._view.scale)
         wide = draw.text_width(label, LABEL_PX, bold=True)
         left, top, right, low = self._window
         x = x + side if x + side + wide <= right else x - side - wide
@@ -202,7 +202,7 @@ class _Camera:
             x += 0.5 * self._radii[m] * math.cos(yaw)
             y += 0.5 * self._radii[m] * math.sin(yaw)
         centre = self._view.to_pixels([[x, y]])[0].round().astype(int).tolist()
-        size = round(radius * self._view.plan.scale)
+        size = round(radius * self._view.scale)
         for start in range(0, 360, 30):
             end = start + (15 if gone else 30)
             cv2.ellipse(

@@ -25,12 +25,12 @@ from PIL import Image
 import scenes
 from scripts.benchmark.tracks import newest
 from scripts.experiments.measured import ended
-from scripts.film.draw import Picture
 from scripts.film.encode import film
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation
 from sim.view import gl
 from sim.view.camera import Camera
+from sim.view.draw import Picture
 from slam.errors import UnknownNameError
 from slam.files import replacing, write_text
 

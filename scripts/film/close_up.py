@@ -8,9 +8,10 @@ import math
 import cv2
 import numpy as np
 
-from scripts.film import draw
-from scripts.film.draw import Color, Picture
-from scripts.film.map_pane import View, draw_ellipse
+from scripts.film.map_pane import draw_ellipse
+from sim.view import draw
+from sim.view.draw import Color, Picture, View
+from sim.view.moment import SIGMAS
 from slam import se2
 from slam.frames import Float
 
@@ -31,7 +32,7 @@ class CloseUp:
     def paint(self, T_view_robot: Float, T_view_truth: Float | None, covariance: Float) -> Picture:
         """A fresh picture; ``covariance`` (2, 2) m^2 in the frame of the view."""
         width, height = self._size
-        reach = 1.15 * 3.0 * math.sqrt(max(float(np.trace(covariance)), 0.0))
+        reach = 1.15 * SIGMAS * math.sqrt(max(float(np.trace(covariance)), 0.0))
         if T_view_truth is not None:
             reach = max(reach, 1.25 * math.dist(T_view_robot[:2], T_view_truth[:2]))
         self._radius = _grown(self._radius, reach)
@@ -40,7 +41,11 @@ class CloseUp:
             (x - self._radius, y - self._radius, x + self._radius, y + self._radius), width, height
         )
         picture: Picture = np.full((height, width, 3), 255, np.uint8)
-        self._grid(picture, view)
+        for k in (1, 2, 3):
+            x, y = round(width * k / 4), round(height * k / 4)
+            cv2.line(picture, (x, 0), (x, height), draw.GRID, 1)
+            cv2.line(picture, (0, y), (width, y), draw.GRID, 1)
+        draw.scale_bar(picture, view, self._unit)
         if T_view_truth is not None:
             self._arrow(picture, view, T_view_truth, draw.GREEN)
         draw_ellipse(picture, view, T_view_robot, covariance, self._color)
@@ -48,29 +53,13 @@ class CloseUp:
         cv2.rectangle(picture, (0, 0), (width - 1, height - 1), draw.GRID, 1)
         return picture
 
-    def _grid(self, picture: Picture, view: View) -> None:
-        """Lines half a radius apart, one of them with its length."""
-        width, height = self._size
-        for k in (1, 2, 3):
-            x, y = round(width * k / 4), round(height * k / 4)
-            cv2.line(picture, (x, 0), (x, height), draw.GRID, 1)
-            cv2.line(picture, (0, y), (width, y), draw.GRID, 1)
-        step = round(width / 4)
-        y, x = height - round(9 * self._unit), round(width / 2)
-        thick = max(1, round(2 * self._unit))
-        picture[y : y + thick, x : x + step] = draw.INK
-        word, size = draw.length(self._radius / 2.0), round(11 * self._unit)
-        left = x + (step - draw.text_width(word, size)) // 2
-        draw.text(picture, word, (left, y - round(15 * self._unit)), size, draw.INK)
-
     def _arrow(self, picture: Picture, view: View, T_view_robot: Float, color: Color) -> None:
         tip = np.array([[0.0, 0.0], [22.0 * self._unit / view.scale, 0.0]])
         ends = view.pixels(se2.transform(T_view_robot, tip))
         if not (np.abs(ends) < 1e4).all():
             return
         draw.polyline(picture, ends, color, max(1, round(2 * self._unit)))
-        x, y = np.round(ends[0] * 16.0).astype(int).tolist()
-        cv2.circle(picture, (x, y), round(4 * self._unit * 16), color, cv2.FILLED, cv2.LINE_AA, 4)
+        draw.dots(picture, ends[:1], [color], 4 * self._unit)
 
 
 def off_by(error: Float, covariance: Float) -> str:

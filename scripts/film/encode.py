@@ -15,7 +15,7 @@ import imageio_ffmpeg
 import numpy as np
 
 from scripts.film import FPS
-from scripts.film.draw import Picture
+from sim.view.draw import Picture
 from slam.errors import InvalidValueError, MissingDependencyError, OutputError
 from slam.files import reason, replacing
 

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 from scripts.comparison.again import run_of, why_no_run
 from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.show import Show
-from scripts.film.view import LogStage, Stage
+from scripts.film.stage import Room, Stage
 from scripts.names import is_run
 from scripts.options import admitted
 from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
 from sim.core.versions import check_world, world_of
 from sim.recording.sums import check_vouched
+from sim.view.moment import Moments
 from slam.errors import (
     InvalidValueError,
     LogFormatError,
@@ -28,7 +29,7 @@ from slam.logs import open_log
 from slam.logs.bag import read_bag
 from slam.logs.bag_topics import is_bag
 from slam.oracle import Oracle
-from slam.replay import Replay, primary_of, systems_named
+from slam.replay import Replay, systems_named
 
 if TYPE_CHECKING:
     from sim.moments import Moment
@@ -82,8 +83,7 @@ class Footage:
                     "A simulated scene has them (--scene), and a bag of 'mobilia generate'."
                 )
         return Show(
-            replay=replay,
-            primary=primary_of(replay),
+            moments=Moments(replay),
             stage=self.stage,
             title=self.title,
             duration_s=self.duration_s,
@@ -92,17 +92,11 @@ class Footage:
             size=size,
         )
 
-    def close(self) -> None:
-        """Give back what the stage holds."""
-        closing = getattr(self.stage, "close", None)
-        if closing is not None:
-            closing()
-
     def __enter__(self) -> Footage:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
+        self.stage.close()
 
 
 def open_run(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
@@ -165,13 +159,12 @@ def of_simulation(
 ) -> Footage:
     """A simulation at hand and the moments that it goes through, a tour unless said otherwise; one
     in ``every`` of them is shown."""
-    from scripts.film.live_view import LiveStage
     from sim.moments import thinned, toured
     from sim.simulation import n_frames
 
     whole = moments or (lambda: toured(simulation, seconds))
     shown = whole if every == 1 else lambda: thinned(whole(), every)
-    stage = LiveStage(simulation, shown, view=view)
+    stage = Room(simulation, shown, view)
     stream = Stream(
         metadata=simulation.metadata(),
         frames=stage.frames,
@@ -182,7 +175,7 @@ def of_simulation(
         stage=stage,
         title=title,
         duration_s=float(seconds),
-        no_camera=stage.why_no_camera(),
+        no_camera=stage.no_camera,
         made_with={
             "simulation": {"odometry": simulation.odometry_preset, **simulation.metadata().extra}
         },
@@ -251,7 +244,7 @@ def of_log(path: Path, *, strict: bool = False, text_format: Path | None = None)
         raise InvalidValueError(f"{path}: holds no frame to film")
     return Footage(
         stream=stream,
-        stage=LogStage(labelled=labelled),
+        stage=Stage(labelled=labelled),
         title=path.resolve().name,
         duration_s=(last_ns - first_ns) / NS_PER_S,
         truth_name=stream.metadata.truth or "truth",

@@ -10,9 +10,9 @@ from rich.markup import escape
 
 from scripts import interrupt
 from scripts.console import progress
-from scripts.film.draw import Picture
 from scripts.film.encode import Film
 from scripts.film.show import Show
+from sim.view.draw import Picture
 from slam.errors import InvalidValueError
 from slam.frames import Frame, Stream
 
@@ -29,7 +29,7 @@ def shoot(
     """
     taken = 0
     for frame in show.replay.run(stream):
-        seconds = show.note(frame)
+        seconds = show.note(frame).seconds
         due = show.pace.due(seconds) - taken if reel is not None else 0
         over = seconds > show.pace.to_s
         if reel is not None and due > 0:
@@ -76,7 +76,7 @@ class Snapshots:
 
     def note(self, frame: Frame) -> None:
         """Take the pictures that are due."""
-        now = self._show.seconds(frame)
+        now = self._show.moments.seconds
         while not self.done() and now >= self._seconds[len(self.pictures)] - 1e-6:
             self.pictures.append(self._paint(frame))
         self._last = frame

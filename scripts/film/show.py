@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The film of a run: the world, what a SLAM made of it, and how far off it was.
 
-show = Show(replay=replay, primary="shunting", stage=LogStage(), title="intel.log", ...)
+show = Show(moments=Moments(replay), stage=Stage(labelled=False), title="intel.log", ...)
 for frame in replay.run(stream):
     show.note(frame)
     picture = show.paint(frame)        # whenever one is wanted
@@ -14,26 +14,26 @@ from dataclasses import dataclass, field, replace
 import cv2
 import numpy as np
 
-from scripts.film import draw, panes
-from scripts.film.changed import Changed
-from scripts.film.chart import Bar, ErrorChart, Series
+from scripts.film import panes
+from scripts.film.chart import UNSURE, ErrorChart, Series
 from scripts.film.close_up import CloseUp, off_by
-from scripts.film.draw import Color, Picture
 from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.layout import Box, Layout
-from scripts.film.map_pane import SIGMAS, MapPane, Trail
-from scripts.film.map_tiles import LevelMap, MapTiles
-from scripts.film.scan_pane import LEGEND, legend, points_robot
-from scripts.film.view import Stage
+from scripts.film.map_pane import MapPane
+from scripts.film.stage import Stage
+from sim.events import Event
+from sim.view import draw
+from sim.view.draw import Color, Picture
+from sim.view.moment import SIGMAS, Moments, Shown
+from sim.view.scans import LEGEND, beams
 from slam import se2
-from slam.estimate import Raster
-from slam.frames import NS_PER_S, Float, Frame, Scan
+from slam.frames import Float, Frame, Scan
 from slam.frontend.seen_space import SeenSpace
 from slam.replay import Replay, Track
-from slam.system import MapsInParts, MovingMap
+from slam.system import MovingMap
 
-SEEN_EVERY_NS = 200_000_000  # the areas of neighbouring scans overlap
-MOST_MAPS = 60  # whole ones, of a log
+SEEN_EVERY_S = 0.2  # the areas of neighbouring scans overlap
+MOST_MAPS = 60  # big ones, of a log
 FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn again
 
 
@@ -41,101 +41,95 @@ FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn again
 class Show:
     """Composes film frames of a replay.
 
-    primary     the track whose map and claims are shown; odometry is always drawn orange
+    moments     of the replay: its primary track is the one whose map and claims are shown
     stage       what is known of the true world
     title       scene, dynamism and seed, or the log's name
     duration_s  of the run;   pace  of the film, which shows a part of it
-    seen        the space that scans have swept; series, trails  errors and paths by track;
-                unsure  when the primary track did not trust itself
-    changed     where the map may have changed since it was drawn last
-    filmed      whether ``paint`` will be called
+    seen        the space that scans have swept;   series  errors by track
+    unsure      when the primary track did not trust itself
+    shown       the last moment that was noted
     """
 
-    replay: Replay
-    primary: str
+    moments: Moments
     stage: Stage
     title: str
     duration_s: float
     truth_name: str = "truth"
     pace: Pace = field(default_factory=Pace)
     size: Size = SIZE
-    filmed: bool = True
     seen: SeenSpace = field(default_factory=SeenSpace)
     series: dict[str, Series] = field(default_factory=dict)
-    trails: dict[str, Trail] = field(default_factory=dict)
-    unsure: list[Bar] = field(default_factory=list)
-    changed: Changed = field(default_factory=Changed)
-    redrawn: int = 0  # times that the SLAM moved its map
-    _seen_ns: int = -SEEN_EVERY_NS
+    unsure: list[Event] = field(default_factory=list)
+    shown: Shown | None = None
+    _seen_s: float = -SEEN_EVERY_S
     _scans: list[tuple[int, Scan]] = field(default_factory=list)  # that were seen, by frame
-    _first: tuple[int, Float | None] | None = None
-    _last: Frame | None = None
+    _moved: int = 0
     _panes: _Panes | None = None
 
-    def color(self, name: str) -> Color:
-        """The colour a track is drawn in."""
-        return draw.GREEN if name == "truth" else draw.colors_of(list(self.replay.tracks))[name]
+    @property
+    def replay(self) -> Replay:
+        """What is shown."""
+        return self.moments.replay
+
+    @property
+    def primary(self) -> str:
+        """The filmed system's name."""
+        return self.moments.primary
+
+    def track(self) -> Track:
+        """What the filmed system has estimated so far."""
+        return self.moments.track
+
+    @property
+    def colors(self) -> dict[str, Color]:
+        """What each track is drawn in, and "truth"."""
+        return draw.colors_of(list(self.replay.tracks))
 
     def named(self) -> list[tuple[str, Color]]:
         """Whose colour is which: the tracks, then the truth where there is one."""
-        known = (
-            [(self.truth_name, draw.GREEN)] if "truth" in self.trails and self.truth_name else []
-        )
-        return [(name, self.color(name)) for name in self.replay.tracks] + known
+        names = {name: name for name in self.replay.tracks}
+        if self.shown is not None and self.shown.truth_map is not None and self.truth_name:
+            names["truth"] = self.truth_name
+        return [(word, self.colors[name]) for name, word in names.items()]
 
     def legend(self) -> list[tuple[str, Color]]:
         """The same for a strip, with what the colours of the beams say."""
         beams = LEGEND if self.stage.labelled else ()
         return self.named() + [(f"scan: {word}", color) for word, color in beams]
 
-    def seconds(self, frame: Frame) -> float:
-        """s since the first frame noted."""
-        return (frame.stamp_ns - self._first[0]) / NS_PER_S if self._first else 0.0
-
     @property
     def last_points_map(self) -> Float:
         """(k, 2) m, what the last scan saw where the primary track believes it was."""
-        if self._last is None or self._last.scan is None:
+        if self.shown is None or self.shown.frame.scan is None:
             return np.zeros((0, 2))
-        here = self.track().estimates[-1].T_map_robot
-        return se2.transform(here, points_robot(self._last.scan))
+        T_robot_laser, ends, _ = beams(self.shown.frame)
+        here = self.shown.estimates[self.primary].T_map_robot
+        return se2.transform(se2.compose(here, T_robot_laser), ends)
 
-    def note(self, frame: Frame) -> float:
-        """Remember this frame's poses and errors; call for every frame, painted or not.
-
-        Returns s since the first frame.
-        """
-        if self._first is None:
-            self._first = (frame.stamp_ns, frame.truth)
-        self._last = frame
-        truth_map = self._truth_map(frame)
-        if truth_map is not None:
-            self.trails.setdefault("truth", Trail()).add(truth_map)
-        if frame.scan is not None and frame.stamp_ns - self._seen_ns >= SEEN_EVERY_NS:
-            self.seen.add(frame.scan, self.track().estimates[-1].T_map_robot)
-            self._seen_ns = frame.stamp_ns
+    def note(self, frame: Frame) -> Shown:
+        """Remember this frame's poses and errors; call for every frame, painted or not."""
+        self.shown = shown = self.moments.note(frame, self.stage.placed)
+        here = shown.estimates[self.primary]
+        if frame.scan is not None and shown.seconds - self._seen_s >= SEEN_EVERY_S - 1e-9:
+            self._seen_s = shown.seconds
+            self.seen.add(frame.scan, here.T_map_robot)
             if isinstance(self.track().system, MovingMap):
-                self._scans.append((len(self.track().estimates) - 1, frame.scan))
-        seconds = self.seconds(frame)
-        for name, track in self.replay.tracks.items():
-            estimate = track.estimates[-1]
-            self.trails.setdefault(name, Trail()).add(estimate.T_map_robot)
-            error = None
-            if truth_map is not None:
-                error = estimate.T_map_robot - truth_map
-                error[2] = se2.wrap(float(error[2]))
-            self.series.setdefault(name, Series()).add(seconds, error, estimate.covariance)
-        self._note_trust(seconds)
-        self._follow_map()
-        if self.filmed and frame.scan is not None and self.stage.bounds is None:
-            self.changed.add(frame.scan, self.track().estimates[-1].T_map_robot)
-        return seconds
+                self._scans.append((shown.number, frame.scan))
+        for name in self.replay.tracks:
+            self.series.setdefault(name, Series()).add(shown, name)
+        if not here.converged:
+            self._note_doubt(shown.seconds)
+        if self._moved != self.moments.moved:  # what was seen lies elsewhere on the map now
+            self._moved, self.seen = self.moments.moved, SeenSpace()
+            for (_, scan), pose in zip(self._scans, self._poses(), strict=True):
+                self.seen.add(scan, pose)
+        return shown
 
     def paint(self, frame: Frame) -> Picture:
         """The film frame at ``frame``: call ``note`` first. Pictures share no memory."""
         if self._panes is None:
             self._panes = _Panes(self)
-        return self._panes.paint(frame, self.seconds(frame))
+        return self._panes.paint(frame)
 
     def vignette(self, frame: Frame) -> Picture:
         """The scan above the map, without words: what a strip is made of."""
@@ -143,61 +137,20 @@ class Show:
         assert self._panes is not None
         return self._panes.vignette(whole)
 
-    # -- what the panes are told ----------------------------------------------------------
-
-    def track(self) -> Track:
-        """What the filmed system has estimated so far."""
-        return self.replay.tracks[self.primary]
-
-    def _truth_map(self, frame: Frame) -> Float | None:
-        first = self._first[1] if self._first else None
-        if frame.truth is None or first is None:
-            return None
-        return se2.between(first, frame.truth)
-
-    def _follow_map(self) -> None:
-        """Lay out again what was seen, where closed loops have moved the map (docs/loops.md)."""
+    def _poses(self) -> list[Float]:
+        """Where the scans that were seen lie in the map by now."""
         system = self.track().system
-        if not isinstance(system, MovingMap):
-            return
-        if not any(self.track().estimates[-1].diagnostics["correction"]):
-            return
+        assert isinstance(system, MovingMap)
         poses = system.poses_in_map()
-        self.seen, self.redrawn = SeenSpace(), self.redrawn + 1
-        self.trails[self.primary] = trail = Trail()
-        for pose in poses:
-            trail.add(pose)
-        for k, scan in self._scans:
-            self.seen.add(scan, poses[k])
-            if self.filmed and self.stage.bounds is None:
-                self.changed.add(scan, poses[k])
+        return [poses[number] for number, _ in self._scans]
 
-    def _note_trust(self, seconds: float) -> None:
-        if self.track().estimates[-1].converged:
-            return
+    def _note_doubt(self, seconds: float) -> None:
         before = self.unsure[-1] if self.unsure else None
         if before is not None and seconds - before.end_s < 0.5:
             self.unsure[-1] = replace(before, end_s=seconds)
         else:
-            self.unsure.append(Bar(lane="unsure", start_s=seconds, end_s=seconds))
-
-    def T_view_map(self) -> Float:
-        """The map drawn the way the world lies, where that is known; for display only."""
-        first = self._first[1] if self._first else None
-        return first if first is not None and self.stage.bounds is not None else np.zeros(3)
-
-    def holds(self) -> str:
-        """What the map of the primary track is made of, where that is known."""
-        track = self.track()
-        if track.landmarks() is not None:
-            return f"landmarks ({SIGMAS:g} σ), "
-        words = track.cells_hold()
-        return f"{words}, " if words else ""
-
-    def names(self) -> list[str]:
-        """What has a trail, the primary track last."""
-        others = [name for name in self.trails if name != self.primary]
-        return [*others, self.primary]
+            doubt = Event(kind=UNSURE, name="", start_s=seconds, end_s=seconds, seen=True)
+            self.unsure.append(doubt)
 
 
 class _Panes:
@@ -210,40 +163,37 @@ class _Panes:
         self._layout, unit = layout, layout.unit
         stage.open(layout)
         self._map = MapPane(*layout.map.size, unit, stage.bounds)
-        self._close = CloseUp(layout.close.size, unit, show.color(show.primary))
+        self._close = CloseUp(layout.close.size, unit, show.colors[show.primary])
         span = (pace.from_s, max(min(pace.to_s, show.duration_s), pace.from_s + 1.0))
         self._chart = ErrorChart(
-            layout.chart.size,
-            unit,
-            span_s=span,
-            primary=show.primary,
-            colors={name: show.color(name) for name in show.replay.tracks},
-            lanes=[*stage.lanes, "unsure"],
-        )
-        # of a log, nobody knows how large its world is
-        self._tiles = MapTiles() if stage.bounds is None else None
-        self._redrawn = show.redrawn
+            layout.chart.size, unit, span_s=span, primary=show.primary, colors=show.colors,
+            lanes=[*stage.lanes, UNSURE],
+        )  # fmt: skip
         self._base = self._still()
-        self._fresh_at = self._mapped_at = -np.inf
+        self._fresh_at = -np.inf
         self._camera: Picture | None = None
 
-    def paint(self, frame: Frame, seconds: float) -> Picture:
-        show, layout = self._show, self._layout
+    def paint(self, frame: Frame) -> Picture:
+        show, layout, moments = self._show, self._layout, self._show.moments
+        shown, T_view_map = show.shown, self._T_view_map()
+        assert shown is not None
         fresh = (
             show.pace.fps * FRESH_S <= 1.0  # scans come when they come: some early by a part
-            or abs(seconds - self._fresh_at) >= FRESH_S * show.pace.speed - 1e-6
+            or abs(shown.seconds - self._fresh_at) >= FRESH_S * show.pace.speed - 1e-6
         )
-        track, trails = show.track(), show.trails
-        T_view_map = show.T_view_map()
+        own, paths = moments.paths[show.primary], moments.paths
         if fresh:
-            self._fresh_at = seconds
-            landmarks = track.landmarks()
-            known = None if landmarks is None else landmarks.ellipses(SIGMAS)
-            self._map.refresh(self._raster(seconds), known, trails[show.primary], T_view_map)
+            self._fresh_at = shown.seconds
+            raster, landmarks = moments.look(big_rest_s=show.duration_s / MOST_MAPS)
+            self._map.refresh(raster, landmarks, own, T_view_map)
         canvas = self._base.copy()
-        self._headline(canvas, seconds)
-        drawn = [(trails[n], show.color(n), 4 if n == "truth" else 2) for n in show.names()]
-        covariance = track.estimates[-1].covariance
+        self._headline(canvas, shown.seconds)
+        names = [name for name in paths if name != show.primary]
+        if shown.truth_map is None:
+            names.remove("truth")
+        drawn = [(paths[n], show.colors[n], 4 if n == "truth" else 2) for n in names]
+        drawn.append((own, show.colors[show.primary], 2))
+        covariance = shown.estimates[show.primary].covariance
         picture = self._map.paint(drawn, show.last_points_map, covariance, T_view_map)
         _put(canvas, layout.map, picture)
         _put(canvas, layout.scan, show.stage.scan(frame))
@@ -251,34 +201,17 @@ class _Panes:
             if fresh or self._camera is None:
                 self._camera = show.stage.view()
             _put(canvas, layout.camera, self._camera)
-        bars = [*show.stage.bars(), *show.unsure]
-        _put(canvas, layout.chart, self._chart.paint(show.series, bars, show.stage.kidnaps()))
-        _put(canvas, layout.close, self._close_up(T_view_map, covariance))
-        self._say_off(canvas, covariance)
-        for pane, box in zip(self._more, layout.more, strict=True):
-            _put(canvas, box, pane(show, frame, box.size))
+        events = [*show.stage.events(), *show.unsure]
+        _put(canvas, layout.chart, self._chart.paint(show.series, events))
+        self._close_up(canvas, shown, covariance)
+        for title, box in zip(self._more, layout.more, strict=True):
+            _put(canvas, box, panes.painted(title, show, frame, box.size))
         return canvas
 
-    def _raster(self, seconds: float) -> Raster | LevelMap | None:
-        """The map now; of a log, what its view has pixels for.
-
-        A map that is not to be had in parts is asked for some dozens of times.
-        """
-        show, tiles = self._show, self._tiles
-        track = show.track()
-        if tiles is None:
-            return track.map()
-        if self._redrawn != show.redrawn:
-            self._redrawn, self._tiles = show.redrawn, (tiles := MapTiles())
-        tiles.fit(self._map.view(show.trails[show.primary], show.T_view_map()).scale)
-        rest_s = 0.0 if isinstance(track.system, MapsInParts) else show.duration_s / MOST_MAPS
-        if abs(seconds - self._mapped_at) >= rest_s:
-            self._mapped_at = seconds
-            for bounds in show.changed.taken(in_parts=rest_s == 0.0, empty=tiles.empty):
-                part = track.map_part(tiles.aligned(bounds))
-                if part is not None:
-                    tiles.put(part)
-        return tiles.whole()
+    def _T_view_map(self) -> Float:
+        """The map drawn the way the world lies, where that is known; for display only."""
+        T = self._show.moments.T_world_map
+        return T if T is not None and self._show.stage.bounds is not None else np.zeros(3)
 
     def vignette(self, whole: Picture) -> Picture:
         """Two panes of a painted frame, one above the other, equally wide."""
@@ -290,21 +223,17 @@ class _Panes:
             parts.append(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA))
         return np.vstack(parts)
 
-    def _close_up(self, T_view_map: Float, covariance: Float) -> Picture:
-        trails = self._show.trails
-        here = se2.compose(T_view_map, trails[self._show.primary].pose)
-        truth = se2.compose(T_view_map, trails["truth"].pose) if "truth" in trails else None
-        turn = se2.rotation(float(T_view_map[2]))
-        return self._close.paint(here, truth, turn @ covariance[:2, :2] @ turn.T)
-
-    def _say_off(self, canvas: Picture, covariance: Float) -> None:
-        """Under the close-up, how far off."""
-        trails, box, unit = self._show.trails, self._layout.close, self._layout.unit
-        if "truth" not in trails:
-            return
-        error: Float = (trails[self._show.primary].pose - trails["truth"].pose)[:2]
-        at = (box.x, box.y + box.height + round(6 * unit))
-        draw.text(canvas, off_by(error, covariance[:2, :2]), at, round(13 * unit), bold=True)
+    def _close_up(self, canvas: Picture, shown: Shown, covariance: Float) -> None:
+        """The last centimetres, and how far off in words."""
+        T, box, unit = self._T_view_map(), self._layout.close, self._layout.unit
+        own, turn = shown.estimates[self._show.primary].T_map_robot, se2.rotation(float(T[2]))
+        truth = None if shown.truth_map is None else se2.compose(T, shown.truth_map)
+        turned = turn @ covariance[:2, :2] @ turn.T
+        _put(canvas, box, self._close.paint(se2.compose(T, own), truth, turned))
+        if shown.truth_map is not None:
+            at = (box.x, box.y + box.height + round(6 * unit))
+            words = off_by((own - shown.truth_map)[:2], covariance[:2, :2])
+            draw.text(canvas, words, at, round(13 * unit), bold=True)
 
     def _headline(self, canvas: Picture, seconds: float) -> None:
         show, unit = self._show, self._layout.unit
@@ -326,10 +255,10 @@ class _Panes:
         self._time_x = x + round(24 * unit)
         self._key(canvas)
         titles = [
-            (layout.map, f"map of {show.primary}: {show.holds()}scan, trails"),
+            (layout.map, f"map of {show.primary}: {self._holds()}scan, trails"),
             (layout.close, f"close-up, {SIGMAS:g} σ ellipse"),
         ]
-        titles += [(box, p.title) for p, box in zip(self._more, layout.more, strict=True)]
+        titles += list(zip(layout.more, self._more, strict=True))
         if layout.camera is not None:
             titles.append((layout.camera, "3D camera"))
         labelled = show.stage.labelled
@@ -338,8 +267,22 @@ class _Panes:
             at = (box.x, box.y - round(20 * unit))
             end = draw.text(canvas, title, at, round(13 * unit), draw.MUTED)
             if box is layout.scan and labelled:
-                legend(canvas, (end + round(10 * unit), at[1]), unit)
+                x = end + round(10 * unit)
+                for word, color in LEGEND:
+                    radius = max(2, round(4 * unit))
+                    middle = [[x + radius, at[1] + round(8 * unit)]]
+                    draw.dots(canvas, np.array(middle), [color], radius)
+                    x = draw.text(canvas, word, (x + round(13 * unit), at[1]), round(12 * unit))
+                    x += round(11 * unit)
         return canvas
+
+    def _holds(self) -> str:
+        """What the map of the primary track is made of, where that is known."""
+        track = self._show.track()
+        if track.landmarks() is not None:
+            return f"landmarks ({SIGMAS:g} σ), "
+        words = track.cells_hold()
+        return f"{words}, " if words else ""
 
     def _key(self, canvas: Picture) -> None:
         """Which colour is whose, from the right."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Film strips: a few moments of a run side by side in one PNG, each labelled with its time.
 
-strip(pictures, seconds, Path("strip.png"))
+strips({"": pictures}, seconds, Path("strip.png"))
 strips({"as it was": pictures, "without chair 3": others}, seconds, Path("both.png"))
 """
 
@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import cv2
 import numpy as np
 from PIL import Image
 
-from scripts.film import draw
-from scripts.film.draw import Picture
+from sim.view import draw
+from sim.view.draw import Picture
 from slam.errors import InvalidValueError
 from slam.files import replacing
 
@@ -35,27 +36,6 @@ def evenly(n: int, start_s: float, end_s: float) -> list[float]:
     return [start_s + (end_s - start_s) * k / (n - 1) for k in range(n)]
 
 
-def strip(
-    pictures: Sequence[Picture],
-    seconds: Sequence[float],
-    path: Path | None = None,
-    *,
-    columns: int | None = None,
-    cell_width: int = CELL_WIDTH,
-    legend: Legend = (),
-) -> Picture:
-    """One row of pictures (or several of ``columns`` each) with their times; written to ``path``.
-
-    pictures  (height, width, 3) uint8 RGB, all of one size
-    seconds   of each, written above it
-    legend    what colours stand for, written below all of them
-    Raises ``InvalidValueError`` where these do not fit together.
-    """
-    return strips(
-        {"": pictures}, seconds, path, columns=columns, cell_width=cell_width, legend=legend
-    )
-
-
 def strips(
     rows: Mapping[str, Sequence[Picture]],
     seconds: Sequence[float],
@@ -65,7 +45,14 @@ def strips(
     cell_width: int = CELL_WIDTH,
     legend: Legend = (),
 ) -> Picture:
-    """Strips under one another, each under its name: the same moments of several runs."""
+    """Pictures of moments in a row (or in several of ``columns`` each) with their times, each run
+    under its name; written to ``path``.
+
+    rows      by name, "" for one without: (height, width, 3) uint8 RGB, all of one size
+    seconds   of each, written above it
+    legend    what colours stand for, written below all of them
+    Raises ``InvalidValueError`` where these do not fit together.
+    """
     columns = min(columns or len(seconds), len(seconds))
     shape = _cell(rows, seconds, cell_width)
     blocks = [_block(name, parts, seconds, columns, shape) for name, parts in rows.items()]
@@ -138,5 +125,6 @@ def _block(
         line, column = divmod(k, columns)
         x, y = column * (width + GAP), top + line * (LABEL + height + GAP)
         draw.text(block, f"{at_s:.1f} s", (x, y + 3), 13, draw.MUTED, bold=True)
-        draw.paste(block, part, (x, y + LABEL), (width, height))
+        small = cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA)
+        block[y + LABEL : y + LABEL + height, x : x + width] = small
     return block

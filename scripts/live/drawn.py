@@ -7,22 +7,21 @@ Room and scan lie in the world; map, estimates and paths in the map, which lies 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from scripts.film import draw
-from scripts.film.draw import Color
-from scripts.film.map_pane import SIGMAS
-from scripts.film.scan_pane import beam_colors, beam_ends
+from sim.view import draw
+from sim.view.draw import Color
 from sim.view.moment import Moments, Path, Shown, ellipse
-from sim.view.parts import BALL, BOX, Parts, Placed
+from sim.view.parts import BOX, Parts, Placed, mesh
+from sim.view.scans import beams
 from sim.world.world import World
 from slam import se2
 from slam.estimate import Landmarks, Raster
-from slam.frames import Float, Frame
+from slam.frames import Float
 from slam.maps import raster_image
 
 LIFT_M = 0.03  # of the map and of lines above the floor, that they are seen
@@ -30,10 +29,10 @@ ROBOT_M = 0.45  # height at which the arrow of an estimate floats: above a robot
 POINT_M = 0.05
 PATH_POINTS = 400  # of a path as drawn
 PATH_S = 1.0  # so often of the run it is drawn anew
-MOST_CELLS = 1024  # of the map as drawn, along an edge
 LEVELS = 8  # of a cell of it that are told apart
 STEPS_M, STEPS_TURN = 512.0, 1024.0  # parts of a metre and of a turn that are told apart
 LOG_BOUNDS = (-10.0, -10.0, 10.0, 10.0)  # of what is seen of a log at first, m
+AROUND = 9  # corners of a circle as drawn
 _ARROW = np.array([[0.32, 0.0, 0.0], [-0.22, 0.2, 0.0], [-0.1, 0.0, 0.0], [-0.22, -0.2, 0.0]])
 
 
@@ -41,19 +40,23 @@ class Drawn:
     """Draws moments into a ``viser.SceneApi``; used by one thread.
 
     parts   what is seen of the room, None for a log;   bounds  xmin, ymin, xmax, ymax of it, m
+    map_s   so often at most the map is drawn anew, s of the run
     """
 
-    def __init__(self, scene: Any, moments: Moments, world: World | None = None) -> None:
+    def __init__(
+        self, scene: Any, moments: Moments, world: World | None = None, map_s: float = 0.0
+    ) -> None:
         self._scene, self.moments = scene, moments
-        self.parts = None if world is None else Parts(world)
+        self.parts = None if world is None else Parts(world.scene, world.model)
         self._height_m = 0.0 if world is None else world.scene.scan_height_m
         self.bounds = LOG_BOUNDS if world is None else world.scene.bounds
-        self._colors = {**draw.colors_of(list(moments.replay.tracks)), "truth": draw.GREEN}
+        self._colors = draw.colors_of(list(moments.replay.tracks))
         self._nodes: dict[str, Any] = {}
         self._values: dict[str, Any] = {}
         self._placed: Placed | None = None
         self._map: tuple[Raster | None, Landmarks | None] = (None, None)
-        self._path_s = -math.inf
+        self._path_s = self._map_s = -math.inf
+        self._map_rest_s = map_s
         scene.configure_default_lights(False)
         scene.configure_environment_map(None)
         scene.add_light_hemisphere("/light/sky", ground_color=(150, 150, 150), intensity=2.4)
@@ -69,8 +72,9 @@ class Drawn:
         if self.parts is not None and shown.placed is not None:
             self._room(self.parts, shown.placed)
         self._scan(shown)
-        if self._map != (shown.raster, shown.landmarks):
-            self._map = shown.raster, shown.landmarks
+        due = abs(shown.seconds - self._map_s) >= self._map_rest_s - 1e-6
+        if due and self._map != (shown.raster, shown.landmarks):
+            self._map_s, self._map = shown.seconds, (shown.raster, shown.landmarks)
             self._cells(shown.raster)
             self._landmarks(shown.landmarks)
         renew = abs(shown.seconds - self._path_s) >= PATH_S
@@ -100,7 +104,7 @@ class Drawn:
             if not first:
                 self._set(name, batched_positions=centres, batched_wxyzs=quats)
                 continue
-            vertices, faces = _UNIT[batch.shape]
+            vertices, faces = mesh(batch.shape, AROUND)
             self._nodes[name] = self._scene.add_batched_meshes_simple(
                 f"/{name}", vertices, faces, quats, centres,
                 batched_scales=batch.sizes.astype(np.float32), batched_colors=batch.colors,
@@ -131,8 +135,6 @@ class Drawn:
         """The map in the colours of the pictures; unknown cells are transparent."""
         if raster is None:
             return
-        step = -(-max(raster.values.shape) // MOST_CELLS)
-        raster = _coarser(raster, step)
         levels = np.round(raster.values * LEVELS) / LEVELS  # a picture of few colours is small
         raster = replace(raster, values=levels.astype(np.float32))
         cells = np.empty((*raster.values.shape, 4), np.uint8)
@@ -152,7 +154,7 @@ class Drawn:
         if landmarks is None:
             return
         rings = [
-            point + ellipse(covariance, SIGMAS)
+            point + ellipse(covariance)
             for point, covariance in zip(landmarks.points_map, landmarks.covariances, strict=True)
         ]
         lines = [_segments(ring, closed=True) for ring in rings]
@@ -174,11 +176,11 @@ class Drawn:
         self._set(name, wxyz=wxyz, position=position)
         if covariance is not None:
             turn = se2.rotation(-float(pose[2]))
-            ring = ellipse(turn @ covariance[:2, :2] @ turn.T, SIGMAS)
+            ring = ellipse(turn @ covariance[:2, :2] @ turn.T)
             self._lines(f"{name}/ellipse", _segments(ring, closed=True), color, 0.025)
 
     def _path(self, name: str, path: Path, number: int) -> None:
-        way = _segments(path.until(number, PATH_POINTS))
+        way = _segments(path.points(PATH_POINTS, number))
         if len(way):
             self._lines(f"path/{name}", way, self._colors[name], 0.03)
 
@@ -201,16 +203,6 @@ class Drawn:
                 setattr(node, key, value)
 
 
-def beams(frame: Frame) -> tuple[Float, Float, Any]:
-    """Where the scanner is on the robot, (n, 2) m in its frame of where beams ended, and (n, 3) RGB
-    by what they hit; the features of a log without scans."""
-    if frame.scan is None:
-        xy = np.zeros((0, 2)) if frame.features is None else frame.features.points_robot
-        return np.zeros(3), xy, np.full((len(xy), 3), 40, np.uint8)
-    valid = frame.scan.valid
-    return frame.scan.spec.T_robot_laser, beam_ends(frame.scan)[valid], beam_colors(frame)[valid]
-
-
 def _pose(pose: Float, z: float = 0.0) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """A turn (w, x, y, z) and a place of a pose on the floor, or above it."""
     x, y, yaw = (float(value) for value in pose)
@@ -225,65 +217,9 @@ def _segments(xy: Float, *, closed: bool = False) -> Float:
     return pieces if closed else pieces[:-1]
 
 
-def _coarser(raster: Raster, step: int) -> Raster:
-    """The same map with cells ``step`` times as wide, each as solid as its most solid part."""
-    if step == 1:
-        return raster
-    high, wide = (-(-n // step) * step for n in raster.values.shape)
-    whole = np.full((high, wide), np.nan, np.float32)
-    whole[: raster.values.shape[0], : raster.values.shape[1]] = raster.values
-    tiles = whole.reshape(high // step, step, wide // step, step)
-    values = np.fmax.reduce(np.fmax.reduce(tiles, axis=3), axis=1)
-    return Raster(
-        values=values, resolution_m=raster.resolution_m * step, T_map_origin=raster.T_map_origin
-    )
-
-
 def _node(name: str) -> str:
     """A track's name as part of a name in the scene."""
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
-
-
-def _box() -> tuple[Float, Any]:
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces = [
-        (4 * k + a, 4 * k + b, 4 * k + c) for k in range(6) for a, b, c in ((0, 1, 2), (0, 2, 3))
-    ]
-    return np.concatenate([corners[list(side)] for side in sides]), np.array(faces)
-
-
-def _turned(radii: Float, heights: Float, around: int = 9) -> tuple[Float, Any]:
-    """A surface of revolution about z through these (radius, height)."""
-    turns = np.linspace(0.0, math.tau, around, endpoint=False)
-    circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    rings = [
-        np.column_stack([r * circle, np.full(around, h)])
-        for r, h in zip(radii, heights, strict=True)
-    ]
-    faces = []
-    for ring in range(len(radii) - 1):
-        for k in range(around):
-            a, b = ring * around + k, ring * around + (k + 1) % around
-            faces += [(a, b, b + around), (a, b + around, a + around)]
-    return np.concatenate(rings), np.array(faces)
-
-
-def _ball() -> tuple[Float, Any]:
-    up = np.linspace(-math.pi / 2.0, math.pi / 2.0, 6)
-    return _turned(0.5 * np.cos(up), 0.5 * np.sin(up))
-
-
-def _cylinder() -> tuple[Float, Any]:
-    """Rims twice, so that sides and lids are shaded apart."""
-    radii, heights = (
-        np.array([0.0, 0.5, 0.5, 0.5, 0.5, 0.0]),
-        np.array([-0.5, -0.5, -0.5, 0.5, 0.5, 0.5]),
-    )
-    return _turned(radii, heights)
-
-
-_UNIT: Mapping[str, tuple[Float, Any]] = {BOX: _box(), BALL: _ball(), "cylinder": _cylinder()}
 
 
 def look_at(camera: Any, bounds: Sequence[float]) -> None:

@@ -20,6 +20,7 @@ import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from http import HTTPStatus
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -31,24 +32,19 @@ log = logging.getLogger(__name__)
 MOST_CLIENTS = 8  # at once
 MOST_BYTES = 4096  # of a message of a page; where its camera is takes 300
 MOST_RATE = 120.0  # messages a second of one page; more of them wait
-MOST_HEAD = 8192  # bytes of a handshake
-HEAD_S = 5.0  # s until it is there
-PAGE_S = 60.0  # s that a browser may take for the page
-CARRIED = 1 << 16  # bytes that are read at a time, and wait in the gate for a client that is slow
+HEAD_S = 5.0  # s until a handshake is there
+CARRIED = 1 << 16  # bytes that wait in the gate for a client that is slow, and a message more
 KINDS = (
     "ViewerCameraMessage", "GuiUpdateMessage", "GuiButtonHoldMessage", "ScenePointerMessage",
     "CommandTriggerMessage",
 )  # fmt: skip
-_HEAD_END = b"\r\n\r\n"
-_TEXT, _BINARY, _CONTROL = 1, 2, 8  # opcodes of frames; from 8 on: close, ping, pong
 SECRET = "X-Mobilia-Gate"  # header of a handshake that went through the gate
-_OK = b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Type: text/html; charset=utf-8\r\n"
 
 
 class Refused(Exception):
-    """A handshake that is not let through: status line and reason."""
+    """A handshake that is not let through: status and reason."""
 
-    def __init__(self, status: str, why: str) -> None:
+    def __init__(self, status: HTTPStatus, why: str) -> None:
         super().__init__(why)
         self.status = status
 
@@ -60,68 +56,40 @@ class Rules:
     host     that the gate listens at, ``port`` too
     origins  of pages beside those that the gate's own address serves
     token    that the address must hold; empty: none
-    secret   by which the server behind knows the gate
     """
 
     host: str
     port: int
     origins: tuple[str, ...] = ()
     token: str = ""
-    secret: str = ""
 
     def names(self) -> frozenset[str]:
         """Hosts that a client may have asked for: a name that leads here by force is none."""
         own = f"[{self.host}]" if ":" in self.host else self.host
         return frozenset(f"{name}:{self.port}" for name in ("localhost", "127.0.0.1", "[::1]", own))
 
-    def check(self, head: bytes) -> bytes:
-        """The handshake as it goes on to viser, b"" for the page itself; raises ``Refused``."""
-        target, headers = _parsed(head)
-        hosts, origins = headers.get("host", []), headers.get("origin", [])
+    def check(self, path: str, headers: Any) -> bool:
+        """Whether a request, ``headers`` of ``websockets``, wants the page; False: its WebSocket.
+
+        Raises ``Refused``.
+        """
+        hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
+        given = path.partition("?")[0].strip("/")
         if len(hosts) != 1 or (not self.token and hosts[0].lower() not in self.names()):
-            raise Refused("403 Forbidden", f"the address is not {self.host}:{self.port}")
-        if self.token and not self._holds_token(target):
-            raise Refused("403 Forbidden", "the token in the address is missing or wrong")
+            raise Refused(HTTPStatus.FORBIDDEN, f"the address is not {self.host}:{self.port}")
+        if self.token and not hmac.compare_digest(given.encode(), self.token.encode()):
+            raise Refused(HTTPStatus.FORBIDDEN, "the token in the address is missing or wrong")
         if origins and (len(origins) > 1 or not self._knows(origins[0], hosts[0])):
-            raise Refused(
-                "403 Forbidden",
-                f"a page of {origins[0]!r:.80} wants in; --allow-origin lets it",
-            )
-        if "upgrade" not in headers:
-            if target.partition("?")[0].strip("/") != self.token:
-                raise Refused("404 Not Found", "there is one page only")
-            return b""
-        if headers["upgrade"] != ["websocket"]:
-            raise Refused("426 Upgrade Required", "this is a WebSocket")
-        lines = head.removesuffix(_HEAD_END).split(b"\r\n")
-        own = f"{SECRET}: {self.secret}".encode()
-        return b"\r\n".join([b"GET / HTTP/1.1", *lines[1:], own, b"", b""])
+            why = f"a page of {origins[0]!r:.80} wants in; --allow-origin lets it"
+            raise Refused(HTTPStatus.FORBIDDEN, why)
+        if headers.get_all("Upgrade"):
+            return False
+        if given != self.token:
+            raise Refused(HTTPStatus.NOT_FOUND, "there is one page only")
+        return True
 
     def _knows(self, origin: str, host: str) -> bool:
-        own = (f"http://{host.lower()}", f"https://{host.lower()}")
-        return origin in self.origins or origin in own
-
-    def _holds_token(self, target: str) -> bool:
-        given = target.partition("?")[0].strip("/")
-        return hmac.compare_digest(given.encode(), self.token.encode())
-
-
-def _parsed(head: bytes) -> tuple[str, dict[str, list[str]]]:
-    """Target and headers, names in lower case, each with all its values."""
-    try:
-        first, *lines = head.removesuffix(_HEAD_END).decode("ascii").split("\r\n")
-        method, target, version = first.split(" ")
-        headers: dict[str, list[str]] = {}
-        for line in lines:
-            name, value = line.split(":", 1)
-            if name != name.strip() or not name or any(c in line for c in "\r\n\0"):
-                raise ValueError(line)
-            headers.setdefault(name.lower(), []).append(value.strip(" \t"))
-    except ValueError as error:  # UnicodeDecodeError is one
-        raise Refused("400 Bad Request", "no handshake of a WebSocket") from error
-    if method != "GET" or version != "HTTP/1.1":
-        raise Refused("400 Bad Request", "no handshake of a WebSocket")
-    return target, headers
+        return origin in (*self.origins, f"http://{host.lower()}", f"https://{host.lower()}")
 
 
 def origin_of(text: str) -> str:
@@ -158,41 +126,42 @@ def hidden_host() -> str:
 class Gate:
     """Listens at an address in a thread of its own, before a server at ``behind``.
 
-    page  what is given to a browser
-    port  where it listens, also where 0 was asked for
+    page    what is given to a browser;   secret  by which the server behind knows the gate
+    port    where it listens, also where 0 was asked for
     """
 
     def __init__(
         self, address: tuple[str, int], behind: tuple[str, int], page: bytes, *,
         origins: Sequence[str] = (), token: str = "", secret: str = "",
     ) -> None:  # fmt: skip
-        self._behind, self._page, self._clients = behind, page, 0
+        self._behind, self._page, self._secret = behind, page, secret
         self._loop = asyncio.new_event_loop()
         host, port = address
-        opened = asyncio.start_server(self._let_in, host, port, limit=MOST_HEAD)
         try:
-            self._server: Any = self._loop.run_until_complete(opened)
+            self._server: Any = self._loop.run_until_complete(self._listen(host, port))
         except (OSError, OverflowError, UnicodeError) as error:
             self._loop.close()
             raise InvalidValueError(f"cannot listen at {host}:{port}: {error}") from error
         self.port = int(self._server.sockets[0].getsockname()[1])
-        self.rules = Rules(
-            host=host, port=self.port, origins=tuple(origins), token=token, secret=secret
-        )
+        self.rules = Rules(host=host, port=self.port, origins=tuple(origins), token=token)
         self._thread = threading.Thread(target=self._run, name="gate", daemon=True)
         self._thread.start()
 
+    async def _listen(self, host: str, port: int) -> Any:
+        quiet = log.getChild("websockets")
+        quiet.setLevel(logging.CRITICAL)  # whoever speaks no HTTP is not worth a traceback
+        return await importlib.import_module("websockets.asyncio.server").serve(
+            self._carry, host, port, process_request=self._let_in, compression=None,
+            select_subprotocol=lambda _, offered: next(iter(offered), None), server_header=None,
+            open_timeout=HEAD_S, close_timeout=HEAD_S, max_size=MOST_BYTES, max_queue=2,
+            write_limit=CARRIED, logger=quiet,
+        )  # fmt: skip
+
     def _run(self) -> None:
         self._loop.run_forever()
-        self._loop.run_until_complete(self._end())
-        self._loop.close()
-
-    async def _end(self) -> None:
         self._server.close()
-        tasks = asyncio.all_tasks() - {asyncio.current_task()}
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        self._loop.run_until_complete(self._server.wait_closed())
+        self._loop.close()
 
     def close(self) -> None:
         """Stop listening, and let go of all clients."""
@@ -200,75 +169,61 @@ class Gate:
             self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(HEAD_S)
 
-    async def _let_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._clients += 1
+    def _let_in(self, connection: Any, request: Any) -> Any:
+        """The answer to a request; None lets a WebSocket in."""
         try:
-            if self._clients > MOST_CLIENTS:
-                raise Refused("503 Service Unavailable", f"{MOST_CLIENTS} clients are here already")
-            head = await asyncio.wait_for(reader.readuntil(_HEAD_END), HEAD_S)
-            onward = self.rules.check(head)
-            if onward:
-                await self._carry(reader, writer, onward)
-            else:
-                writer.write(_OK + b"Content-Length: %d\r\n\r\n" % len(self._page) + self._page)
-                await asyncio.wait_for(writer.drain(), PAGE_S)
+            if len(self._server.handlers) > MOST_CLIENTS:
+                why = f"{MOST_CLIENTS} clients are here already"
+                raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, why)
+            if not self.rules.check(request.path, request.headers):
+                return None
         except Refused as error:
             log.warning("live view: refused: %s", error)
-            text = f"HTTP/1.1 {error.status}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
-            with suppress(OSError):
-                writer.write(text.encode())
-                await asyncio.wait_for(writer.drain(), HEAD_S)
-        except (OSError, EOFError, TimeoutError, asyncio.LimitOverrunError):
-            pass  # it left, or never spoke
-        finally:
-            self._clients -= 1
-            writer.close()
+            return connection.respond(error.status, "")
+        answer = connection.respond(HTTPStatus.OK, "")
+        del answer.headers["Content-Length"], answer.headers["Content-Type"]
+        answer.headers["Content-Length"] = str(len(self._page))
+        answer.headers["Content-Type"] = "text/html; charset=utf-8"
+        answer.body = self._page
+        return answer
 
-    async def _carry(
-        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, head: bytes
-    ) -> None:
-        """Messages in, bytes out until one side ends; a slow side stops the other only."""
-        inner_reader, inner_writer = await asyncio.open_connection(*self._behind, limit=CARRIED)
-        try:
-            inner_writer.write(head)
-            ways = [
-                asyncio.ensure_future(_pass_on(reader, inner_writer)),
-                asyncio.ensure_future(_pour(inner_reader, writer)),
-            ]
-            try:
-                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-            finally:
-                for way in ways:
-                    way.cancel()
-                await asyncio.gather(*ways, return_exceptions=True)
-        finally:
-            inner_writer.close()
-
-
-async def _pass_on(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Messages of a page, one frame each as browsers send them; ends at one that may not be."""
-    with suppress(OSError, EOFError):
-        while True:
-            start = await reader.readexactly(2)
-            opcode, size = start[0] & 15, start[1] & 127
-            more = await reader.readexactly(2) if size == 126 else b""
-            long = size == 127  # its eight bytes of length come next
-            size = int.from_bytes(more) if more else size
-            whole, masked = start[0] & 0xF0 == 0x80, bool(start[1] & 128)
-            if long or not (whole and masked and size <= MOST_BYTES) or opcode in (0, _TEXT):
-                log.warning("live view: a page sent what is no message of it, and is let go")
-                return
-            body = await reader.readexactly(4 + size)
-            if opcode >= _CONTROL or may_pass(_unmasked(body)):
-                writer.write(start + more + body)
-                await writer.drain()
-            if opcode < _CONTROL:
-                await asyncio.sleep(1.0 / MOST_RATE)
+    async def _carry(self, outer: Any) -> None:
+        """Messages in and out until one side ends; a slow side stops the other only."""
+        websockets = importlib.import_module("websockets.asyncio.client")
+        closed = importlib.import_module("websockets.exceptions").WebSocketException
+        spoken = [outer.subprotocol] if outer.subprotocol else None
+        with suppress(OSError, closed):
+            async with websockets.connect(
+                f"ws://{self._behind[0]}:{self._behind[1]}", subprotocols=spoken, compression=None,
+                additional_headers={SECRET: self._secret}, max_size=None, max_queue=1,
+                ping_interval=None, proxy=None,
+            ) as inner:  # fmt: skip
+                ways = [
+                    asyncio.ensure_future(way)
+                    for way in (_pass_on(outer, inner), _pour(inner, outer))
+                ]
+                try:
+                    await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+                finally:
+                    for way in ways:
+                        way.cancel()
+                    await asyncio.gather(*ways, return_exceptions=True)
 
 
-def _unmasked(body: bytes) -> bytes:
-    mask, data = body[:4], body[4:]
-    return bytes(value ^ mask[k & 3] for k, value in enumerate(data))
+async def _pass_on(outer: Any, inner: Any) -> None:
+    """Messages of a page; ends at one that no page sends."""
+    async for message in outer:
+        if not isinstance(message, bytes):
+            log.warning("live view: a page sent what is no message of it, and is let go")
+            return
+        if may_pass(message):
+            await inner.send(message)
+        await asyncio.sleep(1.0 / MOST_RATE)
+
+
+async def _pour(inner: Any, outer: Any) -> None:
+    async for message in inner:
+        await outer.send(message)
 
 
 def may_pass(message: bytes) -> bool:
@@ -291,11 +246,3 @@ def may_pass(message: bytes) -> bool:
 
 def _is_word(value: object) -> bool:
     return isinstance(value, str) and len(value) <= MOST_LETTERS and value.isprintable()
-
-
-async def _pour(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    writer.transport.set_write_buffer_limits(high=CARRIED)
-    with suppress(OSError):
-        while data := await reader.read(CARRIED):
-            writer.write(data)
-            await writer.drain()

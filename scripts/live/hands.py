@@ -5,17 +5,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from scripts.live.requests import Drive, OnWorld, Touch, Tour
+from scripts.live.requests import Click, Drive, OnWorld, Tour
 from sim.driving.pilot import Pilot
 from sim.moments import Moment, observed
 from sim.simulation import Simulation, n_frames
+from sim.view.parts import Parts, Placed
 from sim.world import hands
-from sim.world.requests import MoveDoor, Push, carry_out
+from sim.world.requests import Kidnap, MoveDoor, Push, carry_out
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S
 
 HOLD_NS = NS_PER_S  # a twist holds so long, then the robot stands: its sender may be gone
 REACH_M = 1.0  # of a click: what is farther from it was not meant
+PUSH_SPEED = 1.0  # m/s
+DOOR_S = 20.0  # that a door is held
 
 
 class Hands:
@@ -25,22 +28,22 @@ class Hands:
     """
 
     def __init__(self, simulation: Simulation) -> None:
-        self.simulation = simulation
+        self.simulation, self._world = simulation, simulation.world
         self.client_drives = False
         self._twist, self._asked_ns = Drive(v=0.0, omega=0.0), -HOLD_NS
+        self._parts: Parts | None = None
 
     def moments(self, seconds: float) -> Iterator[Moment]:
         """A tour of ``seconds``, as ``sim.moments.toured`` where no client drives."""
-        simulation, world = self.simulation, self.simulation.world
-        pilot, period_s = Pilot(world), simulation.scan_period_s
+        pilot, period_s = Pilot(self._world), self.simulation.scan_period_s
         for _ in range(n_frames(seconds, period_s)):
-            world.set_command(*self._steer(pilot.command(period_s)))
-            yield observed(simulation)
+            self._world.set_command(*self._steer(pilot.command(period_s)))
+            yield observed(self.simulation)
 
     def _steer(self, tour: tuple[float, float]) -> tuple[float, float]:
         if not self.client_drives:
             return tour
-        if self.simulation.world.time_ns - self._asked_ns > HOLD_NS:
+        if self._world.time_ns - self._asked_ns > HOLD_NS:
             return 0.0, 0.0
         return self._twist.v, self._twist.omega
 
@@ -51,25 +54,32 @@ class Hands:
         """
         if isinstance(request, Drive):
             self.client_drives = True
-            self._twist, self._asked_ns = request, self.simulation.world.time_ns
+            self._twist, self._asked_ns = request, self._world.time_ns
             return "the robot takes twists"
         if isinstance(request, Tour):
             self.client_drives = False
             return "the built-in driver drives"
-        if isinstance(request, Touch):
-            return self._touch(request)
+        if isinstance(request, Click):
+            return self._click(request)
         return carry_out(self.simulation.world, request)
 
-    def _touch(self, request: Touch) -> str:
-        world = self.simulation.world
-        doors, things = world.doors.names, hands.pushable(world)
-        name, apart = request.name, 0.0
+    def _click(self, request: Click) -> str:
+        """Do it to the part that the ray meets first; there, or on the floor, the robot goes."""
+        world = self._world
+        self._parts = parts = self._parts or Parts(world.scene, world.model)
+        parts.place(Placed.of(world))
+        found = parts.hit(request.origin, request.direction)
+        if found is None:
+            raise InvalidValueError("nothing is there")
+        name, (x, y, _) = found[0], found[1].tolist()
+        if request.carry:
+            return carry_out(world, Kidnap(pose=(x, y, 0.0)))
+        doors, things, apart = world.doors.names, hands.pushable(world), 0.0
         if name not in (*doors, *things):
-            name, apart = hands.nearest(world, [*things, *doors], request.x, request.y)
+            name, apart = hands.nearest(world, [*things, *doors], x, y)
         if apart > REACH_M:
             raise InvalidValueError(
-                f"nothing to push or to open within {REACH_M:g} m of "
-                f"({request.x:.2f}, {request.y:.2f})"
+                f"nothing to push or to open within {REACH_M:g} m of ({x:.2f}, {y:.2f})"
             )
         if name in doors:
             return carry_out(world, MoveDoor(opened=True, name=name))

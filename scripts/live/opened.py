@@ -53,4 +53,4 @@ class Opener:
             )
         else:
             footage = of_log(self.path)
-        return Session(footage, footage.show(self.slams).replay, hands)
+        return Session(footage, footage.show(self.slams).moments, hands)

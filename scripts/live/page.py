@@ -145,14 +145,9 @@ class Page:
     def _ask(self, make: Callable[[], Request]) -> None:
         """Hand a request over; what is wrong with it is told."""
         try:
-            self._inbox.put(make()).add_done_callback(self._answered)
+            self._inbox.put(make())
         except MobiliaError as error:
             self._inbox.refuse(error)
-
-    def _answered(self, answer: Any) -> None:
-        error = answer.exception()
-        if error is not None:
-            self._inbox.refuse(str(error))
 
     def _on(self, handle: Any, make: Callable[[Any], Request]) -> Any:
         """Ask when a page, and not we, sets a control or presses a button."""
@@ -175,13 +170,13 @@ class Page:
             self._play = self._on(gui.add_button("Pause"), self._toggled)
             self._on(gui.add_button("One scan"), lambda _: Step())
             back = gui.add_slider("s back", min=0.0, max=KEPT_S, step=0.1, initial_value=0.0)
-            self._on(back, lambda handle: Seek(back_s=float(handle.value), nearest=True))
+            self._on(back, lambda handle: Seek(back_s=float(handle.value)))
             self._on(gui.add_button("Back to now"), lambda _: Seek(back_s=0.0))
             speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
             self._on(speed, lambda handle: Speed(factor=float(handle.value)))
         self._key("Play or pause", "P", lambda: self._toggled(None))
         self._key("One scan", "N", Step)
-        self._key("Look back", "B", lambda: Seek(back_s=self._back_s + BACK_S, nearest=True))
+        self._key("Look back", "B", lambda: Seek(back_s=self._back_s + BACK_S))
         self._key("Back to now", "E", lambda: Seek(back_s=0.0))
 
     def _toggled(self, _handle: Any) -> Request:

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
-from scripts.live import FASTEST, SLOWEST
-from scripts.live.requests import OnView, Run, Seek, Speed, Step
+from scripts.live.requests import OnView, Run, Speed, Step
 from sim.view.moment import Shown
-from slam.errors import InvalidValueError, MobiliaError
+from slam.errors import MobiliaError
 
 KEPT_S = 60.0  # of the run, to look back
 
@@ -27,13 +26,11 @@ class Playback:
     def __init__(
         self, source: Iterator[Shown], *, playing: bool = True, speed: float = 1.0
     ) -> None:
-        if not SLOWEST <= speed <= FASTEST:
-            raise InvalidValueError(f"speed must lie in [{SLOWEST:g}, {FASTEST:g}], got {speed}")
         self.playing, self.speed, self.ended, self.why = playing, speed, False, ""
         self._source = source
         self._kept: deque[Shown] = deque()
         self._at = -1
-        self._steps = 0  # scans to go before it pauses again
+        self._stepping = False
 
     @property
     def shown(self) -> Shown | None:
@@ -53,15 +50,14 @@ class Playback:
     @property
     def resting(self) -> bool:
         """Whether the moment shown stays."""
-        return (not self.playing and self._steps == 0) or (self.ended and not self.looks_back)
+        return (not self.playing and not self._stepping) or (self.ended and not self.looks_back)
 
     def advance(self) -> Shown | None:
         """The next moment, kept or new; None at the end of the run."""
+        self._stepping = False
         if not self.looks_back and not self._take():
-            self._steps = 0
             return None
         self._at += 1
-        self._steps = max(0, self._steps - 1)
         return self._kept[self._at]
 
     def _take(self) -> bool:
@@ -81,35 +77,16 @@ class Playback:
             self._at -= 1
         return True
 
-    def do(self, request: OnView) -> str:
-        """Do as a client asks; what was done, in words. ``InvalidValueError`` where it cannot."""
+    def do(self, request: OnView) -> None:
+        """Do as a client asks."""
+        self._stepping = isinstance(request, Step)
         if isinstance(request, Run):
-            self.playing, self._steps = request.playing, 0
-            return "playing" if request.playing else "paused"
-        if isinstance(request, Step):
-            self.playing, self._steps = False, request.scans
-            return f"{request.scans} scans on, then paused"
-        if isinstance(request, Speed):
-            if not SLOWEST <= request.factor <= FASTEST:
-                raise InvalidValueError(
-                    f"speed must lie in [{SLOWEST:g}, {FASTEST:g}], got {request.factor:g}"
-                )
+            self.playing = request.playing
+        elif isinstance(request, Step):
+            self.playing = False
+        elif isinstance(request, Speed):
             self.speed = request.factor
-            return f"{request.factor:g} times real time"
-        return self._seek(request)
-
-    def _seek(self, request: Seek) -> str:
-        if not self._kept:
-            raise InvalidValueError("seek: nothing has been shown yet")
-        first, last = self._kept[0].seconds, self._kept[-1].seconds
-        wanted = last - (request.back_s or 0.0) if request.time_s is None else request.time_s
-        if not first - 1e-6 <= wanted <= last + 1e-6 and not request.nearest:
-            raise InvalidValueError(
-                f"seek: {wanted:.2f} s is not kept, only {first:.2f} to {last:.2f} s"
-            )
-        self._at = next(
-            (k for k, moment in enumerate(self._kept) if moment.seconds >= wanted - 1e-6),
-            len(self._kept) - 1,
-        )
-        self._steps = 0
-        return f"{self._kept[self._at].seconds:.2f} s is shown, the present is {last:.2f} s"
+        elif self._kept:
+            wanted = self._kept[-1].seconds - request.back_s - 1e-6
+            later = (k for k, moment in enumerate(self._kept) if moment.seconds >= wanted)
+            self._at = next(later)

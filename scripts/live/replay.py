@@ -3,7 +3,7 @@
 
     with Recorder.writing(path, moments, world, title="office", seconds=60.0) as recorder:
         for frame in ...:
-            recorder.note(frame, placed)
+            recorder.note(moments.note(frame, placed))
 
 What is drawn is what the page of the live view draws (``scripts.live.drawn``), kept moment by
 moment by viser's own recorder; nothing is served.
@@ -19,6 +19,7 @@ import threading
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -27,11 +28,9 @@ from scripts.film.show import Show
 from scripts.live.drawn import Drawn, look_at
 from scripts.live.served import require
 from sim.view.moment import Moments, Shown
-from sim.view.parts import Placed
 from sim.world.world import World
 from slam.files import replacing
-from slam.frames import Float, Frame
-from slam.replay import Replay
+from slam.frames import Frame
 
 MOMENT_S = 0.1  # of the replay between two moments
 MOST_MOMENTS = 1200  # of one file; a longer run is shown faster
@@ -43,12 +42,11 @@ class Recorder:
     """Takes moments and makes a page of them."""
 
     def __init__(
-        self, replay: Replay, world: World | None, *, title: str, seconds: float,
-        T_world_map: Float | None = None,
-    ) -> None:  # fmt: skip
-        self.moments = Moments(replay, max(1.0, seconds / MOST_MAPS), T_world_map)
+        self, moments: Moments, world: World | None, *, title: str, seconds: float
+    ) -> None:
         self._tape, self._scene, camera = _taped()
-        self._drawn = Drawn(self._scene, self.moments, world)
+        self.moments, self._map_s = moments, seconds / MOST_MAPS
+        self._drawn = Drawn(self._scene, moments, world, self._map_s)
         look_at(camera, self._drawn.bounds)
         parts = 0 if self._drawn.parts is None else self._drawn.parts.moving
         self._rest_s = MOMENT_S * min(max(1.0, parts / FEW_PARTS), 4.0)
@@ -62,12 +60,10 @@ class Recorder:
     @classmethod
     @contextmanager
     def writing(
-        cls, path: Path, replay: Replay, world: World | None = None, *, title: str, seconds: float,
-        T_world_map: Float | None = None,
-    ) -> Iterator[Recorder]:  # fmt: skip
-        """A page that appears under ``path`` when the block ends well; ``T_world_map`` of the map
-        frame where that is not the first frame's truth."""
-        recorder = cls(replay, world, title=title, seconds=seconds, T_world_map=T_world_map)
+        cls, path: Path, moments: Moments, world: World | None = None, *, title: str, seconds: float
+    ) -> Iterator[Recorder]:
+        """A page that appears under ``path`` when the block ends well."""
+        recorder = cls(moments, world, title=title, seconds=seconds)
         with replacing(path) as temporary:
             yield recorder
             temporary.write_text(recorder.page(), encoding="utf-8")
@@ -76,25 +72,25 @@ class Recorder:
     def of(cls, path: Path, show: Show) -> AbstractContextManager[Recorder]:
         """Of what a film shows."""
         world, seconds = show.stage.world, show.duration_s
-        return cls.writing(path, show.replay, world, title=show.title, seconds=seconds)
+        return cls.writing(path, show.moments, world, title=show.title, seconds=seconds)
 
-    def note(self, frame: Frame, placed: Placed | None = None) -> None:
-        """Call for every frame that the tracks have taken."""
-        shown = self.moments.note(frame, placed)
-        if shown.seconds - self._drawn_s < self._step_s - 1e-6:
+    def note(self, shown: Shown | None) -> None:
+        """Call for every moment."""
+        if shown is None or shown.seconds - self._drawn_s < self._step_s - 1e-6:
             return
         if math.isfinite(self._drawn_s):  # a replay of at most two minutes, however long the run
             faster = self._step_s / self._rest_s
             self._tape.insert_sleep((shown.seconds - self._drawn_s) / faster)
         self._drawn_s = shown.seconds
-        self._drawn.draw(shown)
+        raster, landmarks = self.moments.look(self._map_s, self._map_s)
+        self._drawn.draw(replace(shown, raster=raster, landmarks=landmarks))
         self._words.text = self._said(shown)
 
     def noting(self, frames: Iterable[Frame]) -> Iterator[Frame]:
         """``frames`` for a track to take; each is noted when the next is asked for."""
         for frame in frames:
             yield frame
-            self.note(frame)
+            self.note(self.moments.note(frame))
 
     def page(self) -> str:
         """The file, whole: call it once."""

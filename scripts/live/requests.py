@@ -3,125 +3,114 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
+from typing import Any
 
+from scripts.live import FASTEST, SLOWEST
 from sim.core.checks import FAR_M, three, within, word
 from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError
 
 MOST_TWIST = 1e3  # m/s and rad/s; the drive clips to what it can do
-MOST_SCANS = 1000  # of a step
+
+
+def _number(low: float, high: float, default: Any = ...) -> Any:
+    """A field for a finite number in [low, high]."""
+    known = {} if default is ... else {"default": default}
+    return field(metadata={"low": low, "high": high}, **known)
+
+
+def _point(default: Any = ...) -> Any:
+    """A field for three numbers that a place may have."""
+    known = {} if default is ... else {"default": default}
+    return field(metadata={"low": -FAR_M, "high": FAR_M, "three": True}, **known)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
-    """Twist for the robot, m/s and rad/s."""
-
-    v: float
-    omega: float
+class _Checked:
+    """Checked at birth: ``InvalidValueError`` names the field, the value and what was expected."""
 
     def __post_init__(self) -> None:
-        within("drive: v", self.v, -MOST_TWIST, MOST_TWIST)
-        within("drive: omega", self.omega, -MOST_TWIST, MOST_TWIST)
+        for one in fields(self):
+            value, what = getattr(self, one.name), f"{type(self).__name__.lower()}: {one.name}"
+            if value is None and one.default is None:
+                continue
+            if one.metadata.get("three"):
+                three(what, value)
+            elif "low" in one.metadata:
+                within(what, value, one.metadata["low"], one.metadata["high"])
+            elif one.type != "bool":
+                word(what, value)
+            elif not isinstance(value, bool):
+                raise InvalidValueError(f"{what} must be true or false, got {value!r:.60}")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tour:
+class Drive(_Checked):
+    """Twist for the robot, m/s and rad/s."""
+
+    v: float = _number(-MOST_TWIST, MOST_TWIST)
+    omega: float = _number(-MOST_TWIST, MOST_TWIST)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tour(_Checked):
     """The built-in driver is to go on."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Touch:
-    """A click at (x, y) m in the world: push the thing there away from the robot, open the door.
-
-    name  of what was hit, "" for what is nearest to the place
-    """
-
-    x: float
-    y: float
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        word("touch: name", self.name)
-        for axis, value in (("x", self.x), ("y", self.y)):
-            within(f"touch: {axis}", value, -FAR_M, FAR_M)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Click:
+class Click(_Checked):
     """A click on what is shown, as a ray in the world: touch what it hits, or carry the robot."""
 
-    origin: tuple[float, float, float]
-    direction: tuple[float, float, float]
+    origin: tuple[float, float, float] = _point()
+    direction: tuple[float, float, float] = _point()
     carry: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("origin", "direction"):
-            three(f"click: {name}", getattr(self, name))
+        super().__post_init__()
         if not any(self.direction):
             raise InvalidValueError("click: a ray must have a direction, got zeros")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class Run(_Checked):
     """Play or pause."""
 
     playing: bool
 
 
 @dataclass(frozen=True, kw_only=True)
-class Step:
-    """So many scans, then pause."""
-
-    scans: int = 1
-
-    def __post_init__(self) -> None:
-        within("step: scans", self.scans, 1, MOST_SCANS)
+class Step(_Checked):
+    """One scan, then pause."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seek:
-    """Show the moment that is ``time_s`` since the start, or ``back_s`` before the present.
+class Seek(_Checked):
+    """Show the moment that is ``back_s`` before the present, or the one kept nearest to that."""
 
-    nearest  take the nearest moment that is kept where that one is not
-    """
-
-    time_s: float | None = None
-    back_s: float | None = None
-    nearest: bool = False
-
-    def __post_init__(self) -> None:
-        if (self.time_s is None) == (self.back_s is None):
-            raise InvalidValueError("seek takes one of time_s and back_s")
-        within("seek", self.time_s if self.back_s is None else self.back_s, 0.0, 1e9)
+    back_s: float = _number(0.0, 1e9)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Speed:
+class Speed(_Checked):
     """How fast the view goes, 1 is real time."""
 
-    factor: float
+    factor: float = _number(SLOWEST, FASTEST)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Anew:
+class Anew(_Checked):
     """A new world from the same seed, or the log from its start, with another SLAM or more motion.
 
     slam, crowd  by name;   motion, change  0 to 1; None: as it was
     """
 
     slam: str | None = None
-    motion: float | None = None
-    change: float | None = None
+    motion: float | None = _number(0.0, 1.0, None)
+    change: float | None = _number(0.0, 1.0, None)
     crowd: str | None = None
 
-    def __post_init__(self) -> None:
-        for name in ("slam", "crowd"):
-            word(f"world: {name}", getattr(self, name) or "")
-        for name in ("motion", "change"):
-            within(f"world: {name}", getattr(self, name) or 0.0, 0.0, 1.0)
 
-
-OnWorld = Drive | Tour | Push | MoveDoor | Touch | Kidnap
+OnWorld = Drive | Tour | Push | MoveDoor | Kidnap | Click
 OnView = Run | Step | Seek | Speed
-Request = OnWorld | OnView | Click | Anew
+Request = OnWorld | OnView | Anew

@@ -8,9 +8,8 @@ from collections.abc import Iterator
 from scripts.film.footage import Footage
 from scripts.live.hands import Hands
 from sim.events import KIDNAP, Event
-from sim.view.moment import Moments, Said, Shown, verdict_of
+from sim.view.moment import BIG_MAP_S, MAP_S, Moments, Said, Shown, verdict_of
 from slam.frames import NS_PER_S
-from slam.replay import Replay
 
 EVENTS_NS = NS_PER_S // 5
 _SAYS = {
@@ -23,10 +22,12 @@ class Session:
 
     hands    of a simulation, None for a log
     moments  what is noted for drawing
+    every    factor on the time between two looks at the map
     """
 
-    def __init__(self, footage: Footage, replay: Replay, hands: Hands | None = None) -> None:
-        self.footage, self.hands, self.moments = footage, hands, Moments(replay)
+    def __init__(self, footage: Footage, moments: Moments, hands: Hands | None = None) -> None:
+        self.footage, self.hands, self.moments = footage, hands, moments
+        self.every = 1.0
         self._events_ns = 0
         self._verdict = "tracking"
         self._known: set[tuple[str, str, float]] = set()
@@ -35,6 +36,7 @@ class Session:
         """All frames of the stream."""
         for frame in self.moments.replay.run(self.footage.stream):
             said = self._said(frame.stamp_ns)
+            self.moments.look(self.every * MAP_S, self.every * BIG_MAP_S)
             yield self.moments.note(frame, self.footage.stage.placed, said)
 
     def _said(self, stamp_ns: int) -> list[Said]:

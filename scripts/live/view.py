@@ -12,20 +12,9 @@ from scripts.live.opened import Opener
 from scripts.live.pace import Pace
 from scripts.live.page import CROWDS, Page
 from scripts.live.playback import Playback
-from scripts.live.requests import (
-    Anew,
-    Click,
-    Drive,
-    OnView,
-    OnWorld,
-    Request,
-    Seek,
-    Speed,
-    Touch,
-)
+from scripts.live.requests import Anew, Drive, OnView, OnWorld, Seek, Speed
 from scripts.live.served import Served
 from sim.view.moment import Shown
-from sim.world.requests import Kidnap
 from slam.errors import InvalidValueError, MobiliaError
 
 IDLE_S = 0.05  # between two looks at the inbox while nothing moves
@@ -101,55 +90,38 @@ class View:
 
     def _wait(self, seconds: float) -> bool:
         """Do a request that is there, or comes meanwhile; whether there was one."""
-        asked = self._inbox.get(seconds)
-        if asked is None:
+        request = self._inbox.get(seconds)
+        if request is None:
             return False
         try:
-            done = self._do(asked.request)
+            if isinstance(request, OnView):
+                self._at(request)
+            elif isinstance(request, Anew):
+                self._anew(request)
+            elif isinstance(request, OnWorld):
+                self._touch(request)
         except MobiliaError as error:
-            asked.answer.set_exception(error)
-        else:
-            asked.answer.set_result(done)
+            self._inbox.refuse(error)
         return True
 
-    def _do(self, request: Request) -> str:
-        if isinstance(request, OnView):
-            return self._at(request)
-        if isinstance(request, Anew):
-            return self._anew(request)
-        return self._touch(self._hit(request) if isinstance(request, Click) else request)
-
-    def _at(self, request: OnView) -> str:
-        done = self.playback.do(request)
-        self.session.moments.every = self.playback.speed
+    def _at(self, request: OnView) -> None:
+        self.playback.do(request)
+        self.session.every = max(1.0, self.playback.speed)
         self._pace.restart()
         if isinstance(request, Seek):
             self._due = None
         if self.playback.shown is not None:
             self._show(self.playback.shown)
-        return done
 
-    def _anew(self, request: Anew) -> str:
+    def _anew(self, request: Anew) -> None:
         opener = self._opener.anew(request)
         session = opener.open()  # before anything is given up: it may be refused
         self._opener, self.session = opener, session
         self._page.restart()
         self._page.say(f"from the start: {session.footage.title} · {', '.join(opener.slams)}")
         self._begin(playing=self.playback.playing, speed=self.playback.speed)
-        return "from the start"
 
-    def _hit(self, click: Click) -> OnWorld:
-        """What a click means: the part that its ray meets first, or the floor there."""
-        parts = self._drawn.parts
-        found = None if parts is None else parts.hit(click.origin, click.direction)
-        if found is None:
-            raise InvalidValueError("nothing is there")
-        name, (x, y, _) = found[0], found[1].tolist()
-        if click.carry:
-            return Kidnap(pose=(x, y, 0.0))
-        return Touch(x=x, y=y, name=name)
-
-    def _touch(self, request: OnWorld) -> str:
+    def _touch(self, request: OnWorld) -> None:
         """Do something to the world, which stands between two scans."""
         hands, playback = self.session.hands, self.playback
         if hands is None:
@@ -164,7 +136,6 @@ class View:
             self._page.say(f"you: {done}")
         if playback.shown is not None:
             self._page.show(playback.shown, playback, self.session)
-        return done
 
     def _tell(self) -> None:
         """What was refused, and that the run has ended."""

@@ -90,7 +90,7 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         command=outputs.command,
         settings=outputs.settings,
     ) as folder:
-        costs, show.filmed = outputs.costs or Costs(), outputs.film
+        costs = outputs.costs or Costs()
         show.pace = outputs.pace or Pace.within_a_minute(show.duration_s, outputs.film_fps)
         pace, path = show.pace, folder / "film.mp4"
         reel = film(path, pace.fps, preset=pace.preset) if outputs.film else nullcontext()
@@ -98,10 +98,10 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         started = time.perf_counter()
         with costs.beside(FILM), reel as opened, recorder as recording, costs.scans():
             frames = shoot(costs.reading(stream), show, opened, partial(costs.stage, FILM))
-            for frame in watched(frames, stream, show.title):
+            for _ in watched(frames, stream, show.title):
                 if recording is not None:
                     with costs.stage(FILM):
-                        recording.note(frame, show.stage.placed)
+                        recording.note(show.shown)
         wall_s = time.perf_counter() - started
         with costs.stage(SLAM), working("closing loops, scoring"):
             results = score.results(replay, wall_s, machine())

@@ -118,12 +118,12 @@ def _page(plan: Plan, out: Path, table: Table) -> None:
     """What was made, a plan of the first episode at its start, and what it is good for."""
     from scripts.pages.page import Page, Part, command, inline, tell, write
     from sim.simulation import Simulation
-    from sim.view.pictures import MapPicture
+    from sim.view.mapview import MapView
 
     names, first = list(plan.planned()), plan.jobs()[0]
     room = Simulation(**first.simulation())
     room.sense()
-    start = inline(MapPicture(room, (1080, 720))(room))
+    start = inline(MapView(room.world.scene, 1080, 720).draw(room.world.mover_poses(), room.frame))
     about = {key: value for key, value in first.words().items() if value not in (None, {})}
     page = Page(
         title=f"Episodes of {', '.join(plan.scenes or (first.scene,))}",

@@ -114,7 +114,7 @@ def _render(
 ) -> None:
     from scripts.film.encode import film
     from scripts.film.render import Snapshots, shoot, watched
-    from scripts.film.strips import strip
+    from scripts.film.strips import strips
     from scripts.live.replay import Recorder
 
     started = time.perf_counter()
@@ -125,10 +125,11 @@ def _render(
         for frame in watched(shoot(footage.stream, show, reel), footage.stream, show.title):
             snapshots.note(frame)
             if recorder is not None:
-                recorder.note(frame, footage.stage.placed)
+                recorder.note(show.shown)
         if strip_to is not None:
             columns = min(3, len(moments))
-            strip(snapshots.finish(), moments, strip_to, columns=columns, legend=show.legend())
+            rows = {"": snapshots.finish()}
+            strips(rows, moments, strip_to, columns=columns, legend=show.legend())
     wall_s = time.perf_counter() - started
     if reel is not None and out is not None:
         long_s = reel.frames / show.pace.fps

@@ -77,9 +77,8 @@ def _replays(about: Study) -> list[str]:
         out.parent.mkdir(exist_ok=True)
         with of_compared(path, view=None) as footage:
             show = footage.show([about.subject])
-            show.filmed = False
             with Recorder.of(out, show) as recorder:
-                for frame in shoot(footage.stream, show, None):
-                    recorder.note(frame, footage.stage.placed)
+                for _ in shoot(footage.stream, show, None):
+                    recorder.note(show.shown)
         made.append(str(out))
     return made

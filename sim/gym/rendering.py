@@ -12,7 +12,7 @@ from sim.core.checks import one_of, whole_numbers
 from sim.simulation import Simulation
 
 MODES = ("rgb_array", "map")
-VIEWS = ("top", "follow", "persp")  # as in ``sim.view.pictures``, which needs OpenGL to import
+VIEWS = ("top", "follow", "persp")  # of every scene; ``sim.view.camera`` needs OpenGL to import
 MAX_PX = 8192  # edge of a picture
 
 
@@ -33,6 +33,7 @@ class Rendering:
         self._mode, self._view = mode, view
         self._size = whole_numbers("render_size", size, "(width, height) in px", MAX_PX)
         self._picture: Any = None
+        self._camera: Any = None
 
     def picture(self, simulation: Simulation) -> NDArray[np.uint8]:
         """(height, width, 3) uint8 RGB of the simulation that was drawn first since ``close``."""
@@ -43,15 +44,17 @@ class Rendering:
 
     def _of(self, simulation: Simulation) -> Any:
         if self._mode == "map":
-            from sim.view.pictures import MapPicture
+            from sim.view.mapview import MapView
 
-            return MapPicture(simulation, self._size)
-        from sim.view.pictures import CameraPicture
+            plan = MapView(simulation.world.scene, *self._size)
+            return lambda now: plan.draw(now.world.mover_poses(), now.frame)
+        from sim.view.camera import Camera
 
-        return CameraPicture(simulation, self._size, self._view)
+        self._camera = camera = Camera(simulation.world.model, *self._size)
+        return lambda now: camera.render(now.world.data, self._view)
 
     def close(self) -> None:
         """Free what draws; the next picture makes it anew, of whatever simulation then."""
-        if self._picture is not None:
-            self._picture.close()
-            self._picture = None
+        if self._camera is not None:
+            self._camera.close()
+        self._picture = self._camera = None

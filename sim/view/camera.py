@@ -135,6 +135,7 @@ class Camera:
         return self._picture(data)
 
     def _picture(self, data: mujoco.MjData) -> NDArray[np.uint8]:
+        mujoco.mj_camlight(self._model, data)
         self._update(data)
         self._gl.make_current()
         picture = np.empty((self.height, self.width, 3), dtype=np.uint8)

@@ -4,20 +4,24 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.view.parts import Placed
 from slam import se2
 from slam.estimate import Estimate, Landmarks, Raster
 from slam.frames import NS_PER_S, Float, Frame
-from slam.replay import Replay, primary_of
+from slam.replay import Replay, Track, primary_of
+from slam.system import MovingMap
 
-MAP_NS = NS_PER_S  # so often the map is drawn anew
-BIG_MAP_CELLS, BIG_MAP_NS = 500_000, 5 * NS_PER_S  # one of so many cells less often
+MAP_S = 1.0  # of a run: so often the map is drawn anew
+BIG_MAP_CELLS, BIG_MAP_S = 500_000, 5.0  # one of so many cells less often
+MOST_CELLS = 1024  # of the map as drawn, along an edge
+MOST_POINTS = 1500  # of a path as drawn
+SIGMAS = 3.0  # of the ellipses
 CLAIM = 2.0  # sigmas of what a track claims of its error
 RING = 36  # corners of an ellipse
 
@@ -39,7 +43,7 @@ class Shown:
     truth_map    (3,) true pose in the map frame, None where nobody knows it
     estimates    of every track
     placed       where the room's parts are at the scan's start, None for a log
-    raster, landmarks  the map of the first track, as of at most ``BIG_MAP_NS`` ago
+    raster, landmarks  the map of the first track, as it was looked at last
     said         what happened since the frame before
     """
 
@@ -72,23 +76,29 @@ class Shown:
 
 
 class Path:
-    """Where something was at each frame."""
+    """Where something was at each frame, (x, y) m; NaN where nobody knows.
+
+    pose  the last
+    """
 
     def __init__(self) -> None:
-        self._xy: NDArray[np.float64] = np.zeros((1024, 2))
-        self._n = 0
+        self._xy = array("d")
+        self.pose: Float = np.full(3, np.nan)
 
     def add(self, pose: Float) -> None:
         """At the next frame."""
-        if self._n == len(self._xy):
-            self._xy = np.concatenate([self._xy, np.zeros_like(self._xy)])
-        self._xy[self._n] = pose[:2]
-        self._n += 1
+        self._xy.extend(pose[:2].tolist())
+        self.pose = pose
 
-    def until(self, number: int, most: int) -> Float:
-        """(k, 2) m up to the frame of that number, evenly thinned to about ``most``."""
-        step = max(1, number // most)
-        xy = np.concatenate([self._xy[0:number:step], self._xy[number : number + 1]])
+    def __len__(self) -> int:
+        return len(self._xy) // 2
+
+    def points(self, most: int = MOST_POINTS, number: int | None = None) -> Float:
+        """(k, 2) m up to the frame of that ``number``, None: to the last; of them at most ``most``
+        and the last."""
+        end = len(self) - 1 if number is None else number
+        xy = np.array(self._xy).reshape(-1, 2)
+        xy = np.concatenate([xy[0 : end : max(1, -(-(end + 1) // most))], xy[end : end + 1]])
         known: Float = xy[~np.isnan(xy[:, 0])]
         return known
 
@@ -97,58 +107,89 @@ class Moments:
     """Makes moments of a replay, frame by frame.
 
     primary    the track whose map is shown
-    paths      (n, 2) m in the map frame, by track and "truth": where it was at each frame
-    every      factor on the time between two looks at the map
+    paths      in the map frame, by track and "truth"
     T_world_map  of the map frame; None: the first frame's truth
     seconds    of the last moment
+    moved      how often the primary track has moved its map
     """
 
-    def __init__(
-        self, replay: Replay, every: float = 1.0, T_world_map: Float | None = None
-    ) -> None:
-        self._T_world_map = T_world_map
-        self.replay, self.primary, self.every = replay, primary_of(replay), every
-        self.paths: dict[str, Path] = {name: Path() for name in (*replay.tracks, "truth")}
-        self._first: Frame | None = None
-        self._number, self._map_ns, self.seconds = -1, 0, 0.0
-        self._raster: Raster | None = None
-        self._landmarks: Landmarks | None = None
+    def __init__(self, replay: Replay, T_world_map: Float | None = None) -> None:
+        self.T_world_map = T_world_map
+        self.replay, self.primary = replay, primary_of(replay)
+        self.paths: dict[str, Path] = {name: Path() for name in ("truth", *replay.tracks)}
+        self._first_ns: int | None = None
+        self._number, self.seconds, self.moved = -1, 0.0, 0
+        self._looked_s = -math.inf
+        self._map: tuple[Raster | None, Landmarks | None] = None, None
+
+    @property
+    def track(self) -> Track:
+        """The primary one."""
+        return self.replay.tracks[self.primary]
 
     def note(self, frame: Frame, placed: Placed | None = None, said: Sequence[Said] = ()) -> Shown:
         """The moment of a frame that every track has just taken; call it for each."""
-        if self._first is None:
-            self._first = frame
-            self._T_world_map = frame.truth if self._T_world_map is None else self._T_world_map
+        if self._first_ns is None:
+            self._first_ns = frame.stamp_ns
+            self.T_world_map = frame.truth if self.T_world_map is None else self.T_world_map
         self._number += 1
+        self.seconds = (frame.stamp_ns - self._first_ns) / NS_PER_S
         truth_map = None
-        if self._T_world_map is not None and frame.truth is not None:
-            truth_map = se2.between(self._T_world_map, frame.truth)
+        if self.T_world_map is not None and frame.truth is not None:
+            truth_map = se2.between(self.T_world_map, frame.truth)
         estimates = {name: track.estimates[-1] for name, track in self.replay.tracks.items()}
         for name, estimate in estimates.items():
             self.paths[name].add(estimate.T_map_robot)
         self.paths["truth"].add(np.full(3, np.nan) if truth_map is None else truth_map)
-        self._map(frame.stamp_ns)
-        self.seconds = (frame.stamp_ns - self._first.stamp_ns) / NS_PER_S
+        self._follow_map()
         return Shown(
             number=self._number,
             seconds=self.seconds,
             frame=frame,
-            T_world_map=np.zeros(3) if self._T_world_map is None else self._T_world_map,
+            T_world_map=np.zeros(3) if self.T_world_map is None else self.T_world_map,
             truth_map=truth_map,
             estimates=estimates,
             placed=placed,
-            raster=self._raster,
-            landmarks=self._landmarks,
+            raster=self._map[0],
+            landmarks=self._map[1],
             said=tuple(said),
         )
 
-    def _map(self, stamp_ns: int) -> None:
-        cells = 0 if self._raster is None else self._raster.values.size
-        period_ns = MAP_NS if cells <= BIG_MAP_CELLS else BIG_MAP_NS
-        if self._number > 0 and stamp_ns - self._map_ns < period_ns * max(1.0, self.every):
+    def look(
+        self, rest_s: float = 0.0, big_rest_s: float = BIG_MAP_S
+    ) -> tuple[Raster | None, Landmarks | None]:
+        """The map of the primary track in at most ``MOST_CELLS`` along an edge; as it was seen
+        last where that is less than ``rest_s`` of the run ago, of a big one ``big_rest_s``."""
+        raster = self._map[0]
+        if raster is not None and raster.values.size > BIG_MAP_CELLS:
+            rest_s = max(rest_s, big_rest_s)
+        if self.seconds - self._looked_s >= rest_s - 1e-6:
+            self._looked_s = self.seconds
+            self._map = small_map(self.track), self.track.landmarks()
+        return self._map
+
+    def _follow_map(self) -> None:
+        """Lay out the path again where closed loops have moved the map (docs/loops.md)."""
+        system = self.track.system
+        if not isinstance(system, MovingMap):
             return
-        track, self._map_ns = self.replay.tracks[self.primary], stamp_ns
-        self._raster, self._landmarks = track.map(), track.landmarks()
+        if not any(self.track.estimates[-1].diagnostics["correction"]):
+            return
+        self.moved += 1
+        self._looked_s = -math.inf
+        self.paths[self.primary] = path = Path()
+        for pose in system.poses_in_map():
+            path.add(pose)
+
+
+def small_map(track: Track) -> Raster | None:
+    """What is known of a map, each cell the largest of several where it has too many for a
+    picture: a thin wall stays."""
+    cells = track.map_strips()
+    known = None if cells is None else cells.trimmed()
+    if known is None:
+        return None
+    return known.joined(max(-(-max(known.shape) // MOST_CELLS), 1)).whole()
 
 
 def verdict_of(estimate: Estimate) -> str:
@@ -164,10 +205,10 @@ def claims(covariance: Float) -> tuple[float, float]:
     return CLAIM * math.sqrt(max(float(longest), 0.0)), CLAIM * math.sqrt(float(covariance[2, 2]))
 
 
-def ellipse(covariance: Float, sigmas: float) -> Float:
-    """(RING, 2) m around zero."""
+def ellipse(covariance: Float) -> Float:
+    """(RING, 2) m around zero, of ``SIGMAS``."""
     values, vectors = np.linalg.eigh(np.asarray(covariance)[:2, :2])
     turns = np.linspace(0.0, math.tau, RING, endpoint=False)
     circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    ring: Float = sigmas * (circle * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    ring: Float = SIGMAS * (circle * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
     return ring

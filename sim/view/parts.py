@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A room as boxes, balls and cylinders to be drawn in 3-D, and where they are at a moment.
+"""A room as boxes, balls and cylinders to be drawn, and where they are at a moment.
 
-What a thing looks like is said once, by the geoms of its model: whoever draws a room in 3-D with
-other means than MuJoCo's renderer (``sim.view.camera``) draws these.
+What a thing looks like is said once, by the geoms of its model: whoever draws a room with other
+means than MuJoCo's renderer (``sim.view.camera``), in 3-D or from above, draws these.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.core.bodies import STATIC
+from scenes.scene import Scene
+from sim.core.bodies import STATIC, Bodies
 from sim.world.world import World
 from slam.frames import Float
 
@@ -63,13 +66,22 @@ class Batch:
 
 
 class Parts:
-    """Everything that is seen of a world. ``batches`` say what it is, ``poses`` where."""
+    """Everything that is seen of a scene. ``batches`` say what it is, ``poses`` where.
 
-    def __init__(self, world: World) -> None:
-        self._model, self._data = world.model, mujoco.MjData(world.model)
-        self._bounds = world.scene.bounds
-        self.names = world.mover_names
-        self._owner = owner = world.bodies.mover_of_body[self._model.geom_bodyid]
+    model  of the scene, compiled here where it is None
+    home   (n, 3) pose of each mover before anything is placed
+    limbs  (ngeom,) which go their own ways: legs of people
+    """
+
+    def __init__(self, scene: Scene, model: mujoco.MjModel | None = None) -> None:
+        self._model = model = scene.compile() if model is None else model
+        self._data, self._bounds = mujoco.MjData(model), scene.bounds
+        mujoco.mj_kinematics(model, self._data)
+        self.names = [mover.name for mover in scene.movers]
+        bodies = Bodies(model, scene)
+        self.home = bodies.poses(self._data)
+        self.limbs = model.body_mocapid[model.geom_bodyid] >= 0
+        self._owner = owner = bodies.mover_of_body[model.geom_bodyid]
         found: dict[tuple[str, bool, bool], list[tuple[int, float, tuple[float, ...]]]] = {}
         for geom in np.flatnonzero(np.isin(self._model.geom_group, DRAWN_GROUPS)).tolist():
             glass = self._rgba(geom)[3] < CLEAR
@@ -100,6 +112,21 @@ class Parts:
         if batch.shape == BALL:
             quats[np.ptp(batch.sizes, axis=1) == 0.0] = (1.0, 0.0, 0.0, 0.0)  # looks no different
         return centres, quats
+
+    def corners(self, batch: Batch, around: int) -> Float:
+        """(n, k, 3) m of points whose hulls are the parts; ``around``: of a circle."""
+        turns = self._data.geom_xmat[batch.geoms].reshape(-1, 3, 3)
+        own = mesh(batch.shape, around)[0][None] * batch.sizes[:, None]
+        own[..., 2] += batch.along[:, None]
+        corners: Float = np.einsum("nij,nkj->nki", turns, own)
+        corners += self._data.geom_xpos[batch.geoms, None]
+        return corners
+
+    def is_wall(self, geom: int) -> bool:
+        """Whether it is a wall of the room, and no board on one."""
+        material = int(self._model.geom_matid[geom])
+        name = self._model.mat(material).name if material >= 0 else ""
+        return name.startswith("wall") and not name.startswith("wall_board")
 
     def hit(self, origin: Sequence[float], direction: Sequence[float]) -> tuple[str, Float] | None:
         """Name of the mover, "" for the room, and place (m) where a ray meets something first."""
@@ -167,3 +194,32 @@ class Parts:
             opacity=rgba[:, 3],
             owners=owner[geoms],
         )
+
+
+@cache
+def mesh(shape: str, around: int) -> tuple[Float, NDArray[np.int64]]:
+    """Vertices (n, 3) m and faces (k, 3) of a shape with edges, axes and diameters of 1 m."""
+    if shape == BOX:
+        ways = (-0.5, 0.5)
+        corners = np.array([[x, y, z] for x in ways for y in ways for z in ways])
+        sides = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4),
+                          (1, 5, 7, 3)])  # fmt: skip
+        first = 4 * np.arange(6)[:, None, None]
+        faces = first + np.array([[0, 1, 2], [0, 2, 3]])
+        return corners[sides].reshape(-1, 3), faces.reshape(-1, 3)
+    up = np.linspace(-math.pi / 2.0, math.pi / 2.0, 6)
+    radii, heights = 0.5 * np.cos(up), 0.5 * np.sin(up)
+    if shape == CYLINDER:  # rims twice, so that sides and lids are shaded apart
+        radii = np.array([0.0, 0.5, 0.5, 0.5, 0.5, 0.0])
+        heights = np.array([-0.5, -0.5, -0.5, 0.5, 0.5, 0.5])
+    turns = np.linspace(0.0, math.tau, around, endpoint=False)
+    circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    rings = [np.column_stack([r * circle, np.full(around, h)])
+             for r, h in zip(radii, heights, strict=True)]  # fmt: skip
+    k = np.arange(around)
+    a, b = k, (k + 1) % around
+    ring = np.concatenate(
+        [np.stack([a, b, b + around], 1), np.stack([a, b + around, a + around], 1)]
+    )
+    faces = (around * np.arange(len(rings) - 1)[:, None, None] + ring).reshape(-1, 3)
+    return np.concatenate(rings), faces

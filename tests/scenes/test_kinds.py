@@ -15,17 +15,14 @@ from scenes.mjcf import file_of
 from scenes.scene import Mover
 from sim.actors.castors import stand_on_castors
 from sim.recording.objects import ObjectsMessage
-from sim.view.icons import DRAWINGS
-from sim.view.mapview import MapView
 from slam.errors import UnknownNameError
 
 ROOT = Path(__file__).parents[2]
 
 
-def test_every_row_has_a_part_and_a_drawing():
+def test_every_row_has_a_part():
     for name, row in KINDS.items():
         assert file_of("parts", name).is_file()
-        assert row.icon in DRAWINGS
         assert (row.feet is not None) == (row.group == "chair")
 
 
@@ -38,11 +35,9 @@ def test_a_row_is_all_that_the_rest_reads(monkeypatch):
     built = scenes.build("arena", seed=3)
     chair = next(m for m in built.movers if m.kind == "chair_swivel")
     poses = np.array([built.initial[m.name] for m in built.movers])
-    before = MapView(built, 320, 240).draw(poses)
-    row = KindOfMover(group="chair", height_m=0.5, z_order=9, icon="plain",
-                      feet=Feet(number=3, circle_m=0.2, first_rad=0.0, radius_m=0.02))  # fmt: skip
+    feet = Feet(number=3, circle_m=0.2, first_rad=0.0, radius_m=0.02)
+    row = KindOfMover(group="chair", height_m=0.5, feet=feet)
     monkeypatch.setitem(KINDS, "chair_swivel", row)
-    assert not np.array_equal(MapView(built, 320, 240).draw(poses), before)
     names = [geom.name for geom in stand_on_castors(built).spec.body(f"{chair.name}/base").geoms]
     assert sum(name.startswith(f"{chair.name}/foot") for name in names) == 3
     message = ObjectsMessage(built.movers)
@@ -59,6 +54,6 @@ def test_no_second_list_of_kinds():
                 words = {n.value for n in inside if isinstance(n, ast.Constant)}
                 if len(words & set(KINDS)) > 2:
                     found.add(path.relative_to(ROOT).as_posix())
-    # the rows; the drawings by their own names; what the groups are, some of which are called alike
+    # the rows; what the groups are, some of which are called alike
     of_groups = {"scenes/groups.py", "sim/actors/rearranging.py"}
-    assert found == {"scenes/kinds.py", "sim/view/icons.py"} | of_groups
+    assert found == {"scenes/kinds.py"} | of_groups

@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from scripts.film.chart import BAND_PALE, Bar, ErrorChart, Series, _turned
-from scripts.film.draw import GREEN, INK, MAGENTA, ORANGE, RED, paler
+from scripts.film.chart import BAND_PALE, ErrorChart, Series, _turned
+from sim.events import KIDNAP, Event
+from sim.view.draw import GREEN, INK, MAGENTA, ORANGE, RED, paler
+from sim.view.moment import Shown
 
 COLORS = {"shunting": RED, "odometry": ORANGE}
 LANES = ("chair", "door", "unsure")
@@ -25,8 +28,20 @@ def series(error_m: float | None, sigma_m: float, seconds=range(61)) -> Series:
     made = Series()
     for at_s in seconds:
         error = None if error_m is None else np.array([error_m, 0.0, 0.001])
-        made.add(float(at_s), error, np.diag([sigma_m**2, (0.5 * sigma_m) ** 2, 1e-5]))
+        made.add(shown(at_s, error, np.diag([sigma_m**2, (0.5 * sigma_m) ** 2, 1e-5])), "shunting")
     return made
+
+
+def shown(at_s, error, covariance):
+    """A moment of one track that is off by ``error``."""
+    estimate = SimpleNamespace(T_map_robot=np.ones(3), covariance=covariance)
+    moment = SimpleNamespace(
+        seconds=float(at_s), estimates={"shunting": estimate},
+        truth_map=None if error is None else np.ones(3) - error,
+    )  # fmt: skip
+    moment.error = lambda name: Shown.error(moment, name)
+    moment.claimed = lambda name: Shown.claimed(moment, name)
+    return moment
 
 
 def rows(picture: np.ndarray, color) -> np.ndarray:
@@ -40,10 +55,8 @@ def test_a_series_claims_two_sigma_of_the_longest_axis():
     covariance = np.zeros((3, 3))
     covariance[:2, :2] = axes @ np.diag([0.04, 0.01]) @ axes.T
     covariance[2, 2] = 0.0009
-    made.add(0.0, np.array([0.3, -0.4, 0.1]), covariance)
-    assert made.position[0] == pytest.approx(0.5)
-    assert made.claimed[0] == pytest.approx(0.4)
-    assert made.claimed_rad[0] == pytest.approx(0.06)
+    made.add(shown(3.0, np.array([0.3, -0.4, 0.1]), covariance), "shunting")
+    assert made.rows().tolist() == [pytest.approx([3.0, 0.5, 0.1, 0.4, 0.06])]
 
 
 def test_ten_times_the_error_is_a_decade_higher():
@@ -65,9 +78,9 @@ def test_an_error_beyond_the_claim_leaves_the_band():
 def test_events_stand_at_their_times_and_in_their_lanes():
     still = chart().paint({"shunting": series(None, 0.01)}, ())
     bars = [
-        Bar(lane="chair", start_s=10.0, end_s=20.0),
-        Bar(lane="door", start_s=30.0, end_s=40.0, strong=False),
-        Bar(lane="unsure", start_s=50.0, end_s=50.0),
+        Event(kind="chair", name="a", start_s=10.0, end_s=20.0, seen=True),
+        Event(kind="door", name="b", start_s=30.0, end_s=40.0),
+        Event(kind="unsure", name="", start_s=50.0, end_s=50.0, seen=True),
     ]
     picture = chart().paint({"shunting": series(None, 0.01)}, bars)
     changed = (picture != still).any(axis=2)
@@ -81,7 +94,9 @@ def test_events_stand_at_their_times_and_in_their_lanes():
 
 
 def test_a_kidnap_is_a_line_through_everything():
-    picture = chart().paint({"shunting": series(0.01, 0.01)}, (), kidnaps=[30.0])
+    picture = chart().paint(
+        {"shunting": series(0.01, 0.01)}, [Event(kind=KIDNAP, name="", start_s=30.0, end_s=30.0)]
+    )
     still = chart().paint({"shunting": series(0.01, 0.01)}, ())
     x = round(58 + (600 - 68) / 2)
     assert (picture[:, x] != still[:, x]).any(axis=1).sum() > 150

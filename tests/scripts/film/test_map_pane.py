@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from scripts.film.close_up import CloseUp, off_by
-from scripts.film.draw import GREEN, INK, PAPER, RED
-from scripts.film.map_pane import MAX_TRAIL, Trail, View, draw_trail, raster_picture, scale_bar
+from scripts.film.map_pane import raster_picture
+from sim.view.draw import GREEN, INK, PAPER, RED, View, robot, scale_bar
+from sim.view.moment import MOST_POINTS, Path
 from slam import se2
 from slam.system import Raster
 
@@ -27,7 +28,7 @@ def test_a_cell_is_drawn_at_its_place(yaw: float):
     np.testing.assert_allclose(found, view.pixels(center)[0], atol=1.0)
 
 
-def test_unknown_is_paper_and_trails_end_in_a_robot():
+def test_unknown_is_paper_and_a_robot_is_where_it_is():
     raster = Raster(
         values=np.full((4, 4), np.nan, np.float32), resolution_m=1.0, T_map_origin=np.zeros(3)
     )
@@ -35,18 +36,19 @@ def test_unknown_is_paper_and_trails_end_in_a_robot():
     picture = raster_picture(raster, view, np.zeros(3))
     assert (picture == picture[0, 0]).all()
     here = np.array([2.0, 2.0, 0.0])
-    draw_trail(picture, view, np.array([[0.0, 0.0], [2.0, 2.0]]), here, GREEN, 2)
+    robot(picture, view, here, GREEN)
     assert (picture[50, 50] == GREEN).all()
 
 
 def test_a_long_trail_keeps_its_ends():
-    trail = Trail()
-    for k in range(4 * MAX_TRAIL + 1):
-        trail.add(np.array([float(k), -float(k), 0.0]))
-    points = trail.points()
-    assert len(points) <= MAX_TRAIL + 1
+    path = Path()
+    for k in range(4 * MOST_POINTS + 1):
+        path.add(np.array([float(k), -float(k), 0.0]))
+    points = path.points()
+    assert len(points) <= MOST_POINTS + 1
     assert points[0].tolist() == [0.0, 0.0]
-    assert points[-1].tolist() == [4.0 * MAX_TRAIL, -4.0 * MAX_TRAIL]
+    assert points[-1].tolist() == [4.0 * MOST_POINTS, -4.0 * MOST_POINTS]
+    assert path.points(number=7).tolist() == [[float(k), -float(k)] for k in range(8)]
 
 
 def test_the_close_up_shows_truth_and_estimate_however_far_apart():

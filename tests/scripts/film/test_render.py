@@ -14,18 +14,19 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from scripts.cli import app
-from scripts.film import live_view
-from scripts.film.draw import AZURE, BLUE, GRAY, GREEN, MAGENTA, TEAL, VIOLET
 from scripts.film.encode import FILM_S, Pace, size_of
 from scripts.film.footage import of_scene, open_run
 from scripts.film.layout import Layout
 from scripts.film.render import pictures_at
-from scripts.film.scan_pane import LEGEND, RobotScan, beam_colors
+from scripts.film.scan_pane import RobotScan
 from sim.core.versions import WORLD
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe
 from sim.simulation import stream
+from sim.view import gl
+from sim.view.draw import AZURE, BLUE, GRAY, GREEN, MAGENTA, TEAL, VIOLET
 from sim.view.gl import Gl
+from sim.view.scans import LEGEND, beam_colors
 from slam.errors import InvalidValueError, LogFormatError, MobiliaError
 from slam.frames import BeamClass, BeamLabels, Frame, LaserSpec, Odometry, Scan
 from slam.logs.carmen import write_carmen
@@ -35,7 +36,7 @@ SETTINGS = {"scene": "arena", "seconds": 2.0, "dynamism": 1.0, "seed": 3}
 
 @pytest.fixture
 def without_gl(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(live_view.gl, "find", lambda: Gl(backend=None, reason="no GL here"))
+    monkeypatch.setattr(gl, "find", lambda: Gl(backend=None, reason="no GL here"))
 
 
 OF_WORLD = f'{{"world": {WORLD}, "settings": %s}}'
@@ -141,7 +142,7 @@ def test_a_log_without_truth_is_filmed_without_it(tmp_path: Path):
         show = footage.show(["odometry"])
         (picture,) = pictures_at(footage.stream, show, [0.9], whole=True)
     assert (picture == BLUE).all(axis=2).sum() > 100
-    assert "truth" not in show.trails
+    assert [name for name, _ in show.named()] == ["odometry"]
     assert not (picture == GREEN).all(axis=2).any()
     assert not (picture == MAGENTA).all(axis=2).any()
 

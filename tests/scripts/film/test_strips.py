@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scripts.film.strips import GAP, LABEL, MARGIN, evenly, strip, strips
+from scripts.film.strips import GAP, LABEL, MARGIN, evenly, strips
 from slam.errors import InvalidValueError
 
 
@@ -19,7 +19,7 @@ def plain(level: int) -> np.ndarray:
 
 def test_pictures_stand_side_by_side_in_the_order_of_time(tmp_path: Path):
     path = tmp_path / "strip.png"
-    whole = strip([plain(10), plain(20), plain(30)], [0.0, 1.5, 3.0], path, cell_width=80)
+    whole = strips({"": [plain(10), plain(20), plain(30)]}, [0.0, 1.5, 3.0], path, cell_width=80)
     with Image.open(path) as image:
         np.testing.assert_array_equal(np.asarray(image), whole)
     for k, level in enumerate((10, 20, 30)):
@@ -32,7 +32,7 @@ def test_pictures_stand_side_by_side_in_the_order_of_time(tmp_path: Path):
 def test_two_runs_stand_under_one_another(tmp_path: Path):
     seconds = [0.0, 2.0]
     both = strips({"with": [plain(0), plain(1)], "without": [plain(2), plain(3)]}, seconds)
-    one = strip([plain(0), plain(1)], seconds)
+    one = strips({"": [plain(0), plain(1)]}, seconds)
     assert both.shape[1] == one.shape[1]
     assert both.shape[0] > 2 * 225
     assert {0, 1, 2, 3} <= set(np.unique(both).tolist())
@@ -41,7 +41,7 @@ def test_two_runs_stand_under_one_another(tmp_path: Path):
 
 def test_many_moments_go_over_several_lines():
     pictures = [plain(k) for k in range(5)]
-    whole = strip(pictures, [float(k) for k in range(5)], columns=3, cell_width=160)
+    whole = strips({"": pictures}, [float(k) for k in range(5)], columns=3, cell_width=160)
     assert whole.shape[1] == 2 * MARGIN + 3 * 160 + 2 * GAP
     assert set(range(5)) <= set(np.unique(whole).tolist())
 
@@ -63,13 +63,15 @@ def test_evenly():
 )
 def test_what_does_not_fit_is_named(pictures, seconds, says):
     with pytest.raises(InvalidValueError, match=says):
-        strip(pictures, seconds)
+        strips({"": pictures}, seconds)
 
 
 def test_a_legend_stands_below_and_wraps():
     parts = [np.full((40, 60, 3), 10, np.uint8)]
     legend = [("one of the colours", (1, 2, 3)), ("another of the colours", (4, 5, 6))]
-    bare, told = (strip(parts, [0.0], cell_width=200, legend=named) for named in ((), legend))
+    bare, told = (
+        strips({"": parts}, [0.0], cell_width=200, legend=named) for named in ((), legend)
+    )
     below = told[len(bare) - MARGIN :]
     for _, color in legend:  # in a line of its own each, as both are wider than the strip
         assert (below == color).all(axis=2).any()

@@ -11,7 +11,7 @@ import pytest
 
 from scripts.live.hands import Hands
 from scripts.live.opened import Opener
-from scripts.live.requests import Anew, Drive, Touch
+from scripts.live.requests import Anew, Click, Drive
 from sim.moments import toured
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe
@@ -41,7 +41,7 @@ def test_a_world_that_nobody_touches_is_the_one_that_is_run_and_one_that_is_touc
         hands = Hands(Simulation(**SETTINGS))
         moments = hands.moments(1.0)
         frames = some(moments, 3)
-        hands.do(Push(speed=2.0, heading=0.5))
+        hands.do(Push())
         hands.do(Drive(v=0.3, omega=1.0))
         frames += some(moments, 4)
         hands.do(Kidnap())
@@ -65,14 +65,16 @@ def test_a_click_pushes_what_is_there_and_nothing_far_away():
     hands, world = Hands(simulation), simulation.world
     row = next(k for k, name in enumerate(world.mover_names) if name.startswith("chair"))
     x, y = world.mover_poses()[row, :2].tolist()
-    assert hands.do(Touch(x=x, y=y)).startswith(world.mover_names[row])
-    assert hands.do(Touch(x=1e5, y=0.0, name=world.mover_names[row])).startswith("chair")
+    down = (0.0, 0.0, -1.0)
+    assert hands.do(Click(origin=(x, y, 3.0), direction=down)).startswith(world.mover_names[row])
+    assert hands.do(Push(name=world.mover_names[row])).startswith("chair")
+    xmin, ymin, _, _ = world.scene.bounds
     with pytest.raises(InvalidValueError, match="nothing to push or to open within 1 m"):
-        hands.do(Touch(x=1e5, y=0.0))
+        hands.do(Click(origin=(xmin + 0.1, ymin + 0.1, 3.0), direction=down))
+    with pytest.raises(InvalidValueError, match="nothing is there"):
+        hands.do(Click(origin=(x, y, 3.0), direction=(0.0, 0.0, 1.0)))
     with pytest.raises(UnknownNameError, match="there is no door ''"):
         hands.do(MoveDoor(opened=True))
-    with pytest.raises(UnknownNameError, match="there is no goal 'moon' here, goals: "):
-        hands.do(Kidnap(goal="moon"))
 
 
 def carmen(n: int) -> str:
@@ -107,7 +109,7 @@ def test_a_page_asks_for_another_world_and_keeps_the_seed():
 
 def test_every_part_of_a_room_is_where_mujoco_has_it_and_a_ray_finds_it():
     world = Simulation("arena", dynamism=0.5).world
-    parts = Parts(world)
+    parts = Parts(world.scene, world.model)
     parts.place(Placed.of(world))
     chair = next(k for k, name in enumerate(world.mover_names) if name.startswith("chair"))
     around = world.mover_poses()[chair, :2]
@@ -128,8 +130,8 @@ def test_a_path_is_thinned_and_ends_where_the_robot_is():
     path = Path()
     for k in range(5000):
         path.add(np.array([k, math.nan if k == 7 else 0.0, 0.0]))
-    assert path.until(3, 100)[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0]
-    thin = path.until(4321, 100)
+    assert path.points(100, 3)[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0]
+    thin = path.points(100, 4321)
     assert len(thin) <= 103
     assert thin[-1, 0] == 4321.0
 

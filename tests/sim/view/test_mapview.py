@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import scenes
-from sim.view.floorplan import FOOT_PX
-from sim.view.icons import INK
-from sim.view.mapview import SCAN_HIT, TRAILS, MapView
+from sim.view.draw import BLUE, INK
+from sim.view.mapview import FOOT_PX, MapView
+from sim.view.scans import beam_ends
 from slam.errors import InvalidValueError
+from slam.frames import Frame, LaserSpec, Odometry, Scan
 
 
 @pytest.fixture(scope="module")
@@ -41,8 +42,8 @@ def test_pixels_are_an_affine_picture_of_the_world(office):
     assert corners[0, 0] < corners[1, 0]
     assert corners[0, 1] > corners[1, 1]  # y up, rows down
     centre, right, up = view.to_pixels([(0, 0), (1, 0), (0, 1)])
-    assert right - centre == pytest.approx([view.plan.scale, 0.0])
-    assert up - centre == pytest.approx([0.0, -view.plan.scale])
+    assert right - centre == pytest.approx([view.scale, 0.0])
+    assert up - centre == pytest.approx([0.0, -view.scale])
 
 
 def test_a_mover_is_drawn_where_it_is(office, poses):
@@ -58,35 +59,28 @@ def test_a_mover_is_drawn_where_it_is(office, poses):
         assert count > 30
 
 
-def test_people_get_feet_where_they_are_told(office, poses):
-    scene, view = office
-    n = sum(m.kind == "person" for m in scene.movers)
-    feet = np.full((n, 2, 3), np.nan)
-    without = view.draw(poses, feet=feet)
-    feet[0, 0] = (2.0, -0.5, 0.0)
-    column, row, _ = changed(view, without, view.draw(poses, feet=feet))
-    assert [column, row] == pytest.approx(view.to_pixels([(2.05, -0.5)])[0].tolist(), abs=1.5)
+def seen(ranges):
+    """A frame from (0, 0.4) with these ranges all around."""
+    spec = LaserSpec(n_beams=len(ranges), angle_min=-1.5, angle_increment=3.0 / len(ranges))
+    scan = Scan(stamp_ns=0, ranges=np.array(ranges, np.float32), spec=spec)
+    odometry = Odometry(stamp_ns=0, T_odom_robot=np.zeros(3))
+    return Frame(stamp_ns=0, odometry=odometry, scan=scan, truth=np.array([0.0, 0.4, 0.0]))
 
 
-def test_hits_and_trails_are_drawn_in_their_colours(office, poses):
+def test_hits_are_drawn_in_their_colours(office, poses):
     _, view = office
-    angles = np.linspace(-1.5, 1.5, 60)
-    hits = np.stack([2.0 * np.cos(angles), 0.9 * np.sin(angles)], axis=1)
-    hits[20] = np.nan
-    picture = view.draw(poses, scan=((0.0, 0.0, 0.0), hits))
-    column, row = np.round(view.to_pixels(hits[40:41])[0]).astype(int)
-    assert np.abs(picture[row, column].astype(int) - SCAN_HIT).max() < 60
-    path = np.array([(-4.0, 0.5), (4.0, 0.5)])
-    picture = view.draw(poses, trails={"shunting": path})
-    column, row = np.round(view.to_pixels([(1.0, 0.5)])[0]).astype(int)
-    assert np.abs(picture[row, column].astype(int) - TRAILS["shunting"]).max() < 60
+    frame = seen([1.0] * 60)
+    picture = view.draw(poses, frame)
+    at = np.array([0.0, 0.4]) + beam_ends(frame.scan)[40]
+    column, row = np.round(view.to_pixels([at])[0]).astype(int)
+    assert np.abs(picture[row, column].astype(int) - BLUE).max() < 60
 
 
 def test_drawing_leaves_no_trace_and_takes_any_scan(office, poses):
     _, view = office
     clean = view.draw(poses)
-    for hits in (np.empty((0, 2)), np.full((5, 2), np.nan), np.full((3, 2), 1e4), [(1.0, 1.0)]):
-        view.draw(poses, scan=((0.0, 0.0, 0.0), hits), trails={"x": [(0, 0)]}, caption="t = 1 s")
+    for ranges in ([np.inf], [np.inf] * 5, [1e4] * 3, [1.0]):
+        view.draw(poses, seen(ranges))
     np.testing.assert_array_equal(view.draw(poses), clean)
 
 
@@ -115,6 +109,6 @@ def test_the_scale_bar_is_below_the_room(size):
     view = MapView(scene, *size)
     xmin, ymin, xmax, _ = scene.bounds
     lowest = view.to_pixels([(xmin, ymin), (xmax, ymin)])[:, 1].max()
-    ink = (view.plan.picture[-FOOT_PX:] == INK).all(axis=2)
+    ink = (view.room[-FOOT_PX:] == INK).all(axis=2)
     assert ink.any()
     assert lowest < size[1] - FOOT_PX

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small drawing helpers on RGB uint8 images: crisp text, pasting, a running line chart."""
+"""Small drawing helpers on RGB uint8 images, for all pictures: colours, text, lines, scale bars."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,9 @@ import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
+
+from slam import se2
+from slam.frames import Float
 
 Picture = NDArray[np.uint8]
 Color = tuple[int, int, int]
@@ -32,7 +36,39 @@ TEAL: Color = (0, 150, 158)  # semi-static
 MAGENTA: Color = (222, 0, 128)  # moving
 VIOLET: Color = (140, 84, 206)  # a mixed pixel
 GRAY: Color = (164, 168, 176)  # no return
+SHIFT = 4  # fractional bits of pixel coordinates given to OpenCV
 _TRACKS: tuple[Color, ...] = (RED, BLUE, (122, 63, 176))
+
+
+@dataclass(frozen=True)
+class View:
+    """The part of the plane a pane shows: lower left corner (m), pixels per metre, size (px)."""
+
+    x: float
+    y: float
+    scale: float
+    width: int
+    height: int
+
+    @classmethod
+    def fitting(cls, bounds: tuple[float, float, float, float], width: int, height: int) -> View:
+        """The largest scale at which ``bounds`` (xmin, ymin, xmax, ymax) fit, centred."""
+        xmin, ymin, xmax, ymax = bounds
+        scale = min(width / (xmax - xmin), height / (ymax - ymin))
+        return cls(
+            x=(xmin + xmax) / 2.0 - width / scale / 2.0,
+            y=(ymin + ymax) / 2.0 - height / scale / 2.0,
+            scale=scale,
+            width=width,
+            height=height,
+        )
+
+    def pixels(self, points: Float) -> Float:
+        """(n, 2) m to (n, 2) px, x right and y down."""
+        out = np.empty((len(points), 2))
+        out[:, 0] = (points[:, 0] - self.x) * self.scale
+        out[:, 1] = self.height - (points[:, 1] - self.y) * self.scale
+        return out
 
 
 @lru_cache(maxsize=8)
@@ -100,28 +136,64 @@ def paler(color: Color, share: float) -> Color:
     return red, green, blue
 
 
-def paste(image: Picture, part: Picture, at: tuple[int, int], size: tuple[int, int]) -> None:
-    """Put ``part`` into the box ``at`` + ``size`` (x, y; width, height), letterboxed on paper."""
-    (x, y), (width, height) = at, size
-    scale = min(width / part.shape[1], height / part.shape[0])
-    if abs(scale - 1.0) > 1e-3:
-        shape = (max(1, round(part.shape[1] * scale)), max(1, round(part.shape[0] * scale)))
-        how = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
-        part = cv2.resize(part, shape, interpolation=how)
-    h, w = part.shape[:2]
-    left, top = x + (width - w) // 2, y + (height - h) // 2
-    image[top : top + h, left : left + w] = part
+def darker(color: Color, share: float) -> Color:
+    """That share of ``color``."""
+    red, green, blue = (round(share * c) for c in color)
+    return red, green, blue
+
+
+def fixed(pixels: Float) -> NDArray[np.int32]:
+    """Pixel coordinates as OpenCV's fixed point of ``SHIFT`` bits."""
+    return np.round(np.asarray(pixels) * float(1 << SHIFT)).astype(np.int32)
 
 
 def polyline(image: Picture, pixels: NDArray[Any], color: Color, thickness: int = 1) -> None:
     """An antialiased line through ``pixels`` (n, 2) float, sub-pixel exact."""
     if len(pixels) >= 2:
-        fixed = np.round(np.asarray(pixels) * 16.0).astype(np.int32)
-        cv2.polylines(image, [fixed], False, color, thickness, cv2.LINE_AA, shift=4)
+        cv2.polylines(image, [fixed(pixels)], False, color, thickness, cv2.LINE_AA, SHIFT)
+
+
+def polygon(image: Picture, pixels: Float, color: Color) -> None:
+    """A filled outline, sub-pixel exact."""
+    cv2.fillPoly(image, [fixed(pixels)], color, cv2.LINE_AA, SHIFT)
+
+
+def dots(image: Picture, pixels: Float, colors: Any, radius: float) -> None:
+    """Discs of ``radius`` px; ``colors`` (n, 3)."""
+    wide = round(radius * (1 << SHIFT))
+    for at, color in zip(fixed(pixels).tolist(), np.asarray(colors).tolist(), strict=True):
+        cv2.circle(image, at, wide, color, cv2.FILLED, cv2.LINE_AA, SHIFT)
+
+
+def robot(image: Picture, view: View, T_view_robot: Float, color: Color) -> None:
+    """A triangle, never smaller than 9 px."""
+    size = max(1.0, 9.0 / (0.28 * view.scale))
+    body = np.array([[0.28, 0.0], [-0.2, 0.19], [-0.2, -0.19]]) * size
+    polygon(image, view.pixels(se2.transform(T_view_robot, body)), color)
 
 
 def colors_of(names: Sequence[str]) -> dict[str, Color]:
-    """A colour for each track; odometry is always orange."""
+    """A colour for each track and "truth"; odometry is always orange."""
     rest = [name for name in names if name != "odometry"]
     found = {name: _TRACKS[k % len(_TRACKS)] for k, name in enumerate(rest)}
-    return {**found, "odometry": ORANGE}
+    return {**found, "odometry": ORANGE, "truth": GREEN}
+
+
+def scale_bar(picture: Picture, view: View, unit: float) -> None:
+    """A length of 1, 2 or 5 times a power of ten in a corner: the lower left one, or the first of
+    the others in which nothing is drawn."""
+    meters = round_down(view.width / view.scale / 4.0)
+    word, size, thick = length(meters), round(12 * unit), max(1, round(3 * unit))
+    margin, bar, above = round(12 * unit), round(meters * view.scale), round(18 * unit)
+    wide = max(bar, text_width(word, size))
+    places = [
+        (x, y)
+        for y in (view.height - margin, margin + above)
+        for x in (margin, view.width - margin - wide)
+    ]
+    free = (
+        (x, y) for x, y in places if (picture[y - above : y + thick, x : x + wide] == PAPER).all()
+    )
+    x, y = next(free, places[0])
+    picture[y : y + thick, x : x + bar] = INK
+    text(picture, word, (x, y - above), size, INK)
