@@ -88,7 +88,8 @@ def main(warning: str | None = None) -> None:
     except MobiliaError as error:
         fail(str(error))
         _log.info("where it came from:", exc_info=error)  # with --verbose
-        sys.exit(2 if isinstance(error, MissingPathError) else 1)
+        status = 2 if isinstance(error, MissingPathError) else 1
+        sys.exit(getattr(error, "status", status))
     except interrupt.InterruptedBySignal:
         fail("interrupted: nothing half-written is left behind")
         sys.exit(130)

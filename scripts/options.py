@@ -85,7 +85,24 @@ TextFormat = Annotated[
     typer.Option("--format", help="TOML file that says which columns of a text log hold what."),
 ]
 Strict = Annotated[
-    bool, typer.Option("--strict", help="Refuse a log that would have to be repaired.")
+    bool,
+    typer.Option(
+        "--strict",
+        help="Refuse a log that would have to be repaired, or whose scans contradict the place of "
+        "its scanner; exit status 6 where more than a third of the scans are not trusted.",
+    ),
+]
+Laser = Annotated[
+    str | None,
+    typer.Option(
+        "--laser",
+        help="Where a log's scanner is on the robot, m, m and degrees: --laser 0.1,0,180 looks "
+        "backwards. Default as the log says.",
+        metavar="X,Y,YAW_DEG",
+    ),
+]
+Flip = Annotated[
+    bool, typer.Option("--flip", help="A log's beams count the other way round (it hangs).")
 ]
 Oracles = Annotated[
     list[str] | None,

@@ -367,6 +367,7 @@ class StreamMetadata:
     source  "simulation", "carmen", "rosbag2", ...; ``scene`` and ``seed`` for simulations
     laser   the scanner, None for feature streams; ``robot`` its name or preset
     truth   what ``Frame.truth`` is: "simulator", "corrected poses of the log", "" for none
+    mounting  where ``laser.T_robot_laser`` comes from, in words; "" where it is assumed
     odometry  False where nobody measured it: ``Frame.odometry`` stands still, and ``Replay`` gives
             each SLAM that of a constant velocity
     extra   JSON-serialisable facts (path, counts of repaired lines, ...); ``EPOCH`` among them is
@@ -379,6 +380,7 @@ class StreamMetadata:
     laser: LaserSpec | None = None
     robot: str | None = None
     truth: str = ""
+    mounting: str = ""
     odometry: bool = True
     extra: Mapping[str, Any] = field(default_factory=dict)
 

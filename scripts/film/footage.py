@@ -24,10 +24,11 @@ from slam.errors import (
     NeedsLabelsError,
     UnknownNameError,
 )
-from slam.frames import NS_PER_S, Stream
+from slam.frames import NS_PER_S, Float, Stream
 from slam.logs import open_log
 from slam.logs.bag import read_bag
 from slam.logs.bag_topics import is_bag
+from slam.logs.mounting import MountingTest, remounted
 from slam.oracle import Oracle
 from slam.replay import Replay, systems_named
 
@@ -48,6 +49,7 @@ SIMULATED = (
     "events",
     "robot",
 )
+FEW_RETURNS = 0.1  # share of the beams of a scan; fewer return: the scan is as good as empty
 
 
 @dataclass(eq=False, kw_only=True)
@@ -58,6 +60,9 @@ class Footage:
     truth_name  what the film calls the truth
     slam     the SLAM that the run was about, "" where nobody says
     made_with  what the simulation was made with, for a recipe
+    scans    of a log, how many
+    tested   of a log, what says how its scanner is mounted
+    empty    of a log, share of its scans with next to no returns
     no_camera  why there is no 3D view although one was wanted; empty otherwise
     """
 
@@ -68,6 +73,9 @@ class Footage:
     truth_name: str = "truth"
     slam: str = ""
     no_camera: str = ""
+    scans: int = 0
+    empty: float = 0.0
+    tested: MountingTest | None = None
     made_with: Mapping[str, Any] = field(default_factory=dict)
 
     def show(self, slams: Sequence[str], *, pace: Pace | None = None, size: Size = SIZE) -> Show:
@@ -225,8 +233,18 @@ def of_compared(path: Path, *, view: str | None = "follow", trust: bool = False)
     return footage
 
 
-def of_log(path: Path, *, strict: bool = False, text_format: Path | None = None) -> Footage:
-    """A log: its scans are all that is known of the world. Options as of ``open_log``."""
+def of_log(
+    path: Path,
+    *,
+    strict: bool = False,
+    text_format: Path | None = None,
+    mount: Float | None = None,
+    flip: bool = False,
+) -> Footage:
+    """A log: its scans are all that is known of the world. Options as of ``open_log``.
+
+    mount  (3,) T_robot_laser in place of the log's; ``flip``: its beams count the other way round
+    """
     from sim.recording.verify import check_bag
 
     check_bag(path)
@@ -234,9 +252,14 @@ def of_log(path: Path, *, strict: bool = False, text_format: Path | None = None)
         stream = read_bag(path, labels=True, strict=strict)
     else:
         stream = open_log(path, strict=strict, text_format=text_format)
+    if mount is not None or flip:
+        by = " and ".join(w for w, on in (("--laser", mount is not None), ("--flip", flip)) if on)
+        stream = remounted(stream, mount, flip=flip, by=by)
     first_ns = last_ns = None
-    labelled, frames = False, 0
+    labelled, frames, empty, tested = False, 0, 0, MountingTest()
     for frame in stream:
+        tested.note(frame)
+        empty += frame.scan is not None and float(frame.scan.valid.mean()) < FEW_RETURNS
         first_ns = frame.stamp_ns if first_ns is None else first_ns
         last_ns, frames = frame.stamp_ns, frames + 1
         labelled = labelled or frame.labels is not None
@@ -248,6 +271,9 @@ def of_log(path: Path, *, strict: bool = False, text_format: Path | None = None)
         title=path.resolve().name,
         duration_s=(last_ns - first_ns) / NS_PER_S,
         truth_name=stream.metadata.truth or "truth",
+        scans=frames,
+        empty=empty / frames,
+        tested=tested,
     )
 
 

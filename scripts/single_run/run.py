@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,15 +16,25 @@ from scripts.film.encode import Pace
 from scripts.film.footage import of_log, of_scene
 from scripts.single_run.costs import INPUT, Costs
 from scripts.single_run.session import Outputs, run_session
+from scripts.single_run.understood import UntrustedRunError, distrust, mount_of, tell
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Log:
-    """A log to be run on: ``strict`` refuses repairs, ``text_format`` describes a text log."""
+    """A log to be run on.
+
+    strict       refuse repairs, a mounting that its scans contradict, and a run that nobody trusts
+    text_format  describes a text log
+    laser, flip  how the scanner is mounted, where the log does not say it: ``mount_of``
+    """
 
     path: Path
     strict: bool = False
     text_format: Path | None = None
+    laser: str | None = None
+    flip: bool = False
 
 
 def on_log(
@@ -39,7 +50,11 @@ def on_log(
     path = log.path
     costs = Costs()
     with costs.stage(INPUT), working(f"reading {path.name}"):
-        footage = of_log(path, strict=log.strict, text_format=log.text_format)
+        footage = of_log(
+            path, strict=log.strict, text_format=log.text_format,
+            mount=mount_of(log.laser), flip=log.flip,
+        )  # fmt: skip
+    found = tell(footage, strict=log.strict)
     show = footage.show(names)
     session = None
     if maps is not None and maps.given:
@@ -66,6 +81,11 @@ def on_log(
     )
     if session is not None and maps is not None:
         kept(session, maps)
+    words = distrust(show.track(), footage, found)
+    if words and log.strict:
+        raise UntrustedRunError(words)
+    if words:
+        _log.warning("%s", words)
     return results
 
 

@@ -14,7 +14,9 @@ from scripts.options import (
     CrowdOption,
     DynamismLevel,
     EventsOption,
+    Flip,
     Held,
+    Laser,
     Motion,
     Oracles,
     Overwrite,
@@ -49,6 +51,8 @@ def run(
         ),
     ] = None,
     text_format: TextFormat = None,
+    laser: Laser = None,
+    flip: Flip = False,
     strict: Strict = False,
     scene: Annotated[
         str | None, typer.Option(help="Or a simulated scene, driven on a tour of its rooms.")
@@ -93,7 +97,8 @@ def run(
     slams = list(with_oracles(slam, oracle, set_))
     check(slams, scene)
     if scene is not None:
-        _without_a_log(strict=strict or text_format is not None, maps=bool(map_in or map_out or at))
+        of_a_log = strict or flip or laser is not None or text_format is not None
+        _without_a_log(strict=of_a_log, maps=bool(map_in or map_out or at))
         from scripts.single_run.run import on_scene
         from scripts.single_run.session import Outputs
 
@@ -111,13 +116,13 @@ def run(
 
         maps = Maps(map_in=map_in, map_out=map_out, at=at)
         folder = out or Path("out") / f"run-{run_name(log)}"
-        recorded = Log(path=log, strict=strict, text_format=text_format)
+        recorded = Log(path=log, strict=strict, text_format=text_format, laser=laser, flip=flip)
         on_log(slams, recorded, folder, overwrite=overwrite, film=film, maps=maps)
 
 
 def _without_a_log(*, strict: bool, maps: bool) -> None:
     """``InvalidValueError`` where options about a log were given beside a scene."""
     if strict:
-        raise InvalidValueError("--strict and --format are about a --log")
+        raise InvalidValueError("--strict, --format, --laser and --flip are about a --log")
     if maps:
         raise InvalidValueError("--map-in, --map-out and --at are about a --log")

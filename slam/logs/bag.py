@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,6 @@ from slam.logs.text import about
 
 PROBE_NS = 20 * NS_PER_S  # how far the transform to the laser is looked for
 _BASE = "base_link"  # of REP 105
-_log = logging.getLogger(__name__)
 
 
 def read_bag(
@@ -58,11 +56,13 @@ def read_bag(
     path = Path(path)
     with Bag(path) as bag:
         topics = choose(bag, scan=scan, odometry=odometry, truth=truth, labels=labels)
-        laser = _probe(bag, topics)
+        laser, mounted = _probe(bag, topics)
         epoch_ns = _epoch_ns(bag, topics)
         count = bag.topics[topics.scan][1]
         source = "rosbag1" if bag.is_ros1 else "rosbag2"
     extra: dict[str, Any] = {"file": path.name, "scan": topics.scan, "odometry": topics.odometry}
+    if laser.turned:
+        extra["turned"] = laser.turned
     repairs = Repairs(path, strict)
     if topics.odometry is None:
         repairs.note(NO_ODOMETRY, "no message of nav_msgs/msg/Odometry", None, count)
@@ -71,6 +71,7 @@ def read_bag(
         source=source,
         laser=laser.spec,
         truth=topics.truth or "",
+        mounting=mounted,
         odometry=topics.odometry is not None,
         extra=extra | ({EPOCH: epoch_ns} if epoch_ns else {}),
     )
@@ -90,8 +91,8 @@ def _epoch_ns(bag: Bag, topics: Topics) -> int:
     return 0
 
 
-def _probe(bag: Bag, topics: Topics) -> Laser:  # noqa: C901 (one branch a kind of file)
-    """The scanner, from the first messages of the bag."""
+def _probe(bag: Bag, topics: Topics) -> tuple[Laser, str]:  # noqa: C901 (one branch a kind of file)
+    """The scanner, from the first messages of the bag; where its mounting comes from."""
     named = (topics.scan, topics.odometry, topics.turns, *topics.transforms)
     wanted = {name for name in named if name is not None}
     transforms: dict[tuple[str, str], Any] = {}
@@ -121,13 +122,15 @@ def _probe(bag: Bag, topics: Topics) -> Laser:  # noqa: C901 (one branch a kind 
                     break
     if not scans:
         raise LogFormatError(bag.path, f"no scan on {topics.scan}")
-    if mount is None:
-        _log.info("%s: no transform to the laser, taken to be at the robot's origin", bag.path)
+    frame = _frame_name(scans[0].header.frame_id)
+    said = f"{robot} -> {frame} of {' and '.join(topics.transforms)}" if mount is not None else ""
+    if mount is None and frame == robot:
+        said = f"the scan's own frame, {frame}"
     with about(bag.path, f"topic {topics.scan}, message 1"):
         times = [stamp_of(scan, 0) for scan in scans]
         end = times[1] if len(times) > 1 else math.inf
         turns = [turn for turn in turns if times[0] <= stamp_of(turn, 0) < end]
-        return Laser(scans[0], turns, (np.zeros(3), False) if mount is None else mount)
+        return Laser(scans[0], turns, (np.zeros(3), False) if mount is None else mount), said
 
 
 def _frame_name(name: str) -> str:

@@ -26,8 +26,9 @@ class Laser:
     turns    its messages of single mirror turns, where there are any: they say when each beam was
     mount    ``T_robot_laser`` and whether the scanner hangs upside down
 
-    Beams that count clockwise are put in counter-clockwise order. A range below zero (too close,
-    REP 117) becomes NaN. Raises ``InvalidValueError`` for a geometry that cannot be.
+    Beams that count clockwise are put in counter-clockwise order; ``turned`` says so. A range
+    below zero (too close, REP 117) becomes NaN. Raises ``InvalidValueError`` for a geometry that
+    cannot be.
     """
 
     def __init__(self, first: Any, turns: Sequence[Any], mount: tuple[Float, bool]) -> None:
@@ -39,6 +40,8 @@ class Laser:
         start, step = round_angle(first.angle_min), round_angle(first.angle_increment)
         times = _turn_times(first, turns) if turns else _line_times(first)
         self._backwards = (step < 0.0) != hanging
+        clockwise, hangs = "clockwise" if step < 0.0 else "", "upside down" if hanging else ""
+        self.turned = ", ".join(filter(None, (clockwise, hangs)))
         self._earliest_ns = round(float(times.min()) * NS_PER_S)
         if hanging:
             start, step = -start, -step

@@ -178,6 +178,7 @@ class _Lines:
             ignored=self._ignored,
             digits=self._digits,
             mount=np.array([self._params.get(_OFFSET_PARAM, 0.0), 0.0, 0.0]),
+            mounted=f"PARAM {_OFFSET_PARAM}" if _OFFSET_PARAM in self._params else "",
             range_max=self._params.get(_RANGE_MAX_PARAM, 0.0),
         )
 

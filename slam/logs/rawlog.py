@@ -153,6 +153,7 @@ class _Builder:
             digits=FINE_DIGITS,
             wheels=False,
             mount=self._mount,
+            mounted="its observations",
         )
 
     def _mounted(self) -> Float:

@@ -53,7 +53,13 @@ def read_rover(path: str | Path, text_format: str | Path, *, strict: bool = Fals
         raise LogFormatError(path, "no scan found: no line but empty ones and comments")
     wheels = log_format.odometry is not None
     log = ScanLog(
-        path=path, message=SCAN, scans=scans, mount=mount, wheels=wheels, digits=FINE_DIGITS
+        path=path,
+        message=SCAN,
+        scans=scans,
+        mount=mount,
+        mounted=log_format.mounted,
+        wheels=wheels,
+        digits=FINE_DIGITS,
     )
     return stream_of(log, repairs, "rover")
 

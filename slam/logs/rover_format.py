@@ -90,6 +90,7 @@ class RoverFormat:
     step_rad: float
     range_max_m: float
     mount: tuple[float, float, float]
+    mounted: str = ""
 
 
 def read_format(path: str | Path) -> RoverFormat:
@@ -128,6 +129,7 @@ def read_format(path: str | Path) -> RoverFormat:
             laser.number("y", -30.0 / laser_m, 30.0 / laser_m, default=0.0) * laser_m,
             math.radians(laser.number("yaw_deg", -360.0, 360.0, default=0.0)),
         ),
+        mounted=f"[laser] of {path.name}" if "laser" in tables else "",
     )
     for table in (whole, time, scan, laser, *([] if odometry is None else [odometry])):
         table.refuse_others()

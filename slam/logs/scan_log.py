@@ -39,6 +39,7 @@ class ScanLog:
     digits     significant ones, of the stamp that has most
     wheels     False: a log without odometry is none that is damaged
     mount      (3,) m, m, rad of the laser on the robot, unless the scans say
+    mounted    where ``mount`` comes from, in words; "" where it is assumed
     range_max  m, where the log says it outside its scans; else 0
     """
 
@@ -51,6 +52,7 @@ class ScanLog:
     digits: int
     wheels: bool = True
     mount: Float = field(default_factory=lambda: np.zeros(3))
+    mounted: str = ""
     range_max: float = 0.0
 
 
@@ -92,7 +94,12 @@ def stream_of(log: ScanLog, repairs: Repairs, source: str) -> Stream:
         "ignored": dict(sorted(log.ignored.items())),
     }
     metadata = StreamMetadata(
-        source=source, laser=spec, truth=poses.truth_source, odometry=wheels, extra=extra
+        source=source,
+        laser=spec,
+        truth=poses.truth_source,
+        mounting="the poses in its scans" if poses.mount_in_scans else log.mounted,
+        odometry=wheels,
+        extra=extra,
     )
     return Stream(metadata=metadata, frames=lambda: frames, length=len(frames))
 

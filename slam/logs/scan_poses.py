@@ -67,6 +67,7 @@ class ScanPoses:
     truth: list[Float | None]
     truth_source: str = ""
     wheels: bool = True
+    mount_in_scans: bool = False
 
 
 def scan_poses(
@@ -87,6 +88,7 @@ def scan_poses(
     robot = [scan.robot_pose for scan in scans if scan.robot_pose is not None]
     laser = [scan.laser_pose for scan in scans if scan.laser_pose is not None]
     corrected: list[Float] = []  # by a mapper
+    fixed: Float | None = None
     if not robot:
         if not odom:
             raise LogFormatError(path, "its scans have no pose and the log has no ODOM lines")
@@ -111,6 +113,7 @@ def scan_poses(
         T_robot_laser=mount,
         truth=truth,
         truth_source=truth_source,
+        mount_in_scans=fixed is not None,
     )
 
 
