@@ -17,10 +17,10 @@ import math
 
 import numpy as np
 
-from sim.recording.template import Marks, Template, header, message
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float, LaserSpec, Odometry, Scan
 from slam.logs.ros_numbers import quaternion_of
+from slam.ros.template import Marks, Template, header, message
 
 WORLD, MAP, ODOM = "world", "map", "odom"
 FOOTPRINT, ROBOT, LASER = "base_footprint", "base_link", "laser"
