@@ -17,7 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from slam.names import join_folders, loaded
-from slam.variants import PIPE, inside
+from slam.variants import COMMANDS, inside
 
 INSTALLED = ("site-packages", "dist-packages")
 
@@ -102,7 +102,7 @@ def source_of(slam: str) -> tuple[Path, ...]:
     kind, _, command = slam.partition(":")
     if not command:
         return ()
-    if slam.startswith(PIPE):
+    if slam.startswith(COMMANDS):
         named = [path for path in map(Path, shlex.split(command)) if path.is_file()]
         return tuple(file for path in named for file in _whole(path, path.stem))
     return _of_module(kind)

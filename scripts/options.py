@@ -18,7 +18,7 @@ from scripts.console import note
 from slam.errors import InvalidValueError
 from slam.names import NameFromFile, is_code, refuse_code
 from slam.set_numbers import with_set
-from slam.variants import ORACLE, PIPE, oracle_named
+from slam.variants import COMMANDS, ORACLE, oracle_named
 
 AXES = ("dynamism", "motion", "change")
 MAX_SWEEP = 1000
@@ -305,8 +305,8 @@ def whole(name: str, value: Any, least: int, most: int | None = None) -> None:
 
 
 def named(values: list[str]) -> tuple[str, ...]:
-    """Words may also be joined by commas, but for the command of a pipe, which may hold some, and
-    inside the braces of a variant and the brackets of an oracle."""
-    whole = (PIPE, ORACLE + PIPE)
+    """Words may also be joined by commas, but for a command, which may hold some, and inside
+    the braces of a variant and the brackets of an oracle."""
+    whole = (*COMMANDS, *(ORACLE + prefix for prefix in COMMANDS))
     parts = ([value] if value.startswith(whole) else BETWEEN.split(value) for value in values)
     return tuple(word for words in parts for word in words if word)

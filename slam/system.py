@@ -12,7 +12,8 @@ A SLAM may have more: ``HasLandmarks``, ``HasChanges``, ``CanSave``, ``MapsInPar
 Who wants one of these asks whether it is there (``slam.replay.Track``), never for a class.
 
 ``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class,
-``create("pipe:./my_slam --option")`` a program in any language (``slam.guests.pipe``).
+``create("pipe:./my_slam --option")`` a program in any language (``slam.guests.pipe``),
+``create("ros2")`` and ``create("ros2:COMMAND")`` a node of ROS 2 (``slam.ros.slam``).
 ``create("shunting{matching.reward=7}")`` sets numbers of its config (``slam.variants``).
 ``create("oracle(shunting)")`` shows it no returns from movers (``slam.oracle``), and
 ``create("oracle(map)")`` is shown the true map instead (``slam.oracle_map``).
@@ -158,8 +159,12 @@ OWN = {
     "yag-slam": "slam.guests.yag:YagSlam",
 }
 """This project's SLAMs by name, as ``module:Class``: imported when one is asked for."""
-OWN_PREFIXES = {"pipe:": "slam.guests.pipe:PipeSlam"}
-"""This project's prefixes of names, the same way."""
+OWN_PREFIXES = {
+    "pipe:": "slam.guests.pipe:PipeSlam",
+    "ros2:": "slam.ros.slam:Ros2Slam",
+    "ros2-zenoh:": "slam.ros.slam:Ros2ZenohSlam",
+}
+"""This project's prefixes of names, the same way; a prefix without ":" has nothing behind it."""
 _prefixes: dict[str, Callable[..., object]] = {}
 
 
@@ -216,13 +221,14 @@ def describe(name: str) -> str:
 def check_name(name: str) -> None:
     """Raise what ``create`` raises for a name that nothing is registered under; import nothing."""
     base = parsed(inside(name))[0]
-    if ":" in base or base in OWN or base in _registry or name == MAP_ORACLE:
+    own = base in OWN or f"{base}:" in OWN_PREFIXES or name == MAP_ORACLE
+    if ":" in base or own or base in _registry:
         return
     near = difflib.get_close_matches(base, names(), n=1)
     hint = f" Did you mean '{near[0]}'?" if near else ""
     raise UnknownNameError(
         f"no SLAM is called '{base}'.{hint} Known: {', '.join(names())}, or module:Class, "
-        "or pipe:COMMAND, or oracle(SLAM)."
+        "or pipe:COMMAND, or ros2[:COMMAND], or oracle(SLAM)."
     )
 
 
@@ -282,11 +288,12 @@ def create(name: str, **config: Any) -> SlamSystem:
 
 def _factory(name: str) -> Factory:
     """What makes the SLAM of that name: behind a prefix, in a module, or registered."""
-    prefix, colon, rest = name.partition(":")
-    if prefix + colon in OWN_PREFIXES:  # a module that registers itself
-        importlib.import_module(OWN_PREFIXES[prefix + colon].partition(":")[0])
-    if prefix + colon in _prefixes:
-        return partial(_prefixes[prefix + colon], rest)
+    start, colon, rest = name.partition(":")
+    prefix = f"{start}:"
+    if prefix in OWN_PREFIXES:  # a module that registers itself
+        importlib.import_module(OWN_PREFIXES[prefix].partition(":")[0])
+    if prefix in _prefixes:
+        return partial(_prefixes[prefix], rest)
     if colon:
         return _load(name)
     check_name(name)

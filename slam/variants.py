@@ -15,6 +15,7 @@ from typing import Any
 from slam.errors import InvalidValueError
 
 PIPE = "pipe:"  # what follows is a command, which may hold braces of its own
+COMMANDS = (PIPE, "ros2:", "ros2-zenoh:")  # and behind these
 ORACLE = "oracle("
 MAP_ORACLE = "oracle(map)"  # no SLAM in it: scan matching to the true map (slam.oracle_map)
 TAKEN_OUT = ("movable", "moving")  # returns that an oracle takes out, the default first
@@ -26,7 +27,7 @@ def parsed(name: str) -> tuple[str, dict[str, Any]]:
     Raises ``InvalidValueError`` for what is not ``path=value,...`` in the braces.
     """
     base, brace, rest = name.partition("{")
-    if not brace or name.startswith((PIPE, ORACLE)):
+    if not brace or name.startswith((*COMMANDS, ORACLE)):
         return name, {}
     if not rest.endswith("}"):
         raise InvalidValueError(f"SLAM '{name}': '{{' without '}}' at the end")

@@ -23,13 +23,13 @@ from sim.recording.rearranged import REARRANGED, write_rearranged
 from sim.recording.recipe import RECIPE, Recipe, write_recipe
 from sim.recording.relations import write_relations
 from sim.recording.sums import write_sums
-from sim.recording.template import EPOCH_NS
 from sim.simulation import Simulation
 from sim.twins.twins import TWINS, Twins
 from slam.errors import OutputError
 from slam.files import PART, put, reason
 from slam.frames import BeamClass, Frame
 from slam.maps import write_map
+from slam.ros.template import EPOCH_NS
 from slam.trajectory import Trajectory, write_tum
 
 Result = dict[str, Any]

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.recording.messages import LASER
-from sim.recording.template import Marks, Template, header, message
 from slam._jit import njit
 from slam.frames import BeamLabels, Float, LaserSpec, Scan
+from slam.ros.messages import LASER
+from slam.ros.template import Marks, Template, header, message
 
 POINT = np.dtype(
     [

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from scenes.kinds import kind_of
 from scenes.scene import Mover
-from sim.recording.messages import WORLD
-from sim.recording.template import Marks, Template, header, message
 from slam._jit import njit
 from slam.frames import Float
+from slam.ros.messages import WORLD
+from slam.ros.template import Marks, Template, header, message
 
 LEAF_M = 0.04  # thickness of a door as drawn
 _RESTING, _MOVING = (0.55, 0.55, 0.6, 1.0), (0.9, 0.3, 0.1, 1.0)

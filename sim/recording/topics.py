@@ -7,32 +7,20 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from sim.moments import Moment
-from sim.recording import messages as ros
-from sim.recording import navigation_messages as nav
 from sim.recording.label_cloud import LabelsMessage
 from sim.recording.objects import ObjectsMessage
-from sim.recording.template import STORE
 from slam.errors import InvalidValueError, UnknownNameError
+from slam.ros.frames import SCANS, STATE
+from slam.ros.template import STORE
 
 Maker = Callable[[Moment], Any]
 F = TypeVar("F", bound=Maker)
 _topics: dict[str, tuple[str, Maker]] = {}
-BEGAN = "/ground_truth/time"  # read by ``slam.logs.bag_topics``, too
 OURS = {  # by name their types, in the order of a bag's connections
-    BEGAN: nav.BeganMessage.KIND,
-    "/clock": nav.ClockMessage.KIND,
-    "/map": nav.MapMessage.KIND,
-    "/initialpose": nav.StartMessage.KIND,
-    "/tf_static": ros.TransformMessage.KIND,
-    "/tf": ros.TransformMessage.KIND,
-    "/odom": ros.OdometryMessage.KIND,
-    "/odom_increment": ros.IncrementMessage.KIND,
-    "/ground_truth/pose": ros.TruthMessage.KIND,
-    "/ground_truth/tf": ros.TransformMessage.KIND,
+    **STATE,
     "/ground_truth/objects": ObjectsMessage.KIND,
     "/ground_truth/labels": LabelsMessage.KIND,
-    "/scan": ros.ScanMessage.KIND,
-    "/scan_turn": ros.ScanMessage.KIND,
+    **SCANS,
 }
 
 
@@ -40,7 +28,7 @@ def topic(name: str, kind: str) -> Callable[[F], F]:
     """Function decorator: write ``make(moment)`` under that name, once a frame.
 
     name  as ROS has it: "/robot/speed"
-    kind  a ROS 2 type: "std_msgs/msg/Float64"; ``sim.recording.template.message`` makes one
+    kind  a ROS 2 type: "std_msgs/msg/Float64"; ``slam.ros.template.message`` makes one
 
     A frame for which the function returns None has no message. Raises ``InvalidValueError`` for a
     name that is taken or does not begin with '/', ``UnknownNameError`` for an unknown type.

@@ -32,7 +32,7 @@ from slam.oracle import Oracle
 from slam.path import PosePath
 from slam.system import Estimate, Raster, SlamSystem, create, register_prefix
 from slam.trajectory import Trajectory
-from slam.variants import PIPE, oracle_of
+from slam.variants import COMMANDS, PIPE, oracle_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,7 +242,7 @@ def limited(name: str, limits: Limits | None) -> SlamSystem:
     if (wanted := oracle_of(name)) is not None:  # its labels stay on this side
         refuse_code(name, "SLAM")
         return Oracle(limited(wanted[0], limits), wanted[1])
-    if name.startswith(PIPE):
+    if name.startswith(COMMANDS):
         return create(
             name, scan_limit_s=limits.scan_s, first_limit_s=limits.first_s, hidden=limits.hidden
         )

@@ -22,7 +22,7 @@ from slam.logs.ros_numbers import yaw_of
 from slam.logs.text import about
 
 PATIENCE_NS = 2 * NS_PER_S  # how long a scan waits for its odometry
-_PLANAR = np.array([[6 * i + j for j in (0, 1, 5)] for i in (0, 1, 5)])
+PLANAR = np.array([[6 * i + j for j in (0, 1, 5)] for i in (0, 1, 5)])
 MOST_POSE_M = 1e9  # from the origin of its frame, which may be that of a map of the earth
 _log = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ def frames_of(path: Path, topics: Topics, laser: Laser, epoch_ns: int) -> Iterat
     """
     names = (topics.scan, topics.odometry, topics.truth, topics.increment, topics.labels)
     with Bag(path) as bag:
-        assembly = _Assembly(topics, laser, epoch_ns)
+        assembly = Assembly(topics, laser, epoch_ns)
         for topic, log_ns, message in bag.messages({name for name in names if name}):
             with about(path, bag.at):
                 assembly.take(topic, log_ns, message)
@@ -52,7 +52,7 @@ def stamp_of(message: Any, log_ns: int) -> int:
     return int(stamp.sec) * NS_PER_S + int(stamp.nanosec) or log_ns
 
 
-class _Assembly:
+class Assembly:
     """Puts together what belongs to one stamp."""
 
     def __init__(self, topics: Topics, laser: Laser, epoch_ns: int) -> None:
@@ -81,7 +81,7 @@ class _Assembly:
         elif topic == topics.truth:
             self._truth.add(_pose(message, stamp_ns))
         elif topic == topics.increment:
-            self._increments[stamp_ns] = message.pose.covariance[_PLANAR]
+            self._increments[stamp_ns] = message.pose.covariance[PLANAR]
         elif topic == topics.labels:
             self._labels[stamp_ns] = _labels(message)
 
@@ -158,7 +158,8 @@ class _Assembly:
             raise LogFormatError(path, "no scan lies within the time of the odometry")
 
 
-def _planar(pose: Any) -> Float:
+def planar(pose: Any) -> Float:
+    """(x m, y m, theta rad) of a geometry_msgs/Pose; ``InvalidValueError`` for what cannot be."""
     p, q = pose.position, pose.orientation
     if not max(abs(p.x), abs(p.y)) <= MOST_POSE_M or not math.isfinite(p.x + p.y):
         raise InvalidValueError(
@@ -172,7 +173,7 @@ def _planar(pose: Any) -> Float:
 
 def _pose(message: Any, stamp_ns: int) -> Stamped:
     pose = message.pose
-    return Stamped(stamp_ns=stamp_ns, pose=_planar(getattr(pose, "pose", pose)))
+    return Stamped(stamp_ns=stamp_ns, pose=planar(getattr(pose, "pose", pose)))
 
 
 def _odometry(message: Any, stamp_ns: int, with_covariance: bool) -> Stamped:
@@ -186,9 +187,9 @@ def _odometry(message: Any, stamp_ns: int, with_covariance: bool) -> Stamped:
         )
     return Stamped(
         stamp_ns=stamp_ns,
-        pose=_planar(message.pose.pose),
+        pose=planar(message.pose.pose),
         twist=rates if known else None,
-        covariance=message.pose.covariance[_PLANAR] if with_covariance else None,
+        covariance=message.pose.covariance[PLANAR] if with_covariance else None,
     )
 
 

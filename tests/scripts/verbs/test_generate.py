@@ -25,12 +25,12 @@ from scripts.verbs.verify import verify
 from sim.recording.dataset import Plan, check_dataset, read_plan, writing
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, write_sums
-from sim.recording.template import EPOCH_NS
 from sim.recording.verify import check_hashes, messages_sha256, regenerate
 from slam import create
 from slam.errors import InvalidValueError, LogFormatError, MobiliaError, OutputError
 from slam.evaluation.wide_tum import read_wide_tum
 from slam.logs import read_bag, read_carmen
+from slam.ros.template import EPOCH_NS
 from slam.trajectory import read_tum
 
 REPO = Path(__file__).resolve().parents[3]

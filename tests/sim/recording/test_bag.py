@@ -18,15 +18,15 @@ from mcap_ros2.decoder import DecoderFactory
 from scenes.kinds import kind_of
 from sim.moments import Moment
 from sim.recording.bag import BagWriter
-from sim.recording.messages import turns_of
 from sim.recording.relations import pairs
-from sim.recording.template import EPOCH_NS
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, BeamClass, Frame, LaserSpec, Odometry, Scan
 from slam.logs import read_bag
 from slam.maps import read_map
+from slam.ros.messages import turns_of
+from slam.ros.template import EPOCH_NS
 from slam.trajectory import read_tum
 
 CUBE, CYLINDER = 1, 3  # of visualization_msgs/Marker

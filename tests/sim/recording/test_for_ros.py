@@ -26,7 +26,6 @@ from sim.moments import toured
 from sim.recording.bag import FORMAT, BagWriter
 from sim.recording.recipe import RECIPE
 from sim.recording.sums import write_sums
-from sim.recording.template import EPOCH_NS
 from sim.recording.verify import regenerate
 from sim.sensors.lidar.registry import scanner_of
 from sim.simulation import Simulation
@@ -36,6 +35,7 @@ from slam.evaluation import metrics
 from slam.frames import EPOCH, NS_PER_S
 from slam.logs import read_bag
 from slam.logs.bag_laser import mounting
+from slam.ros.template import EPOCH_NS
 from slam.trajectory import Trajectory, read_tum, write_tum
 
 REPO = Path(__file__).resolve().parents[3]

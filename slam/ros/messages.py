@@ -17,10 +17,10 @@ import math
 
 import numpy as np
 
-from sim.recording.template import Marks, Template, header, message
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float, LaserSpec, Odometry, Scan
 from slam.logs.ros_numbers import quaternion_of
+from slam.ros.template import Marks, Template, header, message
 
 WORLD, MAP, ODOM = "world", "map", "odom"
 FOOTPRINT, ROBOT, LASER = "base_footprint", "base_link", "laser"
@@ -161,13 +161,16 @@ class OdometryMessage:
 
 
 class IncrementMessage:
-    """geometry_msgs/PoseWithCovarianceStamped: the motion since the frame before, in its frame."""
+    """geometry_msgs/PoseWithCovarianceStamped: the motion since the frame before, in its frame.
+
+    Or, with another ``frame``, a pose in that.
+    """
 
     KIND = "geometry_msgs/msg/PoseWithCovarianceStamped"
 
-    def __init__(self) -> None:
+    def __init__(self, frame: str = FOOTPRINT) -> None:
         marks = Marks()(7 + 36)
-        prototype = message(self.KIND, header=header(FOOTPRINT), pose=marks)
+        prototype = message(self.KIND, header=header(frame), pose=marks)
         self._template = Template(self.KIND, prototype)
         view = self._template.view(marks)
         view[:] = 0.0

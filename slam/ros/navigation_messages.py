@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.recording.messages import MAP, fill_pose
-from sim.recording.template import Template, header, marked_time, message
 from slam.estimate import Raster
 from slam.frames import NS_PER_S, Float
+from slam.ros.messages import MAP, fill_pose
+from slam.ros.template import Template, header, marked_time, message
 
 UNKNOWN_CELL = -1  # nav_msgs/OccupancyGrid
 # What RViz sends for "2D Pose Estimate": (0.5 m)^2 and (15 degrees)^2.

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Topics of ROS 2 over DDS, by Cyclone DDS: what its rmw and that of Fast DDS speak.
+
+A topic "/scan" is "rt/scan" there, its type "sensor_msgs::msg::dds_::LaserScan_". Types are made of
+the definitions that ``slam.ros.template`` serialises by; the bytes go through as they are.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from functools import cache
+from typing import Any
+
+import cyclonedds.idl.types as of
+from cyclonedds._clayer import ddspy_take, ddspy_write
+from cyclonedds.core import (
+    InstanceState,
+    Policy,
+    Qos,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.idl import make_idl_struct
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic as DdsTopic
+from rosbags.interfaces import Nodetype
+
+from slam.ros.link import Taken, Topic, open_to_others, type_name
+from slam.ros.template import STORE
+
+_BASES: dict[str, Any] = {
+    "bool": bool, "byte": of.uint8, "char": of.uint8, "octet": of.uint8, "string": str,
+    **{name: getattr(of, name) for name in (
+        "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32",
+        "float64",
+    )},
+}  # fmt: skip
+_ANY = SampleState.Any | ViewState.Any | InstanceState.Any
+_UNREAD = SampleState.NotRead | ViewState.Any | InstanceState.Any
+_MOST = 1000  # messages taken at once
+# As ROS does it for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST: found by asking each port in turn.
+_ALONE = (
+    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces>"
+    "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto"
+    "</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
+    "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
+)
+_domains: dict[int, Domain] = {}
+
+
+def open_link(domain: int, namespace: str, _router: int) -> DdsLink:
+    """A participant; other machines are seen where ``open_to_others`` or CYCLONEDDS_URI says so."""
+    if domain not in _domains and "CYCLONEDDS_URI" not in os.environ and not open_to_others():
+        _domains[domain] = Domain(domain, _ALONE)
+    return DdsLink(domain, namespace)
+
+
+@cache
+def _kind(name: str) -> Any:
+    """The type of that name."""
+    fields = {f"{field}_": _field(how) for field, how in STORE.fielddefs[name][1]}
+    return make_idl_struct(type_name(name), type_name(name).replace("::", "."), fields)
+
+
+def _field(how: Any) -> Any:
+    sort, what = how
+    if sort == Nodetype.BASE:
+        return _BASES[what[0]]
+    if sort == Nodetype.NAME:
+        return _kind(what)
+    item, size = _field(what[0]), what[1]
+    return of.array[item, size] if sort == Nodetype.ARRAY else of.sequence[item]
+
+
+def _qos(topic: Topic) -> Qos:
+    return Qos(
+        Policy.Reliability.Reliable(0) if topic.reliable else Policy.Reliability.BestEffort,
+        Policy.Durability.TransientLocal if topic.latched else Policy.Durability.Volatile,
+        Policy.History.KeepLast(topic.depth),
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+        Policy.IgnoreLocal.Participant,
+        Policy.Userdata(f"typehash={STORE.hash_rihs01(topic.kind)};".encode()),
+    )
+
+
+class DdsLink:
+    """One participant."""
+
+    def __init__(self, domain: int, namespace: str) -> None:
+        self._participant, self._namespace = DomainParticipant(domain), namespace
+        self._topics: dict[str, DdsTopic[Any]] = {}
+        self._writers: dict[str, DataWriter[Any]] = {}
+        self._readers: dict[str, DataReader[Any]] = {}
+        self._waits = WaitSet(self._participant)
+        self._conditions: list[ReadCondition] = []
+
+    def _topic(self, topic: Topic) -> DdsTopic[Any]:
+        if topic.name not in self._topics:
+            name = f"rt{topic.within(self._namespace)}"
+            self._topics[topic.name] = DdsTopic(self._participant, name, _kind(topic.kind))
+        return self._topics[topic.name]
+
+    def _writer(self, topic: Topic) -> DataWriter[Any]:
+        if topic.name not in self._writers:
+            own = self._topic(topic)
+            self._writers[topic.name] = DataWriter(self._participant, own, qos=_qos(topic))
+        return self._writers[topic.name]
+
+    def advertise(self, topic: Topic) -> None:
+        """Show that messages will come."""
+        self._writer(topic)
+
+    def publish(self, topic: Topic, data: bytes) -> None:
+        """Send a message; a reader that is slow never holds us up."""
+        ddspy_write(self._writer(topic)._ref, data + bytes(-len(data) % 4))
+
+    def subscribe(self, topic: Topic) -> None:
+        """Listen from now on."""
+        if topic.name in self._readers:
+            return
+        reader = DataReader(self._participant, self._topic(topic), qos=_qos(topic))
+        self._readers[topic.name] = reader
+        self._conditions.append(ReadCondition(reader, _UNREAD))
+        self._waits.attach(self._conditions[-1])
+
+    def take(self, topic: Topic) -> list[Taken]:
+        """What has come since it was last asked."""
+        self.subscribe(topic)
+        found = ddspy_take(self._readers[topic.name]._ref, _ANY, _MOST)
+        if isinstance(found, int):
+            return []
+        return [
+            Taken(data, str(info.publication_handle)) for data, info in found if info.valid_data
+        ]
+
+    def wait(self, timeout_s: float) -> None:
+        """Until something has come, or for so long."""
+        if self._conditions:
+            self._waits.wait(max(0, round(timeout_s * 1e9)))
+        else:
+            time.sleep(timeout_s)
+
+    def listeners(self, topic: Topic) -> int:
+        """How many readers there are."""
+        return len(self._writer(topic).get_matched_subscriptions())
+
+    def close(self) -> None:
+        """Leave the network."""
+        self._waits, self._conditions = WaitSet(self._participant), []
+        self._readers.clear()
+        self._writers.clear()
+        self._topics.clear()
+        del self._waits, self._participant

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames as the messages of their topics: what a bag holds and what goes over the network."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from slam import se2
+from slam._jit import njit
+from slam.errors import InvalidValueError
+from slam.estimate import Raster
+from slam.frames import NS_PER_S, Float, Frame, LaserSpec, Odometry
+from slam.ros import messages as ros
+from slam.ros import navigation_messages as nav
+
+BEGAN = "/ground_truth/time"  # read by ``slam.logs.bag_topics``, too
+STATE = {  # by name their types, in the order of a bag's connections
+    BEGAN: nav.BeganMessage.KIND,
+    "/clock": nav.ClockMessage.KIND,
+    "/map": nav.MapMessage.KIND,
+    "/initialpose": nav.StartMessage.KIND,
+    "/tf_static": ros.TransformMessage.KIND,
+    "/tf": ros.TransformMessage.KIND,
+    "/odom": ros.OdometryMessage.KIND,
+    "/odom_increment": ros.IncrementMessage.KIND,
+    "/ground_truth/pose": ros.TruthMessage.KIND,
+    "/ground_truth/tf": ros.TransformMessage.KIND,
+}
+SCANS = {"/scan": ros.ScanMessage.KIND, "/scan_turn": ros.ScanMessage.KIND}
+LATCHED = frozenset((BEGAN, "/tf_static", "/map"))  # sent once, kept for who comes later
+
+
+class Message(NamedTuple):
+    """One message; ``data`` is valid until the next of its topic."""
+
+    topic: str
+    stamp_ns: int
+    data: bytearray
+
+
+@njit
+def _accumulate(covariance: Float, theta: float, step: Float, increment: Float) -> None:
+    """``se2.propagate`` in place, without NumPy's matmul: F P F' + G Q G'."""
+    c, s = math.cos(theta), math.sin(theta)
+    carry, turn = np.eye(3), np.eye(3)
+    carry[0, 2], carry[1, 2] = -s * step[0] - c * step[1], c * step[0] - s * step[1]
+    turn[0, 0], turn[0, 1], turn[1, 0], turn[1, 1] = c, -s, s, c
+    out = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(3):
+                for m in range(3):
+                    total += carry[i, k] * covariance[k, m] * carry[j, m]
+                    total += turn[i, k] * increment[k, m] * turn[j, m]
+            out[i, j] = out[j, i] = total
+    covariance[:] = out
+
+
+class _Wheels:
+    """/odom, /tf and /odom_increment of one frame after another."""
+
+    def __init__(self) -> None:
+        self.odometry, self.increment = ros.OdometryMessage(), ros.IncrementMessage()
+        self.tf = ros.TransformMessage((ros.ODOM, ros.FOOTPRINT, 0.0))
+        self._covariance, self._known = np.zeros((3, 3)), True
+        self._last: Odometry | None = None
+
+    def next(self, now: Odometry) -> tuple[bytearray, bytearray, bytearray | None]:
+        """The messages of these three topics, the last only with an increment's covariance."""
+        last, self._last = self._last, now
+        dt, step, theta = 0.0, np.zeros(3), float(now.T_odom_robot[2])
+        if last is not None:
+            dt = (now.stamp_ns - last.stamp_ns) / NS_PER_S
+            step = se2.between(last.T_odom_robot, now.T_odom_robot)
+            theta = float(last.T_odom_robot[2])
+        spread = now.increment_covariance
+        self._known = self._known and spread is not None
+        if spread is not None:
+            _accumulate(self._covariance, theta, step, spread)
+        return (
+            self.odometry(now, self._covariance if self._known else None, dt),
+            self.tf(now.stamp_ns, now.T_odom_robot),
+            None if spread is None else self.increment(now.stamp_ns, step, spread),
+        )
+
+
+class _Truth:
+    """/ground_truth/pose and /ground_truth/tf of one frame after another."""
+
+    def __init__(self) -> None:
+        self._pose = ros.TruthMessage()
+        self._links = ros.TransformMessage(
+            (ros.WORLD, ros.MAP, 0.0), (ros.MAP, ros.ODOM, 0.0),
+            (ros.WORLD, ros.TRUE_FOOTPRINT, 0.0),
+        )  # fmt: skip
+
+    def next(self, T_world_robot: Float, odometry: Odometry) -> tuple[bytearray, bytearray]:
+        """map -> odom is what a SLAM without error would say."""
+        stamp_ns = odometry.stamp_ns
+        T_map_odom = se2.compose(T_world_robot, se2.inverse(odometry.T_odom_robot))
+        links = self._links(stamp_ns, se2.IDENTITY, T_map_odom, T_world_robot)
+        return self._pose(stamp_ns, T_world_robot), links
+
+
+class FrameMessages:
+    """The messages of frames of one scanner, frame by frame.
+
+    height_m  of the scanner, for /tf_static
+    static_map  what never moves, for /map
+    intensities  whether scans have them
+    """
+
+    def __init__(
+        self,
+        spec: LaserSpec,
+        *,
+        height_m: float = 0.0,
+        static_map: Raster | None = None,
+        intensities: bool = False,
+    ) -> None:
+        self.spec, turns = spec, ros.turns_of(spec)
+        turn_s = ros.turn_time_s(spec, turns)
+        whole = {"scan_time": turns * turn_s, "first": 0, "stride": 1}
+        parts = [{"scan_time": turn_s, "first": k, "stride": turns} for k in range(turns)]
+        self._scans = [
+            (topic, ros.ScanMessage(spec, intensities=intensities, **part))  # type: ignore[arg-type]
+            for topic, part in [("/scan", whole), *(("/scan_turn", part) for part in parts)]
+        ]
+        self._mount = ros.TransformMessage(
+            (ros.FOOTPRINT, ros.ROBOT, 0.0), (ros.ROBOT, ros.LASER, height_m)
+        )
+        self._wheels, self._truth, self._clock = _Wheels(), _Truth(), nav.ClockMessage()
+        self._map = None if static_map is None else nav.MapMessage(static_map)
+
+    def begin(self, frame: Frame) -> Iterator[Message]:
+        """What is sent once, before the first frame."""
+        stamp_ns = frame.stamp_ns
+        yield Message(BEGAN, stamp_ns, nav.BeganMessage()(stamp_ns))
+        links = self._mount(stamp_ns, se2.IDENTITY, self.spec.T_robot_laser)
+        yield Message("/tf_static", stamp_ns, links)
+        if self._map is not None:
+            yield Message("/map", stamp_ns, self._map(stamp_ns))
+        if frame.truth is not None:
+            yield Message("/initialpose", stamp_ns, nav.StartMessage()(stamp_ns, frame.truth))
+
+    def state(self, frame: Frame) -> Iterator[Message]:
+        """Clock, odometry and truth of a frame."""
+        stamp_ns = frame.stamp_ns
+        yield Message("/clock", stamp_ns, self._clock(stamp_ns))
+        odometry, tf, increment = self._wheels.next(frame.odometry)
+        yield Message("/tf", stamp_ns, tf)
+        yield Message("/odom", stamp_ns, odometry)
+        if increment is not None:
+            yield Message("/odom_increment", stamp_ns, increment)
+        if frame.truth is not None:
+            truth, links = self._truth.next(frame.truth, frame.odometry)
+            yield Message("/ground_truth/pose", stamp_ns, truth)
+            yield Message("/ground_truth/tf", stamp_ns, links)
+
+    def scans(self, frame: Frame) -> Iterator[Message]:
+        """Its scan, whole and turn by turn.
+
+        Raises ``InvalidValueError`` for a frame without a scan or of another scanner.
+        """
+        scan = frame.scan
+        if scan is None or (scan.spec is not self.spec and scan.spec != self.spec):
+            raise InvalidValueError("messages are of one scanner: this frame has another one")
+        for topic, message in self._scans:
+            yield Message(topic, *message(scan))

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A SLAM of this project as a ROS 2 node: scans in, map -> odom out, without ROS.
+
+    python -m slam.ros.serve shunting dds
+
+It hears /scan, /odom and /tf_static, and says /tf, /pose and, each second, /map. Domain and
+namespace are those of ``slam.ros.link``. Ctrl-C ends it.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from slam import se2
+from slam.answers import asked, asked_map
+from slam.errors import MobiliaError
+from slam.frames import NS_PER_S, Frame
+from slam.logs.bag_frames import Assembly
+from slam.logs.bag_laser import Laser, mounting
+from slam.logs.bag_topics import INCREMENT, ODOMETRY, SCAN, Topics
+from slam.ros.heard import decoded, simulated_ns
+from slam.ros.link import Link, Topic, open_link
+from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
+from slam.ros.navigation_messages import MapMessage
+from slam.ros.template import EPOCH_NS
+from slam.system import SlamSystem, create
+
+MAP_NS = NS_PER_S  # between two maps
+FIRST_S = 0.1  # that the first scan waits for what comes with it
+_log = logging.getLogger(__name__)
+_SCAN = Topic(name="/scan", kind=SCAN, reliable=False, depth=100)
+_TURNS = Topic(name="/scan_turn", kind=SCAN, reliable=False, depth=100)
+_ODOM = Topic(name="/odom", kind=ODOMETRY, depth=100)
+_STEPS = Topic(name="/odom_increment", kind=INCREMENT, depth=100)
+_STATIC = Topic(name="/tf_static", kind=TransformMessage.KIND, latched=True)
+_TF = Topic(name="/tf", kind=TransformMessage.KIND, depth=100)
+_POSE = Topic(name="/pose", kind=INCREMENT)
+_MAP = Topic(name="/map", kind=MapMessage.KIND, latched=True, depth=1)
+_HEARD = (_SCAN, _TURNS, _ODOM, _STEPS, _STATIC)
+
+
+class Served:
+    """One SLAM on a link; frames are put together as out of a bag (``slam.logs.bag_frames``)."""
+
+    def __init__(self, link: Link, system: SlamSystem) -> None:
+        self._link, self._system = link, system
+        for topic in _HEARD:
+            link.subscribe(topic)
+        for topic in (_TF, _POSE, _MAP):
+            link.advertise(topic)
+        self._tf, self._pose = TransformMessage((MAP, ODOM, 0.0)), IncrementMessage(MAP)
+        self._links: dict[tuple[str, str], Any] = {}
+        self._waiting: dict[Topic, list[Any]] = {topic: [] for topic in _HEARD}
+        self._assembly: Assembly | None = None
+        self._map_ns = -MAP_NS
+
+    def turn(self) -> None:
+        """Take what has come and answer it."""
+        self._link.wait(0.5)
+        for topic in _HEARD:  # scans first: what belongs to them was sent before them
+            self._waiting[topic] += self._taken(topic)
+        for message in self._waiting[_STATIC]:
+            for link in message.transforms:
+                self._links[(link.header.frame_id, link.child_frame_id)] = link.transform
+        if self._assembly is None:
+            if not self._waiting[_SCAN] or not self._waiting[_ODOM]:
+                return
+            self._assembly = self._begin()
+        for topic in (_STEPS, _ODOM, _SCAN):
+            for message in self._waiting[topic]:
+                self._assembly.take(topic.name, 0, message)
+        for waiting in self._waiting.values():
+            waiting.clear()
+        for frame in self._assembly.ready(0):
+            self._answer(frame)
+
+    def _taken(self, topic: Topic) -> list[Any]:
+        found = []
+        for taken in self._link.take(topic):
+            try:
+                found.append(decoded(topic.kind, taken.data))
+            except MobiliaError as error:
+                _log.warning("%s: left out: %s", topic.name, error)
+        return found
+
+    def _begin(self) -> Assembly:
+        """The scanner, from the first scan and what came with it."""
+        time.sleep(FIRST_S)
+        for topic in _HEARD[1:]:
+            self._waiting[topic] += self._taken(topic)
+        first, odometry = self._waiting[_SCAN][0], self._waiting[_ODOM][0]
+        began_ns = simulated_ns(first.header)
+        end_ns = began_ns + round(first.scan_time * NS_PER_S)
+        turns = [t for t in self._waiting[_TURNS] if began_ns <= simulated_ns(t.header) < end_ns]
+        mount = mounting(self._links, odometry.child_frame_id, first.header.frame_id)
+        laser = Laser(first, turns, (np.zeros(3), False) if mount is None else mount)
+        steps = _STEPS.name if self._waiting[_STEPS] else None
+        topics = Topics(
+            scan=_SCAN.name, odometry=_ODOM.name, truth=None, turns=None, increment=steps,
+            labels=None, transforms=(),
+        )  # fmt: skip
+        return Assembly(topics, laser, EPOCH_NS)
+
+    def _answer(self, frame: Frame) -> None:
+        estimate = asked(self._system, frame)
+        T_map_odom = se2.compose(estimate.T_map_robot, se2.inverse(frame.odometry.T_odom_robot))
+        stamp_ns = frame.stamp_ns
+        said = bytes(self._pose(stamp_ns, estimate.T_map_robot, estimate.covariance))
+        self._link.publish(_POSE, said)
+        self._link.publish(_TF, bytes(self._tf(stamp_ns, T_map_odom)))
+        if stamp_ns - self._map_ns >= MAP_NS:
+            self._map_ns = stamp_ns
+            raster = asked_map(self._system)
+            if raster is not None:
+                self._link.publish(_MAP, bytes(MapMessage(raster)(stamp_ns)))
+
+
+def main(name: str, middleware: str = "dds") -> None:
+    """Serve until interrupted."""
+    served = Served(open_link(middleware), create(name))
+    with suppress(KeyboardInterrupt):
+        while True:
+            served.turn()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:3])
