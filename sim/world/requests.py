@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from sim.core.checks import FAR_M, three, within, word
+from sim.core.checks import FAR_M, numbers, switch, three, within, word
 from sim.world import hands
 from sim.world.hands import MOST_HOLD_S, MOST_SPEED
 from sim.world.world import World
@@ -29,8 +29,9 @@ class Push:
         word("push: name", self.name)
         within("push: speed", self.speed, 0.05, MOST_SPEED)
         within("push: heading", self.heading or 0.0, -100.0, 100.0)
-        for value in self.towards or ():
-            within("push: towards", value, -FAR_M, FAR_M)
+        if self.towards is not None:
+            for value in numbers("push: towards", self.towards, 2, "two numbers, x and y in m"):
+                within("push: towards", value, -FAR_M, FAR_M)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +43,7 @@ class MoveDoor:
     seconds: float = 20.0
 
     def __post_init__(self) -> None:
+        switch("door: opened", self.opened)
         word("door: name", self.name)
         within("door: seconds", self.seconds, 0.1, MOST_HOLD_S)
 

@@ -28,7 +28,7 @@ KINDS = (Anew, Click, Drive, Kidnap, MoveDoor, Push, Run, Seek, Speed)
         (Drive, {"v": math.nan, "omega": 0.0}, "drive: v must be a number, got nan"),
         (Drive, {"v": "1", "omega": 0.0}, "drive: v must be a number, got '1'"),
         (Drive, {"v": True, "omega": 0.0}, "drive: v must be a number, got True"),
-        (MoveDoor, {"opened": 1}, "movedoor: opened must be true or false, got 1"),
+        (MoveDoor, {"opened": 1}, "door: opened must be True or False, got 1"),
         (Seek, {"back_s": -1.0}, "seek: back_s must lie in"),
         (Speed, {"factor": 1e9}, r"speed: factor must lie in \[0.05, 20\]"),
         (Kidnap, {"pose": (0.0, math.nan, 0.0)}, "kidnap: pose must be a number"),
