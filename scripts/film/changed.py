@@ -9,7 +9,7 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float, Scan
-from slam.frontend.seen_space import FREE_WITHOUT_RETURN_M
+from slam.frontend.seen_space import FREE_AT_MOST_M
 
 SQUARE_M = 4.0
 ALONG_M = 1.5  # between the points of a beam that are looked at
@@ -31,7 +31,7 @@ class Changed:
         T_map_laser = se2.compose(T_map_robot, scan.spec.T_robot_laser)
         angles = scan.spec.angles
         ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        reach = np.where(scan.valid, scan.ranges, FREE_WITHOUT_RETURN_M) + BEYOND_M
+        reach = np.where(scan.valid, scan.ranges, FREE_AT_MOST_M) + BEYOND_M
         met, ends = reach[scan.valid, None], ways[scan.valid]
         around = np.vstack([met * ends, np.maximum(met - 2.0 * BEYOND_M, 0.0) * ends])
         self._met |= _squares(se2.transform(T_map_laser, around))

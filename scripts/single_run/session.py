@@ -29,6 +29,7 @@ from scripts.single_run import score
 from scripts.single_run.costs import FILM, MAP, PICTURES, SLAM, Costs, in_words
 from scripts.single_run.small_maps import Drawn, drawn, for_file
 from slam.errors import InvalidValueError
+from slam.evaluation.consistency import KeptScans
 from slam.files import write_text
 from slam.frames import EPOCH, Stream
 from slam.maps import write_map
@@ -89,14 +90,18 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         recorder = Recorder.of(folder / "replay.html", show) if outputs.film else nullcontext()
         started = time.perf_counter()
         with costs.beside(FILM), reel as opened, recorder as recording, costs.scans():
+            kept = KeptScans()
             frames = shoot(costs.reading(stream), show, opened, partial(costs.stage, FILM))
             for frame in watched(frames, stream, show.title):
+                kept.note(frame, show.track().estimates[-1].T_map_robot)
                 if recording is not None:
                     with costs.stage(FILM):
                         recording.note(frame, show.stage.placed)
         wall_s = time.perf_counter() - started
         with costs.stage(SLAM), working("closing loops, scoring"):
             results = score.results(replay, wall_s, machine())
+            for name, found in score.agreeing(replay, kept).items():
+                results["slams"][name]["consistency"] = found
         with costs.stage(MAP), working("writing map and paths"):
             _write_paths(folder, replay, int(stream.metadata.extra.get(EPOCH, 0)))
             in_pictures = _write_map(folder, show)
@@ -110,6 +115,8 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
         write_recipe(folder, outputs.command, outputs.settings)
     score.print_table(results, show.title)
+    if words := score.agreement_words(results):
+        say(escape(words), highlight=False)
     say(in_words(results["cost"]), highlight=False)
     _tell(outputs)
     return results

@@ -86,5 +86,5 @@ def _after(covariance: Float, before: Float, after: Float) -> Float:
 
 
 def _size(covariance: Float) -> float:
-    """m^2"""
+    """One number, m^2, to compare them by."""
     return float(covariance[0, 0] + covariance[1, 1] + LEVER_M**2 * covariance[2, 2])
