@@ -29,11 +29,13 @@ from slam import se2
 from slam.estimate import Raster
 from slam.frames import NS_PER_S, Float, Frame, Scan
 from slam.frontend.seen_space import SeenSpace
+from slam.maps import OCCUPIED_THRESHOLD
 from slam.replay import Replay, Track
 from slam.system import MapsInParts, MovingMap
 
 SEEN_EVERY_NS = 200_000_000  # the areas of neighbouring scans overlap
 MOST_MAPS = 60  # whole ones, of a log
+STRAY = 0.002  # share of what stands, on each side, that a poster may leave out
 FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn again
 
 
@@ -136,6 +138,19 @@ class Show:
         if self._panes is None:
             self._panes = _Panes(self)
         return self._panes.paint(frame, self.seconds(frame))
+
+    def poster(self, raster: Raster) -> Picture | None:
+        """The last frame, its map framed on what stands in ``raster``; None where the whole room
+        is in view anyway, or nothing stands."""
+        rows, columns = np.nonzero(raster.values > OCCUPIED_THRESHOLD)
+        if self._last is None or self._panes is None or self.stage.bounds or not len(rows):
+            return None
+        step, origin = raster.resolution_m, raster.T_map_origin
+        # without what few beams met through windows
+        xmin, xmax = np.quantile(columns, (STRAY, 1.0 - STRAY)) * step + origin[0]
+        ymin, ymax = np.quantile(rows, (STRAY, 1.0 - STRAY)) * step + origin[1]
+        bounds = float(xmin), float(ymin), float(xmax) + step, float(ymax) + step
+        return self._panes.framed(self._last, self.seconds(self._last), bounds)
 
     def vignette(self, frame: Frame) -> Picture:
         """The scan above the map, without words: what a strip is made of."""
@@ -258,6 +273,13 @@ class _Panes:
         for pane, box in zip(self._more, layout.more, strict=True):
             _put(canvas, box, pane(show, frame, box.size))
         return canvas
+
+    def framed(
+        self, frame: Frame, seconds: float, bounds: tuple[float, float, float, float]
+    ) -> Picture:
+        """A picture whose map shows that part of the plane, m."""
+        self._map.bounds, self._fresh_at = bounds, -np.inf
+        return self.paint(frame, seconds)
 
     def _raster(self, seconds: float) -> Raster | LevelMap | None:
         """The map now; of a log, what its view has pixels for.

@@ -108,7 +108,8 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         with costs.stage(PICTURES), working("drawing map, paths and errors"):
             _draw(folder, show, in_pictures)
             if opened is not None and opened.last is not None:
-                imageio.imwrite(folder / "poster.png", opened.last)
+                poster = None if in_pictures is None else show.poster(in_pictures.map)
+                imageio.imwrite(folder / "poster.png", opened.last if poster is None else poster)
         for name, write in _files.items():
             write(folder / name, show)
         results["cost"] = costs.block(replay)
