@@ -17,6 +17,7 @@ from scipy.stats import spearmanr
 
 from scripts.comparison.recording import Recording
 from scripts.experiments import shared
+from scripts.experiments.honesty import SCENES, crowd
 from scripts.experiments.measured import table
 from scripts.experiments.shared import CM, Row
 from scripts.experiments.study import Study
@@ -32,13 +33,6 @@ NAMES = {
     "sharper_nats": "the map is less sharp", "apart_cm": "revisits lie apart",
     "excess_cm": "the same beyond neighbours",
 }  # fmt: skip
-
-
-def drive(case: Row) -> Row:
-    """One scan in 8, of 37.5 a second."""
-    return shared.on_stream(case["scene"], case["level"], case["seed"], case["seconds"]) | {
-        "every": 8
-    }
 
 
 def run(case: Row, recording: Recording) -> Row:
@@ -62,7 +56,7 @@ def correlation(rows: Sequence[Row], key: str) -> tuple[float, float, float, int
     drives: dict[tuple[str, float, int], list[tuple[float, float]]] = {}
     for row in whole:
         pair = SIGNS[key] * row[key], row["error_m"]
-        drives.setdefault((row["scene"], row["level"], row["seed"]), []).append(pair)
+        drives.setdefault((row["scene"], row["motion"], row["seed"]), []).append(pair)
 
     def rho(chosen: Sequence[int]) -> float:
         groups = list(drives.values())
@@ -97,11 +91,11 @@ def tell(rows: Sequence[Row]) -> str:
 STUDY = Study(
     name="consistency",
     axes={
-        "scene": ("office", "arena", "warehouse"), "level": (0.0, 0.5, 1.0),
+        "scene": SCENES, "motion": (1.0,),
         "slam": ("shunting", "occupancy", "kiss-icp", "odometry"),
     },
-    drive=drive, run=run, tell=tell,
-    page=Path("docs/consistency.md"), defaults={"seeds": 2, "first_seed": 0, "seconds": 60.0},
+    drive=crowd, run=run, tell=tell,
+    page=Path("docs/consistency.md"), defaults={"seeds": 3, "first_seed": 0, "seconds": 50.0},
 )  # fmt: skip
 
 
