@@ -27,13 +27,16 @@ from sim.view.draw import Color, Picture
 from sim.view.moment import SIGMAS, Moments, Shown
 from sim.view.scans import LEGEND, beams
 from slam import se2
+from slam.estimate import Raster
 from slam.frames import Float, Frame, Scan
 from slam.frontend.seen_space import SeenSpace
+from slam.maps import OCCUPIED_THRESHOLD
 from slam.replay import Replay, Track
 from slam.system import MovingMap
 
 SEEN_EVERY_S = 0.2  # the areas of neighbouring scans overlap
 MOST_MAPS = 60  # big ones, of a log
+STRAY = 0.002  # share of what stands, on each side, that a poster may leave out
 FRESH_S = 0.1  # of film: so often are the map and the 3D view drawn again
 
 
@@ -131,6 +134,19 @@ class Show:
             self._panes = _Panes(self)
         return self._panes.paint(frame)
 
+    def poster(self, raster: Raster) -> Picture | None:
+        """The last frame, its map framed on what stands in ``raster``; None where the whole room
+        is in view anyway, or nothing stands."""
+        rows, columns = np.nonzero(raster.values > OCCUPIED_THRESHOLD)
+        if self.shown is None or self._panes is None or self.stage.bounds or not len(rows):
+            return None
+        step, origin = raster.resolution_m, raster.T_map_origin
+        # without what few beams met through windows
+        xmin, xmax = np.quantile(columns, (STRAY, 1.0 - STRAY)) * step + origin[0]
+        ymin, ymax = np.quantile(rows, (STRAY, 1.0 - STRAY)) * step + origin[1]
+        bounds = float(xmin), float(ymin), float(xmax) + step, float(ymax) + step
+        return self._panes.framed(self.shown.frame, bounds)
+
     def vignette(self, frame: Frame) -> Picture:
         """The scan above the map, without words: what a strip is made of."""
         whole = self.paint(frame)
@@ -212,6 +228,11 @@ class _Panes:
         """The map drawn the way the world lies, where that is known; for display only."""
         T = self._show.moments.T_world_map
         return T if T is not None and self._show.stage.bounds is not None else np.zeros(3)
+
+    def framed(self, frame: Frame, bounds: tuple[float, float, float, float]) -> Picture:
+        """A picture whose map shows that part of the plane, m."""
+        self._map.bounds, self._fresh_at = bounds, -np.inf
+        return self.paint(frame)
 
     def vignette(self, whole: Picture) -> Picture:
         """Two panes of a painted frame, one above the other, equally wide."""

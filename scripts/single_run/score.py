@@ -14,6 +14,7 @@ from rich.table import Table
 from scripts.metrics.judged import Judged
 from scripts.metrics.row import digits, minus
 from scripts.metrics.table import IN_RUN
+from slam.evaluation.consistency import KeptScans
 from slam.replay import Replay, Track
 from slam.trajectory import Trajectory
 
@@ -54,6 +55,35 @@ def scores(track: Track, truth: Trajectory | None, duration_s: float) -> dict[st
         errors = _block(Judged(estimate=final, truth=truth), section="errors")
         block |= {f"{key}_final": value for key, value in errors.items()}
     return block
+
+
+def agreeing(replay: Replay, kept: KeptScans) -> dict[str, dict[str, float | int | None]]:
+    """How well each SLAM's poses agree with each other, where there are scans to say it."""
+    out = {}
+    for name, track in replay.tracks.items():
+        found = kept.judged((track.final() or track.online()).poses)
+        if found is not None:
+            out[name] = found.block()
+    return out
+
+
+def agreement_words(outcome: Mapping[str, Any]) -> str:
+    """The same in a sentence; "" for none."""
+    parts = []
+    for name, block in outcome["slams"].items():
+        found = block.get("consistency")
+        if found is None:
+            continue
+        apart, beside = found["apart_cm"], found["neighbours_cm"]
+        revisits = "no place seen twice"
+        if apart is not None and beside is not None:
+            revisits = (
+                f"{found['revisits']} revisits {apart:.1f} cm apart (neighbours {beside:.1f})"
+            )
+        parts.append(
+            f"{name}: {revisits}, map {found['sharper_nats']:.2f} nats sharper than shuffled"
+        )
+    return "Without truth: " + "; ".join(parts) + "." if parts else ""
 
 
 def _block(judged: Judged, section: str = "") -> dict[str, Any]:

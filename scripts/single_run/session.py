@@ -31,6 +31,7 @@ from scripts.single_run import score
 from scripts.single_run.costs import FILM, MAP, PICTURES, SLAM, Costs, in_words
 from scripts.single_run.small_maps import Drawn, drawn, for_file
 from slam.errors import InvalidValueError
+from slam.evaluation.consistency import KeptScans
 from slam.files import write_text
 from slam.frames import EPOCH, Stream
 from slam.maps import write_map
@@ -97,21 +98,26 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         recorder = Recorder.of(folder / "replay.html", show) if outputs.film else nullcontext()
         started = time.perf_counter()
         with costs.beside(FILM), reel as opened, recorder as recording, costs.scans():
+            kept = KeptScans()
             frames = shoot(costs.reading(stream), show, opened, partial(costs.stage, FILM))
-            for _ in watched(frames, stream, show.title):
+            for frame in watched(frames, stream, show.title):
+                kept.note(frame, show.track().estimates[-1].T_map_robot)
                 if recording is not None:
                     with costs.stage(FILM):
                         recording.note(show.shown)
         wall_s = time.perf_counter() - started
         with costs.stage(SLAM), working("closing loops, scoring"):
             results = score.results(replay, wall_s, machine())
+            for name, found in score.agreeing(replay, kept).items():
+                results["slams"][name]["consistency"] = found
         with costs.stage(MAP), working("writing map and paths"):
             _write_paths(folder, replay, int(stream.metadata.extra.get(EPOCH, 0)))
             in_pictures = _write_map(folder, show)
         with costs.stage(PICTURES), working("drawing map, paths and errors"):
             _draw(folder, show, in_pictures)
             if opened is not None and opened.last is not None:
-                imageio.imwrite(folder / "poster.png", opened.last)
+                poster = None if in_pictures is None else show.poster(in_pictures.map)
+                imageio.imwrite(folder / "poster.png", opened.last if poster is None else poster)
         for name, write in _files.items():
             write(folder / name, show)
         results["cost"] = costs.block(replay)
@@ -121,6 +127,8 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         page = _page(outputs, show, results, table)
         pages.write(folder, page)
     console.print(table)
+    if words := score.agreement_words(results):
+        say(escape(words), highlight=False)
     say(in_words(results["cost"]), highlight=False)
     pages.tell(outputs.folder, page)
     return results

@@ -19,8 +19,8 @@ from slam.frames import Float, Scan
 from slam.frontend.config import FRONTEND
 from slam.strips import MapStrips, Piece, Rectangle, Span, edges, runs
 
-# Black or slanted surfaces give no return either: beyond this a silent beam says nothing.
-FREE_WITHOUT_RETURN_M = FRONTEND.view.silent_m
+# Returns from farther away prove nothing either: they may have come through a window.
+FREE_AT_MOST_M = FRONTEND.view.silent_m
 _CHUNK = 512  # cells along a tile: of small ones OpenCV takes as long for each scan and tile
 _SHIFT = 4  # bits of the parts of a cell in which OpenCV takes corners
 _PARTS = 1 << _SHIFT
@@ -36,10 +36,13 @@ class SeenSpace:
         self._tiles: dict[tuple[int, int], NDArray[np.uint8]] = {}
 
     def add(self, scan: Scan, T_map_robot: Float) -> None:
-        """Mark what ``scan`` saw from ``T_map_robot`` (not de-skewed: a cell more or less)."""
+        """Mark what ``scan`` saw from ``T_map_robot`` (not de-skewed: a cell more or less).
+
+        As far as returns prove: black surfaces and windows are silent, too.
+        """
         ranges = scan.ranges.astype(np.float64)
-        ranges[np.isnan(ranges) | (ranges < scan.spec.range_min)] = 0.0
-        ranges = np.minimum(ranges, FREE_WITHOUT_RETURN_M)
+        ranges[~scan.valid] = 0.0  # a beam that was lost, or went on through a window
+        ranges = np.minimum(ranges, FREE_AT_MOST_M)
         angles = scan.spec.angles
         rim = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
         outline = np.vstack([np.zeros((1, 2)), rim])

@@ -117,7 +117,7 @@ class MountingTest:
 
     def pairs(self) -> list[tuple[Float, Float, Float]]:
         """Motion (3,) of the robot and the points before and after it; those of most motion."""
-        found = []
+        found: list[tuple[float, int, Float, Float, Float]] = []
         for (before, old), (after, new) in zip(self._keys, self._keys[1:], strict=False):
             step = se2.between(before, after)
             far_m, turn = math.hypot(step[0], step[1]), abs(float(step[2]))

@@ -260,6 +260,9 @@ class Tracker(abc.ABC):
             len(self._path), match.T_map_robot, motion, covariance, everyone,
             elapsed=prediction.elapsed, written=state is State.TRACKING, found=found,
         )  # fmt: skip
+        error = self._loops.map_error(len(self._path))
+        if error is not None:
+            self._pose_covariance.known(error)
 
     def _report(
         self, frame: Frame, match: Match, state: State, elsewhere: Float | None = None

@@ -40,11 +40,14 @@ class KeyFrame:
 
 
 class KeyFrames:
-    """Collects key frames from the motions between frames."""
+    """Collects key frames from the motions between frames.
+
+    slack  (3, 3) that is added to each step's covariance
+    """
 
     def __init__(self, config: LoopsConfig) -> None:
         self._config = config
-        self._slack = spread(config.slack_m, config.slack_rad)
+        self.slack = spread(config.slack_m, config.slack_rad)
         self.keys: list[KeyFrame] = []
         self.way_m, self.elapsed_s = 0.0, 0.0
         self._step: Float = np.zeros(3)
@@ -84,7 +87,7 @@ class KeyFrames:
                 T_map_robot=T_map_robot,
                 observations=seen,
                 step=self._step,
-                covariance=self._covariance + self._slack,
+                covariance=self._covariance + self.slack,
                 way_m=self.way_m,
                 start_s=self.elapsed_s,
                 written=written,

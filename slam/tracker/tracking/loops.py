@@ -21,7 +21,7 @@ from slam import se2
 from slam.frames import Float
 from slam.frontend.odometry_prior import inverted
 from slam.posegraph import Edge, Relaxation, carried, least_moved, relative
-from slam.tracker.belief.places import coarse
+from slam.tracker.belief.places import coarse, spread
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Matcher
@@ -29,6 +29,7 @@ from slam.tracker.tracking.closures import DRAWN, Closures
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.passages import Passages
 from slam.tracker.tracking.redraw import Correction, Redrawing
+from slam.tracker.uncertainty.anchors import map_errors
 
 _log = logging.getLogger(__name__)
 
@@ -72,6 +73,7 @@ class Loops(KeyFrames):
         self._surprised = False
         self._redrawing: Redrawing | None = None
         self._new_graph = False
+        self._weighed = False  # the loops were, and nobody asked what follows
         self._moved = False  # the map was corrected
 
     def hold(self) -> None:
@@ -99,7 +101,7 @@ class Loops(KeyFrames):
         redrawing = self._redrawing
         if redrawing is None or not redrawing.done or self._found or redrawing.outrun:
             return None
-        self._redrawing, self._moved = None, True
+        self._redrawing, self._moved, self._weighed = None, True, True
         last = len(self.keys) - 1
         T_new_old = se2.compose(redrawing.pose(last), se2.inverse(self.keys[last].T_map_robot))
         after = np.array([redrawing.pose(k) for k in range(len(self.keys))])
@@ -107,6 +109,21 @@ class Loops(KeyFrames):
         for k, key in enumerate(self.keys):
             self.keys[k] = replace(key, T_map_robot=after[k])
         return Correction(T_new_old=T_new_old, cell_map=redrawing.cell_map, poses=moved)
+
+    def map_error(self, frame: int) -> Float | None:
+        """(3, 3) by which the map is off here, where ``frame`` is a key frame and loops have just
+        been weighed; else None: the error of the frame before has grown by what was driven.
+        """
+        if not self._weighed or self.keys[-1].frame != frame:
+            return None
+        self._weighed = False
+        held = {
+            pair: edge
+            for pair, edge in self._edges.items()
+            if self.weights.get(pair, 0.0) > 0.5 and pair not in self._links
+        }
+        found = spread(self._numbers.loop_m, self._numbers.loop_rad)
+        return map_errors(self.keys, self._all_poses(), held, self.slack, found)[-1]
 
     def corrected(self, poses: Float) -> Float:
         """All (n, 3) poses so far, moved with the graph; the same while the map is not torn.
@@ -247,6 +264,7 @@ class Loops(KeyFrames):
         self.weights = dict(zip(self._relaxed, weights, strict=True))
         self.poses = list(relaxation.poses)
         self._relaxation, self._surprised, self._fresh = None, False, 0
+        self._weighed = True
         self._new_graph = True
         return 1
 

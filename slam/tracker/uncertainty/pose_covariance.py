@@ -72,6 +72,11 @@ class PoseCovariance:
         self._drift = covariance.copy()
         self.covariance = covariance.copy()
 
+    def known(self, covariance: Float) -> None:
+        """A loop says that the map in view is off by ``covariance`` (3, 3), and no more."""
+        self._drift = covariance.copy()
+        self.covariance = self._drift + self._blind + self._shared
+
     def odometry_part(self, motion: Float) -> Float:
         """Covariance (3, 3), after ``motion`` in the map, of odometry's own part of late.
 
