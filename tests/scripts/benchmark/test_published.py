@@ -12,8 +12,10 @@ import pytest
 
 from scripts.benchmark import published
 from scripts.benchmark.make import QUICK_LEVELS, QUICK_SEEDS
+from scripts.benchmark.publish import shipped
 from scripts.benchmark.scores import ranking
 from scripts.benchmark.tracks import TRACKS
+from scripts.result_files import ROOT
 from slam.errors import LogFormatError
 
 SHIPPED = published.read()
@@ -63,6 +65,10 @@ def test_the_ranking_of_what_ships_has_shunting_before_odometry():
     named = [row["slam"] for row in ranking(runs, "shunting")]
     assert named.index("shunting") < named.index("odometry")
     assert len(named) > LEAST
+
+
+def test_the_page_has_what_ships():
+    assert shipped(SHIPPED) in (ROOT / "docs" / "benchmark.md").read_text()
 
 
 WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
