@@ -28,6 +28,7 @@ KERNELS_M = (0.2, 0.1, 0.05)  # half weight at 0.64 of it; coarse to fine
 STEPS = 4  # of Gauss and Newton with each kernel
 SIGMA_M = 0.1  # of a distance to the map: neighbouring beams err alike, so each counts for less
 FLOOR_M, FLOOR_RAD = 0.01, math.radians(0.3)  # least spread of odometry's prior a step
+MOST_M = 1e3  # from the nearest wall, where there is none
 ENOUGH = 20  # beams on walls; with fewer the pose is odometry's
 ASSUMED = (0.05, 0.05, math.radians(3.0))  # spread of a step whose odometry states none, m, m, rad
 
@@ -52,11 +53,11 @@ class MapOracle:
     def know(self, world: Raster, T_world_start: Float) -> None:
         """The true map of what never moves, in a world where the first frame is at that pose."""
         occupied = np.pad(world.values > 0.5, 1)
-        if not occupied.any():
-            raise InvalidValueError("oracle(map): nothing stands in the true map")
         outside = distance_transform_edt(~occupied) - 0.5  # cells, from centre to edge
         inside = distance_transform_edt(occupied) - 0.5
         metres = world.resolution_m * np.where(occupied, -inside, outside)
+        if not occupied.any():  # walls that no beam meets: all poses are odometry's
+            metres[:] = MOST_M
         corner = world.resolution_m * np.array([0.5, 0.5])  # of the padding, from its cell's centre
         origin = se2.compose(se2.inverse(T_world_start), world.T_map_origin)
         centre = se2.compose(origin, np.array([-corner[0], -corner[1], 0.0]))

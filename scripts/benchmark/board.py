@@ -96,7 +96,14 @@ class Board:
     @cached_property
     def ranking(self) -> list[Row]:
         """A row for each SLAM that made the same runs as the subject, where tracks count."""
-        return ranking({t.name: self.runs[t.name] for t in self._counting}, self.subject)
+        return ranking(
+            {t.name: self._one_oracle(t, t.oracle) for t in self._counting}, self.subject
+        )
+
+    def _one_oracle(self, track: Track, oracle: str) -> list[Row]:
+        """Its runs; ``oracle``, which each track may have another of, by the name of all."""
+        rest = [r for r in self.runs[track.name] if r["slam"] != OWN_ORACLE or oracle == OWN_ORACLE]
+        return [r | {"slam": OWN_ORACLE} if r["slam"] == oracle else r for r in rest]
 
     @property
     def _counting(self) -> list[Track]:
@@ -132,15 +139,12 @@ class Board:
         """The answer over all tracks that count: each of their rooms is one run at each level."""
         names = [track.name for track in self._counting]
         where = names[0] if len(names) == 1 else f"the {len(names)} tracks that count"
-        rows = []
-        for track in self._counting:
-            oracle = self.fair[track.name]["oracle"]
-            names = {self.subject: self.subject, ODOMETRY: ODOMETRY, oracle: OWN_ORACLE}
-            rows += [
-                row | {"scene": where, "seed": f"{track.name} {row['seed']}", "slam": slam}
-                for row in self.runs[track.name]
-                if (slam := names.get(row["slam"]))
-            ]
+        rows = [
+            row | {"scene": where, "seed": f"{track.name} {row['seed']}"}
+            for track in self._counting
+            for row in self._one_oracle(track, str(self.fair[track.name]["oracle"]))
+            if row["slam"] in (self.subject, ODOMETRY, OWN_ORACLE)
+        ]
         return answer(standing(rows, self.subject, where, "level", len(self._counting)))
 
     def _place(self) -> str:

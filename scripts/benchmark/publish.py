@@ -21,9 +21,10 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark import days, picture
-from scripts.benchmark.board import markdown_table
-from scripts.benchmark.scores import COLUMNS, SILENT, TRACKING
+from scripts.benchmark import days, picture, published
+from scripts.benchmark.board import RANKED_HEADS, Board, markdown_table
+from scripts.benchmark.published import Published
+from scripts.benchmark.scores import COLUMNS, SILENT, TRACKING, lost_from
 from scripts.benchmark.tracks import LEVELS, TRACKS
 from scripts.comparison.csv_files import write_csv
 from scripts.days.scores import LEVEL_COLUMNS, levels
@@ -38,7 +39,7 @@ DOCS = ROOT / "docs"
 PAGE, MARK, BOARD = "benchmark.md", "leaderboard", "leaderboard.md"
 CM, PERCENT = 100.0, 100.0
 HEADS = (
-    "SLAM", "tracks on which half of the runs are lost", "lost at level 1, %",
+    "SLAM", "lost from", "tracks on which half of the runs are lost", "lost at level 1, %",
     "error while not lost, cm", "silent, % of scans", "rank correlation ≥ 0.9 on", "ms a scan, p50",
 )  # fmt: skip
 
@@ -55,7 +56,7 @@ def tracks_table(board: dict[str, Any]) -> str:
 
 
 def rows(board: dict[str, Any]) -> list[list[str]]:
-    """A row for each SLAM over the tracks that count, the fewest lost runs first."""
+    """A row for each SLAM over the tracks that count, by the level it is lost from, then error."""
     counting = {name for name, track in board["tracks"].items() if track["counts"]}
     own: dict[str, list[dict[str, Any]]] = {}
     for row in board["leaderboard"].values():
@@ -64,15 +65,28 @@ def rows(board: dict[str, Any]) -> list[list[str]]:
             own.setdefault(slam, []).append(row)
     if not own:
         raise InvalidValueError("no track of the leaderboard counts")
-    ranked = sorted(own.items(), key=lambda item: _mean(item[1], "lost_at_top"))
-    return [_row(slam, found) for slam, found in ranked]
+    at = {slam: _lost_from(board, found) for slam, found in own.items()}
+
+    def rank(item: tuple[str, list[dict[str, Any]]]) -> tuple[float, float, float]:
+        slam, found = item
+        return -at[slam], _mean(found, "lost_at_top"), _middle(found, TRACKING)
+
+    return [_row(slam, at[slam], found) for slam, found in sorted(own.items(), key=rank)]
 
 
-def _row(slam: str, found: Sequence[dict[str, Any]]) -> list[str]:
+def _lost_from(board: dict[str, Any], found: Sequence[dict[str, Any]]) -> float:
+    """The level from which half of the runs of all these tracks are lost."""
+    of = [board["lost_shares"][f"{row['track']} {row['slam']}"] for row in found]
+    each = zip(*(shares["lost"] for shares in of), strict=True)
+    return lost_from(of[0]["levels"], [sum(level) / len(level) for level in each])
+
+
+def _row(slam: str, at: float, found: Sequence[dict[str, Any]]) -> list[str]:
     broken = sum(math.isfinite(float(row["lost_from"])) for row in found)
     ranked = [float(row["spearman"]) for row in found if row["spearman"] is not None]
     return [
         f"`{slam}`",
+        f"{at:.2g}" if math.isfinite(at) else f"> {LEVELS[-1]:g}",
         f"{broken} of {len(found)}",
         f"{PERCENT * _mean(found, 'lost_at_top'):.0f}",
         _median(found, TRACKING, CM),
@@ -93,9 +107,14 @@ def _mean(found: Sequence[dict[str, Any]], key: str) -> float:
     return sum(values) / len(values) if values else math.inf
 
 
-def _median(found: Sequence[dict[str, Any]], key: str, factor: float) -> str:
+def _middle(found: Sequence[dict[str, Any]], key: str) -> float:
     values = _values(found, key)
-    return digits(factor * quantile(values, 0.5)) if values else "–"
+    return quantile(values, 0.5) if values else math.inf
+
+
+def _median(found: Sequence[dict[str, Any]], key: str, factor: float) -> str:
+    value = _middle(found, key)
+    return digits(factor * value) if math.isfinite(value) else "–"
 
 
 def told(board: dict[str, Any]) -> str:
@@ -120,6 +139,25 @@ def _broken(board: dict[str, Any]) -> str:
             by_track.setdefault(row["track"], []).append(float(row["lost_at_top"]) >= 0.5)
     said = (f"`{name}` {sum(lost)} of {len(lost)}" for name, lost in by_track.items())
     return f"SLAMs that lose half of their runs or more at level 1: {', '.join(said)}."
+
+
+def shipped(of: Published) -> str:
+    """The ranking of the runs that ship with the package, and what they are."""
+    tracks = [track for track in TRACKS.values() if track.counts and track.name in of.runs]
+    runs = {
+        track.name: of.rows(track.name, {at: own[0] for at, own in of.runs[track.name].items()}, ())
+        for track in tracks
+    }
+    board = Board(subject="shunting", head={}, tracks=tracks, runs=runs)
+    asked = [at for own in of.runs.values() for at in own]
+    levels, seeds = (sorted({at[k] for at in asked}) for k in (0, 1))
+    made, on = of.made_with, of.made_with["machine"]["processor"]
+    return (
+        f"{markdown_table(RANKED_HEADS, board.ranked(), left=2)}\n\n"
+        f"{board.ranking[0]['runs']} runs: {len(tracks)} tracks, levels "
+        f"{', '.join(f'{level:g}' for level in levels)}, seeds {', '.join(map(str, seeds))}; "
+        f"commit {made['commit']}, {on}, MuJoCo {made['versions']['mujoco']}."
+    )
 
 
 def publish(folder: Path, docs: Path, results: Path, commit: str) -> None:
@@ -147,6 +185,7 @@ def _publish_board(folder: Path, docs: Path, results: Path, commit: str) -> None
     picture.by_track(lost, docs / "pictures" / "benchmark_tracks.png")
     fill_page(docs / PAGE, MARK, text, most=len(text))  # the table of the page, however many SLAMs
     fill_page(docs / PAGE, "tracks", tracks, most=len(tracks))
+    fill_page(docs / PAGE, "shipped", ships := shipped(published.read()), most=len(ships))
 
 
 def beginning(page: str, tracks: Iterable[str]) -> str:

@@ -37,17 +37,15 @@ PAGE_COLUMNS = 120
 def texts(results: Path) -> dict[str, str]:
     """By the name of the mark."""
     full = Comparison(results / "comparison.json")
-    noise = Comparison(results / "comparison_noise.json")
     costs = load(results / "costs.json")
     return {
-        "readme.comparison": _wrapped(readme_comparison(full, noise)),
+        "readme.comparison": _wrapped(readme_comparison(full)),
         "films.cost": _wrapped(film(costs)),
         "readme.demo": f"{costs['costs']['demo']['s']:.0f} s of processor time",
         "comparing.made": _wrapped(comparing_made(full)),
         "comparing.errors": errors(full),
         "comparing.differences": differences(full),
         "comparing.grid": _wrapped(comparing_grid(full)),
-        "comparing.scanners": scanners(full, noise),
         "comparing.maps": maps(full),
         "comparing.cost": _wrapped(comparing_cost(full, costs)),
     }
@@ -111,22 +109,6 @@ def _rivals(of: Comparison) -> list[str]:
     return [slam for slam in of.data["slams"] if slam != OURS]
 
 
-def scanners(full: Comparison, noise: Comparison) -> str:
-    """Shunting and the ordinary grid, with every error of the scanner and with noise only."""
-    head = ["", "`shunting`, cm", "`occupancy`, cm", "difference over all levels, cm", "seeds won"]
-    rows = []
-    for scene in full.data["scenes"]:
-        for name, of in (("noise only", noise), ("every error", full)):
-            over = of.over_levels(scene, GRID, ATE)
-            rows.append([
-                f"{scene}, {name}",
-                *(_span(_medians(of, scene, slam), 100.0, 2) for slam in (OURS, GRID)),
-                interval(over, ATE, 2),
-                over.won,
-            ])  # fmt: skip
-    return table(head, rows)
-
-
 def maps(of: Comparison) -> str:
     """Medians of both maps over the levels, and the difference with its interval."""
     head = ["", "`shunting`", "`occupancy`", "difference over all levels", "verdict"]
@@ -181,18 +163,6 @@ def film(costs: dict[str, Any]) -> str:
     )
 
 
-def _factors(of: Comparison) -> str:
-    """How many times as far off the grid is, over scenes and levels."""
-    ratios = [
-        theirs / ours
-        for scene in of.data["scenes"]
-        for ours, theirs in zip(
-            _medians(of, scene, OURS), _medians(of, scene, GRID), strict=True
-        )
-    ]  # fmt: skip
-    return _span(ratios, 1.0, 1)
-
-
 def _against_grid(of: Comparison, metric: str = ATE) -> str:
     """``in the arena the two tie (−0.22 cm, 95 % interval [−0.40, 0.01])``, scene by scene."""
     said = []
@@ -216,7 +186,7 @@ def _cm(pair: Interval) -> str:
     return f"{value} cm, 95 % interval [{low}, {high}]"
 
 
-def readme_comparison(full: Comparison, noise: Comparison) -> str:
+def readme_comparison(full: Comparison) -> str:
     """Under the picture of the README."""
     said, least, most = [], full.data["dynamism"][0], full.data["dynamism"][-1]
     for scene in full.data["scenes"]:
@@ -226,10 +196,10 @@ def readme_comparison(full: Comparison, noise: Comparison) -> str:
             ends.append(f"`{slam}` {100.0 * medians[0]:.1f} and {100.0 * medians[-1]:.1f}")
         said.append(f"in the {scene} {', '.join(ends)}")
     return (
-        f"With every error of the scanner, the median position error in cm at dynamism "
+        f"With every error of the scanner and each room's own crowd, the median position error in "
+        f"cm at dynamism "
         f"{least:g} and {most:g} is {'; '.join(said)}. Against an "
         "ordinary grid with the same matcher (`occupancy`), over all levels: "
-        f"{_against_grid(full)}. With a scanner whose only error is noise, the grid "
-        f"is {_factors(noise)} times as far off. Who wins where, and where `shunting` does not: "
+        f"{_against_grid(full)}. Who wins where, and where `shunting` does not: "
         f"[docs/comparing.md](docs/comparing.md) ({made(full.data, full.data['seeds'])})."
     )

@@ -62,12 +62,14 @@ class Level:
 
     against  the subject against odometry, by the position error run by run: 1 nearer, -1 worse,
              0 unclear
+    farther  in so many of their runs it was farther off than odometry
     """
 
     at: float
     subject: Lost
     odometry: Lost | None = None
     against: int = 0
+    farther: int = 0
     oracle: Lost | None = None
 
 
@@ -123,6 +125,7 @@ def standing(
                 subject=_lost(here, subject),
                 odometry=_lost(here, odometry) if odometry else None,
                 against=against(here, subject, odometry) if odometry else 0,
+                farther=_farther(here, subject, odometry) if odometry else 0,
                 oracle=_lost(here, oracle) if oracle else None,
             )
         )
@@ -147,12 +150,21 @@ def against(rows: Sequence[Row], a: str, b: str) -> int:
 
     rows  of one scene at one level
     """
-    errors = by_seed(rows, a, _ATE), by_seed(rows, b, _ATE)
-    seeds = sorted(errors[0].keys() & errors[1].keys())
-    if not seeds:
+    both = _errors(rows, a, b)
+    if not both:
         return 0
-    of_a, of_b = ([error[seed] for seed in seeds] for error in errors)
+    of_a, of_b = zip(*both, strict=True)
     return verdict(paired(of_a, of_b, less_is_better=True), less_is_better=True)
+
+
+def _farther(rows: Sequence[Row], a: str, b: str) -> int:
+    return sum(of_a > of_b for of_a, of_b in _errors(rows, a, b))
+
+
+def _errors(rows: Sequence[Row], a: str, b: str) -> list[tuple[float, float]]:
+    """Of both, on each run that both have."""
+    of_a, of_b = by_seed(rows, a, _ATE), by_seed(rows, b, _ATE)
+    return [(of_a[seed], of_b[seed]) for seed in sorted(of_a.keys() & of_b.keys())]
 
 
 def answer(of: Standing) -> str:
@@ -240,6 +252,9 @@ def _first_level(of: Standing) -> str:
         return f"at {low.at:g} it is already worse than its own odometry{so}"
     if low.subject.half and so:
         return f"this begins at 0{so}"
+    if 2 * low.farther > low.subject.runs:
+        runs = f"{low.farther} of {low.subject.runs} runs"
+        return f"at {low.at:g} it was farther off than its own odometry in {runs}"
     return ""
 
 

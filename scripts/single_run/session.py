@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import imageio.v2 as imageio
+from rich.markup import escape
 from rich.table import Table
 
 from scripts import figures

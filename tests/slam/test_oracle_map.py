@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,10 +84,15 @@ def test_it_is_a_control_that_must_be_shown_the_map():
     )  # fmt: skip
     with pytest.raises(InvalidValueError, match=r"oracle\(map\) needs the true map"):
         oracle.update(frame)
-    with pytest.raises(InvalidValueError, match="nothing stands in the true map"):
-        oracle.know(
-            Raster(values=0.0 * room().values, resolution_m=0.02, T_map_origin=START), START
-        )
+    bare = Raster(values=np.zeros((9, 9), np.float32), resolution_m=0.02, T_map_origin=START)
+    oracle.know(bare, START)
+    oracle.update(frame)
+    moved = Odometry(stamp_ns=10**8, T_odom_robot=np.array([0.1, 0.0, 0.0]))
+    said = oracle.update(
+        replace(frame, stamp_ns=10**8, odometry=moved, scan=replace(frame.scan, stamp_ns=10**8))
+    )
+    assert not said.converged  # no walls: odometry's
+    assert said.T_map_robot.tolist() == [0.1, 0.0, 0.0]
     assert "map" not in slam.system.names()
 
 

@@ -184,11 +184,11 @@ def test_over_all_tracks_each_room_is_a_run_and_the_subject_gets_a_place():
     }
     rows = {t.name: [row for of in slams.values() for row in of[t.name]] for t in TWO}
     made = Board(subject="mine", head={"seeds": [720]}, tracks=TWO, runs=rows)
-    assert [row["slam"] for row in made.ranking] == ["near", "mine", "lost", "odometry"]
+    assert [row["slam"] for row in made.ranking] == [ORACLE, "near", "mine", "lost", "odometry"]
     assert [line[:2] for line in made.ranked()] == [
-        ["1", "near"], ["2", "mine"], ["3", "lost"], ["–", "odometry"],
+        ["–", ORACLE], ["1", "near"], ["2", "mine"], ["3", "lost"], ["–", "odometry"],
     ]  # fmt: skip
-    assert made.ranking[1]["lost_from"] == 0.875
+    assert made.ranking[2]["lost_from"] == 0.875
     over, place, where, _ = made.said()
     assert "in the 2 tracks that count in 0 of 2 at 0" in over
     assert "so at least 34 % of such runs are lost at 1 (95 %)" in over

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The runs that ship: whole, of tracks that count, and taken on the very same recordings alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scripts.benchmark import published
+from scripts.benchmark.make import QUICK_LEVELS, QUICK_SEEDS
+from scripts.benchmark.publish import shipped
+from scripts.benchmark.scores import ranking
+from scripts.benchmark.tracks import TRACKS
+from scripts.result_files import ROOT
+from slam.errors import LogFormatError
+
+SHIPPED = published.read()
+TRACK = "tour-guide-v1"
+KEY = f"{TRACK} 0.5 720"
+LEAST = 8  # SLAMs beside the reader's
+
+
+def digests(track: str) -> dict[tuple[float, int], str]:
+    return {run: recording for run, (recording, _) in SHIPPED.runs[track].items()}
+
+
+def test_every_run_of_a_quick_benchmark_ships_with_eight_slams_and_the_controls():
+    for track in TRACKS.values():
+        asked = [(at, seed) for at in QUICK_LEVELS for seed in track.test[:QUICK_SEEDS]]
+        if track.counts:
+            slams = set.intersection(*(set(SHIPPED.runs[track.name][run][1]) for run in asked))
+            assert len(slams - set(track.controls)) >= LEAST
+            assert set(track.controls) <= slams
+            assert all(SHIPPED.has(track.name, asked, oracle) for oracle in track.oracles)
+    assert not SHIPPED.has(TRACK, [(0.5, 999)], "karto")
+
+
+def test_either_oracle_holds_in_every_run_of_a_track_that_counts():
+    for track in TRACKS.values():
+        rows = SHIPPED.rows(track.name, digests(track.name), ()) if track.counts else []
+        held = [min(sum(r["lost"] for r in rows if r["slam"] == o) for o in track.oracles)]
+        assert held == [0]
+
+
+def test_rows_are_taken_on_the_same_recordings_alone():
+    here = digests(TRACK)
+    rows = SHIPPED.rows(TRACK, here, ("karto",))
+    assert {row["slam"] for row in rows} >= {"shunting", "kiss-icp", "odometry"}
+    assert "karto" not in {row["slam"] for row in rows}
+    assert SHIPPED.others(TRACK, here) == 0
+    first, *rest = here
+    other = {**here, first: "0" * 64}
+    assert SHIPPED.others(TRACK, other) == 1
+    runs = {(row["dynamism"], row["seed"]) for row in SHIPPED.rows(TRACK, other, ())}
+    assert runs == set(rest)
+    assert SHIPPED.rows("nowhere-v1", other, ()) == []
+
+
+def test_the_ranking_of_what_ships_has_shunting_before_odometry():
+    runs = {name: SHIPPED.rows(name, digests(name), ()) for name in SHIPPED.runs}
+    named = [row["slam"] for row in ranking(runs, "shunting")]
+    assert named.index("shunting") < named.index("odometry")
+    assert len(named) > LEAST
+
+
+def test_the_page_has_what_ships():
+    assert shipped(SHIPPED) in (ROOT / "docs" / "benchmark.md").read_text()
+
+
+WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
+    "what": (lambda d: d.update(what="a recipe"), "no published runs"),
+    "columns": (lambda d: d.update(columns=["lost"]), "columns must be"),
+    "track": (lambda d: d["tracks"].update({TRACK: "0" * 64}), "none of this version's"),
+    "level": (lambda d: d["runs"].update({f"{TRACK} 0.3 720": d["runs"][KEY]}), "level must be"),
+    "digest": (lambda d: d["runs"][KEY].update(recording="x"), "recording must be a SHA-256"),
+    "cells": (lambda d: d["runs"][KEY]["slams"].update(karto=["lost"]), "no published runs"),
+    "outcome": (
+        lambda d: d["runs"][KEY]["slams"]["karto"].__setitem__(0, "won"), "outcome must be",
+    ),
+    "error": (
+        lambda d: d["runs"][KEY]["slams"]["karto"].__setitem__(4, -1.0), "ate_unaligned_m must",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_file_that_is_wrong_is_refused_by_name(tmp_path: Path, what: str):
+    data = json.loads(published.FILE.read_text())
+    change, words = WRONG[what]
+    change(data)
+    path = tmp_path / "published.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises(LogFormatError, match=words) as told:
+        published.read(path)
+    assert str(path) in str(told.value)
+    assert published.is_one(path) == (what != "what")
+    assert not published.is_one(tmp_path / "none.json")
