@@ -19,7 +19,7 @@ from scripts import figures
 from scripts.console import console, note, say, working
 from scripts.film import FPS
 from scripts.film.encode import Pace, film, require_ffmpeg
-from scripts.film.render import shoot, watched
+from scripts.film.render import Liveliest, shoot, watched
 from scripts.film.show import Show
 from scripts.live.replay import Recorder
 from scripts.machine import machine
@@ -95,11 +95,12 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         pace, path = show.pace, folder / "film.mp4"
         reel = film(path, pace.fps, preset=pace.preset) if outputs.film else nullcontext()
         recorder = Recorder.of(folder / "replay.html", show) if outputs.film else nullcontext()
-        started = time.perf_counter()
+        liveliest, started = Liveliest(show.duration_s / 3.0), time.perf_counter()
         with costs.beside(FILM), reel as opened, recorder as recording, costs.scans():
             frames = shoot(costs.reading(stream), show, opened, partial(costs.stage, FILM))
             for frame in watched(frames, stream, show.title):
-                if recording is not None:
+                if recording is not None and opened is not None:
+                    liveliest.note(frame, show.seconds(frame), opened.last)
                     with costs.stage(FILM):
                         recording.note(frame, show.stage.placed)
         wall_s = time.perf_counter() - started
@@ -111,7 +112,8 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         with costs.stage(PICTURES), working("drawing map, paths and errors"):
             _draw(folder, show, in_pictures)
             if opened is not None and opened.last is not None:
-                imageio.imwrite(folder / "poster.png", opened.last)
+                poster = opened.last if liveliest.picture is None else liveliest.picture
+                imageio.imwrite(folder / "poster.png", poster)
         for name, write in _files.items():
             write(folder / name, show)
         results["cost"] = costs.block(replay)

@@ -17,6 +17,7 @@ from scripts.options import (
     Motion,
     Oracles,
     Overwrite,
+    PlanOnly,
     ScanHeight,
     Scanner,
     Seconds,
@@ -24,6 +25,7 @@ from scripts.options import (
     Set,
     Strict,
     TextFormat,
+    named,
     with_oracles,
 )
 from slam.errors import InvalidValueError
@@ -63,6 +65,7 @@ def run(
     ] = None,
     overwrite: Overwrite = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
+    plan_only: PlanOnly = False,
     map_in: Annotated[
         Path | None,
         typer.Option(help="Begin anywhere in this map of days before (docs/days.md); with --log."),
@@ -85,11 +88,13 @@ def run(
     """
     if (log is None) == (scene is None):
         raise InvalidValueError("name exactly one of --log and --scene")
-    slams = list(with_oracles(slam, oracle, set_))
+    slams = list(with_oracles(named(list(slam)), oracle, set_))
     check(slams, scene)
+    from scripts.pace import announce, timed
+
     if scene is not None:
         _without_a_log(strict=strict or text_format is not None, maps=bool(map_in or map_out or at))
-        from scripts.single_run.run import on_scene
+        from scripts.single_run.run import on_scene, on_scene_work
         from scripts.single_run.session import Outputs
 
         folder = out or Path("out") / f"run-{scene.replace(':', '-')}"
@@ -98,15 +103,23 @@ def run(
         settings = held.world(scene, dynamism, seed) | {
             "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
         }  # fmt: skip
-        on_scene(slams, settings, outputs)
+        work = on_scene_work(slams, seconds, film)
+        announce(f"{seconds:g} s of {scene}" + ", filmed" * film, [work])
+        if not plan_only:
+            with timed(work):
+                on_scene(slams, settings, outputs)
     elif log is not None:
         from scripts.days.one import Maps
-        from scripts.single_run.run import Log, on_log
+        from scripts.single_run.run import Log, on_log, on_log_work
 
         maps = Maps(map_in=map_in, map_out=map_out, at=at)
         folder = out or Path("out") / f"run-{run_name(log)}"
         recorded = Log(path=log, strict=strict, text_format=text_format)
-        on_log(slams, recorded, folder, overwrite=overwrite, film=film, maps=maps)
+        work = on_log_work(slams, log, film)
+        announce(f"{log.name}, {work.amount / len(slams):.1f} MB" + ", filmed" * film, [work])
+        if not plan_only:
+            with timed(work):
+                on_log(slams, recorded, folder, overwrite=overwrite, film=film, maps=maps)
 
 
 def _without_a_log(*, strict: bool, maps: bool) -> None:
