@@ -19,7 +19,6 @@ import numpy as np
 from scenes.assembly import reach_of
 from scenes.builder import Builder
 from scenes.kinds import KINDS
-from scenes.marks import Mark
 from scenes.placement import gap_to_boxes
 from scenes.plan import Plan, furniture
 from scenes.recipe import (

@@ -13,11 +13,12 @@ import typer
 
 from scripts import interrupt
 from scripts.console import LogLines, console, fail, note
-from scripts.option_names import ManyValues, Verb
-from slam.errors import MissingPathError, MobiliaError
+from scripts.option_names import Verb
+from slam.errors import InvalidValueError, MissingPathError, MobiliaError, UnknownNameError
 from slam.names import load, look_in
 
 _log = logging.getLogger(__name__)
+TYPED = (InvalidValueError, UnknownNameError, MissingPathError)  # mistakes in the command line: 2
 
 app = typer.Typer(
     name="mobilia",
@@ -31,15 +32,14 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 # Each is a function of that name in a module of that name, but for the name of a built-in type.
-VERBS: dict[str, type[Verb]] = {
-    "demo": Verb, "run": Verb, "render": Verb, "generate": Verb, "verify": Verb, "export": Verb,
-    "list": Verb, "config": Verb, "bench": Verb, "doctor": Verb, "sensor-card": Verb,
-    "reproduce": Verb, "compare": ManyValues, "benchmark": ManyValues, "drive": ManyValues,
-    "blame": ManyValues, "live": ManyValues, "report": Verb, "lifelong": Verb, "twin": Verb,
-}  # fmt: skip
-for _name, _kind in VERBS.items():
+VERBS = (
+    "demo", "run", "render", "generate", "verify", "export", "list", "config", "bench", "doctor",
+    "sensor-card", "reproduce", "compare", "benchmark", "drive", "blame", "live", "report",
+    "lifelong", "twin",
+)  # fmt: skip
+for _name in VERBS:
     _own = {"list": "listing"}.get(_name, _name.replace("-", "_"))
-    app.command(_name, cls=_kind)(getattr(import_module(f"scripts.verbs.{_own}"), _own))
+    app.command(_name, cls=Verb)(getattr(import_module(f"scripts.verbs.{_own}"), _own))
 
 
 def _version(asked: bool) -> None:
@@ -88,8 +88,7 @@ def main(warning: str | None = None) -> None:
     except MobiliaError as error:
         fail(str(error))
         _log.info("where it came from:", exc_info=error)  # with --verbose
-        status = 2 if isinstance(error, MissingPathError) else 1
-        sys.exit(getattr(error, "status", status))
+        sys.exit(getattr(error, "status", 2 if isinstance(error, TYPED) else 1))
     except interrupt.InterruptedBySignal:
         fail("interrupted: nothing half-written is left behind")
         sys.exit(130)

@@ -16,11 +16,11 @@ from rich.markup import escape
 from rich.progress import (
     BarColumn,
     Progress,
+    ProgressColumn,
     SpinnerColumn,
     Task,
     TextColumn,
     TimeElapsedColumn,
-    TimeRemainingColumn,
 )
 from rich.table import Table
 from rich.text import Text
@@ -28,7 +28,6 @@ from rich.text import Text
 from slam.errors import printable
 
 LINE_EVERY_S = 10.0  # between lines of progress where the output is no terminal
-FEW_STEPS = 50  # up to these a pace over the last half minute says nothing
 console = Console()
 _errors = Console(stderr=True)
 
@@ -82,7 +81,7 @@ def progress() -> Progress:
         BarColumn(),
         TextColumn("{task.fields[unit]}"),
         TimeElapsedColumn(),
-        TimeRemainingColumn(),
+        _Left(),
         console=console,
         transient=False,
     )
@@ -113,17 +112,32 @@ def _words(task: Task) -> str:
         return f"{_plain(task.description)}: {done or 'done'}, {task.elapsed or 0.0:.0f} s"
     left = _left_s(task)
     parts = [done, f"{task.elapsed or 0.0:.0f} s so far"]
-    parts += [f"about {left:.0f} s left"] if left else []
+    parts += [f"about {in_time(left)} left"] if left else []
     return f"{_plain(task.description)}: {', '.join(filter(None, parts))}"
 
 
+def in_time(seconds: float) -> str:
+    """``40 s``, ``7 min``, ``2.5 h``: as exactly as an estimate is known."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s" if seconds < 20.0 else f"{5.0 * round(seconds / 5.0):.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
 def _left_s(task: Task) -> float | None:
-    """Of few long steps, from all the time so far: the last two may have ended together."""
-    if task.total is None or task.total > FEW_STEPS:
-        return task.time_remaining
-    if not task.completed or task.elapsed is None:
+    """By the pace of all so far, which no single step turns; what was there before is not of it."""
+    done = task.completed - float(task.fields.get("before", 0.0))
+    if task.total is None or not done > 0.0 or task.elapsed is None:
         return None
-    return task.elapsed * (task.total - task.completed) / task.completed
+    return task.elapsed * (task.total - task.completed) / done
+
+
+class _Left(ProgressColumn):
+    """About how long it still takes."""
+
+    def render(self, task: Task) -> Text:
+        left = _left_s(task)
+        words = "" if left is None or task.finished else f"about {in_time(left)} left"
+        return Text(words, style="progress.remaining")
 
 
 def _plain(description: str) -> str:

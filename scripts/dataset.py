@@ -17,6 +17,7 @@ from rich.table import Table
 from scripts import interrupt, workers
 from scripts.console import note, plain_table, progress
 from scripts.options import rate_hz
+from scripts.pace import Work, learn
 from sim.recording.dataset import Dataset, Plan, writing
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
@@ -49,13 +50,17 @@ def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | Non
         )
         note_frame = meter.frame if alone else None
         call = partial(_one, dataset.path, note_frame)
-        for _ in workers.each(call, missing, jobs=jobs, cluster=cluster, shared=dataset.path):
+        for spent in workers.each(call, missing, jobs=jobs, cluster=cluster, shared=dataset.path):
             meter.episode()
+            if cluster is None:
+                learn([spent])
 
 
-def _one(folder: Path, note_frame: Callable[[], None] | None, recipe: Recipe) -> None:
-    """A job, here or in a worker."""
+def _one(folder: Path, note_frame: Callable[[], None] | None, recipe: Recipe) -> tuple[Work, float]:
+    """A job, here or in a worker: what it was, and s that it took."""
+    started = time.perf_counter()
     record(recipe, folder, note=note_frame or (lambda: None))
+    return Work(f"generate {recipe.scene}", recipe.seconds), time.perf_counter() - started
 
 
 class _Meter:
@@ -68,7 +73,11 @@ class _Meter:
         self._frames, self._before, self._started = 0, done, time.perf_counter()
         self._rate_hz = rate_hz
         self._task = bar.add_task(
-            "generating", unit="", total=total * length_s, completed=int(done * length_s)
+            "generating",
+            unit="",
+            total=total * length_s,
+            completed=int(done * length_s),
+            before=int(done * length_s),
         )
 
     def frame(self) -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -25,6 +26,7 @@ from scenes import registry
 from scripts import interrupt, workers
 from scripts.console import note, progress
 from scripts.machine import versions
+from scripts.pace import Work, learn
 from sim.recording.sums import damage_beside, write_beside
 from slam import locks
 from slam.errors import InvalidValueError, MobiliaError, OutputError, SlamFailedError
@@ -40,6 +42,7 @@ class Job:
     call       a function of a module (workers import it): ``call(path, **arguments)``
     arguments  as JSON has them
     suffix     ending of the file
+    seconds    of simulated time that it works on, for ``scripts.pace``; no part of its name
     code       folders or files that the result depends on, data too: the digest of all that is in
                them, but for what is hidden or compiled, is part of the name
     """
@@ -48,6 +51,7 @@ class Job:
     call: Callable[..., None]
     arguments: Mapping[str, Any]
     suffix: str = ".npz"
+    seconds: float = 1.0
     code: Sequence[Path] = ()
 
     def __post_init__(self) -> None:
@@ -59,6 +63,11 @@ class Job:
     def over(self, what: str, arguments: Mapping[str, Any]) -> Job:
         """The same on what is called so, and these arguments besides."""
         return replace(self, name=f"{what}_{self.name}", arguments={**self.arguments, **arguments})
+
+    def work(self) -> Work:
+        """Its kind: the function, and of which SLAM or scene."""
+        of = self.arguments.get("slam") or self.arguments.get("scene") or ""
+        return Work(f"{self.call.__module__}.{self.call.__qualname__} {of}", self.seconds)
 
     def file_name(self) -> str:
         """Where its result goes, within the folder of the jobs."""
@@ -144,16 +153,24 @@ def _make_missing(
     missing = [job for name, job in wanted.items() if not _whole(files[name])]
     with progress() as bar:
         done = len(wanted) - len(missing)
-        task = bar.add_task(escape(title), total=len(wanted), completed=done, unit="")
+        task = bar.add_task(escape(title), total=len(wanted), completed=done, before=done, unit="")
 
         def advance() -> None:
             bar.advance(task)
             bar.update(task, unit=f"{int(bar.tasks[0].completed)}/{len(wanted)}")
 
         pairs = [(job, files[job.name]) for job in missing]
-        for _ in workers.each(_make_pair, pairs, jobs=processes, cluster=cluster, shared=folder):
-            interrupt.check()
-            advance()
+        spent = []
+        try:
+            for one in workers.each(
+                _make_pair, pairs, jobs=processes, cluster=cluster, shared=folder
+            ):
+                spent.append(one)
+                interrupt.check()
+                advance()
+        finally:
+            if spent and cluster is None:
+                learn(spent)
     return files
 
 
@@ -167,8 +184,11 @@ def _whole(file: Path) -> bool:
     return not wrong
 
 
-def _make_pair(pair: tuple[Job, Path]) -> None:
+def _make_pair(pair: tuple[Job, Path]) -> tuple[Work, float]:
+    """What it was, and s that it took."""
+    started = time.perf_counter()
     make(*pair)
+    return pair[0].work(), time.perf_counter() - started
 
 
 def make(job: Job, file: Path) -> None:

@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is wrong with a field is said by the name of the option that it came from."""
+"""How a command line is read: lists, names that a shell completes, errors that name options."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from typing import Any
 
 from typer.core import TyperCommand
 
 from slam.errors import InvalidValueError
 
+WORDS = "mobilia.words"  # of the command line, in a context
 # Fields that are called otherwise than their option; of several the first that the verb has.
 OPTIONS_OF: dict[str, tuple[str, ...]] = {
     "Plan.slams": ("--slam",),
@@ -34,12 +36,45 @@ _FIELD = re.compile(rf"\b({'|'.join(_FILLED)})\.([a-z_]+)\b")
 _FIRST = re.compile(r"^([a-z_]+)(?= must )")
 
 
+# What a shell offers for an argument or option of that name.
+COMPLETED: dict[str, tuple[str, ...]] = {
+    "scene": ("scenes.registry:names",), "slam": ("slam.system:names",),
+    "subject": ("slam.system:names",), "oracle": ("slam.system:names",),
+    "scanner": ("sim.sensors.lidar.registry:names",),
+    "tracks": ("scripts.benchmark.tracks:TRACKS",),
+    "what": ("slam.system:names", "sim.sensors.lidar.registry:names"),
+}  # fmt: skip
+
+
 class Verb(TyperCommand):
-    """A command whose errors name its options, and whose help fits any terminal."""
+    """A command whose list options take all the words up to the next option, whose names a shell
+    completes, whose errors name its options, and whose help fits any terminal."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.help = flowing(self.help or "")
+        for parameter in self.params:
+            if parameter.name in COMPLETED:
+                parameter._custom_shell_complete = completed
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat each list option before every one of its words."""
+        lists = {
+            name
+            for parameter in self.params
+            if getattr(parameter, "multiple", False)
+            for name in parameter.opts
+        }
+        ctx.meta[WORDS] = args
+        return super().parse_args(ctx, repeated(args, lists))
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> Any:
+        """The second and later words of a list are completed as its first is."""
+        options = [word for word in ctx.meta.get(WORDS, ()) if word.startswith("-")]
+        for parameter in self.params if options else ():
+            if options[-1] in parameter.opts and getattr(parameter, "multiple", False):
+                return parameter.shell_complete(ctx, incomplete)
+        return super().shell_complete(ctx, incomplete)
 
     def invoke(self, ctx: Any) -> Any:
         """Run it; ``InvalidValueError`` about a field becomes one about the option."""
@@ -52,18 +87,15 @@ class Verb(TyperCommand):
             raise InvalidValueError(said) from error
 
 
-class ManyValues(Verb):
-    """A command whose list options take all the words up to the next option."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Repeat each list option before every one of its words."""
-        lists = {
-            name
-            for parameter in self.params
-            if getattr(parameter, "multiple", False)
-            for name in parameter.opts
-        }
-        return super().parse_args(ctx, repeated(args, lists))
+def completed(_ctx: Any, parameter: Any, incomplete: str) -> list[str]:
+    """Names that go on as the last word of a list with commas begins."""
+    before, comma, begun = incomplete.rpartition(",")
+    names: list[str] = []
+    for where in COMPLETED[parameter.name]:
+        module, _, attribute = where.partition(":")
+        known = getattr(import_module(module), attribute)
+        names += known() if callable(known) else known
+    return [before + comma + name for name in names if name.startswith(begun)]
 
 
 def repeated(args: list[str], lists: set[str]) -> list[str]:

@@ -125,6 +125,10 @@ Set = Annotated[
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
 ]
+PlanOnly = Annotated[
+    bool,
+    typer.Option("--plan", help="Only say what would run, and about how long it would take."),
+]
 Jobs = Annotated[int, typer.Option(help="Processes of this machine.")]
 Cluster = Annotated[
     str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")

@@ -31,7 +31,7 @@ SEED = 100
 DYNAMISM = 0.5
 REPEATS = 7
 N_ENVS = 4
-GOAL_ROOM = {"terminate_on_collision": True, "time_limit_s": 30.0}
+GOAL_ROOM: dict[str, Any] = {"terminate_on_collision": True, "time_limit_s": 30.0}
 Row = dict[str, Any]
 
 

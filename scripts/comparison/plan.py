@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -198,7 +198,14 @@ class Plan(Asked):
             for run in self.runs():
                 own: dict[str, Any] = {"recording": f"{RECORDINGS}/{recordings[run.name]}"}
                 own |= {} if self.judge_maps else {"judge_maps": False}
-                yield run, name, job.over(run.name, own)
+                yield run, name, replace(job.over(run.name, own), seconds=self.seconds)
+
+
+def ahead(plan: Plan, out: Path) -> tuple[list[Job], int]:
+    """The jobs that are not done yet in ``out``, of how many; buildings over days aside."""
+    parts = ((plan.recordings().values(), RECORDINGS), ([e[2] for e in plan.entries()], ENTRIES))
+    every = [(job, out / folder) for jobs, folder in parts for job in jobs]
+    return [job for job, folder in every if not (folder / job.file_name()).exists()], len(every)
 
 
 def simulator(scene: str) -> tuple[Path, ...]:
@@ -209,7 +216,8 @@ def simulator(scene: str) -> tuple[Path, ...]:
 def simulating(name: str, recipe: Recipe, every: int, code: Sequence[Path]) -> Job:
     """The job that records one scan in ``every`` of a simulation."""
     arguments = {**asdict(recipe), "every": every}
-    return Job(name=name, call=recording.record, arguments=arguments, code=code)
+    seconds = recipe.seconds
+    return Job(name=name, call=recording.record, arguments=arguments, seconds=seconds, code=code)
 
 
 def running(call: Callable[..., None], name: str, scan_limit_s: float) -> Job:

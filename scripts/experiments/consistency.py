@@ -16,7 +16,6 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from scripts.comparison.recording import Recording
-from scripts.experiments import shared
 from scripts.experiments.honesty import SCENES, crowd
 from scripts.experiments.measured import table
 from scripts.experiments.shared import CM, Row

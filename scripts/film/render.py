@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 
@@ -14,7 +15,7 @@ from scripts.film.encode import Film
 from scripts.film.show import Show
 from sim.view.draw import Picture
 from slam.errors import InvalidValueError
-from slam.frames import Frame, Stream
+from slam.frames import BeamClass, Frame, Stream
 
 
 def shoot(
@@ -57,6 +58,30 @@ def watched(frames: Iterator[Frame], stream: Stream, title: str) -> Iterator[Fra
             if count % 25 == 0 or count == stream.length:
                 bar.update(task, completed=count, unit=f"{count}/{stream.length} scans")
             yield frame
+
+
+class Liveliest:
+    """The picture of a film at the end of the second in which most beams met what moves.
+
+    The first third does not count: its map is young. Without labels it is the last one.
+    """
+
+    def __init__(self, least_s: float) -> None:
+        self.picture: Picture | None = None
+        self._least_s, self._most = least_s, -1
+        self._second: deque[tuple[float, int]] = deque()
+
+    def note(self, frame: Frame, seconds: float, picture: Picture | None) -> None:
+        """Call after each frame, with the newest picture."""
+        moving = 0
+        if frame.labels is not None:
+            moving = int((frame.labels.kind == BeamClass.MOVING).sum())
+        self._second.append((seconds, moving))
+        while self._second[0][0] <= seconds - 1.0:
+            self._second.popleft()
+        beams = sum(count for _, count in self._second)
+        if seconds >= self._least_s and (beams > self._most or frame.labels is None):
+            self.picture, self._most = picture, beams
 
 
 class Snapshots:

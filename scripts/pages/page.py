@@ -171,7 +171,7 @@ def _files(folder: Path) -> list[tuple[str, str]]:
     """Names that are there, and what each is."""
     last = {SUMS} if (folder / "dataset.json").exists() else {SUMS, "recipe.json"}  # written later
     there = sorted({*_names(folder), *_names(folder, "replays/*.html"), *last})
-    found = {}
+    found: dict[str, str] = {}
     for pattern, about in ABOUT.items():
         own = [name for name in there if fnmatch(name, pattern) and name not in found]
         found |= dict.fromkeys(own[:LISTED], about)

@@ -6,9 +6,9 @@ from __future__ import annotations
 from scripts.closed_loop.folder import Driven
 from scripts.comparison.csv_files import Row
 from scripts.metrics.row import digits
+from scripts.pages.page import Cell, Table
 from scripts.report.answer import percent
 from scripts.report.curves import PRECISION, SUCCESS, few_goals
-from scripts.report.tables import Cell, Table
 
 
 def table(drive: Driven) -> Table:

@@ -14,6 +14,7 @@ from scripts.console import note, working
 from scripts.days.one import Maps, kept, session_of
 from scripts.film.encode import Pace
 from scripts.film.footage import of_log, of_scene
+from scripts.pace import Work
 from scripts.single_run.costs import INPUT, Costs
 from scripts.single_run.session import Outputs, run_session
 from scripts.single_run.understood import UntrustedRunError, distrust, mount_of, tell
@@ -87,6 +88,18 @@ def on_log(
     if words:
         _log.warning("%s", words)
     return results
+
+
+def on_scene_work(names: list[str], seconds: float, film: bool) -> Work:
+    """For an estimate: about so much for each SLAM, and more with a film."""
+    return Work("run on a scene" + ", filmed" * film, seconds * len(names))
+
+
+def on_log_work(names: list[str], path: Path, film: bool) -> Work:
+    """The same of a log, which is not read for it: by its MB."""
+    files = path.rglob("*") if path.is_dir() else [path]
+    size = sum(file.stat().st_size for file in files if file.is_file())
+    return Work(f"run on {path.suffix}" + ", filmed" * film, size / 1e6 * len(names))
 
 
 def on_scene(names: list[str], settings: Mapping[str, Any], outputs: Outputs) -> dict[str, Any]:

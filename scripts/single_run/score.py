@@ -103,7 +103,8 @@ def said(outcome: Mapping[str, Any], primary: str) -> list[str]:
             f"over {outcome['distance_m']:.0f} m; at the end by {digits(off[primary])} cm{beside}."
         )
     else:
-        first = f"`{primary}` ran through {own['scans']} scans. This log has no truth: no errors."
+        plural = "" if own["scans"] == 1 else "s"
+        first = f"`{primary}` ran through {own['scans']} scan{plural}; without truth, no errors."
     doubted = own.get("not_converged", 0)
     scans = f"{doubted} of {own['scans']} scans" if doubted else "every scan: it was never in doubt"
     return [first, f"It {'did not trust' if doubted else 'trusted'} {scans}."]

@@ -20,7 +20,7 @@ from scripts import figures
 from scripts.console import console, note, say, working
 from scripts.film import FPS
 from scripts.film.encode import Pace, film, require_ffmpeg
-from scripts.film.render import shoot, watched
+from scripts.film.render import Liveliest, shoot, watched
 from scripts.film.show import Show
 from scripts.live.replay import Recorder
 from scripts.machine import machine
@@ -97,13 +97,14 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         pace, path = show.pace, folder / "film.mp4"
         reel = film(path, pace.fps, preset=pace.preset) if outputs.film else nullcontext()
         recorder = Recorder.of(folder / "replay.html", show) if outputs.film else nullcontext()
-        started = time.perf_counter()
+        liveliest, started = Liveliest(show.duration_s / 3.0), time.perf_counter()
         with costs.beside(FILM), reel as opened, recorder as recording, costs.scans():
             kept = KeptScans()
             frames = shoot(costs.reading(stream), show, opened, partial(costs.stage, FILM))
             for frame in watched(frames, stream, show.title):
                 kept.note(frame, show.track().estimates[-1].T_map_robot)
-                if recording is not None:
+                if recording is not None and opened is not None and show.shown is not None:
+                    liveliest.note(frame, show.shown.seconds, opened.last)
                     with costs.stage(FILM):
                         recording.note(show.shown)
         wall_s = time.perf_counter() - started
@@ -118,7 +119,9 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
             _draw(folder, show, in_pictures)
             if opened is not None and opened.last is not None:
                 poster = None if in_pictures is None else show.poster(in_pictures.map)
-                imageio.imwrite(folder / "poster.png", opened.last if poster is None else poster)
+                if poster is None:
+                    poster = opened.last if liveliest.picture is None else liveliest.picture
+                imageio.imwrite(folder / "poster.png", poster)
         for name, write in _files.items():
             write(folder / name, show)
         results["cost"] = costs.block(replay)

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from scripts.console import console, note, say
 from scripts.names import check
-from scripts.options import Cluster, Jobs, Set, named
+from scripts.options import Cluster, Jobs, PlanOnly, Set, named
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
@@ -79,6 +79,7 @@ def benchmark(
     ] = None,
     jobs: Jobs = 1,
     cluster: Cluster = None,
+    plan_only: PlanOnly = False,
     set_: Set = None,
 ) -> None:
     """Find out on which track, and from which level on, a SLAM gets lost.
@@ -96,10 +97,11 @@ def benchmark(
         return
     slams = named(slam or [])
     check((*slams, *([subject] if subject else [])))
-    from scripts import workers
+    from scripts import pace, workers
     from scripts.benchmark import published, submission
     from scripts.benchmark.make import QUICK_SEEDS, SEEDS, carry_out, wanted_of
     from scripts.benchmark.tracks import chosen
+    from scripts.comparison.plan import ahead
 
     workers.check_jobs(jobs)
     shared = [path for path in merge or () if published.is_one(path)]
@@ -119,6 +121,12 @@ def benchmark(
         train=train, sealed=drawn, seeds=count, quick=quick, seconds=seconds, submit=submit,
         days=days,
     )  # fmt: skip
+    parts = [ahead(wanted.plan(track), out / track.name) for track in wanted.tracks]
+    works = [job.work() for missing, _ in parts for job in missing]
+    what = f"{len(works)} of {sum(count for _, count in parts)} jobs on {len(parts)} tracks"
+    pace.announce(what + (", buildings over days besides" if days else ""), works, jobs)
+    if plan_only:
+        return
     started = time.perf_counter()
     board = carry_out(wanted, out, jobs=jobs, cluster=cluster, merge=others, shared=ship)
     _tell(board, out, time.perf_counter() - started)

@@ -19,6 +19,7 @@ from scripts.options import (
     Jobs,
     MotionLevels,
     Oracles,
+    PlanOnly,
     Scanner,
     Set,
     axis_levels,
@@ -68,6 +69,7 @@ def compare(
     ] = Limits.scan_s,
     jobs: Jobs = 1,
     cluster: Cluster = None,
+    plan_only: PlanOnly = False,
     set_: Set = None,
 ) -> None:
     """Run SLAMs on the same simulated runs; write tables of error against dynamism.
@@ -84,9 +86,9 @@ def compare(
     slams = with_oracles(named(slam), oracle, set_)
     rooms = named(scene or ["arena", "office"])
     check(slams, *rooms)
-    from scripts import workers
+    from scripts import pace, workers
     from scripts.comparison.make import carry_out
-    from scripts.comparison.plan import Plan
+    from scripts.comparison.plan import Plan, ahead
 
     workers.check_jobs(jobs)
     axis, at, held = axis_levels(dynamism, motion, change)
@@ -104,6 +106,15 @@ def compare(
         scan_limit_s=scan_limit,
         sessions=sessions,
     )
+    missing, every_job = ahead(plan, out)
+    runs = f"{len(plan.runs())} runs, {len(slams)} SLAMs on each"
+    beside_ = ", buildings besides" if sessions is not None else ""
+    pace.announce(
+        f"{runs}: {len(missing)} of {every_job} jobs are to do{beside_}",
+        [job.work() for job in missing], jobs,
+    )  # fmt: skip
+    if plan_only:
+        return
     started = time.perf_counter()
     ways: dict[str, Any] = {"jobs": jobs, "cluster": cluster}
     if sessions is not None:

@@ -16,6 +16,7 @@ from scripts.options import (
     Held,
     Motion,
     Overwrite,
+    PlanOnly,
     ScanHeight,
     Scanner,
     Seconds,
@@ -38,6 +39,7 @@ def demo(
     scanner: Scanner = "full",
     overwrite: Overwrite = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
+    plan_only: PlanOnly = False,
 ) -> None:
     """Drive a robot through a moving office, and compare SLAM with odometry.
 
@@ -48,7 +50,8 @@ def demo(
     nothing changes out of sight, unless --crowd and --change say so.
     """
     check(["shunting"], scene)
-    from scripts.single_run.run import on_scene
+    from scripts.pace import announce, timed
+    from scripts.single_run.run import on_scene, on_scene_work
     from scripts.single_run.session import Outputs
 
     outputs = Outputs(folder=out, command="demo", overwrite=overwrite, film=film, film_fps=FILM_FPS)
@@ -56,4 +59,8 @@ def demo(
     settings = held.world(scene, dynamism, seed) | {
         "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
     }  # fmt: skip
-    on_scene(["shunting"], settings, outputs)
+    work = on_scene_work(["shunting"], seconds, film)
+    announce(f"{seconds:g} s of {scene}" + ", filmed" * film, [work])
+    if not plan_only:
+        with timed(work):
+            on_scene(["shunting"], settings, outputs)

@@ -18,6 +18,7 @@ from scripts.options import (
     CrowdOption,
     Jobs,
     MotionLevels,
+    PlanOnly,
     Scanner,
     Set,
     axis_levels,
@@ -54,6 +55,7 @@ def drive(
     ] = None,
     scanner: Scanner = "full",
     jobs: Jobs = 1,
+    plan_only: PlanOnly = False,
     set_: Set = None,
 ) -> None:
     """Drive to a goal in every room, steered by each SLAM's estimate; truth only scores.
@@ -65,9 +67,9 @@ def drive(
     """
     slams = with_set(named(slam), set_ or [])
     check(slams, scene)
-    from scripts import workers
+    from scripts import pace, workers
     from scripts.closed_loop.make import carry_out, said, success_table
-    from scripts.closed_loop.plan import Plan
+    from scripts.closed_loop.plan import RUNS, Plan
     from scripts.pages.page import Page, Part, command, publish
     from sim.loop.config import LoopConfig
 
@@ -85,6 +87,10 @@ def drive(
         loop=LoopConfig(plan_on=plan_on, limit_s=seconds, scans=every_of(scanner, every, 4)),
         scanner=scanner,
     )
+    missing = [job for _, job in plan.jobs() if not (out / RUNS / job.file_name()).exists()]
+    pace.announce(f"{len(missing)} drives", [job.work() for job in missing], jobs)
+    if plan_only:
+        return
     started = time.perf_counter()
     rows = carry_out(plan, out, jobs=jobs)
     table = success_table(plan, rows)

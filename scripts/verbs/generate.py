@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,12 +20,15 @@ from scripts.options import (
     Held,
     Jobs,
     Motion,
+    PlanOnly,
     RobotOption,
     Scanner,
+    named,
     options_with,
     staged,
     sweep,
 )
+from scripts.options import levels as levels_of
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -42,10 +46,14 @@ def generate(
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder of the dataset.")],
-    dynamism: Annotated[float, typer.Option(help="How much the room moves, 0 to 1.")] = 0.5,
-    dynamism_sweep: Annotated[
-        str, typer.Option(help="Several instead, each with the same seeds: start:stop:step.")
-    ] = "",
+    dynamism: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="How much the room moves, 0 to 1, default 0.5; or several, each with the same "
+            "seeds: 0 0.5 1 or start:stop:step."
+        ),
+    ] = None,
+    dynamism_sweep: Annotated[str, typer.Option(help="The same.", hidden=True)] = "",
     motion: Motion = None,
     change: Change = None,
     crowd: CrowdOption = None,
@@ -74,6 +82,7 @@ def generate(
     scanner: Scanner = "full",
     events: EventsOption = None,
     robot: RobotOption = None,
+    plan_only: PlanOnly = False,
 ) -> None:
     """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
 
@@ -84,9 +93,10 @@ def generate(
 
     [bold]mobilia generate office arena --split train:8,validation:1,test:1 --out data[/bold]
     """
-    levels = sweep(dynamism_sweep) if dynamism_sweep else (dynamism,)
-    check([], *scene)
-    from scripts import workers
+    levels = sweep(dynamism_sweep) if dynamism_sweep else levels_of(dynamism or ["0.5"])
+    rooms = named(scene)
+    check([], *rooms)
+    from scripts import pace, workers
     from scripts.dataset import carry_out
     from sim.recording.dataset import Plan
     from sim.recording.recipe import Recipe
@@ -97,18 +107,24 @@ def generate(
     parts = split_of(split)
     Held(motion=motion, change=change, crowd=crowd)  # complains by the options' names
     first = Recipe(
-        scene=scene[0], seed=seed, dynamism=levels[0], motion=motion, change=change,
+        scene=rooms[0], seed=seed, dynamism=levels[0], motion=motion, change=change,
         seconds=seconds, scanner=scanner, options=options_with(crowd),
         **staged(events, robot),
     )  # fmt: skip
     plan = Plan(
         recipe=first, dynamisms=levels, twins=twins, sessions=sessions, split=parts,
         episodes=sum(dict(parts).values()) or (1 if episodes is None else episodes),
-        scenes=tuple(scene) if len(scene) > 1 else (),
+        scenes=rooms if len(rooms) > 1 else (),
     )  # fmt: skip
     workers.check_jobs(jobs)
-    for name in scene:  # a wrong name is told, and a module found, before anything starts
+    for name in rooms:  # a wrong name is told, and a module found, before anything starts
         registry.find(name)
+    there = set(os.listdir(out)) if out.is_dir() else set()
+    missing = [job for job in plan.jobs() if not there.issuperset(plan.folders(job))]
+    works = [pace.Work(f"generate {job.scene}", job.seconds) for job in missing]
+    pace.announce(f"{len(missing)} of {len(plan.jobs())} drives to record", works, jobs)
+    if plan_only:
+        return
     table = carry_out(plan, out, jobs=jobs, cluster=cluster)
     console.print(table)
     _page(plan, out, table)

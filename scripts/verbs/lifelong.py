@@ -12,7 +12,7 @@ from rich.markup import escape
 
 from scripts.console import console, say, working
 from scripts.names import check
-from scripts.options import CrowdOption, Motion, Overwrite, Scanner, options_with
+from scripts.options import CrowdOption, Motion, Overwrite, PlanOnly, Scanner, named, options_with
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -25,7 +25,9 @@ def lifelong(
         Path | None,
         typer.Argument(help="A dataset of [bold]mobilia generate --sessions[/bold]."),
     ] = None,
-    slam: Annotated[str, typer.Option(help="SLAMs, by name, with commas.")] = "shunting,occupancy",
+    slam: Annotated[
+        list[str] | None, typer.Option(help="SLAMs: --slam A B C; default shunting occupancy.")
+    ] = None,
     scene: Annotated[
         str | None, typer.Option(help="Or a scene, whose sessions are simulated here.")
     ] = None,
@@ -44,6 +46,7 @@ def lifelong(
     scanner: Scanner = "full",
     out: Annotated[Path | None, typer.Option(help="Folder to write; default out/lifelong.")] = None,
     overwrite: Overwrite = False,
+    plan_only: PlanOnly = False,
 ) -> None:
     """Let SLAMs live in a building: each session starts anywhere in the map of those before.
 
@@ -53,17 +56,22 @@ def lifelong(
     """
     if (folder is None) == (scene is None):
         raise InvalidValueError("name exactly one of FOLDER and --scene")
-    names = list(dict.fromkeys(name.strip() for name in slam.split(",") if name.strip()))
+    names = list(dict.fromkeys(named(["shunting", "occupancy"] if slam is None else slam)))
     if not names:
         raise InvalidValueError("--slam must name at least one SLAM")
     check(names, *([scene] if scene else []))
     from scripts.days import sessions as days
     from scripts.days.buildings import FIRST
+    from scripts.pace import Work, announce, timed
     from sim.recording.recipe import MAX_SECONDS, Recipe
 
     if folder is not None:
-        days.recorded(folder)  # complains before anything is written
-        _write(names, days.read(folder), {"dataset": folder.name}, out, overwrite)
+        count = len(days.recorded(folder))  # complains before anything is written
+        work = Work(f"lifelong, recorded, {' '.join(names)}", count)
+        announce(f"{count} sessions, {len(names)} SLAMs", [work])
+        if not plan_only:
+            with timed(work):
+                _write(names, days.read(folder), {"dataset": folder.name}, out, overwrite)
         return
     assert scene is not None
     recipe = Recipe(
@@ -75,8 +83,13 @@ def lifelong(
         raise InvalidValueError(
             f"--first-seconds must be > 0 and at most {MAX_SECONDS:g}, got {first_s}"
         )
-    drives = days.simulated(recipe, sessions, first_s)
-    _write(names, drives, _settings(recipe, sessions, first_s), out, overwrite)
+    work = Work(f"lifelong {' '.join(names)}", first_s + seconds * (sessions - 1))
+    announce(f"{sessions} sessions of {scene}, {len(names)} SLAMs", [work])
+    if plan_only:
+        return
+    with timed(work):
+        drives = days.simulated(recipe, sessions, first_s)
+        _write(names, drives, _settings(recipe, sessions, first_s), out, overwrite)
 
 
 def _settings(recipe: Recipe, sessions: int, first_seconds: float) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from scripts.options import (
     Motion,
     Oracles,
     Overwrite,
+    PlanOnly,
     RobotOption,
     ScanHeight,
     Scanner,
@@ -28,6 +29,7 @@ from scripts.options import (
     Set,
     Strict,
     TextFormat,
+    named,
     staged,
     with_oracles,
 )
@@ -72,6 +74,7 @@ def run(
     ] = None,
     overwrite: Overwrite = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
+    plan_only: PlanOnly = False,
     map_in: Annotated[
         Path | None,
         typer.Option(help="Begin anywhere in this map of days before (docs/days.md); with --log."),
@@ -94,12 +97,14 @@ def run(
     """
     if (log is None) == (scene is None):
         raise InvalidValueError("name exactly one of --log and --scene")
-    slams = list(with_oracles(slam, oracle, set_))
+    slams = list(with_oracles(named(list(slam)), oracle, set_))
     check(slams, scene)
+    from scripts.pace import announce, timed
+
     if scene is not None:
         of_a_log = strict or flip or laser is not None or text_format is not None
         _without_a_log(strict=of_a_log, maps=bool(map_in or map_out or at))
-        from scripts.single_run.run import on_scene
+        from scripts.single_run.run import on_scene, on_scene_work
         from scripts.single_run.session import Outputs
 
         folder = out or Path("out") / f"run-{scene.replace(':', '-')}"
@@ -109,15 +114,23 @@ def run(
             "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
             **staged(events, robot),
         }  # fmt: skip
-        on_scene(slams, settings, outputs)
+        work = on_scene_work(slams, seconds, film)
+        announce(f"{seconds:g} s of {scene}" + ", filmed" * film, [work])
+        if not plan_only:
+            with timed(work):
+                on_scene(slams, settings, outputs)
     elif log is not None:
         from scripts.days.one import Maps
-        from scripts.single_run.run import Log, on_log
+        from scripts.single_run.run import Log, on_log, on_log_work
 
         maps = Maps(map_in=map_in, map_out=map_out, at=at)
         folder = out or Path("out") / f"run-{run_name(log)}"
         recorded = Log(path=log, strict=strict, text_format=text_format, laser=laser, flip=flip)
-        on_log(slams, recorded, folder, overwrite=overwrite, film=film, maps=maps)
+        work = on_log_work(slams, log, film)
+        announce(f"{log.name}, {work.amount / len(slams):.1f} MB" + ", filmed" * film, [work])
+        if not plan_only:
+            with timed(work):
+                on_log(slams, recorded, folder, overwrite=overwrite, film=film, maps=maps)
 
 
 def _without_a_log(*, strict: bool, maps: bool) -> None:

@@ -45,7 +45,7 @@ class Rooms(VecEnv):  # type: ignore[misc]
 
     def reset(self) -> Any:
         """All rooms anew; their observations."""
-        seeds = None if None in self._seeds else list(self._seeds)
+        seeds: Any = None if None in self._seeds else list(self._seeds)
         observations, _ = self.rooms.reset(seed=seeds)
         self._reset_seeds()
         return observations

@@ -15,7 +15,7 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from slam.bounded import check_file
-from slam.errors import LogFormatError, MobiliaError
+from slam.errors import LogFormatError, MissingPathError, MobiliaError
 from slam.logs import unpacking
 
 SCAN = "sensor_msgs/msg/LaserScan"
@@ -46,7 +46,7 @@ def failing_as_ours(path: Path, where: str = "") -> Iterator[None]:
     except MobiliaError:
         raise
     except FileNotFoundError as error:
-        raise LogFormatError(path, "no such file") from error
+        raise MissingPathError(path, "no such file") from error
     except OSError as error:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
     except Exception as error:  # parsers of foreign bytes fail in every way
@@ -66,7 +66,7 @@ class Bag:
         self.path = path
         self.is_ros1 = path.suffix == ".bag" and not path.is_dir()
         if not path.exists():
-            raise LogFormatError(path, "no such file")
+            raise MissingPathError(path, "no such file")
         for file in path.iterdir() if path.is_dir() else [path]:
             if file.exists() and not file.is_dir():
                 check_file(file)

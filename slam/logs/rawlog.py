@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from slam import se2
-from slam.errors import LogFormatError
+from slam.errors import LogFormatError, MissingPathError
 from slam.frames import Float, Stream
 from slam.logs.rawlog_objects import MoveObject, Object, Objects, OdometryObject, ScanObject, Torn
 from slam.logs.repairs import TORN_LINE, Repairs
@@ -83,8 +83,10 @@ def _unpacked(path: Path, repairs: Repairs) -> bytes:
     """The bytes, up to ``MAX_RAWLOG_BYTES``; a gzip file that was cut gives what is there."""
     out = bytearray()
     try:
+        if not path.exists():
+            raise MissingPathError(path, "no such file")
         if not path.is_file():
-            raise LogFormatError(path, "no such file" if not path.exists() else "is no file")
+            raise LogFormatError(path, "is no file")
         with path.open("rb") as raw:
             packed = raw.read(2) == _GZIP
             raw.seek(0)

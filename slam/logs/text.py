@@ -18,7 +18,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import BinaryIO, cast
 
-from slam.errors import LogFormatError
+from slam.errors import LogFormatError, MissingPathError
 from slam.frames import NS_PER_S
 from slam.logs.repairs import TORN_LINE, Repairs
 from slam.logs.unpacking import MAX_TEXT_BYTES, open_xz
@@ -99,7 +99,7 @@ def numbered_lines(path: Path, repairs: Repairs | None = None) -> Iterator[tuple
     number, total = 0, 0
     try:
         if not path.exists():
-            raise LogFormatError(path, "no such file")
+            raise MissingPathError(path, "no such file")
         if not path.is_file():  # a pipe or device might never end
             raise LogFormatError(path, "is not a regular file")
         with _open(path) as file:

@@ -65,7 +65,19 @@ def test_the_time_left_of_few_long_steps_is_that_of_all_so_far():
     now = 99.0
     bar.advance(task, 2)  # two that ended together
     now = 150.0
-    assert console._words(bar.tasks[0]) == "simulating: 150 s so far, about 300 s left"
+    assert console._words(bar.tasks[0]) == "simulating: 150 s so far, about 5 min left"
+
+
+def test_what_was_there_before_is_not_of_the_pace():
+    bar = Progress(get_time=lambda: now)
+    now = 0.0
+    bar.add_task("simulating", total=1000, completed=900, before=900)
+    now = 50.0
+    bar.advance(bar.task_ids[0], 50)
+    assert console._words(bar.tasks[0]) == "simulating: 50 s so far, about 50 s left"
+    assert [console.in_time(s) for s in (7.4, 52.0, 250.0, 9000.0)] == [
+        "7 s", "50 s", "4 min", "2.5 h",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("say", [console.note, console.fact])

@@ -21,7 +21,7 @@ from scripts.comparison.entry import lost_at
 from scripts.comparison.plan import Plan
 from scripts.comparison.rules import Table, number, word
 from scripts.experiments import dynamism_curve
-from scripts.option_names import ManyValues, repeated
+from scripts.option_names import Verb, repeated
 from scripts.options import levels
 from scripts.verbs import compare as verb
 from slam import Estimate, Trajectory, se2, system
@@ -209,7 +209,7 @@ def test_words_after_a_list_option():
 def test_the_command_line_of_the_readme(monkeypatch):
     seen = {}
     app = typer.Typer()
-    app.command(cls=ManyValues)(verb.compare)
+    app.command(cls=Verb)(verb.compare)
 
     def carry_out(plan, out, **ways):
         seen.update(plan=plan, out=out, ways=ways)

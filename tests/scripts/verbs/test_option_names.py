@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+from typer._completion_classes import BashComplete
 from typer.main import get_command
 
 from scripts.cli import app
@@ -35,7 +36,7 @@ from scripts.option_names import OPTIONS_OF, by_option, flowing
 )
 def test_the_option_is_named_and_no_field(tmp_path: Path, called, words: str, says: str):
     done = called(*words.split(), "--out", tmp_path / "out")
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert says in done.stderr
     assert not re.search(r"\b[A-Z]\w+\.[a-z]", done.stderr)
     assert list(tmp_path.iterdir()) == []
@@ -66,3 +67,20 @@ def test_a_paragraph_of_help_is_one_line():
     assert flowing("First.\n\nOne that\nis long.\n") == "First.\n\nOne that is long."
     for command in get_command(app).commands.values():
         assert not re.search(r"[^\n]\n[^\n]", command.help or ""), command.name
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("run sh", {"shunting", "shunting-features"}),
+        ("run shunting,ek", {"shunting,ekf"}),
+        ("run shunting --scene off", {"office"}),
+        ("compare --slam shunting oc", {"occupancy"}),
+        ("benchmark --tracks rush", {"rush-hour-v1"}),
+        ("live --scanner utm", {"utm30lx"}),
+    ],
+)
+def test_a_shell_completes_names(words: str, found: set[str]):
+    shell = BashComplete(get_command(app), {}, "mobilia", "_MOBILIA_COMPLETE")
+    *before, begun = words.split()
+    assert {item.value for item in shell.get_completions(before, begun)} == found

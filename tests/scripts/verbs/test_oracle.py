@@ -40,7 +40,7 @@ def test_a_log_has_no_labels(tmp_path: Path, called: Callable[..., SimpleNamespa
     write_carmen(log, stream("arena", seconds=0.5, n_chairs=2))
     words = ("run", "odometry", "--oracle", "shunting", "--log", log, "--out", tmp_path / "out")
     done = called(*words, "--no-film")
-    assert done.returncode == 1
+    assert done.returncode == 2
     said = " ".join(done.stderr.split())
     assert "oracle(shunting): it.log has no labels" in said
     assert "--scene" in said
@@ -50,7 +50,7 @@ def test_a_log_has_no_labels(tmp_path: Path, called: Callable[..., SimpleNamespa
 def test_a_word_that_is_no_oracle_is_one_line(called: Callable[..., SimpleNamespace]):
     for word, says in (("shuntin", "Did you mean 'shunting'"), ("ekf,often", "movable or moving")):
         done = called("run", "odometry", "--oracle", word, "--scene", "arena")
-        assert done.returncode == 1
+        assert done.returncode == 2
         assert says in " ".join(done.stderr.split())
 
 

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What will run, and about how long: from what such work took on this machine before.
+
+The rates lie in the user's cache folder, in no result; who loses them loses estimates only.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from scripts.console import in_time, say
+from slam.files import make_folder, write_text
+
+KEPT = 0.6  # of a rate that is known, when another is measured
+MOST_KINDS = 1000  # in the file; the oldest go first
+MOST_BYTES = 1 << 20
+
+
+class Work(NamedTuple):
+    """``amount`` (simulated s, MB or jobs) of one ``kind`` of work."""
+
+    kind: str
+    amount: float = 1.0
+
+
+def state() -> Path:
+    """Where the rates lie."""
+    folder = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(folder) / "mobilia" / "pace.json"
+
+
+def rates() -> dict[str, float]:
+    """s of each amount of 1, by kind; none where there is no such file."""
+    with suppress(OSError, ValueError, RecursionError):
+        with state().open("rb") as file:
+            found = json.loads(file.read(MOST_BYTES))
+        if isinstance(found, dict):
+            return {str(k): float(v) for k, v in found.items() if _is_rate(v)}
+    return {}
+
+
+def _is_rate(value: object) -> bool:
+    return isinstance(value, int | float) and math.isfinite(value) and value >= 0.0
+
+
+def learn(spent: Iterable[tuple[Work, float]]) -> None:
+    """Take in how many seconds each piece of work took. Where nothing can be kept, nothing is."""
+    known = rates()
+    for work, seconds in spent:
+        rate = seconds / max(work.amount, 1e-9)
+        before = known.pop(work.kind, rate)
+        known[work.kind] = KEPT * before + (1.0 - KEPT) * rate
+    with suppress(OSError):
+        make_folder(state().parent)
+        write_text(state(), json.dumps(dict(list(known.items())[-MOST_KINDS:])) + "\n")
+
+
+@contextmanager
+def timed(work: Work) -> Iterator[None]:
+    """Learn how long the block takes, if it ends well."""
+    started = time.perf_counter()
+    yield
+    learn([(work, time.perf_counter() - started)])
+
+
+def estimate(works: Iterable[Work], processes: int = 1) -> float | None:
+    """s; a kind that has not run here takes as long as the slowest one like it, another SLAM's or
+    scene's; None where there is none."""
+    known = rates()
+    each = [work.amount * known.get(work.kind, _like(work.kind, known)) for work in works]
+    whole = max(sum(each) / max(processes, 1), max(each, default=0.0))
+    return None if math.isnan(whole) else whole
+
+
+def _like(kind: str, known: dict[str, float]) -> float:
+    like = kind.rpartition(" ")[0]
+    found = [rate for other, rate in known.items() if other.rpartition(" ")[0] == like]
+    return max(found, default=math.nan)
+
+
+def announce(what: str, works: Iterable[Work], processes: int = 1) -> None:
+    """Print what will run, and about how long that takes."""
+    seconds = estimate(works, processes)
+    long = "how long is not known yet on this machine" if seconds is None else (
+        f"about {in_time(seconds)}"
+    )  # fmt: skip
+    say(f"Ahead: {what}; {long}.", highlight=False)

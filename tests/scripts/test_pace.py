@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Estimates come from what work took before, in a cache that nobody has to have."""
+
+from __future__ import annotations
+
+import pytest
+
+from scripts import pace
+from scripts.pace import Work
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+def test_what_ran_before_tells_how_long_it_takes(capsys):
+    works = [Work("run a", 10.0), Work("run a", 30.0)]
+    assert pace.estimate(works) is None
+    pace.announce("two runs", works)
+    assert "not known yet" in capsys.readouterr().out
+    pace.learn([(Work("run a", 5.0), 10.0)])
+    assert pace.estimate(works) == pytest.approx(80.0)
+    assert pace.estimate(works, processes=2) == pytest.approx(60.0)  # the longer one alone
+    assert pace.estimate([Work("run b", 1.0)]) == pytest.approx(2.0)  # like the others
+    assert pace.estimate([Work("walk a")]) is None
+    pace.learn([(Work("run a", 5.0), 5.0)])
+    assert pace.rates()["run a"] == pytest.approx(0.6 * 2.0 + 0.4 * 1.0)
+    pace.announce("two runs", works)
+    assert capsys.readouterr().out == "Ahead: two runs; about 65 s.\n"
+    assert pace.estimate([]) == 0.0
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", '{"run a": "x"}', '{"run a": Infinity}', "\x00"])
+def test_a_damaged_cache_is_none(text):
+    pace.state().parent.mkdir(parents=True)
+    pace.state().write_text(text)
+    assert pace.estimate([Work("run a")]) is None
+    pace.learn([(Work("run a"), 2.0)])
+    assert pace.estimate([Work("run a")]) == 2.0
+
+
+def test_a_cache_that_cannot_be_written_is_left(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    pace.learn([(Work("run a"), 2.0)])
+    with pytest.raises(ValueError, match="it failed"), pace.timed(Work("run a")):
+        raise ValueError("it failed")
+    assert pace.rates() == {}
