@@ -222,10 +222,15 @@ def _node(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
 
 
-def look_at(camera: Any, bounds: Sequence[float]) -> None:
-    """Where a page's camera is at first: south of the room and above it."""
+def look_at(camera: Any, bounds: Sequence[float], *, upright: bool = False) -> None:
+    """Where a page's camera is at first: south of the room and above it; on an ``upright`` screen
+    its longer side goes up."""
     xmin, ymin, xmax, ymax = bounds
-    middle = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 0.0)
-    far = max(0.7 * (xmax - xmin), ymax - ymin)
-    camera.position = (middle[0], middle[1] - 0.75 * far, 0.85 * far)
+    middle, wide, high = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 0.0), xmax - xmin, ymax - ymin
+    far = max(0.7 * wide, high)
+    away = (0.0, -0.75 * far, 0.85 * far)
+    if upright:
+        far = max(1.3 * min(wide, high), 0.75 * max(wide, high))
+        away = (-0.45 * far, 0.0, far) if wide > high else (0.0, -0.45 * far, far)
+    camera.position = tuple(m + a for m, a in zip(middle, away, strict=True))
     camera.look_at = middle

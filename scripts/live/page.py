@@ -37,7 +37,8 @@ from slam.errors import MobiliaError
 from slam.system import names as slams
 
 STATUS_S, PLOT_S = 0.2, 0.5  # of the wall: so often the words and the plot are told anew
-MOST_SAID = 8  # lines of events
+MOST_SAID = 4  # lines of events
+ANSWER_S = 4.0  # of the wall: so long the title says what was done
 BACK_S = 5.0  # that a key looks back
 HOLD_HZ = 4.0  # twists a second while a key of the pad is held
 SHOVE, CARRY = "shove or open", "carry the robot there"
@@ -64,13 +65,14 @@ class Page:
         self._series: deque[tuple[float, ...]] = deque(maxlen=1200)
         self._shown_s = self._plot_s = -math.inf
         self._wall = time.monotonic
+        self._answer, self._answer_until, self._labelled = "", 0.0, ""
         self._back_s = 0.0  # of the moment that is shown
         self._status = gui.add_html("starting: inner loops are compiled the first time")
         self._plot = self._plotted()
         self._events = gui.add_html("")
-        self._time()
         if settings["room"]:
             self._driving(scene)
+        self._time()
         self._world(settings)
 
     # -- what is told -------------------------------------------------------------------------
@@ -90,6 +92,8 @@ class Page:
             self._shown_s = now
             self._status.content = self._words(shown, playback, session, off, claimed)
             self._play.label = "Pause" if playback.playing else "Play"
+            verdict = f"{shown.seconds:.0f} s · {name}: {shown.verdict(name)}"
+            self._label(self._answer if now < self._answer_until else verdict)
         if now - self._plot_s >= PLOT_S and len(self._series) > 1:
             self._plot_s = now
             seconds, offs, claims = np.array(self._series).T
@@ -97,9 +101,17 @@ class Page:
             self._plot.data = (seconds[kept], 100.0 * offs[kept], 100.0 * claims[kept])
 
     def say(self, text: str) -> None:
-        """A line for the log of events, at once."""
+        """A line for the log of events, at once; for a while the panel's title says it too."""
         self._said.appendleft(text)
         self._events.content = _lines(self._said)
+        self._answer, self._answer_until = text[:60], self._wall() + ANSWER_S
+        self._label(self._answer)
+
+    def _label(self, text: str) -> None:
+        """The title of the panel, which is all of it that a phone shows at first."""
+        if text != self._labelled:
+            self._labelled = text
+            self._gui.set_panel_label(text)
 
     def restart(self) -> None:
         """Another run begins."""

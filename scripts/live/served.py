@@ -12,6 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from scripts.live.drawn import LOG_BOUNDS, look_at
 from scripts.live.gate import SECRET, Gate, hidden_host, new_token
 from slam.errors import InvalidValueError, MissingDependencyError
 
@@ -26,9 +29,22 @@ def require() -> Any:
         ) from error
 
 
+# viser's panel covers most of a phone: there it begins as a strip, whose handle opens half of it
+_PHONE = b"""<style>@media (max-width: 600px) {
+[style*="max-height: 60%"] { width: 100% !important; max-height: 50% !important }
+[style*="max-height: 60%"] * { max-width: 100vw }
+}</style><script>
+if (innerWidth <= 600) new MutationObserver((_, seen) => {
+  const handle = document.querySelector('[style*="max-height: 60%"] [style*="cursor: pointer"]');
+  if (handle) { seen.disconnect(); setTimeout(() => handle.click(), 500) }
+}).observe(document, {childList: true, subtree: true})
+</script></head>"""
+
+
 def page_of(viser: Any) -> bytes:
     """The page that viser's wheel brings: one file, whole without a net."""
-    return (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
+    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
+    return page.replace(b"</head>", _PHONE, 1)
 
 
 class Served:
@@ -43,10 +59,12 @@ class Served:
         host = hidden_host()
         with contextlib.redirect_stdout(io.StringIO()):  # it prints where it listens
             self._viser = viser.ViserServer(host, port=0, label=title, verbose=False)
+        self._bounds: Sequence[float] = LOG_BOUNDS
         secret = secrets.token_urlsafe(16)
         _only_from_gate(self._viser, secret)
         self.scene, self.gui = self._viser.scene, self._viser.gui
         self.camera = self._viser.initial_camera
+        self._viser.on_client_connect(self._turn_for_phone)
         self.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         self.behind = behind = (host, int(self._viser.get_port()))
         try:
@@ -63,6 +81,20 @@ class Served:
     def token(self) -> str:
         """What the address must hold, where others can reach it; else empty."""
         return self._gate.rules.token
+
+    def look_at(self, bounds: Sequence[float]) -> None:
+        """Let pages that come show that room."""
+        self._bounds = bounds
+        look_at(self.camera, bounds)
+
+    def _turn_for_phone(self, client: Any) -> None:
+        """Once a page shows the first view, turn it where the screen is upright."""
+
+        @client.camera.on_update  # type: ignore[untyped-decorator]
+        def _(camera: Any) -> None:
+            first = np.allclose(camera.position, self.camera.position, atol=0.01)
+            if first and camera.aspect < 1.0:
+                look_at(camera, self._bounds, upright=True)
 
     def clients(self) -> dict[int, Any]:
         """Who is there, as viser's handles."""

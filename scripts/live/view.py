@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scripts import interrupt
-from scripts.live.drawn import Drawn, look_at
+from scripts.live.drawn import Drawn
 from scripts.live.inbox import MOST_WAITING, Inbox
 from scripts.live.opened import Opener
 from scripts.live.pace import Pace
@@ -43,7 +43,7 @@ class View:
             },
         )  # fmt: skip
         self._begin(playing=playing, speed=speed)
-        look_at(self.served.camera, self._drawn.bounds)
+        self.served.look_at(self._drawn.bounds)
 
     def _begin(self, *, playing: bool, speed: float) -> None:
         """Show the session from its start."""

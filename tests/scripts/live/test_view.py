@@ -121,6 +121,35 @@ def test_a_click_shoves_the_chair_that_is_seen_there(browser: Browser, view: Vie
     until(lambda: f"you: {world.mover_names[row]} is pushed" in words(browser))
 
 
+def test_a_phone_shows_the_room_upright_and_a_tap_shoves(view: View, tmp_path: Path):
+    if CHROMIUM is None:
+        pytest.skip("needs chromium")
+    size, before = (390, 780), set(view.served.clients())
+    world = view.session.hands.simulation.world
+    with Browser(tmp_path, gl=True) as phone:
+        phone.open(f"http://127.0.0.1:{view.served.port}/", *size)
+        until(lambda: set(view.served.clients()) - before)
+        (client,) = set(view.served.clients()) - before
+        camera = view.served.clients()[client].camera
+        until(lambda: abs(camera.position[0] - camera.look_at[0]) > 1.0)  # its long side is up
+        until(lambda: "Drive" not in words(phone))  # the panel is a strip
+        chairs = [k for k, name in enumerate(world.mover_names) if name.startswith("chair")]
+        start = world.mover_poses()[chairs, :2]
+
+        def shoved() -> bool:
+            x, y = projected(camera, (*world.mover_poses()[chairs[0], :2], 0.45), size)
+            phone.call(
+                "Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}]
+            )
+            phone.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+            time.sleep(1.0)
+            moved = world.mover_poses()[chairs, :2] - start
+            return bool((np.hypot(*moved.T) > 0.1).any())
+
+        until(shoved)
+        until(lambda: "is pushed" in words(phone))
+
+
 def projected(camera, place, size) -> tuple[float, float]:
     """CSS pixels of a place in the world, as a camera of viser sees it."""
     w, x, y, z = camera.wxyz
