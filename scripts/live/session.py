@@ -9,6 +9,7 @@ from scripts.film.footage import Footage
 from scripts.live.hands import Hands
 from sim.events import KIDNAP, Event
 from sim.view.moment import Moments, Said, Shown, verdict_of
+from slam.estimate import Raster
 from slam.frames import NS_PER_S
 from slam.replay import Replay
 
@@ -30,6 +31,11 @@ class Session:
         self._events_ns = 0
         self._verdict = "tracking"
         self._known: set[tuple[str, str, float]] = set()
+
+    @property
+    def static_map(self) -> Raster | None:
+        """What never moves, in the world; None for a log."""
+        return None if self.hands is None else self.hands.simulation.world.scene.static_map
 
     def run(self) -> Iterator[Shown]:
         """All frames of the stream."""
