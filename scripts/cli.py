@@ -36,6 +36,7 @@ VERBS: dict[str, type[Verb]] = {
     "list": Verb, "config": Verb, "bench": Verb, "doctor": Verb, "sensor-card": Verb,
     "reproduce": Verb, "compare": ManyValues, "benchmark": ManyValues, "drive": ManyValues,
     "blame": ManyValues, "live": ManyValues, "report": Verb, "lifelong": Verb,
+    "score": Verb,
 }  # fmt: skip
 for _name, _kind in VERBS.items():
     _own = {"list": "listing"}.get(_name, _name.replace("-", "_"))
