@@ -35,7 +35,7 @@ app = typer.Typer(
 VERBS = (
     "demo", "run", "render", "generate", "verify", "export", "list", "config", "bench", "doctor",
     "sensor-card", "reproduce", "compare", "benchmark", "drive", "blame", "live", "report",
-    "lifelong", "twin",
+    "lifelong", "twin", "score",
 )  # fmt: skip
 for _name in VERBS:
     _own = {"list": "listing"}.get(_name, _name.replace("-", "_"))

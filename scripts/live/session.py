@@ -9,6 +9,7 @@ from scripts.film.footage import Footage
 from scripts.live.hands import Hands
 from sim.events import KIDNAP, Event
 from sim.view.moment import BIG_MAP_S, MAP_S, Moments, Said, Shown, verdict_of
+from slam.estimate import Raster
 from slam.frames import NS_PER_S
 
 EVENTS_NS = NS_PER_S // 5
@@ -31,6 +32,11 @@ class Session:
         self._events_ns = 0
         self._verdict = "tracking"
         self._known: set[tuple[str, str, float]] = set()
+
+    @property
+    def static_map(self) -> Raster | None:
+        """What never moves, in the world; None for a log."""
+        return None if self.hands is None else self.hands.simulation.world.scene.static_map
 
     def run(self) -> Iterator[Shown]:
         """All frames of the stream."""

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from scripts import interrupt
 from scripts.live.drawn import Drawn
 from scripts.live.inbox import MOST_WAITING, Inbox
+from scripts.live.network import Network
 from scripts.live.opened import Opener
 from scripts.live.pace import Pace
 from scripts.live.page import CROWDS, Page
@@ -28,8 +29,9 @@ class View:
 
     def __init__(
         self, opener: Opener, address: tuple[str, int], origins: Sequence[str] = (), *,
-        playing: bool = True, speed: float = 1.0,
+        playing: bool = True, speed: float = 1.0, network: Network | None = None,
     ) -> None:  # fmt: skip
+        self._network = network
         self._opener, self._inbox, self._pace = opener, Inbox(), Pace()
         self.session = opener.open()
         self.served = Served(address, self.session.footage.title, origins)
@@ -47,6 +49,8 @@ class View:
 
     def _begin(self, *, playing: bool, speed: float) -> None:
         """Show the session from its start."""
+        if self._network is not None:
+            self._network.begin(self.session.static_map)
         footage, scene = self.session.footage, self.served.scene
         scene.reset()
         scene.set_up_direction("+z")
@@ -59,6 +63,8 @@ class View:
     def close(self) -> None:
         """Stop listening."""
         self.served.close()
+        if self._network is not None:
+            self._network.close()
 
     def turn(self) -> None:
         """Once round: what pages ask for, then the next moment when it is due."""
@@ -69,6 +75,7 @@ class View:
         self._tell()
         playback = self.playback
         if self._due is None and not playback.resting:
+            self._from_network()
             self._due = playback.advance()
         if self._due is None:
             self._wait(IDLE_S)
@@ -77,6 +84,8 @@ class View:
         if self._wait(self._wait_s(shown)) and (self._due is None or self._wait_s(shown) > 0.0):
             return  # it may have been done away with; a stream of requests does not hold it up
         self._due = None
+        if self._network is not None:
+            self._network.send(shown)
         if self._pace.to_send() or not playback.playing or shown.said:
             self._show(shown)
 
@@ -137,9 +146,21 @@ class View:
         if playback.shown is not None:
             self._page.show(playback.shown, playback, self.session)
 
+    def _from_network(self) -> None:
+        """Do what others on the network ask for, just before the next scan."""
+        if self._network is None:
+            return
+        for request in self._network.requests():
+            try:
+                self._touch(request)
+            except MobiliaError as error:
+                self._network.refuse(str(error))
+
     def _tell(self) -> None:
         """What was refused, and that the run has ended."""
         said = self._inbox.refused()
+        if said is None and self._network is not None:
+            said = self._network.refused()
         if said is not None:
             self._page.say(said)
         if self.playback.ended and not self._told_end:

@@ -29,6 +29,7 @@ from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
+    from scripts.live.network import Network
     from scripts.live.opened import Opener
 
 PORT = 8765
@@ -66,6 +67,10 @@ def live(
     browser: Annotated[
         bool, typer.Option("--open", help="Open the page in this machine's browser, too.")
     ] = False,
+    ros2: Annotated[
+        str | None,
+        typer.Option(help="The robot on a network of ROS 2 as well: dds or zenoh (docs/ros2.md)."),
+    ] = None,
     set_: Set = None,
 ) -> None:
     """Open a page with a running world: watch it, drive in it, push its chairs.
@@ -92,7 +97,11 @@ def live(
     opener = opened.Opener(
         slams=slams, path=path, settings=world if path is None else {}, seconds=seconds
     )
-    _serve(opener, (host, port), allowed, playing=not paused, speed=speed, browser=browser)
+    network = None if ros2 is None else _network(ros2)
+    _serve(
+        opener, (host, port), allowed, playing=not paused, speed=speed, browser=browser,
+        network=network,
+    )  # fmt: skip
 
 
 def _file(scene: str | None, log: Path | None, bag: Path | None) -> Path | None:
@@ -103,13 +112,28 @@ def _file(scene: str | None, log: Path | None, bag: Path | None) -> Path | None:
     return log if log is not None else bag
 
 
+def _network(middleware: str) -> Network:
+    """The robot on the network; ``InvalidValueError``, ``MissingDependencyError``."""
+    from scenes import SCAN_HEIGHT
+    from scripts.live.network import Network
+    from slam.ros.link import domain_of_environment, open_link, open_to_others
+
+    network = Network(open_link(middleware), height_m=SCAN_HEIGHT)
+    whom = "others on the network" if open_to_others() else "this machine's nodes"
+    note(
+        f"ROS 2 over {middleware}, ROS_DOMAIN_ID {domain_of_environment()}: {whom} see the robot, "
+        "drive it and move things."
+    )
+    return network
+
+
 def _serve(
     opener: Opener, address: tuple[str, int], origins: list[str], *, playing: bool, speed: float,
-    browser: bool = False,
+    browser: bool = False, network: Network | None = None,
 ) -> None:  # fmt: skip
     from scripts.live.view import View
 
-    view = View(opener, address, origins, playing=playing, speed=speed)
+    view = View(opener, address, origins, playing=playing, speed=speed, network=network)
     try:
         host, token = address[0], view.served.token
         if token:

@@ -106,6 +106,7 @@ class Assembly:
             (topics.odometry is None or self._odometry.reaches(stamp_ns))
             and (topics.truth is None or self._truth.reaches(stamp_ns))
             and (topics.labels is None or stamp_ns in self._labels)
+            and (topics.increment is None or stamp_ns in self._increments)
         )
 
     def _frame(self, scan: Scan) -> Frame | None:

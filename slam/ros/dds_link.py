@@ -46,7 +46,7 @@ _MOST = 1000  # messages taken at once
 # As ROS does it for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST: found by asking each port in turn.
 _ALONE = (
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces>"
-    "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto"
+    "<AllowMulticast>spdp</AllowMulticast></General><Discovery><ParticipantIndex>auto"
     "</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
     "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
 )

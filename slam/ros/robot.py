@@ -38,24 +38,21 @@ def topics(*, paced: bool = False) -> dict[str, Topic]:
 class Robot:
     """Publishes frames.
 
-    height_m    of the scanner, for /tf_static
-    static_map  what never moves, for /ground_truth/map
-    paced       as of ``topics``
+    height_m  of the scanner, for /tf_static
+    paced     as of ``topics``
     """
 
-    def __init__(
-        self, link: Link, *, height_m: float = 0.0, static_map: Raster | None = None,
-        paced: bool = False,
-    ) -> None:  # fmt: skip
-        self._link, self._height_m, self._map = link, height_m, static_map
+    def __init__(self, link: Link, *, height_m: float = 0.0, paced: bool = False) -> None:
+        self._link, self._height_m = link, height_m
         self.topics = topics(paced=paced)
         for topic in self.topics.values():
             link.advertise(topic)
         self._messages: FrameMessages | None = None
+        self._map: Raster | None = None
 
-    def restart(self) -> None:
-        """The next frame is the first of another drive."""
-        self._messages = None
+    def restart(self, static_map: Raster | None = None) -> None:
+        """The next frame is the first of another drive; what never moves is /ground_truth/map."""
+        self._messages, self._map = None, static_map
 
     def send(self, frame: Frame) -> None:
         """All messages of a frame; without a scan, only those about its motion."""

@@ -72,12 +72,13 @@ class Served:
             if not self._waiting[_SCAN] or not self._waiting[_ODOM]:
                 return
             self._assembly = self._begin()
+        now_ns = time.monotonic_ns()
         for topic in (_STEPS, _ODOM, _SCAN):
             for message in self._waiting[topic]:
-                self._assembly.take(topic.name, 0, message)
+                self._assembly.take(topic.name, now_ns, message)
         for waiting in self._waiting.values():
             waiting.clear()
-        for frame in self._assembly.ready(0):
+        for frame in self._assembly.ready(now_ns):
             self._answer(frame)
 
     def _taken(self, topic: Topic) -> list[Any]:

@@ -31,6 +31,7 @@ from slam.ros.robot import Robot
 from slam.system import register_prefix
 from slam.trajectory import Trajectory
 
+SETTLE_S = 0.5  # from our finding the node to its finding us: what is sent before may be lost
 ANSWER_S = 1.0  # that a scan's answer is waited for, wall clock: a node may skip scans
 
 
@@ -173,6 +174,7 @@ class _Other:
                     f"(ROS_DOMAIN_ID {self._domain.number})", "hung",
                 )  # fmt: skip
             time.sleep(0.02)
+        time.sleep(SETTLE_S)
         self._first, self._heard_s = False, time.monotonic()
 
     def _check_alive(self) -> None:

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an outside node says, and what is made of it: timely, late, silent, wrong, twice."""
+
+from __future__ import annotations
+
+import sys
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from slam import se2
+from slam.errors import InvalidValueError, MissingDependencyError, SlamFailedError
+from slam.estimate import Raster
+from slam.frames import NS_PER_S
+from slam.ros import slam as ros2
+from slam.ros.heard import StampedPose
+from slam.ros.link import Taken, Topic, open_link
+from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
+from slam.ros.navigation_messages import MapMessage
+from slam.ros.node import GRID, POSES, TF, Node
+from slam.ros.recorded import RecordedSlam
+from slam.ros.robot import Robot
+from slam.system import create
+from tests.slam.ros.frames import driven
+
+SAID = np.array([0.5, -0.25, 0.1])  # map -> odom
+
+
+class InMemory:
+    """A link to nobody: what a test puts in is taken."""
+
+    def __init__(self) -> None:
+        self.sent: dict[str, list[bytes]] = defaultdict(list)
+        self.come: dict[str, list[Taken]] = defaultdict(list)
+
+    def advertise(self, topic: Topic) -> None:
+        self.sent[topic.name]
+
+    def subscribe(self, topic: Topic) -> None:
+        self.come[topic.name]
+
+    def publish(self, topic: Topic, data: bytes) -> None:
+        self.sent[topic.name].append(data)
+
+    def take(self, topic: Topic) -> list[Taken]:
+        return self.come.pop(topic.name, [])
+
+
+def transform(stamp_ns: int, pose=SAID, sender: str = "a") -> Taken:
+    return Taken(bytes(TransformMessage((MAP, ODOM, 0.0))(stamp_ns, np.asarray(pose))), sender)
+
+
+@pytest.fixture
+def node() -> tuple[Node, InMemory]:
+    link = InMemory()
+    return Node(link), link
+
+
+FIRST, SECOND = driven(2)
+
+
+def test_the_frame_of_the_first_pose_is_ours_whatever_the_nodes_map_is(node):
+    node, link = node
+    node.sent(FIRST.odometry)
+    assert not node.answered()
+    link.come[TF.name] = [transform(FIRST.stamp_ns)]
+    assert node.answered()
+    assert node.estimate() == pytest.approx(np.zeros(3), abs=1e-15)
+    node.sent(SECOND.odometry)
+    link.come[TF.name] = [transform(SECOND.stamp_ns, SAID + np.array([0.1, 0.0, 0.0]))]
+    assert node.answered()
+    moved = se2.between(FIRST.odometry.T_odom_robot, SECOND.odometry.T_odom_robot)
+    shifted = node.estimate() - moved
+    assert np.hypot(*shifted[:2]) == pytest.approx(0.1)
+
+
+def test_a_late_transform_is_no_answer_and_still_stands(node):
+    node, link = node
+    node.sent(FIRST.odometry)
+    node.sent(SECOND.odometry)
+    link.come[TF.name] = [transform(FIRST.stamp_ns)]
+    assert not node.answered()
+    assert node.T_own_odom is not None
+
+
+def test_a_clock_an_hour_off_is_named(node):
+    node, link = node
+    node.sent(FIRST.odometry)
+    link.come[TF.name] = [transform(FIRST.stamp_ns + 3600 * NS_PER_S)]
+    assert not node.answered()
+    assert node.T_own_odom is None
+    assert "3600 s ahead: run it with use_sim_time:=true" in node.why_silent()
+
+
+def test_malformed_samples_and_a_second_publisher_are_counted_and_left_out(node, caplog):
+    node, link = node
+    node.sent(FIRST.odometry)
+    whole = transform(FIRST.stamp_ns)
+    nan = transform(FIRST.stamp_ns, [np.nan, 0.0, 0.0], sender="c")
+    other = transform(FIRST.stamp_ns, [9.0, 9.0, 0.0], sender="b")
+    link.come[TF.name] = [Taken(whole.data[:30], "c"), Taken(b"", "c"), nan, whole, other]
+    assert node.answered()
+    assert node.odd == {"malformed": 3, "from_others": 1}
+    assert node.estimate() == pytest.approx(np.zeros(3), abs=1e-15)
+    assert "a second node states map -> odom" in caplog.text
+
+
+def test_a_pose_is_an_answer_and_states_the_covariance(node):
+    node, link = node
+    node.sent(FIRST.odometry)
+    spread = np.diag([0.01, 0.02, 0.03])
+    pose = IncrementMessage(MAP)(FIRST.stamp_ns, np.array([1.0, 2.0, 0.0]), spread)
+    link.come[POSES[0].name] = [Taken(bytes(pose), "a")]
+    assert node.answered()
+    assert node.estimate() == pytest.approx(np.zeros(3), abs=1e-15)
+    assert np.sort(np.diag(node.covariance)) == pytest.approx([0.01, 0.02, 0.03])
+
+
+def test_its_map_comes_back(node):
+    node, link = node
+    node.sent(FIRST.odometry)
+    values = np.array([[0.0, 1.0, np.nan], [0.5, 0.25, 0.0]], dtype=np.float32)
+    raster = Raster(values=values, resolution_m=0.1, T_map_origin=np.array([-1.0, -2.0, 0.0]))
+    link.come[GRID.name] = [Taken(bytes(MapMessage(raster)(FIRST.stamp_ns)), "a")]
+    link.come[TF.name] = [transform(FIRST.stamp_ns, np.zeros(3))]
+    assert node.answered()
+    found = node.map()
+    np.testing.assert_array_equal(found.values, values)
+    assert found.T_map_origin == pytest.approx(raster.T_map_origin, abs=1e-9)
+
+
+def test_a_robot_sends_what_a_bag_holds_and_no_truth_where_a_frame_has_none():
+    link = InMemory()
+    robot = Robot(link)
+    for frame in driven(3):
+        robot.send(frame)
+    assert {name: len(sent) for name, sent in link.sent.items() if sent} == {
+        "/ground_truth/time": 1, "/tf_static": 1, "/clock": 3, "/tf": 3, "/odom": 3,
+        "/odom_increment": 3, "/ground_truth/pose": 3, "/ground_truth/tf": 3, "/scan": 3,
+        "/scan_turn": 3,
+    }  # fmt: skip
+
+
+def test_a_recorded_stack_is_looked_up_as_tf2_does():
+    frames = driven(40)
+    said = [StampedPose(f.stamp_ns, SAID) for f in frames[::10]]
+    slam = RecordedSlam(said)
+    estimates = [slam.update(frame) for frame in frames]
+    assert all(e.converged for e in estimates)
+    wanted = [se2.between(frames[0].odometry.T_odom_robot, f.odometry.T_odom_robot) for f in frames]
+    np.testing.assert_allclose([e.T_map_robot for e in estimates], wanted, atol=1e-12)
+    hour_ns = 3600 * NS_PER_S
+    late = [s._replace(stamp_ns=s.stamp_ns + hour_ns) for s in said]
+    with pytest.raises(InvalidValueError, match="--clock-offset -3600"):
+        RecordedSlam(late).update(frames[0])
+    aligned = RecordedSlam(late, clock_offset_s=-3600.0)
+    assert aligned.update(frames[0]).converged
+
+
+def test_recorded_poses_are_carried_on_by_odometry():
+    frames = driven(40)
+    said = [StampedPose(f.stamp_ns, f.odometry.T_odom_robot) for f in frames[::10]]
+    slam = RecordedSlam(said, poses=True)
+    for frame in frames:
+        estimate = slam.update(frame)
+    np.testing.assert_allclose(estimate.T_map_robot, frames[-1].odometry.T_odom_robot, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "match"),
+    [
+        ("ROS_DOMAIN_ID", "233", "0..232, got 233"),
+        ("ROS_DOMAIN_ID", "x", "whole number, got 'x'"),
+        ("ROS_NAMESPACE", "a b", "names between '/', got 'a b'"),
+    ],
+)
+def test_what_the_environment_says_wrong_is_named(monkeypatch, variable, value, match):
+    monkeypatch.setenv(variable, value)
+    with pytest.raises(InvalidValueError, match=match):
+        open_link("dds")
+
+
+def test_without_the_extra_the_error_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "slam.ros.dds_link", None)
+    with pytest.raises(MissingDependencyError, match=r"pip install 'mobilia\[ros2\]'"):
+        open_link("dds")
+
+
+def test_clock_and_transforms_are_the_same_for_all_robots():
+    names = [Topic(name=n, kind="").within("/one") for n in ("/scan", "/tf", "/clock")]
+    assert names == ["/one/scan", "/tf", "/clock"]
+
+
+class TestOverDds:
+    """Real processes on the loopback."""
+
+    @pytest.fixture(autouse=True)
+    def installed(self, monkeypatch):
+        pytest.importorskip("cyclonedds", reason="needs the extra ros2")
+        monkeypatch.setattr(ros2, "ANSWER_S", 0.2)
+
+    def test_nobody_there_is_hung(self):
+        with pytest.raises(SlamFailedError, match="nobody listens to /scan") as raised:
+            create("ros2", first_limit_s=0.3).update(FIRST)
+        assert raised.value.outcome == "hung"
+
+    def test_a_node_that_ends_is_named_with_its_last_words(self):
+        slam = create(f"ros2:{sys.executable} -c 'import sys; sys.exit(\"no map\")'")
+        with pytest.raises(SlamFailedError, match=r"ended with status 1.*no map") as raised:
+            slam.update(FIRST)
+        assert raised.value.outcome == "raised"
+        with pytest.raises(SlamFailedError, match="is over"):
+            slam.update(SECOND)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("middleware", ["dds", "zenoh"])
+def test_a_node_of_ours_says_what_the_same_code_says_here(middleware, monkeypatch):
+    monkeypatch.setattr(ros2, "ANSWER_S", 20.0)  # a busy machine
+    pytest.importorskip({"dds": "cyclonedds", "zenoh": "zenoh"}[middleware])
+    prefix = {"dds": "ros2", "zenoh": "ros2-zenoh"}[middleware]
+    served = create(f"{prefix}:{sys.executable} -m slam.ros.serve odometry {middleware}")
+    own = create("odometry")
+    for frame in driven(50):
+        a, b = served.update(frame), own.update(frame)
+        assert a.diagnostics == {"answered": True}
+        np.testing.assert_allclose(a.T_map_robot, b.T_map_robot, atol=1e-12)
+        np.testing.assert_allclose(a.covariance, b.covariance, atol=1e-12)
+    served.close()
