@@ -14,6 +14,7 @@ import typer
 from scripts import interrupt
 from scripts.console import LogLines, console, fail, note
 from scripts.option_names import Verb
+from scripts.verbs.scene import scene
 from slam.errors import InvalidValueError, MissingPathError, MobiliaError, UnknownNameError
 from slam.names import load, look_in
 
@@ -40,6 +41,8 @@ VERBS = (
 for _name in VERBS:
     _own = {"list": "listing"}.get(_name, _name.replace("-", "_"))
     app.command(_name, cls=Verb)(getattr(import_module(f"scripts.verbs.{_own}"), _own))
+
+app.add_typer(scene, name="scene")
 
 
 def _version(asked: bool) -> None:
