@@ -24,7 +24,7 @@ import numpy as np
 from scipy.stats import rankdata, spearmanr
 
 from scripts.console import note
-from scripts.log_twin.make import REFERENCE, made, recorded
+from scripts.log_twin.make import REFERENCE, housed, made, recorded
 from slam import create
 from slam.errors import InvalidValueError, MobiliaError
 from slam.evaluation.metrics import ate
@@ -76,11 +76,11 @@ def predict(data: Path, logs: Sequence[str], slams: Sequence[str]) -> None:
         raise InvalidValueError(f"{REAL} is there: a prediction comes before what it predicts")
     found: dict[str, Any] = json.loads(PREDICTED.read_text()) if PREDICTED.exists() else {}
     for log in logs:
-        read = recorded(data / LOGS[log], REFERENCE)
         row = found.setdefault(log, {"errors_m": {}, "twin": {}})
-        for seed in SEEDS:
-            with tempfile.TemporaryDirectory() as folder:
-                twin = made(read, Path(folder), seed=seed)
+        with tempfile.TemporaryDirectory() as folder:
+            read, scene = housed(recorded(data / LOGS[log], REFERENCE), Path(folder))
+            twins = [made(read, scene, seed=seed) for seed in SEEDS]
+        for seed, twin in zip(SEEDS, twins, strict=True):
             row["twin"] = twin.words["beside"]
             frames = list(twin.stream)
             for slam in slams:
