@@ -26,7 +26,7 @@ from sim.sensors.odometry.encoders import WheelOdometry
 from sim.sensors.tag_cameras import TagCameras, TagReading
 from sim.world.kidnapping import Kidnapping
 from sim.world.labels import BeamLabeller
-from sim.world.script import Script, cues_of, visitors
+from sim.world.script import Script, cues_of, of_file, visitors
 from sim.world.sweep import Sweep
 from sim.world.world import World
 from slam.errors import InvalidValueError
@@ -64,8 +64,10 @@ class Simulation:
     session    number of a session of the same building (``sim.world.sessions``)
     kidnap_every_s  s after which the robot is carried elsewhere, again and again
                (``sim.world.kidnapping``); None: never
-    events     what happens at stated times, as rows of ``sim.world.script``; None: nothing
-    robot      another than the scene's, by name or from its tables (``sim.world.robots``)
+    events     what happens at stated times, as rows of ``sim.world.script``; None: what the scene's
+               own file says
+    robot      another than the scene's, by name or from its tables (``sim.world.robots``);
+               None: what the scene's own file says
     laser      a scanner by name ("utm30lx", "lms221:noise"; ``sim.sensors.lidar.registry``), a
                ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
@@ -104,7 +106,9 @@ class Simulation:
         **options: Any,
     ) -> None:
         rates = Dynamism.of(dynamism, moving_share, motion=motion, change=change)
-        cues = cues_of(events or ())
+        own = of_file(scene)
+        cues = cues_of(own.get("events", ()) if events is None else events)
+        robot = own.get("robot") if robot is None else robot
         self.world = World(
             scene, seed=seed, dynamism=rates, change=change, session=session, drive=drive,
             start=start, chairs=chairs, visitors=visitors(cues), robot=robot, **options,

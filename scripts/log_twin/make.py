@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenes import filled
+from scenes import build
 from scenes.crowd import crowd_of
 from scenes.crowd_kinds import with_crowd
 from scenes.scene import Scene
@@ -88,24 +88,25 @@ def recorded(path: Path, slam: str) -> Recorded:
     return Recorded(stream=stream, frames=frames, poses=np.array(track.poses), whose=name)
 
 
+def housed(log: Recorded, folder: Path) -> tuple[Recorded, Path]:
+    """The log with its poses put right by the walls, and its building, written into ``folder``."""
+    name = str(log.stream.metadata.extra.get("file", "a log"))
+    scene, poses = written_building(log.frames, log.poses, folder / "building", name)
+    return replace(log, poses=poses), scene
+
+
 def made(
-    log: Recorded,
-    folder: Path,
-    *,
-    seed: int = 0,
-    crowd: str = "none",
-    motion: float = 0.0,
-    scene: Path | None = None,
+    log: Recorded, scene: Path, *, seed: int = 0, crowd: str = "none", motion: float = 0.0
 ) -> Made:
-    """The twin of a log; its building is written into ``folder``, or read from ``scene``."""
-    plan = scene or written_building(log.frames, log.poses, folder / "building.xml")
-    built = with_crowd(filled(plan, seed), crowd_of(crowd), as_many_as_fit=True)
-    fit, sigma_m, unit_m = fitted(log.odometry, log.poses), *_noise(log.stream)
+    """The twin of a log in a scene by its file."""
+    poses = log.poses
+    built = with_crowd(build(str(scene), seed=seed), crowd_of(crowd), as_many_as_fit=True)
+    fit, sigma_m, unit_m = fitted(log.odometry, poses), *_noise(log.stream)
     rng = np.random.default_rng([seed, 1])
     drive = Drive(
         stamps_ns=np.array([frame.stamp_ns for frame in log.frames]),
-        poses=log.poses,
-        odometry=fit.drawn(log.poses, rng),
+        poses=poses,
+        odometry=fit.drawn(poses, rng),
     )
     lives = motion > 0.0
     twin = LogTwin(
@@ -117,7 +118,7 @@ def made(
         "seed": seed, "crowd": crowd, "motion": motion, "poses": log.whose,
         "sigma_m": sigma_m, "range_step_m": unit_m, "odometry": fit.words(),
     }  # fmt: skip
-    found = beside(log.frames, frames, log.poses)
+    found = beside(log.frames, frames, poses)
     return Made(
         stream=_stream(frames, log.spec, settings), scene=built, fit=fit, beside=found,
         words={**settings, "beside": found.words()},

@@ -29,7 +29,8 @@ def twin(
         ),
     ] = "reference",
     scene: Annotated[
-        Path | None, typer.Option(help="The building, a plan in MJCF; default made of the log.")
+        Path | None,
+        typer.Option(help="The building, a TOML or MJCF file; default made of the log."),
     ] = None,
     crowd: Annotated[
         str, typer.Option(help="Who is there besides: none, or like streams:6,groups:4.")
@@ -40,7 +41,7 @@ def twin(
 ) -> None:
     """Make the twin of a log: its building, its way at its times, its scanner, such odometry.
 
-    Writes twin.log, a recording for every verb that takes a log; building.xml, the plan;
+    Writes twin.log, a recording for every verb that takes a log; building.toml, a scene;
     twin.json and differences.png, which lay the scans of both side by side.
 
     [bold]mobilia twin intel.log.xz --out out/intel[/bold]
@@ -64,7 +65,9 @@ def twin(
     with working(f"reading {log.name}"):
         read = make.recorded(log, poses)
     with working("building and driving its twin"):
-        made = make.made(read, folder, seed=seed, crowd=crowd, motion=motion, scene=scene)
+        if scene is None:
+            read, scene = make.housed(read, folder)
+        made = make.made(read, scene, seed=seed, crowd=crowd, motion=motion)
     write_carmen(folder / "twin.log", made.stream)
     words = json.dumps({"log": log.name, **made.words}, indent=1)
     write_text(folder / "twin.json", words + "\n")

@@ -2,12 +2,14 @@
 """Walls moved to where the returns of a log lie: each face of a box by the median of its beams.
 
 A wall of a plan drawn from cells lies within a cell or two of the real one; the scans know it to a
-centimetre. A face moves along its normal and, with many beams, its wall turns a little.
+centimetre. A face moves along its normal and, with many beams, its wall turns a little. Then each
+scan moves to where the walls are, as the poses of a log err by centimetres, too; and so on in turn.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,23 +23,44 @@ LEAST = 6  # beams on a face, to move it
 MOST_M = 0.15  # that a face moves in one round
 THIN_M = 0.02  # thickness that is left of a wall, at least
 OBLIQUE = 0.17  # cosine of incidence; more oblique beams place a face badly
+POSE_NEAR_M, POSE_LEAST = 0.15, 20  # returns that put a pose right: how near to a face, how many
+POSE_HOLDS, POSE_MOST = 5.0, (0.05, 0.05, 0.01)  # returns that a pose weighs; m, m, rad of a round
 TURN_LEAST, TURN_SPAN_M, TURN_MOST = 40, 1.0, 0.03  # beams, m along a face, rad, to turn a wall
 
 
-def moved_to(boxes: Float, lasers: Float, ranges: Float, angles: Float) -> Float:
-    """(n, 5) boxes, cx, cy, half sizes m and yaw rad, as the scans see them.
+def laid(boxes: Float, lasers: Float, ranges: Float, angles: Float) -> tuple[Float, Float]:
+    """(n, 5) boxes, cx, cy, half sizes m and yaw rad, as the scans see them; poses of the scanner.
 
-    lasers  (k, 3) poses of the scanner;  ranges  (k, b) m, NaN for none;  angles  (b,) rad
+    lasers  (k, 3) poses of the scanner, which are put right by the walls a little, in turn
+    ranges  (k, b) m, NaN for none;  angles  (b,) rad
     """
-    out = np.array(boxes, dtype=np.float64)
+    out, poses = np.array(boxes, dtype=np.float64), np.array(lasers, dtype=np.float64)
     for _ in range(ROUNDS if len(out) else 0):
-        rows, faces, inward, along = _residuals(out, lasers, ranges, angles)
-        order = np.argsort(rows * 4 + faces, kind="stable")
-        keys = (rows * 4 + faces)[order]
-        for part in np.split(order, np.flatnonzero(keys[1:] != keys[:-1]) + 1):
+        seen = _residuals(out, poses, ranges, angles)
+        keys = seen.rows * 4 + seen.faces
+        order = np.argsort(keys, kind="stable")
+        for part in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1):
             if len(part) >= LEAST:
-                _move(out[rows[part[0]]], int(faces[part[0]]), inward[part], along[part])
-    return np.round(out, 4)
+                first = part[0]
+                face = int(seen.faces[first])
+                _move(out[seen.rows[first]], face, seen.inward[part], seen.along[part])
+        _put_right(poses, _residuals(out, poses, ranges, angles))
+    return np.round(out, 4), np.round(poses, 6)
+
+
+def _put_right(poses: Float, seen: Seen) -> None:
+    """Move each pose to where its returns lie on the faces: one step of least squares, bounded."""
+    near = np.abs(seen.inward) < POSE_NEAR_M
+    for k in range(len(poses)):
+        own = near & (seen.scans == k)
+        if own.sum() < POSE_LEAST:
+            continue
+        normal, arm = seen.normals[own], seen.points[own] - poses[k, :2]
+        by_turn = normal[:, 1] * arm[:, 0] - normal[:, 0] * arm[:, 1]
+        by = np.column_stack([normal, by_turn])
+        weight = np.eye(3) * [POSE_HOLDS, POSE_HOLDS, POSE_HOLDS * 10.0]
+        step = np.linalg.solve(by.T @ by + weight, by.T @ seen.inward[own])
+        poses[k] += np.clip(step, -np.array(POSE_MOST), POSE_MOST)
 
 
 def _move(box: Float, face: int, inward: Float, along: Float) -> None:
@@ -100,14 +123,27 @@ def _hit(
     return found, side, best
 
 
+class Seen(NamedTuple):
+    """Beams that end near a face: scan, box, face (-u, +u, -v, +v), m inward, m along it.
+
+    normals, points  (n, 2) out of the face; where the return lies
+    """
+
+    scans: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    faces: NDArray[np.int64]
+    inward: Float
+    along: Float
+    normals: Float
+    points: Float
+
+
 @njit
-def _residuals(
-    boxes: Float, lasers: Float, ranges: Float, angles: Float
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Float, Float]:
-    """Of each beam that ends near a face: box, face (-u, +u, -v, +v), m inward, m along it."""
+def _residuals(boxes: Float, lasers: Float, ranges: Float, angles: Float) -> Seen:
+    """Every beam that ends near the face it meets."""
     n, count = ranges.size, 0
-    rows, faces = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    inward, along = np.empty(n), np.empty(n)
+    which = np.empty((3, n), dtype=np.int64)
+    values = np.empty((n, 6))
     reach = np.sqrt(boxes[:, 2] ** 2 + boxes[:, 3] ** 2)
     for k in range(lasers.shape[0]):
         x, y, heading = lasers[k]
@@ -123,12 +159,20 @@ def _residuals(
             deeper = (r - best) * square
             if square < OBLIQUE or abs(deeper) > NEAR_M:
                 continue
-            px, py = (
-                x + r * math.cos(way) - boxes[found, 0],
-                y + r * math.sin(way) - boxes[found, 1],
-            )
+            px, py = x + r * math.cos(way), y + r * math.sin(way)
+            dx, dy = px - boxes[found, 0], py - boxes[found, 1]
             c, s = math.cos(boxes[found, 4]), math.sin(boxes[found, 4])
-            rows[count], faces[count], inward[count] = found, side, deeper
-            along[count] = -s * px + c * py if side < 2 else c * px + s * py
+            out = 1.0 if side % 2 else -1.0
+            which[0, count], which[1, count], which[2, count] = k, found, side
+            values[count, 0], values[count, 4], values[count, 5] = deeper, px, py
+            if side < 2:
+                values[count, 1] = -s * dx + c * dy
+                values[count, 2], values[count, 3] = out * c, out * s
+            else:
+                values[count, 1] = c * dx + s * dy
+                values[count, 2], values[count, 3] = -out * s, out * c
             count += 1
-    return rows[:count], faces[:count], inward[:count], along[:count]
+    which, values = which[:, :count].copy(), values[:count].copy()
+    return Seen(
+        which[0], which[1], which[2], values[:, 0], values[:, 1], values[:, 2:4], values[:, 4:]
+    )

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from scenes.assembly import hull_radius
+from scenes.from_file import tables
 from sim.core.checks import FAR_M, within, word
 from sim.world import hands
 from sim.world.populated import VISITOR
@@ -77,6 +78,14 @@ def read_events(path: str | Path) -> list[dict[str, Any]]:
     except InvalidValueError as error:
         raise LogFormatError(path, str(error)) from error
     return rows
+
+
+def of_file(scene: object) -> dict[str, Any]:
+    """``events`` and ``robot`` that a scene's own TOML file holds; nothing for other scenes."""
+    if not (isinstance(scene, str) and scene.endswith(".toml")):
+        return {}
+    own = tables(Path(scene))
+    return {name: own[key] for key, name in (("event", "events"), ("robot", "robot")) if key in own}
 
 
 def cues_of(rows: Sequence[Mapping[str, Any]]) -> tuple[Cue, ...]:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.twins.faces import moved_to
+from sim.twins.faces import laid
 
 ANGLES = np.radians(np.arange(-60.0, 61.0))
 LASERS = np.array([[0.0, 0.1 * k, 0.0] for k in range(-5, 6)])
@@ -25,11 +25,11 @@ def _ranges(tilt: float) -> np.ndarray:
 
 
 def test_a_face_moves_to_its_returns_and_the_other_stays() -> None:
-    box = moved_to(np.array([[3.1, 0.0, 0.2, 5.0, 0.0]]), LASERS, _ranges(0.0), ANGLES)[0]
+    box = laid(np.array([[3.1, 0.0, 0.2, 5.0, 0.0]]), LASERS, _ranges(0.0), ANGLES)[0][0]
     assert box[0] - box[2] == pytest.approx(3.0, abs=2e-3)
     assert box[0] + box[2] == pytest.approx(3.3, abs=2e-3)
 
 
 def test_a_wall_turns_with_its_returns() -> None:
-    box = moved_to(np.array([[3.1, 0.0, 0.1, 5.0, 0.0]]), LASERS, _ranges(0.02), ANGLES)[0]
+    box = laid(np.array([[3.1, 0.0, 0.1, 5.0, 0.0]]), LASERS, _ranges(0.02), ANGLES)[0][0]
     assert box[4] == pytest.approx(0.02, abs=4e-3)

@@ -15,6 +15,12 @@ from sim.simulation import Simulation
 from sim.world.script import cues_of, read_events
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 
+SHED = """<mujoco><worldbody>
+  <geom name="floor:shed" class="floor" size="3 2 0.1" material="floor_concrete"/>
+  <geom name="wall:north" class="wall" pos="0 2.1 0.55" size="3.2 0.1 0.55"/>
+  <site name="room:shed" type="box" size="3 2 0.01"/>
+  <site name="start:robot" pos="-2 0 0"/> <site name="goal:end" pos="2 0 0"/>
+</worldbody></mujoco>"""
 ROWS = [
     {"at_s": 1.0, "push": "chair0", "towards_m": [2.0, 1.0]},
     {"at_s": 0.5, "enter": 2, "by": [2.0, 2.0]},
@@ -92,3 +98,13 @@ def test_a_file_and_a_recipe_hold_them(tmp_path: Path) -> None:
     path.write_text("[[event]]\nat_s = 4\n")
     with pytest.raises(LogFormatError, match="event 1 must have one of"):
         read_events(path)
+
+
+def test_a_scenes_own_file_may_hold_events_and_a_robot(tmp_path: Path) -> None:
+    (tmp_path / "shed.xml").write_text(SHED)
+    path = tmp_path / "own.toml"
+    text = 'plan = "shed.xml"\nrobot = "turtlebot3"\n'
+    path.write_text(text + "[[event]]\nat_s = 0.2\nenter = 1\nby = [1.0, 0.5]\n")
+    world = Simulation(str(path), seed=1, dynamism=0.0).world
+    assert world.robot is not None
+    assert (world.robot.name, world.people.names) == ("turtlebot3", ["visitor0"])
