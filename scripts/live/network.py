@@ -10,8 +10,9 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from scripts.live.requests import Drive, Kidnap, MoveDoor, OnWorld, Push
+from scripts.live.requests import Drive, OnWorld
 from sim.view.moment import Shown
+from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError, MobiliaError
 from slam.estimate import Raster
 from slam.ros.heard import decoded, pose_of

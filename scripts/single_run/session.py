@@ -31,6 +31,7 @@ from scripts.pages.page import Page, Part, command
 from scripts.single_run import score
 from scripts.single_run.costs import FILM, MAP, PICTURES, SLAM, Costs, in_words
 from scripts.single_run.small_maps import Drawn, drawn, for_file
+from sim.view.draw import Picture
 from slam.errors import InvalidValueError
 from slam.evaluation.consistency import KeptScans
 from slam.files import write_text
@@ -109,18 +110,14 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
                         recording.note(show.shown)
         wall_s = time.perf_counter() - started
         with costs.stage(SLAM), working("closing loops, scoring"):
-            results = score.results(replay, wall_s, machine())
-            for name, found in score.agreeing(replay, kept).items():
-                results["slams"][name]["consistency"] = found
+            results = _scored(replay, wall_s, kept)
         with costs.stage(MAP), working("writing map and paths"):
             _write_paths(folder, replay, int(stream.metadata.extra.get(EPOCH, 0)))
             in_pictures = _write_map(folder, show)
         with costs.stage(PICTURES), working("drawing map, paths and errors"):
             _draw(folder, show, in_pictures)
             if opened is not None and opened.last is not None:
-                poster = None if in_pictures is None else show.poster(in_pictures.map)
-                if poster is None:
-                    poster = opened.last if liveliest.picture is None else liveliest.picture
+                poster = _poster(show, in_pictures, opened.last, liveliest.picture)
                 imageio.imwrite(folder / "poster.png", poster)
         for name, write in _files.items():
             write(folder / name, show)
@@ -131,10 +128,24 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         page = _page(outputs, show, results, table)
         pages.write(folder, page)
     console.print(table)
-    if words := score.agreement_words(results):
+    for words in filter(None, (score.agreement_words(results), in_words(results["cost"]))):
         say(escape(words), highlight=False)
-    say(in_words(results["cost"]), highlight=False)
     pages.tell(outputs.folder, page)
+    return results
+
+
+def _poster(show: Show, drawn: Drawn | None, last: Picture, liveliest: Picture | None) -> Picture:
+    """A log's map in its frame; of a room the liveliest second, or the last."""
+    framed = None if drawn is None else show.poster(drawn.map)
+    if framed is not None:
+        return framed
+    return last if liveliest is None else liveliest
+
+
+def _scored(replay: Replay, wall_s: float, kept: KeptScans) -> dict[str, Any]:
+    results = score.results(replay, wall_s, machine())
+    for name, found in score.agreeing(replay, kept).items():
+        results["slams"][name]["consistency"] = found
     return results
 
 
