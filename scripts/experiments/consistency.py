@@ -8,6 +8,7 @@ Spearman's rank correlation over all runs, with the 95 % interval of a bootstrap
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,16 +19,18 @@ from scipy.stats import spearmanr
 from scripts.comparison.recording import Recording
 from scripts.experiments.honesty import SCENES, crowd
 from scripts.experiments.measured import table
-from scripts.experiments.shared import CM, Row
+from scripts.experiments.shared import Row
 from scripts.experiments.study import Study
 from scripts.metrics.judged import world_truth
 from slam.evaluation import metrics
 from slam.evaluation.consistency import KeptScans
 from slam.evaluation.statistics import RESAMPLES, SEED
+from slam.frames import Float
 from slam.replay import Track
 from slam.system import create
 
 SIGNS = {"sharper_nats": -1.0, "apart_cm": 1.0, "excess_cm": 1.0}  # of what grows with the error
+FEW = 20  # runs with a number: fewer say nothing
 NAMES = {
     "sharper_nats": "the map is less sharp", "apart_cm": "revisits lie apart",
     "excess_cm": "the same beyond neighbours",
@@ -49,42 +52,52 @@ def run(case: Row, recording: Recording) -> Row:
     return {"error_m": error_m} | ({} if found is None else found.block())
 
 
-def correlation(rows: Sequence[Row], key: str) -> tuple[float, float, float, int]:
-    """Spearman's rho of a number and the error, its 95 % interval, and the runs that have both."""
-    whole = [row for row in rows if row.get(key) is not None and "error_m" in row]
-    drives: dict[tuple[str, float, int], list[tuple[float, float]]] = {}
-    for row in whole:
-        pair = SIGNS[key] * row[key], row["error_m"]
-        drives.setdefault((row["scene"], row["motion"], row["seed"]), []).append(pair)
+def correlations(rows: Sequence[Row], key: str) -> list[tuple[str, float, float, float, int]]:
+    """Spearman's rho of a number and the error, its 95 % interval, and of how many runs.
 
-    def rho(chosen: Sequence[int]) -> float:
-        groups = list(drives.values())
-        pairs = np.array([pair for k in chosen for pair in groups[k]])
+    Over all runs, and the mean over drives of that of the SLAMs on one drive: what is asked where
+    one log is at hand.
+    """
+    drives: dict[tuple[str, float, int], list[tuple[float, float]]] = {}
+    for row in rows:
+        if row.get(key) is not None and "error_m" in row:
+            pair = SIGNS[key] * row[key], row["error_m"]
+            drives.setdefault((row["scene"], row["motion"], row["seed"]), []).append(pair)
+    groups = [np.array(pairs) for pairs in drives.values()]
+
+    def rho(pairs: Float) -> float:
         return float(spearmanr(pairs[:, 0], pairs[:, 1]).statistic)
 
-    rng, n = np.random.default_rng(SEED), len(drives)
-    drawn = [rho(rng.integers(0, n, n).tolist()) for _ in range(RESAMPLES)]
-    low, high = np.nanquantile(drawn, [0.025, 0.975]).tolist()
-    return rho(range(n)), low, high, len(whole)
+    def pooled(chosen: Sequence[int]) -> float:
+        return rho(np.vstack([groups[k] for k in chosen]))
+
+    own = {k: rho(pairs) for k, pairs in enumerate(groups) if len(pairs) > 2}
+
+    def within(chosen: Sequence[int]) -> float:
+        found = [own[k] for k in chosen if k in own]
+        return float(np.mean(found)) if found else math.nan
+
+    rng, out = np.random.default_rng(SEED), []
+    draws = [rng.integers(0, len(groups), len(groups)).tolist() for _ in range(RESAMPLES)]
+    for name, of_drives in (("all runs", pooled), ("SLAMs on one drive", within)):
+        low, high = np.nanquantile([of_drives(d) for d in draws], [0.025, 0.975]).tolist()
+        count = sum(map(len, groups))
+        out.append((name, of_drives(range(len(groups))), low, high, count))
+    return out
 
 
 def tell(rows: Sequence[Row]) -> str:
-    """The correlations, and the errors by how far revisits lie apart."""
+    """The correlations of each number."""
     lines = []
     for key, name in NAMES.items():
-        rho, low, high, n = correlation(rows, key)
-        lines.append([f"{name} (`{key}`)", f"{rho:.2f}", f"{low:.2f} to {high:.2f}", str(n)])
-    parts = [table(("where", "Spearman's rho with the error", "95 %", "runs"), lines)]
-    steps = [(0.0, 3.0), (3.0, 6.0), (6.0, 12.0), (12.0, np.inf)]
-    lines = []
-    for low, high in steps:
-        own = [CM * row["error_m"] for row in rows if low <= (row.get("apart_cm") or -1.0) < high]
-        if own:
-            word = f"{low:g} to {high:g}" if np.isfinite(high) else f"{low:g} and more"
-            q = np.quantile(own, [0.1, 0.5, 0.9])
-            lines.append([word, str(len(own)), f"{q[1]:.1f}", f"{q[0]:.1f} to {q[2]:.1f}"])
-    heads = ("revisits apart, cm", "runs", "true error, cm, median", "80 % of the runs")
-    return "\n\n".join([*parts, table(heads, lines)])
+        have = sum(row.get(key) is not None for row in rows)
+        if have < FEW:
+            lines.append([f"{name} (`{key}`)", "–", "too few to tell", "", str(have)])
+            continue
+        for over, rho, low, high, n in correlations(rows, key):
+            interval = f"{low:.2f} to {high:.2f}"
+            lines.append([f"{name} (`{key}`)", over, f"{rho:.2f}", interval, str(n)])
+    return table(("where the error is larger", "over", "Spearman's rho", "95 %", "runs"), lines)
 
 
 STUDY = Study(

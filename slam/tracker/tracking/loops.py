@@ -25,11 +25,11 @@ from slam.tracker.belief.places import coarse, spread
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Matcher
+from slam.tracker.tracking.anchors import map_errors
 from slam.tracker.tracking.closures import DRAWN, Closures
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.passages import Passages
 from slam.tracker.tracking.redraw import Correction, Redrawing
-from slam.tracker.uncertainty.anchors import map_errors
 
 _log = logging.getLogger(__name__)
 

@@ -12,8 +12,8 @@ from slam import se2
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.posegraph import Edge
+from slam.tracker.tracking.anchors import map_errors
 from slam.tracker.tracking.keys import KeyFrame
-from slam.tracker.uncertainty.anchors import map_errors
 from tests.world2d import Drive
 
 STEP = np.diag([0.02, 0.02, 0.004]) ** 2  # of each metre driven
