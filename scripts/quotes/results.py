@@ -42,7 +42,7 @@ class Pair(Interval):
 
 @dataclass(frozen=True)
 class Comparison:
-    """``comparison.json`` or ``comparison_noise.json``."""
+    """``comparison.json``."""
 
     path: Path
 

@@ -164,19 +164,25 @@ def film(costs: dict[str, Any]) -> str:
 
 
 def _against_grid(of: Comparison, metric: str = ATE) -> str:
-    """``in the arena the two tie (−0.22 cm, 95 % interval [−0.40, 0.01])``, scene by scene."""
+    """``in the arena the two tie at dynamism 0 and 0.5, at 1 `shunting` is nearer (−48 cm, …)``."""
+    words = {1: "`shunting` is nearer", -1: "**`occupancy` is nearer**"}
     said = []
     for scene in of.data["scenes"]:
-        over = of.over_levels(scene, GRID, metric)
-        word = {1: "`shunting` is nearer", -1: "**`occupancy` is nearer**", 0: "the two tie"}
-        said.append(f"in the {scene} {word[verdict(over, metric)]} ({_cm(over)})")
-    return listed(said)
+        pairs = list(zip(of.data["dynamism"], of.pairs(scene, GRID, metric), strict=True))
+        ties = [f"{level:g}" for level, pair in pairs if not verdict(pair, metric)]
+        clear = [
+            f"at {level:g} {words[verdict(pair, metric)]} ({_cm(pair)})"
+            for level, pair in pairs if pair and verdict(pair, metric)
+        ]  # fmt: skip
+        told = [f"the two tie at dynamism {listed(ties)}"] if ties else []
+        said.append(f"in the {scene} {', '.join([*told, *clear])}")
+    return "; ".join(said)
 
 
 def comparing_grid(of: Comparison) -> str:
-    """The ordinary grid, over all levels, unaligned and aligned."""
+    """The ordinary grid, level by level, unaligned and aligned."""
     return (
-        "Over all levels, `shunting` less `occupancy`, the ordinary grid: "
+        "`shunting` less `occupancy`, the ordinary grid, run by run: "
         f"{_against_grid(of)}. With the paths aligned: {_against_grid(of, ALIGNED)}."
     )
 
@@ -199,7 +205,7 @@ def readme_comparison(full: Comparison) -> str:
         f"With every error of the scanner and each room's own crowd, the median position error in "
         f"cm at dynamism "
         f"{least:g} and {most:g} is {'; '.join(said)}. Against an "
-        "ordinary grid with the same matcher (`occupancy`), over all levels: "
+        "ordinary grid with the same matcher (`occupancy`), run by run: "
         f"{_against_grid(full)}. Who wins where, and where `shunting` does not: "
         f"[docs/comparing.md](docs/comparing.md) ({made(full.data, full.data['seeds'])})."
     )

@@ -22,6 +22,7 @@ from slam.variants import ORACLE, oracle_of
 
 Row = dict[str, Any]
 MOST_SEEDS = 50  # that anybody would run
+TRACK_SEEDS = 20  # that a track has
 ODOMETRY = "odometry"  # the control that looks at nothing
 _ATE = "ate_unaligned_m"
 _WORDS = {
@@ -220,10 +221,11 @@ def _to_decide(of: Standing) -> str:
     open_ = [level for level in (*before[-1:], *lost[:1]) if _is_open(level.subject)]
     if not open_:
         return ""
-    wanted = [_seeds_to_tell(level.subject) for level in open_]
+    most = TRACK_SEEDS if of.axis == LEVEL else MOST_SEEDS
+    wanted = [_runs_to_tell(level.subject, most * of.runs_a_seed) for level in open_]
     at = "" if len(of.levels) == 1 else " at " + listed([f"{level.at:g}" for level in open_])
     if not all(wanted):
-        return f"that is too near to one half{at} for {MOST_SEEDS} seeds to tell"
+        return f"that is too near to one half{at} for {most} seeds to tell"
     seeds = math.ceil(max(wanted) / of.runs_a_seed)
     return f"`--seeds {seeds}` would tell whether more than half are lost{at}"
 
@@ -233,11 +235,11 @@ def _is_open(seen: Lost) -> bool:
     return low <= 0.5 <= high
 
 
-def _seeds_to_tell(seen: Lost) -> int:
+def _runs_to_tell(seen: Lost, most: int) -> int:
     """Least runs of that share lost whose interval is on one side of one half; where there are none
-    up to ``MOST_SEEDS``, 0, or of very few runs ``LEAST_RUNS``: the share itself may be another.
+    up to ``most``, 0, or of very few runs ``LEAST_RUNS``: the share itself may be another.
     """
-    for runs in range(seen.runs + 1, MOST_SEEDS + 1):
+    for runs in range(seen.runs + 1, most + 1):
         if not _is_open(Lost(lost=round(seen.lost / max(seen.runs, 1) * runs), runs=runs)):
             return runs
     return LEAST_RUNS if seen.runs < LEAST_RUNS else 0

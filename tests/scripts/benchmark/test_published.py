@@ -10,11 +10,12 @@ from typing import Any
 
 import pytest
 
-from scripts.benchmark import published
+from scripts.benchmark import make, published
 from scripts.benchmark.make import QUICK_LEVELS, QUICK_SEEDS
 from scripts.benchmark.publish import shipped
 from scripts.benchmark.scores import ranking
 from scripts.benchmark.tracks import TRACKS
+from scripts.comparison.plan import Plan
 from scripts.result_files import ROOT
 from slam.errors import LogFormatError
 
@@ -99,3 +100,39 @@ def test_a_file_that_is_wrong_is_refused_by_name(tmp_path: Path, what: str):
     assert str(path) in str(told.value)
     assert published.is_one(path) == (what != "what")
     assert not published.is_one(tmp_path / "none.json")
+
+
+def test_a_readers_row_stands_between_the_others_and_no_oracle_runs_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    asked: list[Plan] = []
+
+    def compared(plan: Plan, *_: object, **__: object) -> list[dict[str, Any]]:
+        """The reader's SLAM was never lost, and 3 cm off."""
+        asked.append(plan)
+        row = {"outcome": "finished", "failure": None, "lost": 0, "lost_at_s": None}
+        errors = dict.fromkeys(("error_tracking_m", "ate_unaligned_m", "rpe_m_per_m"), 0.03)
+        return [
+            {"slam": slam, "dynamism": run.dynamism, "seed": run.seed, **row, **errors}
+            for slam in plan.slams
+            for run in plan.runs()
+        ]
+
+    tracks = (TRACKS[TRACK], TRACKS["no-walls-v1"])
+    there = iter([digests(track.name) for track in tracks])
+    monkeypatch.setattr(make, "compare", compared)
+    monkeypatch.setattr(published, "digests", lambda plan, folder: next(there))
+    wanted = make.wanted_of(tracks, ["odometry", "shunting"], "odometry", quick=True, seeds=1)
+    board = make.carry_out(wanted, tmp_path / "out", shared=SHIPPED)
+    assert [plan.slams for plan in asked] == [("odometry", "shunting")] * 2
+    assert len({row["slam"] for row in board.ranking}) >= LEAST + 2
+    mine = next(row for row in board.ranking if row["slam"] == "odometry")
+    assert (mine["runs"], mine["lost_runs"]) == (6, 0)
+    assert any(said.startswith("It is number ") for said in board.said())
+    assert "are others here" not in capsys.readouterr().err
+
+    there = iter([dict.fromkeys(digests(track.name), "0" * 64) for track in tracks])
+    board = make.carry_out(wanted, tmp_path / "out", shared=SHIPPED)
+    assert {row["slam"] for row in board.ranking} == {"odometry", "shunting"}
+    printed = capsys.readouterr()
+    assert "6 of 6 recordings are others here" in " ".join((printed.out + printed.err).split())
