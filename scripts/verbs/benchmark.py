@@ -173,7 +173,8 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
         _tell_days(out)
     reports = [command("report", out / track.name) for track in board.tracks[:3]]
     publish(out, Page(
-        title=f"{board.subject} on {len(board.tracks)} track{'s' * (len(board.tracks) > 1)}", said=board.said(),
+        title=f"{board.subject} on {len(board.tracks)} track{'s' * (len(board.tracks) > 1)}",
+        said=board.said(),
         parts=[Part(title="Lost from which level", note=f"{table.caption}.", table=table)],
         next={
             "A track run by run, and what misled it:": "\n".join(reports),
