@@ -16,7 +16,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
+from scipy.ndimage import center_of_mass, maximum_filter
+from scipy.ndimage import label as components
 
 from slam import se2
 from slam.estimate import Changes
@@ -223,7 +224,7 @@ def map_picture(path: Path, raster: Raster, track: Trajectory, points_map: Float
 
 @styled()
 def changes_picture(path: Path, raster: Raster, changes: Changes, track: Trajectory) -> None:
-    """Recent changes over the present map: appeared green, gone red, the rest grey.
+    """Recent changes over the present map, ringed: appeared green, gone red, the rest grey.
 
     Where nothing has changed there is no picture.
     """
@@ -242,3 +243,7 @@ def changes_picture(path: Path, raster: Raster, changes: Changes, track: Traject
         draw_raster(ax, raster, vmax=2.0, interpolation="nearest")
         for values, cmap, label in layers:
             _coloured(ax, raster, values, cmap, label, 0.02)
+            places, count = components(np.isfinite(values), structure=np.ones((3, 3)))
+            spots = np.array(center_of_mass(places > 0, places, range(1, count + 1)))
+            x, y = ((spots[:, ::-1] + 0.5) * raster.resolution_m + raster.T_map_origin[:2]).T
+            ax.plot(x, y, "o", mfc="none", mec=mpl.colormaps[cmap](0.8), ms=16, mew=1.2)

@@ -189,8 +189,8 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
         _tell_days(out)
     reports = [command("report", out / track.name) for track in board.tracks[:3]]
     publish(out, Page(
-        title=f"{board.subject} on {len(board.tracks)} tracks", said=board.said(),
-        parts=parts,
+        title=f"{board.subject} on {len(board.tracks)} track{'s' * (len(board.tracks) > 1)}",
+        said=board.said(), parts=parts,
         next={
             "A track run by run, and what misled it:": "\n".join(reports),
             "Hand it in:": command("benchmark", "--slam", board.subject, "--submit", "NAME"),
