@@ -37,7 +37,8 @@ check: $(STAMP)  ## lint, format, spelling and strict types
 bench: $(RUN)    ## speed figures of this machine, as a table
 	@$(BIN)/mobilia bench
 
-docs: $(DOCS)/.installed  ## the site, in out/site; fails on a broken link and on anything loaded from elsewhere
+docs: $(RUN) $(DOCS)/.installed  ## the site, in out/site; fails on a broken link and on anything loaded from elsewhere
+	@$(BIN)/python -m scripts.site.replays out/replays
 	@NO_MKDOCS_2_WARNING=1 $(DOCS)/bin/python -m mkdocs build --strict  # not --quiet: then it counts no warnings
 	@$(DOCS)/bin/python -m scripts.site.check out/site
 	@echo "Open out/site/index.html; to search it, too: python3 -m http.server --bind 127.0.0.1 --directory out/site"

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from scripts.comparison.again import run_of, why_no_run
 from scripts.film.encode import SIZE, Pace, Size
@@ -16,7 +16,12 @@ from scripts.names import is_run
 from scripts.options import admitted
 from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
 from sim.core.versions import check_world, world_of
+from sim.moments import Moment, thinned, toured
+from sim.recording.recipe import read_recipe
 from sim.recording.sums import check_vouched
+from sim.recording.verify import check_bag
+from sim.simulation import Simulation, n_frames
+from sim.twins.twins import Twins
 from sim.view.moment import Moments
 from slam.errors import (
     InvalidValueError,
@@ -31,10 +36,6 @@ from slam.logs.bag_topics import is_bag
 from slam.logs.mounting import MountingTest, remounted
 from slam.oracle import Oracle
 from slam.replay import Replay, systems_named
-
-if TYPE_CHECKING:
-    from sim.moments import Moment
-    from sim.simulation import Simulation
 
 # Of a run's settings.
 KNOBS = ("motion", "change", "crowd")
@@ -149,8 +150,6 @@ def open_run(path: Path, *, view: str | None = "follow", trust: bool = False) ->
 
 def of_scene(settings: Mapping[str, Any], *, view: str | None = "follow") -> Footage:
     """A simulated tour: scene, seconds, and what ``Simulation`` takes."""
-    from sim.simulation import Simulation
-
     seconds = settings["seconds"]
     simulation = Simulation(**{k: v for k, v in settings.items() if k != "seconds"}, labels=True)
     return of_simulation(simulation, seconds=seconds, title=title_of(settings), view=view)
@@ -167,9 +166,6 @@ def of_simulation(
 ) -> Footage:
     """A simulation at hand and the moments that it goes through, a tour unless said otherwise; one
     in ``every`` of them is shown."""
-    from sim.moments import thinned, toured
-    from sim.simulation import n_frames
-
     whole = moments or (lambda: toured(simulation, seconds))
     shown = whole if every == 1 else lambda: thinned(whole(), every)
     stage = Room(simulation, shown, view)
@@ -178,24 +174,15 @@ def of_simulation(
         frames=stage.frames,
         length=-(-n_frames(seconds, simulation.scan_period_s) // every),
     )
+    made_with = {"odometry": simulation.odometry_preset, **simulation.metadata().extra}
     return Footage(
-        stream=stream,
-        stage=stage,
-        title=title,
-        duration_s=float(seconds),
-        no_camera=stage.no_camera,
-        made_with={
-            "simulation": {"odometry": simulation.odometry_preset, **simulation.metadata().extra}
-        },
-    )
+        stream=stream, stage=stage, title=title, duration_s=float(seconds),
+        no_camera=stage.no_camera, made_with={"simulation": made_with},
+    )  # fmt: skip
 
 
 def of_episode(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
     """An episode of a dataset, made again from its recipe."""
-    from sim.recording.recipe import read_recipe
-    from sim.simulation import Simulation
-    from sim.twins.twins import Twins
-
     made = read_recipe(path / RECIPE)
     check_world(path / RECIPE, made.world)
     recipe = replace(made.recipe, scene=admitted(made.recipe.scene, "scene", trust))
@@ -203,8 +190,9 @@ def of_episode(path: Path, *, view: str | None = "follow", trust: bool = False) 
     settings.pop("twin")
     if not recipe.twin:
         simulation = Simulation(**recipe.simulation())
-        title = title_of(settings)
-        return of_simulation(simulation, seconds=recipe.seconds, title=title, view=view)
+        return of_simulation(
+            simulation, seconds=recipe.seconds, title=title_of(settings), view=view
+        )
     twins = Twins(**recipe.simulation(), seconds=recipe.seconds)
     footage = of_simulation(
         twins.simulation,
@@ -220,8 +208,6 @@ def of_episode(path: Path, *, view: str | None = "follow", trust: bool = False) 
 
 def of_compared(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
     """A run of a comparison, made again with the scans that its SLAMs got."""
-    from sim.simulation import Simulation
-
     again = run_of(path)
     recipe = replace(again.recipe, scene=admitted(again.recipe.scene, "scene", trust))
     simulation = Simulation(**recipe.simulation())
@@ -245,8 +231,6 @@ def of_log(
 
     mount  (3,) T_robot_laser in place of the log's; ``flip``: its beams count the other way round
     """
-    from sim.recording.verify import check_bag
-
     check_bag(path)
     if text_format is None and is_bag(path):
         stream = read_bag(path, labels=True, strict=strict)
@@ -281,10 +265,5 @@ def title_of(settings: Mapping[str, Any]) -> str:
     """``office · dynamism 0.5 · seed 4``; motion, change and crowd where they are given."""
     twin = f" · {settings['twin']} twin" if settings.get("twin") else ""
     knobs = [f"{k} {settings[k]}" for k in KNOBS if settings.get(k) is not None]
-    words = [
-        str(settings["scene"]),
-        f"dynamism {settings.get('dynamism', 0.5)}",
-        *knobs,
-        f"seed {settings.get('seed', 0)}{twin}",
-    ]
-    return " · ".join(words)
+    dynamism, seed = settings.get("dynamism", 0.5), settings.get("seed", 0)
+    return " · ".join([settings["scene"], f"dynamism {dynamism}", *knobs, f"seed {seed}{twin}"])

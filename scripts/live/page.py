@@ -86,7 +86,7 @@ class Page:
         if not playback.looks_back:
             self._series.append((shown.seconds, off, claimed))
         for said in shown.said if not playback.looks_back else ():
-            self._said.appendleft(said.text)
+            self._said.appendleft(said)
             self._events.content = _lines(self._said)
         if now - self._shown_s >= STATUS_S or not playback.playing:
             self._shown_s = now

@@ -29,7 +29,8 @@ def require() -> Any:
         ) from error
 
 
-# viser's panel covers most of a phone: there it begins as a strip, whose handle opens half of it
+# viser's panel covers most of a phone: there it begins as a strip, whose handle opens half of it.
+# A browser captures a finger for what it touches, which viser takes for a drag: no tap would click.
 _PHONE = b"""<style>@media (max-width: 600px) {
 [style*="max-height: 60%"] { width: 100% !important; max-height: 50% !important }
 [style*="max-height: 60%"] * { max-width: 100vw }
@@ -38,6 +39,9 @@ if (innerWidth <= 600) new MutationObserver((_, seen) => {
   const handle = document.querySelector('[style*="max-height: 60%"] [style*="cursor: pointer"]');
   if (handle) { seen.disconnect(); setTimeout(() => handle.click(), 500) }
 }).observe(document, {childList: true, subtree: true})
+addEventListener('pointerdown', event => {
+  if (event.pointerType === 'touch') event.target.releasePointerCapture(event.pointerId)
+}, true)
 </script></head>"""
 
 

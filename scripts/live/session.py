@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from scripts.film.footage import Footage
 from scripts.live.hands import Hands
 from sim.events import KIDNAP, Event
-from sim.view.moment import BIG_MAP_S, MAP_S, Moments, Said, Shown, verdict_of
+from sim.view.moment import BIG_MAP_S, MAP_S, Moments, Shown, verdict_of
 from slam.estimate import Raster
 from slam.frames import NS_PER_S
 
@@ -45,8 +45,8 @@ class Session:
             self.moments.look(self.every * MAP_S, self.every * BIG_MAP_S)
             yield self.moments.note(frame, self.footage.stage.placed, said)
 
-    def _said(self, stamp_ns: int) -> list[Said]:
-        said: list[Said] = []
+    def _said(self, stamp_ns: int) -> list[str]:
+        said: list[str] = []
         if stamp_ns - self._events_ns >= EVENTS_NS:
             self._events_ns = stamp_ns
             said = self._begun()
@@ -54,17 +54,17 @@ class Session:
         verdict = verdict_of(self.moments.replay.tracks[primary].estimates[-1])
         if verdict != self._verdict:
             self._verdict = verdict
-            said = [*said, Said(text=f"{primary}: {verdict}", level="warning")]
+            said = [*said, f"{primary}: {verdict}"]
         return said
 
-    def _begun(self) -> list[Said]:
+    def _begun(self) -> list[str]:
         """Events that have begun since it was last asked."""
         found = []
         for event in self.footage.stage.events():
             key = (event.kind, event.name, event.start_s)
             if key not in self._known:
                 self._known.add(key)
-                found.append(Said(text=_told(event)))
+                found.append(_told(event))
         return found
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import posixpath
 import re
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parents[2]
+REPLAYS = ROOT / "out" / "replays"
 OUTSIDE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 RESULTS = "results.md"  # the page of the folder docs/results
 INSTEAD = {"README.md": "index.md", "docs/results": RESULTS, **OUTSIDE}  # which page shows what
@@ -63,6 +65,21 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
 
 
 def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """A picture that links to a clip becomes the clip, with the picture until it is played."""
-    del page, config, files
-    return _CLIP.sub(_VIDEO, html)
+    """A picture that links to a clip becomes the clip, with the picture until it is played; where
+    there is a page to turn of the same, a link to it follows."""
+    del config, files
+
+    def turned(clip: re.Match[str]) -> str:
+        name = f"{Path(clip[1]).stem}.html"
+        if not (REPLAYS / name).exists():
+            return clip.expand(_VIDEO)
+        to = posixpath.relpath(f"replays/{name}", page.url or ".")
+        return f'{clip.expand(_VIDEO)}<br><a href="{to}">Turn it, scrub it</a>'
+
+    return _CLIP.sub(turned, html)
+
+
+def on_post_build(*, config: MkDocsConfig) -> None:
+    """Pages to turn, where ``scripts.site.replays`` has made them, go into the site."""
+    if REPLAYS.is_dir():
+        shutil.copytree(REPLAYS, Path(config.site_dir) / "replays", dirs_exist_ok=True)

@@ -27,14 +27,6 @@ RING = 36  # corners of an ellipse
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Said:
-    """One line for the log of events; ``level`` "info" or "warning"."""
-
-    text: str
-    level: str = "info"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Shown:
     """Everything that is shown of one scan; later scans do not change it.
 
@@ -56,7 +48,7 @@ class Shown:
     placed: Placed | None
     raster: Raster | None
     landmarks: Landmarks | None
-    said: tuple[Said, ...]
+    said: tuple[str, ...]
 
     def error(self, name: str) -> Float | None:
         """(x m, y m, theta rad wrapped) of a track, None without truth."""
@@ -127,7 +119,7 @@ class Moments:
         """The primary one."""
         return self.replay.tracks[self.primary]
 
-    def note(self, frame: Frame, placed: Placed | None = None, said: Sequence[Said] = ()) -> Shown:
+    def note(self, frame: Frame, placed: Placed | None = None, said: Sequence[str] = ()) -> Shown:
         """The moment of a frame that every track has just taken; call it for each."""
         if self._first_ns is None:
             self._first_ns = frame.stamp_ns
