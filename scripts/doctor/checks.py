@@ -29,6 +29,7 @@ EXTRAS = {  # what each is for; how to get them follows from their names
     "guests": "SLAMs of others to compare with",
     "yag": "YAG SLAM",
     "rl": "scripts.experiments.train_policy",
+    "ros2": "nodes of ROS 2 over DDS and Zenoh",
     "cluster": "--cluster",
 }
 PROGRAMS = {"icp-slam": "the SLAM icp-slam", "rbpf-slam": "the SLAM rbpf-slam"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from slam import se2
 from slam.frames import Frame, LaserSpec, Odometry, Scan
 
 SPEC = LaserSpec(
@@ -23,5 +24,6 @@ def driven(n: int) -> list[Frame]:
         pose = np.array([2.0 * np.sin(turn), 2.0 - 2.0 * np.cos(turn), turn])
         odometry = Odometry(stamp_ns=stamp_ns, T_odom_robot=pose, increment_covariance=covariance)
         scan = Scan(stamp_ns=stamp_ns, ranges=ranges, spec=SPEC)
-        frames.append(Frame(stamp_ns=stamp_ns, odometry=odometry, scan=scan, truth=pose + 1.0))
+        truth = se2.compose(np.ones(3), pose)  # odometry is perfect
+        frames.append(Frame(stamp_ns=stamp_ns, odometry=odometry, scan=scan, truth=truth))
     return frames

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mobilia score``: what a stack said in a bag, beside the truth of another one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from sim.moments import Moment
+from sim.recording.bag import VERSION, BagWriter
+from slam.ros.messages import MAP, ODOM, TransformMessage
+from slam.ros.template import EPOCH_NS, STORE
+from tests.slam.ros.frames import SPEC, driven
+
+FRAMES = driven(60)
+HOUR_NS = 3600 * 10**9
+
+
+@pytest.fixture(scope="module")
+def ours(tmp_path_factory) -> Path:
+    """A bag of ours: scans, perfect odometry, truth."""
+    path = tmp_path_factory.mktemp("ours") / "bag"
+    with BagWriter(path, SPEC, labels=False) as bag:
+        for frame in FRAMES:
+            bag.write(Moment(frame=frame, poses=np.empty((0, 3)), moving=np.empty(0, bool)))
+    return path
+
+
+def stack(path: Path, offset_ns: int = 0) -> Path:
+    """What a stack recorded: its map -> odom goes off by 1 mm a scan."""
+    say = TransformMessage((MAP, ODOM, 0.0))
+    with Writer(path, version=VERSION, storage_plugin=StoragePlugin.MCAP) as bag:
+        connection = bag.add_connection("/tf", say.KIND, typestore=STORE)
+        for k, frame in enumerate(FRAMES):
+            stamp_ns = frame.stamp_ns + offset_ns
+            data = bytes(say(stamp_ns, np.array([0.001 * k, 0.0, 0.0])))
+            bag.write(connection, stamp_ns + EPOCH_NS, data)
+    return path
+
+
+def test_a_stack_is_scored_as_a_slam_is(called, ours, tmp_path):
+    ended = called("score", stack(tmp_path / "said"), "--on", ours, "--out", tmp_path / "out")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    slams = json.loads((tmp_path / "out" / "results.json").read_text())["slams"]
+    errors = {name: block["final_error_m"] for name, block in slams.items()}
+    assert errors["recorded"] == pytest.approx(0.059, abs=1e-3)
+    assert errors["odometry"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_another_clock_is_named_and_can_be_aligned(called, ours, tmp_path):
+    late = stack(tmp_path / "late", HOUR_NS)
+    ended = called("score", late, "--on", ours, "--out", tmp_path / "out")
+    assert ended.returncode == 1
+    assert "--clock-offset -3600" in ended.stdout + ended.stderr
+    words = ("--clock-offset", "-3600", "--out", tmp_path / "out")
+    assert called("score", late, "--on", ours, *words).returncode == 0
+
+
+def test_a_bag_without_statements_lists_its_topics(called, ours, tmp_path):
+    ended = called("score", ours, "--pose", "/amcl_pose", "--out", tmp_path / "out")
+    assert ended.returncode == 1
+    assert "no pose on /amcl_pose" in ended.stdout + ended.stderr
