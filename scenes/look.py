@@ -115,7 +115,7 @@ def trim_walls(spec: mujoco.MjSpec) -> None:
         _trim(spec, f"skirting:{name}", (x, y, half), (a + out, b + out, half), "wall_base", quat)
 
 
-def _trim(  # noqa: PLR0913 (a geom)
+def _trim(
     spec: mujoco.MjSpec,
     name: str,
     pos: tuple[float, float, float],

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import mujoco
 
+from scenes.kinds import KINDS
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ WRITTEN = {
     "bin": "bin:ROOM:N",
     "bounds": "bounds:NAME",
 }
+STANDS = {"seat": "chair", "spot": "load"}  # group of the kinds that stand at a mark
 NEEDED = ("room", "start")
 
 
@@ -64,7 +66,7 @@ def marks(spec: mujoco.MjSpec) -> tuple[Mark, ...]:
 
 
 def check_written(source: str, found: Iterable[Mark]) -> None:
-    """Raise ``InvalidValueError`` for a mark of ``WRITTEN`` that lacks a word."""
+    """Raise ``InvalidValueError`` for a mark that lacks a word or names an unknown kind."""
     for mark in found:
         form = WRITTEN.get(mark.words[0], "")
         short = len(mark.words) < len(form.split(":"))
@@ -72,6 +74,12 @@ def check_written(source: str, found: Iterable[Mark]) -> None:
         if short or (form.endswith("left|right") and mark.words[2] not in ("left", "right")):
             name = ":".join(mark.words)
             raise InvalidValueError(f"plan '{source}': mark '{name}' must be written {form}")
+        known = [k for k, row in KINDS.items() if row.group == STANDS.get(mark.words[0])]
+        if mark.words[0] in STANDS and mark.words[1] not in known:
+            raise InvalidValueError(
+                f"plan '{source}': mark '{':'.join(mark.words)}' has the unknown kind "
+                f"'{mark.words[1]}'. There are: {', '.join(known)}"
+            )
 
 
 def check_marks(source: str, found: Sequence[Mark], parts: Collection[str]) -> None:

@@ -14,6 +14,7 @@ import typer
 from scripts import interrupt
 from scripts.console import LogLines, console, fail, note
 from scripts.option_names import ManyValues, Verb
+from scripts.verbs.scene import scene
 from slam.errors import MissingPathError, MobiliaError
 from slam.names import load, look_in
 
@@ -40,6 +41,8 @@ VERBS: dict[str, type[Verb]] = {
 for _name, _kind in VERBS.items():
     _own = {"list": "listing"}.get(_name, _name.replace("-", "_"))
     app.command(_name, cls=_kind)(getattr(import_module(f"scripts.verbs.{_own}"), _own))
+
+app.add_typer(scene, name="scene")
 
 
 def _version(asked: bool) -> None:

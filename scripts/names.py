@@ -47,6 +47,11 @@ def run_name(path: Path) -> str:
     return path.name
 
 
+def scene_name(scene: str) -> str:
+    """A scene's name as part of the name of one output: of a file, the name without its folder."""
+    return Path(scene).stem if registry.is_file(scene) else file_name(scene)
+
+
 def file_name(name: str) -> str:
     """A system's name as part of a file name: ``my_pkg:MySlam`` becomes ``my_pkg-MySlam``."""
     return "".join(c if c.isalnum() or c in "-_." else "-" for c in name)

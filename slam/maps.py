@@ -8,6 +8,7 @@ import math
 import os
 import re
 import shutil
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ OCCUPIED_THRESHOLD = 0.65
 # (1 - 205/255 = 0.19608) for free; 0.196 keeps it unknown in both.
 FREE_THRESHOLD = 0.196
 OCCUPIED, UNKNOWN, FREE = 0, 205, 254
+
+MODES = ("trinary", "scale", "raw")
 
 _UNKNOWN_RGB = (176, 180, 184)
 _STOPS = np.array([0.0, 0.5, 1.0])  # of existence: free paper, doubtful amber, solid ink
@@ -117,33 +120,52 @@ def _kept(pgm: Path) -> Path:
     return pgm.with_name(f".{pgm.stem}.earlier.pgm")
 
 
-def read_map(yaml: Path) -> Raster:
+def read_map(yaml: Path, *, saved: bool = False) -> Raster:
     """The raster of a map_server YAML file: 1 occupied, 0 free, NaN unknown.
 
-    Reads binary PGM images in mode trinary, the ones ``write_map`` and map_saver write.
-    Raises ``LogFormatError`` naming the file when one of the two is missing, wrong, too large, or
-    not what the sums of ``write_map`` say; files without these sums are read as they are.
+    Reads binary PGM and PNG images in the modes trinary, scale (between the thresholds in
+    proportion) and raw (0 to 100). Raises ``LogFormatError`` naming the file when one of the two is
+    missing, wrong, too large, or not what the sums of ``write_map`` say; files without these sums
+    are read as they are.
+
+    saved  take the gray 205, which every map_saver writes for unknown, for unknown, though nav2's
+           own threshold of 0.25 makes a map_server take it for free
     """
     text = text_of(yaml, _MAX_YAML_BYTES)
     image_sum = _checked_sums(yaml, text)
     fields = _yaml_fields(yaml, text)
     resolution = _numbers(yaml, fields, "resolution", 1)[0]
     origin = _numbers(yaml, fields, "origin", 3)
-    negate = fields.get("negate", "0").lower() in ("1", "true")
-    if fields.get("mode", "trinary") != "trinary":
-        raise LogFormatError(yaml, f"mode must be trinary, got {fields['mode']!r}")
-    gray = _read_pgm(yaml.parent / _field(yaml, fields, "image"), image_sum)
-    grays = np.arange(256)
-    occupancy = grays / 255.0 if negate else (255 - grays) / 255.0
-    meant = np.full(256, np.nan, dtype=np.float32)
-    meant[occupancy > _numbers(yaml, fields, "occupied_thresh", 1)[0]] = 1.0
-    meant[occupancy < _numbers(yaml, fields, "free_thresh", 1)[0]] = 0.0
+    mode = fields.get("mode", "trinary")
+    if mode not in MODES:
+        raise LogFormatError(yaml, f"mode must be one of {', '.join(MODES)}, got {mode!r:.80}")
+    gray, opaque = _read_image(yaml.parent / _field(yaml, fields, "image"), image_sum)
+    meant = _meaning(yaml, fields, mode)
+    if saved and mode != "raw":
+        meant[UNKNOWN] = np.nan
+    values = meant[gray[::-1]]
+    if opaque is not None:
+        values[~opaque[::-1]] = np.nan
     try:
-        return Raster(
-            values=meant[gray[::-1]], resolution_m=resolution, T_map_origin=np.array(origin)
-        )
+        return Raster(values=values, resolution_m=resolution, T_map_origin=np.array(origin))
     except InvalidValueError as error:
         raise LogFormatError(yaml, str(error)) from error
+
+
+def _meaning(yaml: Path, fields: dict[str, str], mode: str) -> NDArray[np.float32]:
+    """Of each gray: (256,) how likely it is occupied, NaN for unknown."""
+    grays = np.arange(256)
+    if mode == "raw":
+        return np.where(grays <= 100, grays / 100.0, np.nan).astype(np.float32)
+    negate = fields.get("negate", "0").lower() in ("1", "true")
+    occupancy = grays / 255.0 if negate else (255 - grays) / 255.0
+    high = _numbers(yaml, fields, "occupied_thresh", 1)[0]
+    low = _numbers(yaml, fields, "free_thresh", 1)[0]
+    if not low < high:
+        raise LogFormatError(yaml, f"free_thresh must be < occupied_thresh, got {low} and {high}")
+    between = (occupancy - low) / (high - low) if mode == "scale" else np.nan
+    meant = np.where(occupancy > high, 1.0, np.where(occupancy < low, 0.0, between))
+    return meant.astype(np.float32)
 
 
 def raster_image(raster: Raster) -> NDArray[np.uint8]:
@@ -224,15 +246,40 @@ def _sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _read_pgm(path: Path, image_sum: str | None) -> NDArray[np.uint8]:
+def _read_image(
+    path: Path, image_sum: str | None
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:
+    """Gray values, and which pixels are opaque where the image says so."""
     data = bytes_of(path, MAX_PIXELS + _MAX_HEADER_BYTES)
     if image_sum is not None and _sha256(data) != image_sum:
         raise LogFormatError(path, f"is not the image that was written{_EDITED}")
+    if data.startswith(b"\x89PNG"):
+        return _png(path, data)
     header = _PGM_HEADER.match(data[:_MAX_HEADER_BYTES])
     if header is None:
-        raise LogFormatError(path, "not a binary PGM image of 8 bits (P5, maximum 255)")
+        raise LogFormatError(path, "no PNG, and not a binary PGM image of 8 bits (P5, maximum 255)")
     width, height = int(header[1][:9]), int(header[2][:9])
     pixels: NDArray[Any] = np.frombuffer(data, dtype=np.uint8, offset=header.end())
     if not 0 < width * height <= MAX_PIXELS or len(pixels) != width * height:
         raise LogFormatError(path, f"{width} x {height} pixels expected, found {len(pixels)}")
-    return pixels.reshape(height, width)
+    return pixels.reshape(height, width), None
+
+
+def _png(path: Path, data: bytes) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:
+    """The mean of its colours, as a map_server takes it."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(BytesIO(data), formats=["PNG"]) as image:
+            if image.width * image.height > MAX_PIXELS:
+                raise LogFormatError(
+                    path, f"{image.width} x {image.height} pixels, at most {MAX_PIXELS} are allowed"
+                )
+            if image.mode.startswith("I"):
+                raise LogFormatError(path, "16 bits a pixel, expected 8")
+            clear = image.has_transparency_data
+            pixels = np.asarray(image.convert("RGBA" if clear else "RGB"))
+    except (Image.DecompressionBombError, UnidentifiedImageError, OSError, SyntaxError) as error:
+        raise LogFormatError(path, f"no PNG that can be read: {error}") from error
+    gray = (pixels[..., :3].sum(axis=2, dtype=np.uint16) // 3).astype(np.uint8)
+    return gray, pixels[..., 3] > 127 if clear else None

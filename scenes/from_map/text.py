@@ -93,7 +93,7 @@ def recipe(plan: MapPlan, plan_file: str, *, furniture: str, doors: str, made_of
     return "\n".join([*lines, "]", ""])
 
 
-def write(  # noqa: PLR0913 (by keyword)
+def write(
     plan: MapPlan,
     stem: Path,
     *,

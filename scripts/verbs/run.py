@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from scripts.names import check, run_name
+from scripts.names import check, run_name, scene_name
 from scripts.options import (
     Change,
     CrowdOption,
@@ -97,7 +97,7 @@ def run(
         from scripts.single_run.run import on_scene
         from scripts.single_run.session import Outputs
 
-        folder = out or Path("out") / f"run-{scene.replace(':', '-')}"
+        folder = out or Path("out") / f"run-{scene_name(scene)}"
         outputs = Outputs(folder=folder, command="run", overwrite=overwrite, film=film)
         held = Held(motion=motion, change=change, crowd=crowd)
         settings = held.world(scene, dynamism, seed) | {

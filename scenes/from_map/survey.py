@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the floor of a building is, given its walls: start, spots to visit, rooms, passages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.from_map import floor as floors
+from scenes.from_map.floor import Passage, Point, Rect
+from scenes.from_map.walls import disc, footprint
+from slam import se2
+from slam.errors import InvalidValueError
+
+Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Pose = tuple[float, float, float]
+
+FLOOR_M = 0.05  # cells of floor
+SPECK_M = 0.2  # unknown specks of floor up to that are floor
+LEAK_M = 0.55  # a narrower gap in a wall leads nowhere
+GATE_M = 1.6  # what is connected to the edge of a map by a narrower gap is not outside
+NEAR_PATH_M = 4.0  # floor of a log is so near to the robot's way
+DOOR_M = (0.7, 1.2)  # gaps that may be doors
+
+
+@dataclass(frozen=True, kw_only=True)
+class Survey:
+    """What was found, in the frame of the map, m and rad.
+
+    rooms    name -> rectangles xmin, ymin, xmax, ymax     area_m2  that the robot can reach
+    gaps     passages as wide as a door
+    """
+
+    start: Pose
+    goals: tuple[Point, ...]
+    rooms: dict[str, tuple[Rect, ...]]
+    gaps: tuple[Passage, ...]
+    area_m2: float
+
+
+def survey(  # noqa: PLR0913 (what is known of a building)
+    cells: Cells,
+    free: Mask,
+    walls: Float,
+    things: Float,
+    *,
+    start: Pose | None = None,
+    path: Float | None = None,
+    source: str = "map",
+) -> Survey:
+    """The floor of a building.
+
+    free           which cells are free floor
+    walls, things  (n, 5) boxes in the frame of the cells; things stand on floor
+    start, path    as in ``FromMap``
+    Raises ``InvalidValueError`` where there is no floor for a robot.
+    """
+    built = cells.raster(walls)
+    ground = _filled(free, cells) & ~_shut(built, LEAK_M, cells)
+    passable = ~built & ~cells.raster(things)
+    if path is not None:
+        driven = cells.beside(path, floors.ROBOT_M + 2.0 * cells.cell_m)
+        ground, passable = ground | driven, passable | driven
+        ground = cells.reached(driven, ground, NEAR_PATH_M)
+    else:
+        inside, wanted = ground & ~_outside(built, cells), cells.at(start)
+        open_to_all = wanted is not None and ground[wanted] and not inside[wanted]
+        if not open_to_all and inside.sum() * cells.cell_m**2 >= floors.LEAST_M2:
+            ground = inside
+    clear = floors.clearance(ground, cells.cell_m)
+    labels = floors.rooms_of(clear, ground)
+    outdoors = set(floors.outdoors(labels, built))
+    if path is not None:
+        outdoors -= set(np.unique(labels[cells.beside(path, 0.0)]).tolist())
+    ground &= ~np.isin(labels, sorted(outdoors))
+    passable_m = floors.clearance(ground & passable, cells.cell_m)
+    begin = floors.start_cell(passable_m, cells.at(start), source)
+    reach = floors.reachable(passable_m, begin)
+    area = float(reach.sum()) * cells.cell_m**2
+    if area < floors.LEAST_M2:
+        raise InvalidValueError(
+            f"{source}: the robot can reach {area:.1f} m2 of floor only, expected at least "
+            f"{floors.LEAST_M2:g} m2 (is it a map of rooms, or noise?)"
+        )
+    labels[~_around(reach, ground, cells.cell_m)] = 0
+    spots = cells.points([begin, *floors.spots(passable_m, reach, begin, cells.cell_m)])
+    gaps = floors.passages_of(labels, clear, cells.cell_m)
+    return Survey(
+        start=start or (*spots[0], 0.0),
+        goals=tuple(spots[1:]),
+        rooms=_rooms(labels, cells.cell_m, cells.T_map_cells),
+        gaps=tuple(
+            replace(gap, at=cells.in_map(gap.at))
+            for gap in gaps
+            if DOOR_M[0] <= gap.wide_m <= DOOR_M[1]
+        ),
+        area_m2=area,
+    )
+
+
+class Cells:
+    """Cells of a few centimetres on which floor is looked at: each of ``n`` x ``n`` of the map.
+
+    shape, cell_m  of the map and of a cell of it       T_map_cells  (3,) pose of their corner
+    """
+
+    def __init__(self, shape: tuple[int, ...], cell_m: float, T_map_cells: Float) -> None:
+        self.n = max(1, round(FLOOR_M / cell_m))
+        self.shape = (-(-shape[0] // self.n), -(-shape[1] // self.n))
+        self.cell_m, self.T_map_cells = cell_m * self.n, T_map_cells
+
+    def mostly(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which of our cells are set for the most part, given those of the map."""
+        down, right = (n * self.n - size for n, size in zip(self.shape, mask.shape, strict=True))
+        blocks = np.pad(mask, ((0, down), (0, right))).reshape(self.shape[0], self.n, -1, self.n)
+        return np.asarray(2 * blocks.sum(axis=(1, 3)) > self.n * self.n)
+
+    def raster(self, boxes: Float) -> NDArray[np.bool_]:
+        """Which cells a box touches, (n, 5) in their frame."""
+        return raster_of(boxes, self.shape, self.cell_m)
+
+    def at(self, start: Pose | None) -> tuple[int, int] | None:
+        """The cell of the start, or of the origin of the map frame; None where that is off the map.
+
+        Raises ``InvalidValueError`` for a start that was asked for and is off the map.
+        """
+        place = np.array([start[:2] if start is not None else (0.0, 0.0)])
+        row, column = self._cells(place)[0].tolist()
+        if 0 <= row < self.shape[0] and 0 <= column < self.shape[1]:
+            return row, column
+        if start is not None:
+            raise InvalidValueError(f"start at ({start[0]:g}, {start[1]:g}) m is off the map")
+        return None
+
+    def points(self, cells: list[tuple[int, int]]) -> list[Point]:
+        """Their middles in the map, m."""
+        at = (np.array(cells)[:, ::-1] + 0.5) * self.cell_m
+        return [(x, y) for x, y in se2.transform(self.T_map_cells, at).tolist()]
+
+    def in_map(self, pose: Pose) -> Pose:
+        """A pose in the frame of the cells, in the map."""
+        x, y, yaw = se2.compose(self.T_map_cells, np.array(pose)).tolist()
+        return x, y, yaw
+
+    def beside(self, path: Float, metres: float) -> NDArray[np.bool_]:
+        """Cells within that distance of a way, (n, 2) m in the map."""
+        away = np.ones(self.shape, dtype=np.uint8)
+        points = np.ascontiguousarray(self._cells(path)[:, ::-1], dtype=np.int32)
+        cv2.polylines(away, [points.reshape(-1, 1, 2)], False, 0)
+        far = cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * self.cell_m
+        return np.asarray(far <= metres)
+
+    def reached(
+        self, begin: NDArray[np.bool_], ground: NDArray[np.bool_], metres: float
+    ) -> NDArray[np.bool_]:
+        """Ground to which a way of that length leads from where one begins."""
+        found, allowed = begin.astype(np.uint8), ground.astype(np.uint8)
+        for k in range(round(metres / self.cell_m)):
+            shape = cv2.MORPH_CROSS if k % 2 else cv2.MORPH_RECT  # in turn: nearly a disc
+            found = cv2.dilate(found, cv2.getStructuringElement(shape, (3, 3))) & allowed
+        return np.asarray(found > 0)
+
+    def _cells(self, points: Float) -> NDArray[np.int64]:
+        at = se2.transform(se2.inverse(self.T_map_cells), points)
+        return np.floor(at[:, ::-1] / self.cell_m).astype(np.int64)
+
+
+def raster_of(boxes: Float, shape: tuple[int, ...], cell_m: float) -> NDArray[np.bool_]:
+    """Which cells a box touches."""
+    cells = np.zeros(shape, dtype=np.uint8)
+    for box in boxes:
+        window, inside = footprint(box, shape, cell_m, 0.5 * cell_m)
+        cells[window] |= inside
+    return cells.astype(bool)
+
+
+def _filled(free: Mask, cells: Cells) -> Mask:
+    """Free floor, and specks in it that no beam happened to cross."""
+    return _shut(free, SPECK_M, cells)
+
+
+def _shut(walls: NDArray[np.bool_], metres: float, cells: Cells) -> NDArray[np.bool_]:
+    """Walls, and gaps in them up to that width."""
+    n = round(metres / cells.cell_m) + 1
+    ones = cv2.morphologyEx(
+        np.pad(walls.astype(np.uint8), n), cv2.MORPH_CLOSE, disc(metres, cells.cell_m)
+    )
+    return np.asarray(ones[n:-n, n:-n] > 0)
+
+
+def _outside(walls: NDArray[np.bool_], cells: Cells) -> NDArray[np.bool_]:
+    """Cells that are connected to the edge of the map by more than a door."""
+    _, labels = cv2.connectedComponents((~_shut(walls, GATE_M, cells)).astype(np.uint8))
+    rim = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    return np.isin(labels, np.unique(rim[rim > 0]))
+
+
+def _around(
+    reach: NDArray[np.bool_], ground: NDArray[np.bool_], cell_m: float
+) -> NDArray[np.bool_]:
+    """Floor at or beside where the robot can get to."""
+    away = cv2.distanceTransform((~reach).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.asarray(ground & (away * cell_m <= floors.ROOM_M))
+
+
+def _rooms(
+    labels: NDArray[np.int32], cell_m: float, T_map_cells: Float
+) -> dict[str, tuple[Rect, ...]]:
+    """Rectangles along the axes of the map, of floor that is all of one room."""
+    height, width = labels.shape
+    corners = np.array([[0, 0], [width, 0], [0, height], [width, height]]) * cell_m
+    low = se2.transform(T_map_cells, corners).min(axis=0)
+    high = se2.transform(T_map_cells, corners).max(axis=0)
+    step = floors.CELL_M
+    columns, rows = (int(v) for v in np.ceil((high - low) / step))
+    coarse: NDArray[np.int32] | None = None
+    back = se2.inverse(T_map_cells)
+    for dy in (0.0, 0.5, 1.0):
+        for dx in (0.0, 0.5, 1.0):
+            x, y = low[0] + (np.arange(columns) + dx) * step, low[1] + (np.arange(rows) + dy) * step
+            points = np.column_stack([np.tile(x, rows), np.repeat(y, columns)])
+            at = np.floor(se2.transform(back, points) / cell_m).astype(int)
+            known = ((at >= 0) & (at < [width, height])).all(axis=1)
+            here = np.zeros(len(at), dtype=np.int32)
+            here[known] = labels[at[known, 1], at[known, 0]]
+            here = here.reshape(rows, columns)
+            coarse = here if coarse is None else np.where(coarse == here, coarse, 0)
+    found: dict[str, tuple[Rect, ...]] = {}
+    n_rects = 0
+    for k in range(1, int(labels.max()) + 1):
+        inside = np.asarray(coarse == k)
+        if not inside.any() or n_rects >= floors.MAX_RECTS:
+            continue
+        i, j = np.nonzero(inside)
+        i0, j0 = int(i.min()), int(j.min())
+        own = inside[i0 : int(i.max()) + 1, j0 : int(j.max()) + 1]
+        rects = floors.rectangles(own, round(floors.RECT_M / step), floors.ROOM_RECTS, 0.9)
+        if not rects:
+            continue
+        n_rects += len(rects)
+        x0, y0 = low[0] + j0 * step, low[1] + i0 * step
+        found[f"room{len(found)}"] = tuple(
+            (x0 + c0 * step, y0 + r0 * step, x0 + c1 * step, y0 + r1 * step)
+            for r0, c0, r1, c1 in rects
+        )
+    return found
