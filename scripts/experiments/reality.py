@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import rankdata, spearmanr
+from scipy.stats import spearmanr
 
 from scripts.console import note
 from scripts.log_twin.make import REFERENCE, housed, made, recorded
@@ -49,6 +49,7 @@ SLAMS = (
 SEEDS = (0,)
 FOLDER = Path("docs/results")
 PREDICTED, REAL = FOLDER / "reality_predicted.json", FOLDER / "reality_real.json"
+NEAR_M = 1.0  # SLAMs that are not lost
 DRAWS = 2000  # of the bootstrap over logs
 Errors = dict[str, dict[str, float | None]]
 
@@ -145,19 +146,15 @@ def table() -> list[str]:
         bool(np.argmin([a for a, _ in rows]) == np.argmin([b for _, b in rows]))
         for rows in pairs.values()
     ]
-    close = {
-        log: [(a, b) for (a, b), r in zip(rows, rankdata([a for a, _ in rows]), strict=True) if r]
-        for log, rows in pairs.items()
-    }
-    without = {log: [p for p in rows if p[0] < 1.0 and p[1] < 1.0] for log, rows in close.items()}
-    kept = {log: rows for log, rows in without.items() if len(rows) > 3}
+    near = {log: [pair for pair in rows if max(pair) < NEAR_M] for log, rows in pairs.items()}
+    kept = {log: rows for log, rows in near.items() if len(rows) > 3}
     lines += ["", f"Rank correlation: {mean:+.2f} (95 %: {low:+.2f} to {high:+.2f}), the mean of "
               f"{len(pairs)} logs, logs drawn again {DRAWS} times. The best on the twin is the "
               f"best on the log in {sum(best)} of {len(best)}."]  # fmt: skip
     if kept:
         mean, low, high = correlation(kept)
-        lines += ["", f"Among SLAMs that are within 1 m on both: {mean:+.2f} ({low:+.2f} to "
-                  f"{high:+.2f}), {len(kept)} logs."]  # fmt: skip
+        lines += ["", f"Among SLAMs that err by less than {NEAR_M:g} m on both: {mean:+.2f} "
+                  f"({low:+.2f} to {high:+.2f}), {len(kept)} logs."]  # fmt: skip
     return lines
 
 
