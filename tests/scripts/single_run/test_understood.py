@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import tests.slam.logs.foreign_bags as bags
+from scripts import cli
 from scripts.film.footage import Footage, of_log
 from scripts.single_run import understood
 from slam.errors import InvalidValueError
@@ -112,3 +113,15 @@ def test_a_run_that_nobody_trusts_names_the_likeliest_cause_first(without: Path)
     assert "50% of the scans return less than 10 % of beams" in understood.distrust(
         track(4), footage, []
     )
+
+
+def test_a_strict_run_that_nobody_trusts_ends_with_its_own_status(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def run() -> None:
+        raise understood.UntrustedRunError("mine did not trust 40% of its scans")
+
+    monkeypatch.setattr(cli, "app", run)
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == understood.UNTRUSTED_STATUS == 6
