@@ -115,18 +115,3 @@ class Snapshots:
         while not self.done():
             self.pictures.append(self._paint(self._last))
         return self.pictures
-
-
-def pictures_at(
-    stream: Stream, show: Show, seconds: Sequence[float], *, whole: bool = False
-) -> list[Picture]:
-    """Pictures of a run at these moments for ``scripts.film.strips``, without a film.
-
-    Scan above map each (``Show.vignette``); ``whole``: all of the film frame.
-    """
-    snapshots = Snapshots(show, seconds, show.paint if whole else show.vignette)
-    for frame in shoot(stream, show, None):
-        snapshots.note(frame)
-        if snapshots.done():
-            break
-    return snapshots.finish()

@@ -27,6 +27,7 @@ from slam.maps import raster_image
 LIFT_M = 0.03  # of the map and of lines above the floor, that they are seen
 ROBOT_M = 0.45  # height at which the arrow of an estimate floats: above a robot
 POINT_M = 0.05
+NEAR_M = 8.0  # steps of the place from which the points of a scan are counted
 PATH_POINTS = 400  # of a path as drawn
 PATH_S = 1.0  # so often of the run it is drawn anew
 LEVELS = 8  # of a cell of it that are told apart
@@ -121,10 +122,13 @@ class Drawn:
         if here is None:
             here = shown.estimates[self.moments.primary].T_map_robot
         mounted, xy, rgb = beams(shown.frame)
-        wxyz, position = _pose(se2.compose(here, mounted), self._height_m + LIFT_M)
+        # a slow page moves nodes at once and points later: where they lie, points say, and of few m
+        near = np.round(np.r_[here[:2], 0.0] / NEAR_M) * NEAR_M
+        wxyz, position = _pose(near, self._height_m + LIFT_M)
+        xy = se2.transform(se2.compose(here, mounted), xy) - near[:2]
         points = np.column_stack([xy, np.zeros(len(xy))]).astype(np.float16)
         if "scan" in self._nodes:
-            self._set("scan", points=points, colors=rgb, wxyz=wxyz, position=position)
+            self._set("scan", points=points, colors=rgb, position=position)
             return
         self._nodes["scan"] = self._scene.add_point_cloud(
             "/map/scan", points, rgb, point_size=POINT_M, point_shape="circle",

@@ -34,7 +34,7 @@ from slam.frames import Frame
 
 MOMENT_S = 0.1  # of the replay between two moments
 MOST_MOMENTS = 1200  # of one file; a longer run is shown faster
-FEW_PARTS = 1100  # that move; of more, moments come less often, four times at the most
+FEW_PARTS = 900  # that move; of more, moments come less often, four times at the most
 MOST_MAPS = 40  # that are drawn of one run
 
 

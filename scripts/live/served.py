@@ -29,6 +29,7 @@ def require() -> Any:
         ) from error
 
 
+PANEL = 0.3  # of a room's width: so much more is left for the panel at its right
 # viser's panel covers most of a phone: there it begins as a strip, whose handle opens half of it.
 # A browser captures a finger for what it touches, which viser takes for a drag: no tap would click.
 _PHONE = b"""<style>@media (max-width: 600px) {
@@ -89,7 +90,8 @@ class Served:
     def look_at(self, bounds: Sequence[float]) -> None:
         """Let pages that come show that room."""
         self._bounds = bounds
-        look_at(self.camera, bounds)
+        xmin, ymin, xmax, ymax = bounds
+        look_at(self.camera, (xmin, ymin, xmax + PANEL * (xmax - xmin), ymax))
 
     def _turn_for_phone(self, client: Any) -> None:
         """Once a page shows the first view, turn it where the screen is upright."""

@@ -73,7 +73,7 @@ def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files
         name = f"{Path(clip[1]).stem}.html"
         if not (REPLAYS / name).exists():
             return clip.expand(_VIDEO)
-        to = posixpath.relpath(f"replays/{name}", page.url or ".")
+        to = posixpath.relpath(f"replays/{name}", posixpath.dirname(page.url) or ".")
         return f'{clip.expand(_VIDEO)}<br><a href="{to}">Turn it, scrub it</a>'
 
     return _CLIP.sub(turned, html)

@@ -33,7 +33,6 @@ import numpy as np
 from scripts.comparison.make import carry_out
 from scripts.comparison.plan import Plan
 from scripts.film.footage import of_simulation, title_of
-from scripts.film.render import pictures_at
 from sim.core.dynamism import Dynamism
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, made_with, read_recipe
@@ -43,6 +42,7 @@ from slam import Estimate, create, se2
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import Frame
 from slam.logs import open_log
+from tests.pictures import pictures_at
 
 FILE = Path(__file__).with_name("golden.json")
 TOLERANCE = 1e-6  # m and rad: beyond rounding, below anything that a figure shows

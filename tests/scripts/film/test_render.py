@@ -17,7 +17,6 @@ from scripts.cli import app
 from scripts.film.encode import FILM_S, Pace, size_of
 from scripts.film.footage import of_scene, open_run
 from scripts.film.layout import Layout
-from scripts.film.render import pictures_at
 from scripts.film.scan_pane import RobotScan
 from sim.core.versions import WORLD
 from sim.recording.episode import record
@@ -30,6 +29,7 @@ from sim.view.scans import LEGEND, beam_colors
 from slam.errors import InvalidValueError, LogFormatError, MobiliaError
 from slam.frames import BeamClass, BeamLabels, Frame, LaserSpec, Odometry, Scan
 from slam.logs.carmen import write_carmen
+from tests.pictures import pictures_at
 
 SETTINGS = {"scene": "arena", "seconds": 2.0, "dynamism": 1.0, "seed": 3}
 
