@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scenes import registry
+from scripts.console import note
 from slam import system
+from slam.variants import inside
 
 RUNS = "runs"  # of a comparison: the folder of its runs
 DATASET = "dataset.json"  # the plan that ``generate`` writes (``sim.recording.dataset``)
@@ -25,6 +27,8 @@ def check(slams: Sequence[str], *scenes: str | None) -> None:
             registry.check_name(scene)
     for slam in slams:
         system.check_name(slam)
+        if inside(slam).partition(":")[0] in ("ros2", "ros2-zenoh"):
+            note(f"{slam} is a node of ROS 2: its results do not repeat to the byte")
 
 
 def is_run(path: Path) -> bool:

@@ -53,6 +53,7 @@ def listen(middleware: str, domain: int, router: int) -> None:
             now_ns = time.time_ns()
             came[simulated_ns(decoded(SCAN.kind, taken.data).header)] = now_ns
             last_s = time.monotonic() + 3.0
+    link.close()
     print(json.dumps(sorted(came.items())))
 
 

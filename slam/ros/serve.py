@@ -12,7 +12,7 @@ from __future__ import annotations
 import logging
 import sys
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from typing import Any
 
 import numpy as np
@@ -124,8 +124,9 @@ class Served:
 
 def main(name: str, middleware: str = "dds") -> None:
     """Serve until interrupted."""
-    served = Served(open_link(middleware), create(name))
-    with suppress(KeyboardInterrupt):
+    link = open_link(middleware)
+    served = Served(link, create(name))
+    with closing(link), suppress(KeyboardInterrupt):
         while True:
             served.turn()
 

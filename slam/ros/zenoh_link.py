@@ -27,6 +27,7 @@ from slam.ros.template import STORE
 
 _NO_HASH = "TypeHashNotSupported"  # what rmw_zenoh of Humble has in a hash's place
 _OLD = "humble"
+_PATIENT_MS = 10_000
 _OVERRIDE = "ZENOH_CONFIG_OVERRIDE"
 _gids = itertools.count(1)
 
@@ -50,7 +51,10 @@ def _session(router: int) -> Any:
         with suppress(zenoh.ZError):
             return zenoh.open(config)
         host = "[::]" if open_to_others() else "127.0.0.1"
-        return zenoh.open(_config("router", "listen", f"tcp/{host}:{router}"))
+        with suppress(zenoh.ZError):
+            return zenoh.open(_config("router", "listen", f"tcp/{host}:{router}"))
+        config.insert_json5("connect/timeout_ms", str(_PATIENT_MS))  # there is one, and it is busy
+        return zenoh.open(config)
     except zenoh.ZError as error:
         raise InvalidValueError(f"Zenoh cannot be opened: {error!s:.200}") from error
 

@@ -46,7 +46,7 @@ def test_a_stack_is_scored_as_a_slam_is(called, ours, tmp_path):
     ended = called("score", stack(tmp_path / "said"), "--on", ours, "--out", tmp_path / "out")
     assert ended.returncode == 0, ended.stdout + ended.stderr
     slams = json.loads((tmp_path / "out" / "results.json").read_text())["slams"]
-    errors = {name: block["final_error_m"] for name, block in slams.items()}
+    errors = {name: block["end_error_m"] for name, block in slams.items()}
     assert errors["recorded"] == pytest.approx(0.059, abs=1e-3)
     assert errors["odometry"] == pytest.approx(0.0, abs=1e-6)
 

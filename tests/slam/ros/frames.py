@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+
 import numpy as np
 
 from slam import se2
 from slam.frames import Frame, LaserSpec, Odometry, Scan
+from slam.ros.link import Taken, Topic
 
 SPEC = LaserSpec(
     n_beams=361, angle_min=-np.pi / 2, angle_increment=np.pi / 360, range_min=0.0, range_max=80.0
@@ -27,3 +30,23 @@ def driven(n: int) -> list[Frame]:
         truth = se2.compose(np.ones(3), pose)  # odometry is perfect
         frames.append(Frame(stamp_ns=stamp_ns, odometry=odometry, scan=scan, truth=truth))
     return frames
+
+
+class InMemory:
+    """A link to nobody: what a test puts in is taken."""
+
+    def __init__(self) -> None:
+        self.sent: dict[str, list[bytes]] = defaultdict(list)
+        self.come: dict[str, list[Taken]] = defaultdict(list)
+
+    def advertise(self, topic: Topic) -> None:
+        self.sent[topic.name]
+
+    def subscribe(self, topic: Topic) -> None:
+        self.come[topic.name]
+
+    def publish(self, topic: Topic, data: bytes) -> None:
+        self.sent[topic.name].append(data)
+
+    def take(self, topic: Topic) -> list[Taken]:
+        return self.come.pop(topic.name, [])

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import sys
-from collections import defaultdict
 
 import numpy as np
 import pytest
@@ -22,29 +21,9 @@ from slam.ros.node import GRID, POSES, TF, Node
 from slam.ros.recorded import RecordedSlam
 from slam.ros.robot import Robot
 from slam.system import create
-from tests.slam.ros.frames import driven
+from tests.slam.ros.frames import InMemory, driven
 
 SAID = np.array([0.5, -0.25, 0.1])  # map -> odom
-
-
-class InMemory:
-    """A link to nobody: what a test puts in is taken."""
-
-    def __init__(self) -> None:
-        self.sent: dict[str, list[bytes]] = defaultdict(list)
-        self.come: dict[str, list[Taken]] = defaultdict(list)
-
-    def advertise(self, topic: Topic) -> None:
-        self.sent[topic.name]
-
-    def subscribe(self, topic: Topic) -> None:
-        self.come[topic.name]
-
-    def publish(self, topic: Topic, data: bytes) -> None:
-        self.sent[topic.name].append(data)
-
-    def take(self, topic: Topic) -> list[Taken]:
-        return self.come.pop(topic.name, [])
 
 
 def transform(stamp_ns: int, pose=SAID, sender: str = "a") -> Taken:
