@@ -18,7 +18,7 @@ OPTIONS_OF: dict[str, tuple[str, ...]] = {
     "Plan.slams": ("--slam",),
     "Plan.scenes": ("--scene",),
     "Plan.levels": ("--dynamism",),
-    "Plan.dynamisms": ("--dynamism-sweep",),
+    "Plan.dynamisms": ("--dynamism",),
     "Limits.scan_s": ("--scan-limit",),
     "LoopConfig.limit_s": ("--seconds",),
     "LoopConfig.scans": ("--every",),

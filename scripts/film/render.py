@@ -53,8 +53,8 @@ def watched(frames: Iterator[Frame], stream: Stream, title: str) -> Iterator[Fra
         task = bar.add_task(warming, total=stream.length, unit="")
         for count, frame in enumerate(frames, 1):
             interrupt.check()
-            if count == 1:
-                bar.update(task, description=escape(title))
+            if count == 1:  # what compiling took says nothing of the pace
+                bar.reset(task, total=stream.length, description=escape(title))
             if count % 25 == 0 or count == stream.length:
                 bar.update(task, completed=count, unit=f"{count}/{stream.length} scans")
             yield frame

@@ -127,12 +127,13 @@ def generate(
         return
     table = carry_out(plan, out, jobs=jobs, cluster=cluster)
     console.print(table)
+    table.title = None  # what was made now is not of the dataset
     _page(plan, out, table)
 
 
 def _page(plan: Plan, out: Path, table: Table) -> None:
     """What was made, a plan of the first episode at its start, and what it is good for."""
-    from scripts.pages.page import Page, Part, command, inline, tell, write
+    from scripts.pages.page import Page, Part, command, inline, publish
     from sim.simulation import Simulation
     from sim.view.mapview import MapView
 
@@ -152,11 +153,10 @@ def _page(plan: Plan, out: Path, table: Table) -> None:
             Part(title="Episode by episode", table=table),
         ],
         next={
-            "Is every byte still there?": command("verify", out),
-            "A SLAM on the first of them:": command("run", "shunting", "--log", out / names[0]),
-            "The first of them as a film:": command("render", out / names[0]),
+            "In this folder: is every byte still there?": command("verify", "."),
+            "A SLAM on the first of them:": command("run", "shunting", "--log", names[0]),
+            "The first of them as a film:": command("render", names[0]),
         },
         settings=about,
     )
-    write(out, page)
-    tell(out, page)
+    publish(out, page)

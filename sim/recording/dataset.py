@@ -25,7 +25,7 @@ from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import PART, is_part, make_folder, reason, write_text
 
 PLAN = "dataset.json"
-PAGE = "index.html"  # of who looks at it: no part of the data, so no hash is kept
+PAGE = "index.html"  # for who looks at it; listed where ``generate`` came as far as that
 SCHEMA = 1
 MAX_EPISODES = 1_000_000
 MAX_BYTES = 1 << 20  # of dataset.json
@@ -246,6 +246,7 @@ def check_dataset(path: Path) -> list[Finding]:
             sorted({name.partition("/")[0] for name in listed} - {PLAN, *FILES})
         )
         files = (PLAN, *(name for name in FILES if name in listed))
+    files = (*files, PAGE) if PAGE in listed else files
     for name in files:
         if name != PLAN and not os.path.lexists(path / name):
             why = f"{path / name} is missing: 'mobilia generate' as before writes it again"
@@ -283,7 +284,7 @@ def _against(
 
 def _strangers(path: Path, planned: set[str], files: Sequence[str]) -> list[Fault]:
     """What lies beside the episodes."""
-    there = set(os.listdir(path)) - {*files, SUMS, PAGE}
+    there = set(os.listdir(path)) - {*files, SUMS}
     return foreign(path, there, planned)
 
 

@@ -7,6 +7,7 @@ import matplotlib as mpl
 import numpy as np
 
 from scripts import figures
+from slam.estimate import Changes, Raster
 from slam.trajectory import Trajectory
 
 
@@ -20,3 +21,18 @@ def test_a_figure_is_the_same_to_the_byte_whoever_drew_before(tmp_path):
     with mpl.rc_context({"font.size": 30, "axes.grid": False}):
         figures.errors(tmp_path / "two.png", {"shunting": track}, track)
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
+
+
+def test_a_picture_of_changes_is_there_only_where_something_changed(tmp_path):
+    cells = np.zeros((30, 40))
+    cells[10:13, 20:22] = 1.0
+    still, gone = (
+        Raster(values=values, resolution_m=0.1, T_map_origin=np.array([-1.0, -1.0, 0.0]))
+        for values in (np.zeros((30, 40)), cells)
+    )
+    track = Trajectory(stamps_ns=np.array([0, 1]), poses=np.array([[0.0, 0, 0], [1.0, 0.5, 0]]))
+    path = tmp_path / "changes.png"
+    figures.changes_picture(path, gone, Changes(appeared=still, gone=still), track)
+    assert not path.exists()
+    figures.changes_picture(path, gone, Changes(appeared=still, gone=gone), track)
+    assert path.stat().st_size > 10_000

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -17,6 +18,7 @@ from scripts.cli import app
 from scripts.film.encode import FILM_S, Pace, size_of
 from scripts.film.footage import of_scene, open_run
 from scripts.film.layout import Layout
+from scripts.film.render import Liveliest
 from scripts.film.scan_pane import RobotScan
 from sim.core.versions import WORLD
 from sim.recording.episode import record
@@ -274,3 +276,18 @@ def test_a_replay_is_written_whole(run: Path, tmp_path: Path):
     render(run, "--replay", out, "--slam", "odometry", "--to", "0.5", "--no-3d")
     assert "__VISER_EMBED_DATA__" in out.read_text()
     assert {p.name for p in tmp_path.iterdir()} == {"run", "run.html"}
+
+
+def test_the_poster_is_of_the_second_in_which_most_moved():
+    def told(moving: int) -> SimpleNamespace:
+        kind = np.array([BeamClass.MOVING] * moving + [BeamClass.STATIC] * (9 - moving), np.uint8)
+        return SimpleNamespace(labels=SimpleNamespace(kind=kind))
+
+    lively = Liveliest(least_s=1.0)
+    for k, moving in enumerate([9, 0, 0, 0, 3, 4, 5, 1, 0, 0]):  # early ones do not count
+        lively.note(told(moving), 0.5 * k, f"picture {k}")
+    assert lively.picture == "picture 6"
+    blind = Liveliest(least_s=1.0)
+    for k in range(4):
+        blind.note(SimpleNamespace(labels=None), 0.5 * k, f"picture {k}")
+    assert blind.picture == "picture 3"

@@ -96,7 +96,7 @@ def test_killed_in_mid_episode_and_started_again_ends_with_the_same_bytes(serial
     generate(["arena"], out, **SETTINGS)
     assert (out / SUMS).read_bytes() == (serial / SUMS).read_bytes()
     assert (first / RECIPE).stat().st_mtime_ns == kept.st_mtime_ns  # not made again
-    assert {p.name for p in out.iterdir()} == {*NAMES, SUMS, "dataset.json"}
+    assert {p.name for p in out.iterdir()} == {*NAMES, SUMS, "dataset.json", "index.html"}
     done = subprocess.run(["sha256sum", "-c", "--quiet", SUMS], cwd=out, check=False)
     assert done.returncode == 0
 
@@ -244,7 +244,7 @@ def test_two_writers_another_plan_and_foreign_files_are_refused(serial, tmp_path
         ({"dynamism_sweep": "0:1"}, "start:stop:step"),
         ({"dynamism_sweep": "0:2:0.5"}, "stop <= 1"),
         ({"dynamism_sweep": "0:1:1e-9"}, "at most"),
-        ({"dynamism": 1.5}, "dynamism must lie in"),
+        ({"dynamism": ["1.5"]}, "dynamism must lie in"),
     ],
 )
 def test_impossible_wishes_are_one_clear_line_and_leave_nothing(change, message, tmp_path):
@@ -269,7 +269,7 @@ def test_a_sweep_has_both_ends():
 
 def test_twins_share_path_and_odometry_and_differ_in_what_moves(tmp_path):
     out = tmp_path / "data"
-    generate(["arena"], out, episodes=1, seconds=2.0, seed=2, dynamism=1.0, twins=True)
+    generate(["arena"], out, episodes=1, seconds=2.0, seed=2, dynamism=["1"], twins=True)
     frames = {
         name: list(read_bag(out / f"arena-d1-s0002-{name}"))
         for name in ("dynamic", "semi_static", "static")
