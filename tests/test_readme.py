@@ -66,7 +66,9 @@ def test_slam_needs_no_simulator():
     forbidden = "('mujoco', 'gymnasium', 'sim', 'scenes')"
     code = (
         "import importlib, pkgutil, sys, slam\n"
-        "for m in pkgutil.walk_packages(slam.__path__, 'slam.'): importlib.import_module(m.name)\n"
+        "for m in pkgutil.walk_packages(slam.__path__, 'slam.'):\n"
+        "    try: importlib.import_module(m.name)\n"
+        "    except ModuleNotFoundError as e: assert e.name in ('cyclonedds', 'zenoh'), e\n"
         f"print([name for name in {forbidden} if name in sys.modules])"
     )
     assert run("-c", code).strip() == "[]"

@@ -43,6 +43,8 @@ OPEN_NOTHING = {
     "doctor": "the installed packages",
     "sensor-card": "scenes of ours; logs by the readers of run --log",
     "live": "logs and bags by the readers of run --log; its scene and SLAM are typed",
+    "twin": "logs by the readers of run --log",
+    "score": "bags by the readers of run --log",
     "reproduce": "logs by the readers of run --log; its results, of which it takes numbers",
 }
 Words = list[str]

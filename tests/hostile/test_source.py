@@ -26,6 +26,8 @@ IMPORTERS = {
     "sim/view/camera.py": "the GL libraries, by constants",
     "scripts/workers.py": "Dask",
     "scripts/cli.py": "verbs of ours, by constants",
+    "scripts/option_names.py": "names to complete, by constants",
+    "slam/ros/link.py": "the two middlewares, by constants",
     "scripts/live/served.py": "viser, by a constant",
     "scripts/live/replay.py": "the same",
     "scripts/live/page.py": "the same",
