@@ -50,7 +50,7 @@ def recipe(name: str) -> Callable[..., Scene]:
     path = Path(name)
     check_file(path)
 
-    def from_file(  # noqa: PLR0913 (options of a scene)
+    def from_file(
         seed: int,
         *,
         n_chairs: int | None = None,
@@ -118,7 +118,7 @@ def _plan(file: SceneFile, _path: str, _stamps: Any, wanted: Wanted) -> tuple[Pl
 
 
 def _movers(file: SceneFile, wanted: Wanted, plan: Plan) -> tuple[Movers, list[Box]]:
-    """What moves, and the boxes of things that do not, as that is asked for or they have no room."""
+    """What moves, and the boxes of things that do not: kept, or without room to move."""
     movers, boxes = [(kind, pose) for kind, pose in file.put if kind in KINDS], plan.boxes
     standing: list[Box] = []
     for thing in file.things if wanted.furniture != "drop" else ():
@@ -184,7 +184,9 @@ def _drawn(file: SceneFile) -> Plan:
         f"{name}.{k}": rect for name, own in found.rooms.items() for k, rect in enumerate(own)
     }
     for name, (a, b, c, d) in rooms.items():
-        plan.mark(f"room:{name}", (0.5 * (a + c), 0.5 * (b + d), 0.0), (0.5 * (c - a), 0.5 * (d - b)))
+        plan.mark(
+            f"room:{name}", (0.5 * (a + c), 0.5 * (b + d), 0.0), (0.5 * (c - a), 0.5 * (d - b))
+        )
     for k, (x, y) in enumerate(file.goals or found.goals):
         plan.mark(f"goal:{k}", (x, y, 0.0))
     plan.mark("bounds:all", (*middle.tolist(), 0.0), (float(size[0]), float(size[1])))

@@ -44,7 +44,7 @@ class Thing:
 def things_of(occupied: Mask, cell_m: float) -> tuple[list[Thing], Mask]:
     """Things that stand apart, in the frame of the cells, and the cells that are none of theirs."""
     linked = cv2.dilate(occupied.astype(np.uint8), disc(LINK_M, cell_m))
-    n, labels, stats, _ = cv2.connectedComponentsWithStats(linked, connectivity=8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(linked, connectivity=8)
     most = (LARGEST_M + LINK_M) / cell_m
     small = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) <= 1.5 * most
     small[0] = False
