@@ -75,7 +75,7 @@ KINDS = {
     "bin": KindOfMover(group="bin", height_m=0.4, z_order=0, icon="bin"),
     "trolley": KindOfMover(group="load", height_m=1.0, z_order=1, icon="trolley"),
     "pallet": KindOfMover(group="load", height_m=0.15, z_order=0, icon="pallet"),
-    "crate": KindOfMover(group="load", height_m=0.6, z_order=1, icon="trolley"),
+    "carton": KindOfMover(group="load", height_m=0.6, z_order=1, icon="plain"),
     "board": KindOfMover(
         group="load", height_m=1.8, z_order=1, icon="board", half_length_m=0.55
     ),

@@ -91,7 +91,7 @@ def test_the_files_are_a_scene_and_each_part_can_be_switched_off(tmp_path):
     file = write(plan(two_rooms()), tmp_path / "lab")
     name = str(file)
     moving = scenes.build(name, 1)
-    assert [m.kind for m in moving.movers] == ["door", "crate", "robot"]
+    assert [m.kind for m in moving.movers] == ["door", "carton", "robot"]
     assert model_bytes(moving) == model_bytes(scenes.build(name, 1))
     assert [m.kind for m in scenes.build(name, 1, furniture="keep", doors="none").movers] == [
         "robot"
