@@ -156,13 +156,14 @@ def _footprints(file: SceneFile) -> NDArray[np.float64]:
 def _drawn(file: SceneFile) -> Plan:
     """The plan of the walls that a file draws; what it does not say is found on the floor."""
     plan = Plan("blank", floors=(FLOOR,))
-    half, boxes = 0.5 * file.wall_m, []
+    half = 0.5 * file.wall_m
+    boxes: list[list[float]] = []
     for line in file.walls:
         for (x, y), (u, v) in pairwise(line):
             length = math.hypot(u - x, v - y)
             middle, yaw = (0.5 * (x + u), 0.5 * (y + v)), math.atan2(v - y, u - x)
             plan.wall(str(len(boxes)), middle, (0.5 * length + half, half), yaw)
-            boxes.append((*middle, 0.5 * length + half, half, yaw))
+            boxes.append([*middle, 0.5 * length + half, half, yaw])
     points = np.array([point for line in file.walls for point in line])
     low, high = points.min(axis=0) - RIM_M, points.max(axis=0) + RIM_M
     shape = np.ceil((high - low) / CELL_M).astype(int)[::-1]

@@ -194,9 +194,9 @@ def _figures(
 ) -> Figures:
     """``walls`` and all ``boxes`` in the frame of the cells."""
     rows, columns = np.nonzero(skin(occupied, cell_m))
-    cells = (np.column_stack([columns, rows]) + 0.5) * cell_m
+    cells: Float = (np.column_stack([columns, rows]) + 0.5) * cell_m
     back = cv2.distanceTransform((~occupied).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    faces = np.vstack([_outline(box) for box in walls]) if len(walls) else np.zeros((0, 2))
+    faces: Float = np.vstack([np.zeros((0, 2)), *(_outline(box) for box in walls)])
     at = np.clip(
         np.floor(faces / cell_m).astype(int), 0, [occupied.shape[1] - 1, occupied.shape[0] - 1]
     )
