@@ -194,7 +194,7 @@ def _figures(
 ) -> Figures:
     """``walls`` and all ``boxes`` in the frame of the cells."""
     rows, columns = np.nonzero(skin(occupied, cell_m))
-    cells: Float = (np.column_stack([columns, rows]) + 0.5) * cell_m
+    cells = np.asarray((np.column_stack([columns, rows]) + 0.5) * cell_m, dtype=np.float64)
     back = cv2.distanceTransform((~occupied).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     faces: Float = np.vstack([np.zeros((0, 2)), *(_outline(box) for box in walls)])
     at = np.clip(
