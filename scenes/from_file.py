@@ -40,6 +40,7 @@ from slam.bounded import check_file
 from slam.errors import InvalidValueError
 
 CELL_M, RIM_M = 0.05, 0.6  # cells on which the floor inside drawn walls is found, and beyond them
+BESIDE_M = 0.3  # a thing that near to a room is on its floor
 MAX_CELLS = 1 << 26
 FLOOR = "floor_concrete"
 Movers = tuple[tuple[str, Pose], ...]
@@ -118,11 +119,17 @@ def _plan(file: SceneFile, _path: str, _stamps: Any, wanted: Wanted) -> tuple[Pl
 
 
 def _movers(file: SceneFile, wanted: Wanted, plan: Plan) -> tuple[Movers, list[Box]]:
-    """What moves, and the boxes of things that do not: kept, or without room to move."""
+    """What moves, and the boxes of things that do not: kept, off the floor, or without room."""
     movers, boxes = [(kind, pose) for kind, pose in file.put if kind in KINDS], plan.boxes
     standing: list[Box] = []
     for thing in file.things if wanted.furniture != "drop" else ():
-        if wanted.furniture == "move" and _has_room(thing, movers, boxes, plan.start):
+        on_floor = any(
+            a - BESIDE_M <= thing.at[0] <= c + BESIDE_M
+            and b - BESIDE_M <= thing.at[1] <= d + BESIDE_M
+            for a, b, c, d in (mark.rect for mark in plan.find("room"))
+        )
+        room = on_floor and _has_room(thing, movers, boxes, plan.start)
+        if wanted.furniture == "move" and room:
             movers.append((thing.kind, thing.at))
         else:
             standing += thing.boxes
