@@ -26,6 +26,7 @@ Rect = tuple[float, float, float, float]
 
 MARGIN_M = 0.03  # m between hulls, and between a hull and a box
 CELL_M = 0.1  # m between the nodes on which floor is looked for
+LARGE_M2 = 1e5  # m2 of floor times goals from which on ways are found on coarser nodes
 AT_WALL_M = 0.35  # m from a hull to the furniture or wall that it stands at, at most
 ROW_M = 0.08  # m between two hulls in a row
 DOORWAY_M, GOAL_M, START_M = 0.65, 0.45, 0.7  # m kept clear, as in ``scenes.recipe``
@@ -255,10 +256,12 @@ def _ways(bounds: Rect, walls: bytes, goals: bytes) -> Float:
     boxes = np.frombuffer(walls, dtype=np.float64).reshape(-1, 5)
     spots = np.frombuffer(goals, dtype=np.float64).reshape(-1, 2)
     x0, y0, x1, y1 = bounds
-    nx, ny = round((x1 - x0) / CELL_M) + 1, round((y1 - y0) / CELL_M) + 1
+    large = len(spots) * (x1 - x0) * (y1 - y0) > LARGE_M2
+    cell = 2.0 * CELL_M if large else CELL_M
+    nx, ny = round((x1 - x0) / cell) + 1, round((y1 - y0) / cell) + 1
     number = np.arange(nx * ny).reshape(ny, nx)
     rows, columns = np.divmod(number.ravel(), nx)
-    nodes = np.column_stack([x0 + columns * CELL_M, y0 + rows * CELL_M])
+    nodes = np.column_stack([x0 + columns * cell, y0 + rows * cell])
     gap = gap_to_boxes(np.ascontiguousarray(nodes), boxes)
     tight = np.maximum(TIGHT_M - gap, 0.0) / TIGHT_M
     cost = np.where(gap > WAY_M - CELL_M, 1.0 + 4.0 * tight * tight, np.inf).reshape(ny, nx)
@@ -273,12 +276,13 @@ def _ways(bounds: Rect, walls: bytes, goals: bytes) -> Float:
         prices.append(price[there])
     edges = (np.concatenate(prices), (np.concatenate(starts), np.concatenate(ends)))
     graph = coo_matrix(edges, shape=(nx * ny, nx * ny)).tocsr()
-    column = np.clip(np.round((spots[:, 0] - x0) / CELL_M), 0, nx - 1).astype(int)
-    row = np.clip(np.round((spots[:, 1] - y0) / CELL_M), 0, ny - 1).astype(int)
+    column = np.clip(np.round((spots[:, 0] - x0) / cell), 0, nx - 1).astype(int)
+    row = np.clip(np.round((spots[:, 1] - y0) / cell), 0, ny - 1).astype(int)
     at = row * nx + column
-    _, before = dijkstra(graph, directed=False, indices=at, return_predecessors=True)
+    first = at[:1] if large else at  # of a large floor the ways from the start alone
+    _, before = dijkstra(graph, directed=False, indices=first, return_predecessors=True)
     used: set[int] = set()
-    for k in range(len(at)):
+    for k in range(len(first)):
         for end in at[k + 1 :].tolist():
             node = end
             while node >= 0:

@@ -40,6 +40,7 @@ from slam.bounded import check_file
 from slam.errors import InvalidValueError
 
 CELL_M, RIM_M = 0.05, 0.6  # cells on which the floor inside drawn walls is found, and beyond them
+BESIDE_M = 0.3  # a thing that near to a room is on its floor
 MAX_CELLS = 1 << 26
 FLOOR = "floor_concrete"
 Movers = tuple[tuple[str, Pose], ...]
@@ -50,7 +51,7 @@ def recipe(name: str) -> Callable[..., Scene]:
     path = Path(name)
     check_file(path)
 
-    def from_file(  # noqa: PLR0913 (options of a scene)
+    def from_file(
         seed: int,
         *,
         n_chairs: int | None = None,
@@ -118,11 +119,17 @@ def _plan(file: SceneFile, _path: str, _stamps: Any, wanted: Wanted) -> tuple[Pl
 
 
 def _movers(file: SceneFile, wanted: Wanted, plan: Plan) -> tuple[Movers, list[Box]]:
-    """What moves, and the boxes of things that do not, as that is asked for or they have no room."""
+    """What moves, and the boxes of things that do not: kept, off the floor, or without room."""
     movers, boxes = [(kind, pose) for kind, pose in file.put if kind in KINDS], plan.boxes
     standing: list[Box] = []
     for thing in file.things if wanted.furniture != "drop" else ():
-        if wanted.furniture == "move" and _has_room(thing, movers, boxes, plan.start):
+        on_floor = any(
+            a - BESIDE_M <= thing.at[0] <= c + BESIDE_M
+            and b - BESIDE_M <= thing.at[1] <= d + BESIDE_M
+            for a, b, c, d in (mark.rect for mark in plan.find("room"))
+        )
+        room = on_floor and _has_room(thing, movers, boxes, plan.start)
+        if wanted.furniture == "move" and room:
             movers.append((thing.kind, thing.at))
         else:
             standing += thing.boxes
@@ -156,13 +163,14 @@ def _footprints(file: SceneFile) -> NDArray[np.float64]:
 def _drawn(file: SceneFile) -> Plan:
     """The plan of the walls that a file draws; what it does not say is found on the floor."""
     plan = Plan("blank", floors=(FLOOR,))
-    half, boxes = 0.5 * file.wall_m, []
+    half = 0.5 * file.wall_m
+    boxes: list[list[float]] = []
     for line in file.walls:
         for (x, y), (u, v) in pairwise(line):
             length = math.hypot(u - x, v - y)
             middle, yaw = (0.5 * (x + u), 0.5 * (y + v)), math.atan2(v - y, u - x)
             plan.wall(str(len(boxes)), middle, (0.5 * length + half, half), yaw)
-            boxes.append((*middle, 0.5 * length + half, half, yaw))
+            boxes.append([*middle, 0.5 * length + half, half, yaw])
     points = np.array([point for line in file.walls for point in line])
     low, high = points.min(axis=0) - RIM_M, points.max(axis=0) + RIM_M
     shape = np.ceil((high - low) / CELL_M).astype(int)[::-1]
@@ -184,7 +192,9 @@ def _drawn(file: SceneFile) -> Plan:
         f"{name}.{k}": rect for name, own in found.rooms.items() for k, rect in enumerate(own)
     }
     for name, (a, b, c, d) in rooms.items():
-        plan.mark(f"room:{name}", (0.5 * (a + c), 0.5 * (b + d), 0.0), (0.5 * (c - a), 0.5 * (d - b)))
+        plan.mark(
+            f"room:{name}", (0.5 * (a + c), 0.5 * (b + d), 0.0), (0.5 * (c - a), 0.5 * (d - b))
+        )
     for k, (x, y) in enumerate(file.goals or found.goals):
         plan.mark(f"goal:{k}", (x, y, 0.0))
     plan.mark("bounds:all", (*middle.tolist(), 0.0), (float(size[0]), float(size[1])))

@@ -71,7 +71,7 @@ KINDS = {
     "bin": KindOfMover(group="bin", height_m=0.4),
     "trolley": KindOfMover(group="load", height_m=1.0),
     "pallet": KindOfMover(group="load", height_m=0.15),
-    "crate": KindOfMover(group="load", height_m=0.6),
+    "carton": KindOfMover(group="load", height_m=0.6),
     "board": KindOfMover(
         group="load", height_m=1.8, half_length_m=0.55
     ),

@@ -121,7 +121,8 @@ def check_name(name: str) -> None:
     near = difflib.get_close_matches(name, names(), n=1)
     hint = f" Did you mean '{near[0]}'?" if near else ""
     raise UnknownNameError(
-        f"no scene is called '{name}'.{hint} Known: {', '.join(names())}, module:function, or a file (.toml, .xml)."
+        f"no scene is called '{name}'.{hint} Known: {', '.join(names())}, "
+        "module:function, or a file (.toml, .xml)."
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a TOML file of a scene says, checked before anything is built. docs/scenes.md has the keys."""
+"""What a TOML file of a scene says, checked before anything is built (docs/scenes.md)."""
 
 from __future__ import annotations
 
@@ -146,9 +146,7 @@ class _Reading:
             raise self._wrong(key, f"a list of at most {MAX_ROWS}", rows)
         return ((f"{key}[{k}]", row) for k, row in enumerate(rows))
 
-    def _numbers(
-        self, where: str, value: object, n: int, least: float = -1e4
-    ) -> tuple[float, ...]:
+    def _numbers(self, where: str, value: object, n: int, least: float = -1e4) -> tuple[float, ...]:
         if isinstance(value, list) and len(value) == n:
             numbers = [v for v in value if isinstance(v, int | float) and not isinstance(v, bool)]
             if len(numbers) == n and all(least <= v <= 1e4 for v in numbers):

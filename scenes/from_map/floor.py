@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,8 +22,8 @@ Point = tuple[float, float]
 ROBOT_M = 0.36  # from the robot's middle to what it must not touch, as in ``scenes.arrangement``
 START_M, GOAL_M = 0.7, 0.6  # of floor round the robot's start, round a spot to visit
 ROOM_M = 0.65  # half the width of floor that is no passage
-GOALS_M = 4.0  # from one spot to visit to the next
-MAX_GOALS = 60
+GOALS_M = 4.0  # from one spot to visit to the next, at least
+MAX_GOALS = 20
 LEAST_M2 = 2.0  # of floor that the robot can reach
 WALLED = 0.4  # share of a room's edge that is wall
 CELL_M = 0.1  # on which rooms are cut into rectangles
@@ -96,7 +97,8 @@ def spots(
     if not left.any():
         left = np.where(floor, clear, 0.0)
     found: list[tuple[int, int]] = []
-    away = round(GOALS_M / cell_m)
+    area = float(floor.sum()) * cell_m * cell_m
+    away = round(max(GOALS_M, math.sqrt(area / MAX_GOALS)) / cell_m)
     _clear_around(left, first, away // 2)
     while len(found) < MAX_GOALS and left.any():
         row, column = np.unravel_index(int(np.argmax(left)), left.shape)
@@ -119,22 +121,23 @@ def _clear_around(field: Float, at: tuple[int, int], n: int) -> None:
 
 
 def rooms_of(clear: Float, floor: Mask) -> NDArray[np.int32]:
-    """A number for each cell of floor: of the wide place that it drains to; 0 elsewhere."""
+    """A number for each cell of floor: of the wide place to which the
+    widest way leads; 0 elsewhere."""
     wide = ((clear >= ROOM_M) & floor).astype(np.uint8)
     n, seeds = cv2.connectedComponents(wide, connectivity=8)
     if n < 2:
-        return floor.astype(np.int32)
-    markers = seeds.astype(np.int32) + 1
-    markers[(seeds == 0) & floor] = 0
-    markers[~floor] = 1
-    steep = np.uint8(255) - np.minimum(clear / ROOM_M * 254.0, 254.0).astype(np.uint8)
-    cv2.watershed(cv2.merge([steep, steep, steep]), markers)
-    labels = np.where(markers > 1, markers - 1, 0).astype(np.int32)
-    # watershed leaves lines of -1: give them to a neighbour
-    lines = (markers == -1) & floor
-    grown = cv2.dilate(labels.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
-    labels[lines] = grown[lines]
-    return labels
+        return np.asarray(floor, dtype=np.int32)
+    labels = seeds.astype(np.float32)
+    for level in np.arange(ROOM_M, -CELL_M, -0.5 * CELL_M).tolist():
+        left = floor & (clear >= level) & (labels == 0.0)
+        while left.any():
+            grown = np.where(left, cv2.dilate(labels, np.ones((3, 3), np.uint8)), 0.0)
+            reached = grown > 0.0
+            if not reached.any():
+                break
+            labels[reached] = grown[reached]
+            left &= ~reached
+    return np.asarray(labels, dtype=np.int32)
 
 
 def outdoors(labels: NDArray[np.int32], built: Mask) -> list[int]:
@@ -158,8 +161,9 @@ def outdoors(labels: NDArray[np.int32], built: Mask) -> list[int]:
 def rectangles(
     inside: Mask, least: int, most: int, share: float
 ) -> list[tuple[int, int, int, int]]:
-    """Largest rectangles of set cells, (row, column, row, column) half open, until most is covered."""
-    left, found = inside.copy(), []
+    """Largest rectangles (row, column, row, column), half open, until a share is covered."""
+    left = inside.copy()
+    found: list[tuple[int, int, int, int]] = []
     total = int(inside.sum())
     while len(found) < most and left.sum() > (1.0 - share) * total:
         r0, c0, r1, c1 = _largest(left)

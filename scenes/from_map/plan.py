@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scenes.from_map.floor import Passage, Point, Rect
 from scenes.from_map.survey import Cells, Survey, survey
 from scenes.from_map.things import Thing, things_of
-from scenes.from_map.walls import boxes_of
+from scenes.from_map.walls import boxes_of, skin
 from scenes.placement import gap_to_boxes
 from slam import se2
 from slam.errors import InvalidValueError
@@ -58,8 +58,8 @@ class Figures:
     """What became of the map.
 
     walls, pieces   boxes of at least 0.3 m, and shorter ones     wall_m  length of all
-    map_wall_m      length of the middle lines of the map's walls
-    cells_near      share of occupied cells within 5 cm of a wall or thing
+    cells_near      share of occupied cells, less those deep in what is solid, within 5 cm of a
+                    wall or thing
     walls_near      share of the walls' surface within 5 cm of an occupied cell
     floor_m2        free floor that the robot can get to, in the map
     rooms_m2        of it inside rooms
@@ -193,10 +193,10 @@ def _figures(
     cell_m: float,
 ) -> Figures:
     """``walls`` and all ``boxes`` in the frame of the cells."""
-    rows, columns = np.nonzero(occupied)
-    cells = (np.column_stack([columns, rows]) + 0.5) * cell_m
+    rows, columns = np.nonzero(skin(occupied, cell_m))
+    cells = np.asarray((np.column_stack([columns, rows]) + 0.5) * cell_m, dtype=np.float64)
     back = cv2.distanceTransform((~occupied).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    faces = np.vstack([_outline(box) for box in walls]) if len(walls) else np.zeros((0, 2))
+    faces: Float = np.vstack([np.zeros((0, 2)), *(_outline(box) for box in walls)])
     at = np.clip(
         np.floor(faces / cell_m).astype(int), 0, [occupied.shape[1] - 1, occupied.shape[0] - 1]
     )

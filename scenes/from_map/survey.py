@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenes.from_map import floor as floors
 from scenes.from_map.floor import Passage, Point, Rect
-from scenes.from_map.walls import disc, footprint
+from scenes.from_map.walls import footprint
 from slam import se2
 from slam.errors import InvalidValueError
 
@@ -19,11 +19,13 @@ Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Pose = tuple[float, float, float]
 
-FLOOR_M = 0.05  # cells of floor
+FLOOR_M, MOST_CELLS = 0.05, 1 << 22  # cells of floor, and so many at most
 SPECK_M = 0.2  # unknown specks of floor up to that are floor
 LEAK_M = 0.55  # a narrower gap in a wall leads nowhere
 GATE_M = 1.6  # what is connected to the edge of a map by a narrower gap is not outside
+INSIDE = 0.3  # share of free floor that is inside, or else the walls have too many gaps to say
 NEAR_PATH_M = 4.0  # floor of a log is so near to the robot's way
+DOOR_CLEAR_M = 1.7  # from the middle of a door to a spot to visit: 1.2 m from its hinge
 DOOR_M = (0.7, 1.2)  # gaps that may be doors
 
 
@@ -59,17 +61,17 @@ def survey(  # noqa: PLR0913 (what is known of a building)
     start, path    as in ``FromMap``
     Raises ``InvalidValueError`` where there is no floor for a robot.
     """
-    built = cells.raster(walls)
-    ground = _filled(free, cells) & ~_shut(built, LEAK_M, cells)
+    built, leak = cells.raster(walls), 0.5 * LEAK_M / cells.cell_m
+    ground = _filled(free, cells) & ~built
     passable = ~built & ~cells.raster(things)
     if path is not None:
         driven = cells.beside(path, floors.ROBOT_M + 2.0 * cells.cell_m)
         ground, passable = ground | driven, passable | driven
-        ground = cells.reached(driven, ground, NEAR_PATH_M)
+        wide = floors.clearance(ground, cells.cell_m) >= 0.5 * LEAK_M
+        ground &= _away(cells.reached(driven, wide | driven, NEAR_PATH_M)) <= leak
     else:
-        inside, wanted = ground & ~_outside(built, cells), cells.at(start)
-        open_to_all = wanted is not None and ground[wanted] and not inside[wanted]
-        if not open_to_all and inside.sum() * cells.cell_m**2 >= floors.LEAST_M2:
+        inside = ground & ~_outside(built, cells)
+        if inside.sum() >= INSIDE * ground.sum():
             ground = inside
     clear = floors.clearance(ground, cells.cell_m)
     labels = floors.rooms_of(clear, ground)
@@ -87,17 +89,19 @@ def survey(  # noqa: PLR0913 (what is known of a building)
             f"{floors.LEAST_M2:g} m2 (is it a map of rooms, or noise?)"
         )
     labels[~_around(reach, ground, cells.cell_m)] = 0
-    spots = cells.points([begin, *floors.spots(passable_m, reach, begin, cells.cell_m)])
-    gaps = floors.passages_of(labels, clear, cells.cell_m)
+    gaps = [
+        gap
+        for gap in floors.passages_of(labels, clear, cells.cell_m)
+        if DOOR_M[0] <= gap.wide_m <= DOOR_M[1]
+    ]
+    away = reach & ~_beside([gap.at for gap in gaps], cells)
+    found = floors.spots(passable_m, away if away.any() else reach, begin, cells.cell_m)
+    spots = cells.points([begin, *found])
     return Survey(
         start=start or (*spots[0], 0.0),
         goals=tuple(spots[1:]),
         rooms=_rooms(labels, cells.cell_m, cells.T_map_cells),
-        gaps=tuple(
-            replace(gap, at=cells.in_map(gap.at))
-            for gap in gaps
-            if DOOR_M[0] <= gap.wide_m <= DOOR_M[1]
-        ),
+        gaps=tuple(replace(gap, at=cells.in_map(gap.at)) for gap in gaps),
         area_m2=area,
     )
 
@@ -110,6 +114,8 @@ class Cells:
 
     def __init__(self, shape: tuple[int, ...], cell_m: float, T_map_cells: Float) -> None:
         self.n = max(1, round(FLOOR_M / cell_m))
+        while shape[0] * shape[1] > MOST_CELLS * self.n**2:
+            self.n += 1
         self.shape = (-(-shape[0] // self.n), -(-shape[1] // self.n))
         self.cell_m, self.T_map_cells = cell_m * self.n, T_map_cells
 
@@ -178,25 +184,39 @@ def raster_of(boxes: Float, shape: tuple[int, ...], cell_m: float) -> NDArray[np
     return cells.astype(bool)
 
 
+def _beside(poses: list[Pose], cells: Cells) -> Mask:
+    """Cells near to where doors may hang, in the frame of the cells."""
+    found = np.zeros(cells.shape, dtype=np.uint8)
+    for x, y, _ in poses:
+        at = (int(x / cells.cell_m), int(y / cells.cell_m))
+        cv2.circle(found, at, round(DOOR_CLEAR_M / cells.cell_m), 1, -1)
+    return found > 0
+
+
 def _filled(free: Mask, cells: Cells) -> Mask:
     """Free floor, and specks in it that no beam happened to cross."""
-    return _shut(free, SPECK_M, cells)
+    reach = 0.5 * SPECK_M / cells.cell_m
+    n = round(reach) + 2
+    apart = _away(np.pad(free, n)) > reach
+    return np.asarray((_away(apart) > reach)[n:-n, n:-n])
 
 
-def _shut(walls: NDArray[np.bool_], metres: float, cells: Cells) -> NDArray[np.bool_]:
-    """Walls, and gaps in them up to that width."""
-    n = round(metres / cells.cell_m) + 1
-    ones = cv2.morphologyEx(
-        np.pad(walls.astype(np.uint8), n), cv2.MORPH_CLOSE, disc(metres, cells.cell_m)
-    )
-    return np.asarray(ones[n:-n, n:-n] > 0)
+def _away(mask: Mask) -> NDArray[np.float32]:
+    """Cells from each cell to the nearest that is set; far where none is."""
+    if not mask.any():
+        return np.full(mask.shape, np.inf, dtype=np.float32)
+    far = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.asarray(far, dtype=np.float32)
 
 
-def _outside(walls: NDArray[np.bool_], cells: Cells) -> NDArray[np.bool_]:
-    """Cells that are connected to the edge of the map by more than a door."""
-    _, labels = cv2.connectedComponents((~_shut(walls, GATE_M, cells)).astype(np.uint8))
-    rim = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
-    return np.isin(labels, np.unique(rim[rim > 0]))
+def _outside(walls: Mask, cells: Cells) -> Mask:
+    """Cells to which something as wide as ``GATE_M`` gets from beyond the map."""
+    reach = 0.5 * GATE_M / cells.cell_m
+    n = round(reach) + 2
+    wide = (_away(np.pad(walls, n)) > reach).astype(np.uint8)
+    _, labels = cv2.connectedComponents(wide, connectivity=4)
+    out = _away((labels == labels[0, 0]) & (wide > 0)) <= reach
+    return np.asarray(out[n:-n, n:-n])
 
 
 def _around(
@@ -217,18 +237,16 @@ def _rooms(
     high = se2.transform(T_map_cells, corners).max(axis=0)
     step = floors.CELL_M
     columns, rows = (int(v) for v in np.ceil((high - low) / step))
-    coarse: NDArray[np.int32] | None = None
-    back = se2.inverse(T_map_cells)
-    for dy in (0.0, 0.5, 1.0):
-        for dx in (0.0, 0.5, 1.0):
-            x, y = low[0] + (np.arange(columns) + dx) * step, low[1] + (np.arange(rows) + dy) * step
-            points = np.column_stack([np.tile(x, rows), np.repeat(y, columns)])
-            at = np.floor(se2.transform(back, points) / cell_m).astype(int)
-            known = ((at >= 0) & (at < [width, height])).all(axis=1)
-            here = np.zeros(len(at), dtype=np.int32)
-            here[known] = labels[at[known, 1], at[known, 0]]
-            here = here.reshape(rows, columns)
-            coarse = here if coarse is None else np.where(coarse == here, coarse, 0)
+    x, y = low[0] + (np.arange(columns) + 0.5) * step, low[1] + (np.arange(rows) + 0.5) * step
+    points = np.column_stack([np.tile(x, rows), np.repeat(y, columns)])
+    at = np.floor(se2.transform(se2.inverse(T_map_cells), points) / cell_m).astype(int)
+    known = ((at >= 0) & (at < [width, height])).all(axis=1)
+    here = np.zeros(len(at), dtype=np.float32)
+    here[known] = labels[at[known, 1], at[known, 0]]
+    middles = here.reshape(rows, columns)
+    around = np.ones((3, 3), np.uint8)
+    same = cv2.erode(middles, around) == cv2.dilate(middles, around)
+    coarse = np.where(same, middles, 0.0).astype(np.int32)
     found: dict[str, tuple[Rect, ...]] = {}
     n_rects = 0
     for k in range(1, int(labels.max()) + 1):
@@ -244,7 +262,12 @@ def _rooms(
         n_rects += len(rects)
         x0, y0 = low[0] + j0 * step, low[1] + i0 * step
         found[f"room{len(found)}"] = tuple(
-            (x0 + c0 * step, y0 + r0 * step, x0 + c1 * step, y0 + r1 * step)
+            (
+                float(x0 + c0 * step),
+                float(y0 + r0 * step),
+                float(x0 + c1 * step),
+                float(y0 + r1 * step),
+            )
             for r0, c0, r1, c1 in rects
         )
     return found

@@ -20,8 +20,7 @@ def mjcf(plan: MapPlan, name: str) -> str:
     x0, y0, x1, y1 = plan.bounds
     middle, half = (0.5 * (x0 + x1), 0.5 * (y0 + y1)), (0.5 * (x1 - x0), 0.5 * (y1 - y0))
     lines = [
-        "<!-- A plan of a map, in m and rad: half sizes, as always in MJCF. docs/scenes.md lists the"
-        " marks. -->",
+        "<!-- A plan of a map, in m and rad; sizes are half. Marks: docs/scenes.md. -->",
         f"<mujoco model={quoteattr(name)}>",
         f'  <statistic center="{_n(*middle)} 0" extent="{_n(max(half) * 2)}" meansize="0.3"/>',
         "  <worldbody>",
@@ -54,18 +53,19 @@ def mjcf(plan: MapPlan, name: str) -> str:
 
 
 def recipe(plan: MapPlan, plan_file: str, *, furniture: str, doors: str, made_of: str) -> str:
-    """The TOML file by which the scene is named: each thing and each door is a line of it."""
+    """The TOML file by which the scene is named: each thing and each door is a line."""
+    one_line = "".join(c if c.isprintable() else "?" for c in made_of)
     lines = [
-        f"# Made of {made_of}. Lengths in m, angles in degrees. A line with # before it is left out.",
+        f"# Made of {one_line}. Lengths in m, angles in degrees. A # before a line leaves it out.",
         f'plan = "{plan_file}"',
         "",
         "# What the scene has unless it is asked for otherwise.",
-        f'furniture = "{furniture}"  # things: "move" they can be pushed, "keep" they stand, "drop"',
+        f'furniture = "{furniture}"  # of things: "move" can be pushed, "keep" stands, "drop"',
         f'doors = "{doors}"  # "none", "open", "ajar", "closed", "mixed"',
         "n_chairs = 0",
         "n_people = 0",
         "",
-        "things = [  # what can move, in the place of boxes that stand [x, y, length, width, turned]",
+        "things = [  # what may move; in its place boxes that stand, [x, y, length, width, turned]",
     ]
     for thing in plan.things:
         x, y, yaw = thing.at

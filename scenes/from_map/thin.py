@@ -124,21 +124,7 @@ def _joined(branches: list[Chain]) -> list[Chain]:
         if line[0] != line[-1]:
             at.setdefault(line[0], []).append((k, False))
             at.setdefault(line[-1], []).append((k, True))
-    partner: dict[tuple[int, bool], tuple[int, bool]] = {}
-    for ends in at.values():
-        pairs = []
-        for m, one in enumerate(ends):
-            for other in ends[m + 1 :]:
-                out, back = (
-                    _heading(branches[one[0]], one[1]),
-                    _heading(branches[other[0]], other[1]),
-                )
-                bend = abs(math.remainder(out - back - math.pi, math.tau))
-                if one[0] != other[0] and (bend < BEND_RAD or len(ends) == 2):
-                    pairs.append((bend, one, other))
-        for _, one, other in sorted(pairs):
-            if one not in partner and other not in partner:
-                partner[one], partner[other] = other, one
+    partner = _straight_on(branches, at)
     used: set[int] = set()
     found = []
     for k in range(len(branches)):
@@ -159,3 +145,25 @@ def _joined(branches: list[Chain]) -> list[Chain]:
             step = partner.get((j, not from_end))
         found.append(whole)
     return found
+
+
+def _straight_on(
+    branches: list[Chain], at: dict[Cell, list[tuple[int, bool]]]
+) -> dict[tuple[int, bool], tuple[int, bool]]:
+    """Which end of a branch goes on in which other: of those that meet, the straightest first."""
+    partner: dict[tuple[int, bool], tuple[int, bool]] = {}
+    for ends in at.values():
+        pairs = []
+        for m, one in enumerate(ends):
+            for other in ends[m + 1 :]:
+                out, back = (
+                    _heading(branches[one[0]], one[1]),
+                    _heading(branches[other[0]], other[1]),
+                )
+                bend = abs(math.remainder(out - back - math.pi, math.tau))
+                if one[0] != other[0] and (bend < BEND_RAD or len(ends) == 2):
+                    pairs.append((bend, one, other))
+        for _, one, other in sorted(pairs):
+            if one not in partner and other not in partner:
+                partner[one], partner[other] = other, one
+    return partner

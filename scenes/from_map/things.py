@@ -23,7 +23,7 @@ LARGEST_M = 0.8  # longer side of a thing; what is longer is wall
 POST_M = 0.15  # what is smaller is a post: the column of a swivel chair, the leg of a table
 FILLED = 0.3  # share of its rectangle that a solid thing fills; below it stands on legs
 LEGS, LEGS_M = 5, 0.75  # so many posts at most are legs of one thing, that near to each other
-BIN_M = 0.35  # a solid thing up to that is a bin, a larger one a crate
+BIN_M = 0.35  # a solid thing up to that is a bin, a larger one a carton
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class Thing:
 def things_of(occupied: Mask, cell_m: float) -> tuple[list[Thing], Mask]:
     """Things that stand apart, in the frame of the cells, and the cells that are none of theirs."""
     linked = cv2.dilate(occupied.astype(np.uint8), disc(LINK_M, cell_m))
-    n, labels, stats, _ = cv2.connectedComponentsWithStats(linked, connectivity=8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(linked, connectivity=8)
     most = (LARGEST_M + LINK_M) / cell_m
     small = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) <= 1.5 * most
     small[0] = False
@@ -79,7 +79,7 @@ def _grouped(parts: list[tuple[Box, bool]]) -> list[Thing]:
         if k not in free:
             if k not in posts:
                 kind = (
-                    ("bin" if 2.0 * max(box[2:4]) <= BIN_M else "crate")
+                    ("bin" if 2.0 * max(box[2:4]) <= BIN_M else "carton")
                     if solid
                     else "chair_visitor"
                 )

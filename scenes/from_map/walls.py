@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import heapq
 import math
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -15,7 +16,7 @@ from scenes.from_map.thin import chains, thinned
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-SHELL_M = 0.08  # of what is solid, only so much below its surface is built: nothing sees the rest
+SHELL_M = 0.11  # of what is solid, only so much below its surface is built: nothing sees the rest
 REACH_M = 0.10  # cells that far to the side of a line are of its wall
 THIN_M, THICK_M = 0.02, 0.08  # half thickness of a wall
 LONG_M = 0.3  # a box that is longer is no dot of a dotted wall
@@ -30,7 +31,7 @@ BRIDGE_M = 0.13  # gaps up to that, in a wall seen now and then, are closed
 def disc(metres: float, cell_m: float) -> NDArray[np.uint8]:
     """A disc of that diameter for OpenCV's morphology."""
     n = max(1, 2 * round(0.5 * metres / cell_m) + 1)
-    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (n, n)).astype(np.uint8)
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (n, n)), dtype=np.uint8)
 
 
 def bridged(occupied: Mask, cell_m: float) -> Mask:
@@ -40,16 +41,20 @@ def bridged(occupied: Mask, cell_m: float) -> Mask:
     return np.asarray(closed[8:-8, 8:-8] > 0)
 
 
+def skin(occupied: Mask, cell_m: float) -> Mask:
+    """Occupied cells less those deep inside what is solid."""
+    padded = np.pad(occupied.astype(np.uint8), 1)
+    deep = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+    return np.asarray(occupied & (deep * cell_m <= max(SHELL_M, 1.5 * cell_m)))
+
+
 def boxes_of(occupied: Mask, cell_m: float, tolerance_m: float) -> Float:
     """(n, 5) boxes cx, cy, half length, half thickness m, yaw rad, in the frame of the cells.
 
     The middle lines of walls, straightened until they would be off by ``tolerance_m``; each box
     then takes the place and the thickness of the cells beside it.
     """
-    whole = bridged(occupied, cell_m)
-    n = round(SHELL_M / cell_m)
-    inner = cv2.erode(np.pad(whole.astype(np.uint8), 1), disc(2 * SHELL_M, cell_m))[1:-1, 1:-1]
-    hollow = whole & ~cv2.erode(inner, np.ones((3, 3), np.uint8)).astype(bool) if n else whole
+    hollow, occupied = skin(bridged(occupied, cell_m), cell_m), skin(occupied, cell_m)
     around = _Around(occupied, cell_m)
     found = []
     for chain in chains(thinned(hollow)):
@@ -59,7 +64,7 @@ def boxes_of(occupied: Mask, cell_m: float, tolerance_m: float) -> Float:
             line = (corners.reshape(-1, 2) + 0.5) * cell_m
             if len(line) == 1:
                 line = np.vstack([line, line])
-            for a, b in zip(line[:-1], line[1:], strict=True):
+            for a, b in pairwise(line):
                 box = around.box(a, b)
                 if box is not None:
                     found.append(box)
@@ -93,7 +98,7 @@ def _dotted(boxes: Float, around: _Around, occupied: Mask, cell_m: float) -> Flo
 
 
 def _needed(boxes: Float, occupied: Mask, cell_m: float) -> Float:
-    """The fewest of those boxes that cover ``ENOUGH`` of the cells: the best of the rest each time."""
+    """Few of those boxes, the best first: all long ones, and ``ENOUGH`` of the cells."""
     number = np.full(occupied.shape, -1)
     number[occupied] = np.arange(int(occupied.sum()))
     cells, covered = [], np.zeros(int(occupied.sum()), dtype=bool)
@@ -104,13 +109,15 @@ def _needed(boxes: Float, occupied: Mask, cell_m: float) -> Float:
     queue = [(-len(own), k) for k, own in enumerate(cells)]
     heapq.heapify(queue)
     kept: list[int] = []
-    while queue and covered.sum() < ENOUGH * len(covered):
+    while queue:
         _, k = heapq.heappop(queue)
         gain = int((~covered[cells[k]]).sum())
-        if queue and -gain > queue[0][0]:  # another one has become better
+        if gain == 0 or (queue and -gain > queue[0][0]):  # another one has become better
             if gain:
                 heapq.heappush(queue, (-gain, k))
             continue
+        if gain * cell_m < LONG_M and covered.sum() >= ENOUGH * len(covered):
+            break
         covered[cells[k]] = True
         kept.append(k)
     return boxes[sorted(kept)]
@@ -119,7 +126,7 @@ def _needed(boxes: Float, occupied: Mask, cell_m: float) -> Float:
 def footprint(
     box: Float, shape: tuple[int, ...], cell_m: float, more_m: float = 0.0
 ) -> tuple[tuple[slice, slice], NDArray[np.uint8]]:
-    """Rows and columns around a box that is larger by ``more_m``, and which cells of them it holds."""
+    """Rows and columns around a box made larger by ``more_m``, and which cells it holds."""
     x, y, a, b, yaw = box.tolist()
     c, s, a, b = math.cos(yaw), math.sin(yaw), a + more_m, b + more_m
     reach = np.array([abs(a * c) + abs(b * s), abs(a * s) + abs(b * c)])
@@ -151,17 +158,18 @@ class _Around:
         cells = (np.column_stack([columns + x0, rows + y0]) + 0.5) * self._cell - a
         u, v = (cells * ahead).sum(axis=1), (cells * left).sum(axis=1)
         end = 0.5 * self._cell
-        own = (abs(v) <= reach_m) & (u >= -end) & (u <= length + end)
+        own = (abs(v) <= reach_m) & (u >= -REACH_M) & (u <= length + REACH_M)
         if not own.any():
             return None
         u, v = u[own], v[own]
+        first, last = min(float(u.min()) - end, -end), max(float(u.max()), length) + end
         slope = _slope(u, v) if length > 0.4 else 0.0
         offsets = v - slope * (u - 0.5 * length)
         near, far = np.percentile(offsets, [12.0, 88.0]).tolist()
         half = min(max(0.5 * (far - near) + 0.3 * self._cell, THIN_M), THICK_M)
-        middle = a + 0.5 * length * ahead + 0.5 * (near + far) * left
+        middle = a + 0.5 * (first + last) * ahead + 0.5 * (near + far) * left
         yaw = math.atan2(ahead[1], ahead[0]) + math.atan(slope)
-        return [*middle.tolist(), 0.5 * length + end, half, yaw]
+        return [*middle.tolist(), 0.5 * (last - first), half, yaw]
 
 
 def _slope(u: Float, v: Float) -> float:

@@ -60,7 +60,12 @@ def gap_to_nowhere(scene: Scene) -> tuple[float, tuple[float, float]] | None:
     x0, y0, x1, y1 = _wider(scene, RIM_M)
     shape = (math.ceil((y1 - y0) / CELL_M), math.ceil((x1 - x0) / CELL_M))
     leaves = [
-        [*_middle(scene.initial[m.name], 0.5 * m.radius), 0.5 * m.radius, 0.03, scene.initial[m.name][2]]
+        [
+            *_middle(scene.initial[m.name], 0.5 * m.radius),
+            0.5 * m.radius,
+            0.03,
+            scene.initial[m.name][2],
+        ]
         for m in scene.movers
         if m.group == "door"
     ]
@@ -75,12 +80,17 @@ def gap_to_nowhere(scene: Scene) -> tuple[float, tuple[float, float]] | None:
     for _ in range(12):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _leaves(clear > middle, start) else (low, middle)
-    inner = _part(clear > high, start)
-    near = cv2.distanceTransform((~inner).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    neck = _part(clear > low, start) & ~inner & (clear <= high + 1.0)
-    if not neck.any():
-        return 2.0 * low * CELL_M, (scene.start[0], scene.start[1])
-    row, column = np.unravel_index(int(np.argmin(np.where(neck, near, np.inf))), near.shape)
+    inner, edge = _part(clear > high, start), np.zeros(clear.shape, dtype=bool)
+    edge[[0, -1]], edge[:, [0, -1]] = True, True
+    wide = (clear > high).astype(np.uint8)
+    _, labels = cv2.connectedComponents(wide, connectivity=4)
+    outer = edge | np.isin(labels, np.unique(labels[edge & (wide > 0)]))
+    away = [
+        cv2.distanceTransform((~m).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        for m in (inner, outer & ~inner)
+    ]
+    between = np.where(_part(clear > low, start), np.maximum(*away), np.inf)
+    row, column = np.unravel_index(int(np.argmin(between)), clear.shape)
     return 2.0 * low * CELL_M, (x0 + (column + 0.5) * CELL_M, y0 + (row + 0.5) * CELL_M)
 
 

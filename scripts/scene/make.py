@@ -100,8 +100,8 @@ def in_words(drawn: MapPlan) -> Iterator[str]:
         f"in all ({(f.walls + f.pieces) / max(f.wall_m, 1e-9):.2f} a metre)"
     )
     yield (
-        f"of the map's occupied cells {100 * f.cells_near:.1f} % lie within 5 cm of what was built; "
-        f"of the walls' faces {100 * f.walls_near:.1f} % within 5 cm of an occupied cell"
+        f"of the map's occupied cells {100 * f.cells_near:.1f} % lie within 5 cm of what was "
+        f"built; of the walls' faces {100 * f.walls_near:.1f} % within 5 cm of an occupied cell"
     )
     yield (
         f"floor: {f.floor_m2:.0f} m2 that the robot can reach; {len(drawn.rooms)} rooms with "

@@ -15,9 +15,7 @@ from scripts.option_names import Verb
 from scripts.options import Overwrite, Seed, Strict
 from slam.errors import InvalidValueError, MobiliaError
 
-scene = typer.Typer(
-    help="Make a scene of a map or a log, show it, check it.", no_args_is_help=True
-)
+scene = typer.Typer(help="Make a scene of a map or a log, show it, check it.", no_args_is_help=True)
 
 Furniture = Annotated[
     str, typer.Option(help="Small things of the map: move (they can be pushed), keep, drop.")
@@ -140,6 +138,31 @@ def check(which: Which, seed: Seed = 0) -> None:
     if found:
         raise MobiliaError(f"{which}: {len(found)} things are wrong")
     note(f"{which}: nothing is wrong")
+
+
+@scene.command("kinds", cls=Verb)
+def kinds(
+    out: Annotated[Path | None, typer.Option(help="Also draw them all here, a PNG.")] = None,
+) -> None:
+    """List the kinds of furniture that a scene's file may put.
+
+    [bold]mobilia scene kinds --out kinds.png[/bold]
+    """
+    from scripts.scene.kinds import kinds as known
+    from scripts.scene.kinds import picture
+
+    stands, moves = known()
+    say(f"stands: {', '.join(stands)}", highlight=False)
+    say(f"can be pushed: {', '.join(moves)}", highlight=False)
+    if out is not None:
+        import imageio.v2 as imageio
+
+        from slam.files import replacing
+
+        path = out.with_suffix(".png")
+        with replacing(path) as new:
+            imageio.imwrite(new, picture(), format="png")
+        note(f"wrote {path}")
 
 
 def _tell(done: object) -> None:

@@ -9,6 +9,7 @@ import os
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from slam import Raster, maps
 from slam.errors import InvalidValueError, LogFormatError, OutputError
@@ -139,7 +140,7 @@ def test_a_file_claims_no_more_than_a_map_can_have(tmp_path):
         ("resolution: 0.05", "resolution: fine", "resolution"),
         ("resolution: 0.05", "resolution: -1", "resolution_m must be > 0"),
         ("origin: [", "origin: [7, ", "origin must be 3 finite numbers"),
-        ("mode: trinary", "mode: raw", "mode must be trinary"),
+        ("mode: trinary", "mode: rough", "mode must be one of trinary, scale, raw"),
         ("negate: 0", "negate 0", "map.yaml:5: expected 'key: value'"),
     ],
 )
@@ -190,3 +191,26 @@ def test_a_raster_without_cells_is_no_map(tmp_path):
     with pytest.raises(InvalidValueError, match="needs 1 to"):
         maps.write_map(tmp_path / "m", empty)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("mode", "means"),
+    [
+        ("trinary", [1.0, np.nan, 0.0, 0.0]),
+        ("scale", [1.0, 0.5, 0.0, 0.0]),  # 0.196 is below the threshold: free
+        ("raw", [0.0, np.nan, np.nan, np.nan]),
+    ],
+)
+def test_a_map_server_file_with_a_png_means_what_its_mode_says(tmp_path, mode, means):
+    grays = np.array([[0, 153, 205, 254]], dtype=np.uint8)
+    Image.fromarray(grays).save(tmp_path / "map.png")
+    yaml = tmp_path / "map.yaml"
+    yaml.write_text(
+        f"image: map.png\nmode: {mode}\nresolution: 0.1\norigin: [0, 0, 0.3]\nnegate: 0\n"
+        "occupied_thresh: 0.6\nfree_thresh: 0.2\n"
+    )
+    read = maps.read_map(yaml)
+    assert read.values[0] == pytest.approx(means, nan_ok=True, abs=1e-6)
+    saved = maps.read_map(yaml, saved=True).values[0]
+    assert np.isnan(saved[2])
+    assert read.T_map_origin[2] == 0.3

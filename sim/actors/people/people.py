@@ -27,6 +27,8 @@ from sim.core.state import flat
 Float = NDArray[np.float64]
 _LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
 FILE_FIRST, FILE_STEP = 0.95, 0.65  # m behind a leader, of the first in file and each after it
+NODE_M, LARGE_NODE_M = 0.1, 0.2  # m between the nodes of a flow map: usually, and of a large floor
+LARGE_M2 = 1e5  # m2 of floor times goals from which on a floor is large: 240 MB of nodes
 _LOOKS = np.uint64(0xD1342543DE82EF95)  # sets the second generator of each person apart
 
 
@@ -35,10 +37,13 @@ def _flow(
     bounds: tuple[float, float, float, float], boxes: bytes, leaves: bytes, goals: bytes
 ) -> FlowMap:
     """Flow maps are the costly part of a reset and depend on the floor plan alone."""
+    spots = np.frombuffer(goals, dtype=np.float64).reshape(-1, 2)
+    area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
     return FlowMap(
         bounds,
         np.frombuffer(boxes, dtype=np.float64).reshape(-1, 5),
-        np.frombuffer(goals, dtype=np.float64).reshape(-1, 2),
+        spots,
+        cell=NODE_M if len(spots) * area < LARGE_M2 else LARGE_NODE_M,
         leaves=np.frombuffer(leaves, dtype=np.float64).reshape(-1, 5),
     )
 

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes drawn in TOML: what they hold, and what is said of those that are wrong."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+import scenes
+from scripts.scene.check import contents, problems
+from slam.errors import InvalidValueError, MobiliaError
+
+LAB = """\
+walls = [
+  [[0, 0], [8, 0], [8, 5], [0, 5], [0, 0]],
+  [[4, 0], [4, 2]], [[4, 2.98], [4, 5]],
+]
+start = [1, 1, 90]
+goals = [[1.5, 4], [6, 1]]
+hinges = [[4, 2.02, 90, "left"]]
+put = [["desk", 6.5, 4.4, 0], ["chair_swivel", 2, 2.8, 90]]
+n_people = 1
+"""
+
+
+@pytest.fixture
+def lab(tmp_path):
+    """Writes a scene's file; gives its name."""
+
+    def written(text: str) -> str:
+        path = tmp_path / "lab.toml"
+        path.write_text(text)
+        return str(path)
+
+    return written
+
+
+def test_a_drawn_plan_has_what_it_says(lab):
+    scene = scenes.build(lab(LAB), 3, n_chairs=1)
+    assert [m.kind for m in scene.movers] == [
+        "door",
+        "chair_swivel",
+        "chair_swivel",
+        "person",
+        "robot",
+    ]
+    assert scene.goals == {"0": (1.5, 4.0), "1": (6.0, 1.0)}
+    assert scene.initial["chair0"][:2] == (2.0, 2.8)
+    assert scene.options["n_people"] == 1
+    assert list(problems(scene)) == []
+    assert "stands: 1 desk, 1 door_frame" in list(contents(scene))
+
+
+def test_seats_that_come_with_a_table_are_optional(lab):
+    assert "chair_swivel" in dict(scenes.build(lab(LAB)).places)
+    assert scenes.build(lab(LAB), seats=False).places == ()
+
+
+@pytest.mark.parametrize(
+    ("was", "is_", "says"),
+    [
+        (
+            "goals = [[1.5, 4], [6, 1]]",
+            "goals = [[1.5, 4], [11, 1]]",
+            "goal:1' at .* is in no room",
+        ),
+        ("goals = [[1.5, 4], [6, 1]]", "goals = [[4.5, 2.6]]", "goal:0' .* from a hinge"),
+        (
+            "[0, 5], [0, 0]]",
+            "[0, 5], [0, 1.2]]",
+            r"gap to nowhere: 1\.[012] m wide, at \(0\.0., 0\.[56]",
+        ),
+    ],
+)
+def test_check_names_what_is_wrong(lab, was, is_, says):
+    found = list(problems(scenes.build(lab(LAB.replace(was, is_)))))
+    assert any(re.search(says, line) for line in found), found
+
+
+@pytest.mark.parametrize(
+    ("was", "is_", "says"),
+    [
+        ('"desk"', '"dsek"', r"lab\.toml: put\[0\] must be a kind that there is .* got 'dsek'"),
+        ("start =", "strat =", r"lab\.toml: unknown key 'strat'"),
+        ("[4, 0], [4, 2]]", "[4, 0], [4, nan]]", r"walls\[1\]\[1\] must be 2 numbers"),
+        ('"left"', '"up"', r"hinges\[0\] must be"),
+        ("n_people = 1", "n_people = -1", r"lab\.toml: n_people must lie in 0\.\.400"),
+        ("n_people = 1", "n_people = ", r"lab\.toml: no TOML"),
+        ("n_people = 1", 'plan = "x.xml"', "plan or walls must be one of the two"),
+    ],
+)
+def test_bad_files_are_refused_by_name_and_line(lab, was, is_, says):
+    with pytest.raises(InvalidValueError, match=says):
+        scenes.build(lab(LAB.replace(was, is_, 1)))
+
+
+def test_a_file_that_is_not_there_is_refused():
+    with pytest.raises(MobiliaError, match=r"nowhere\.toml"):
+        scenes.build("nowhere.toml")
+
+
+def test_a_seat_of_an_unknown_kind_is_named_before_anything_runs(tmp_path):
+    plan = tmp_path / "shed.xml"
+    plan.write_text(
+        '<mujoco><worldbody><site name="room:a" type="box" size="2 2 0.01"/>'
+        '<site name="start:robot"/><site name="seat:chair:0"/></worldbody></mujoco>'
+    )
+    with pytest.raises(InvalidValueError, match=r"shed\.xml.*'seat:chair:0'.*chair_swivel"):
+        scenes.build(str(plan))

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a map to a plan: walls, gaps, things and floor are where the map has them."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+import scenes
+from scenes.from_map import FromMap, plan, write
+from scenes.placement import gap_to_boxes
+from slam import se2
+from slam.errors import InvalidValueError
+from slam.estimate import Raster
+
+CELL = 0.05
+WIDE, HIGH, GAP = 12.0, 8.0, 1.0
+
+
+def two_rooms(yaw: float = 0.0, hole: bool = False) -> Raster:
+    """12 x 8 m, a wall across the middle with a gap of 1 m, a small box; unknown outside."""
+    values = np.full((200, 280), np.nan, dtype=np.float32)
+    r, c = round(HIGH / CELL), round(WIDE / CELL)
+    room = values[20 : 20 + r, 20 : 20 + c]
+    room[:] = 0.0
+    room[:2], room[-2:], room[:, :2], room[:, -2:] = 1.0, 1.0, 1.0, 1.0
+    room[:, c // 2 : c // 2 + 2] = 1.0
+    room[60:80, c // 2 : c // 2 + 2] = 0.0
+    room[110:118, 40:48] = 1.0
+    if hole:
+        room[30:60, :2] = 0.0
+    return Raster(values=values, resolution_m=CELL, T_map_origin=np.array([-3.0, -2.0, yaw]))
+
+
+@pytest.mark.parametrize("yaw", [0.0, math.radians(15.0)])
+def test_walls_cover_the_cells_and_nothing_else(yaw):
+    raster = two_rooms(yaw)
+    made = plan(raster)
+    rows, columns = np.nonzero(raster.values == 1.0)
+    cells = se2.transform(raster.T_map_origin, (np.column_stack([columns, rows]) + 0.5) * CELL)
+    boxes = np.vstack([made.walls, [part for thing in made.things for part in thing.parts]])
+    assert (gap_to_boxes(np.ascontiguousarray(cells), boxes) <= 0.05).mean() > 0.95
+    assert made.figures.walls_near > 0.95
+    assert made.figures.walls + made.figures.pieces <= made.figures.wall_m
+    length = 2 * (WIDE + HIGH) + HIGH - GAP
+    assert made.figures.wall_m == pytest.approx(length, rel=0.05)
+
+
+def test_a_gap_is_a_door_and_a_small_box_a_thing():
+    made = plan(two_rooms())
+    (gap,) = made.gaps
+    assert gap.wide_m == pytest.approx(GAP, abs=0.15)
+    assert gap.at[:2] == pytest.approx((-3.0 + 1.0 + 6.05, -2.0 + 1.0 + 3.5), abs=0.2)
+    assert abs(math.sin(gap.at[2])) > 0.95
+    (thing,) = made.things
+    assert thing.at[:2] == pytest.approx((0.2, 4.7), abs=0.05)
+    assert thing.half == pytest.approx((0.2, 0.2), abs=0.03)
+    assert len(made.rooms) == 2
+
+
+def test_rooms_and_spots_lie_on_free_floor_also_of_a_turned_map():
+    raster = two_rooms(math.radians(15.0), hole=True)
+    made = plan(raster)
+    back = se2.inverse(raster.T_map_origin)
+    spots = [made.start[:2], *made.goals]
+    for a, b, c, d in (rect for rects in made.rooms.values() for rect in rects):
+        spots += [(a, b), (c, b), (a, d), (c, d), (0.5 * (a + c), 0.5 * (b + d))]
+    columns, rows = np.floor(se2.transform(back, np.array(spots)) / CELL).astype(int).T
+    assert (raster.values[rows, columns] == 0.0).all()
+    assert made.figures.rooms_m2 > 0.7 * WIDE * HIGH
+
+
+def test_what_a_robot_drove_through_is_no_thing():
+    raster = two_rooms()
+    path = np.array([[-1.0, 4.7], [1.5, 4.7], [1.5, 1.5]])
+    assert plan(raster, FromMap(path=path)).things == ()
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_noise_is_refused(seed):
+    noise = np.random.default_rng(seed).integers(0, 2, (120, 120)).astype(np.float32)
+    raster = Raster(values=noise, resolution_m=CELL, T_map_origin=np.zeros(3))
+    with pytest.raises(InvalidValueError, match=r"noise\.yaml: .* floor"):
+        plan(raster, source="noise.yaml")
+
+
+def test_the_files_are_a_scene_and_each_part_can_be_switched_off(tmp_path):
+    file = write(plan(two_rooms()), tmp_path / "lab")
+    name = str(file)
+    moving = scenes.build(name, 1)
+    assert [m.kind for m in moving.movers] == ["door", "carton", "robot"]
+    assert model_bytes(moving) == model_bytes(scenes.build(name, 1))
+    assert [m.kind for m in scenes.build(name, 1, furniture="keep", doors="none").movers] == [
+        "robot"
+    ]
+    assert scenes.build(name, furniture="keep").spec.geom("wall:thing0") is not None
+    assert scenes.build(name, furniture="drop").spec.geom("wall:thing0") is None
+    lines = file.read_text().splitlines()
+    off = ["# " + line if "kind =" in line else line for line in lines]
+    file.write_text("\n".join(off))
+    assert [m.kind for m in scenes.build(name, 1).movers] == ["door", "robot"]
+
+
+def model_bytes(scene: scenes.Scene) -> bytes:
+    """The compiled model."""
+    model = scene.compile()
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
