@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from scenes.assembly import hull_radius
-from scenes.from_file import tables
+from scenes.scene_file import tables
 from sim.core.checks import FAR_M, within, word
 from sim.world import hands
 from sim.world.populated import VISITOR
