@@ -60,12 +60,7 @@ def gap_to_nowhere(scene: Scene) -> tuple[float, tuple[float, float]] | None:
     x0, y0, x1, y1 = _wider(scene, RIM_M)
     shape = (math.ceil((y1 - y0) / CELL_M), math.ceil((x1 - x0) / CELL_M))
     leaves = [
-        [
-            *_middle(scene.initial[m.name], 0.5 * m.radius),
-            0.5 * m.radius,
-            0.03,
-            scene.initial[m.name][2],
-        ]
+        [*_middle(scene.initial[m.name], 0.5 * m.radius), 0.5 * m.radius, 0.03, scene.initial[m.name][2]]
         for m in scene.movers
         if m.group == "door"
     ]

@@ -17,13 +17,7 @@ Picture = NDArray[np.uint8]
 
 LONGEST_PX, MOST_PX_PER_M = 2400, 60.0
 PAPER, UNKNOWN, CELL = (255, 255, 255), (225, 227, 230), (240, 150, 40)
-WALL, THING, GOAL, START, GAP = (
-    (40, 50, 80),
-    (20, 140, 90),
-    (200, 30, 40),
-    (20, 90, 220),
-    (200, 0, 160),
-)
+WALL, THING, GOAL, START, GAP = (40, 50, 80), (20, 140, 90), (200, 30, 40), (20, 90, 220), (200, 0, 160)
 FLOORS = ((214, 230, 246), (214, 240, 224), (246, 234, 212), (236, 222, 244), (244, 220, 220))
 
 
@@ -36,9 +30,9 @@ def over_map(map_: Raster, plan: MapPlan) -> Picture:
     def px(points: object) -> NDArray[np.int32]:
         """Pixels of points (n, 2) m."""
         at = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-        return np.round(np.column_stack([(at[:, 0] - x0) * scale, (y1 - at[:, 1]) * scale])).astype(
-            np.int32
-        )
+        return np.round(
+            np.column_stack([(at[:, 0] - x0) * scale, (y1 - at[:, 1]) * scale])
+        ).astype(np.int32)
 
     picture = np.full((height, width, 3), UNKNOWN, dtype=np.uint8)
     known, occupied = _sampled(map_, (x0, y1), scale, (height, width))
@@ -86,9 +80,7 @@ def _sampled(
     occupied = np.zeros(shape, dtype=bool)
     occupied[i[inside], j[inside]] = True
     y, x = np.mgrid[: shape[0], : shape[1]]
-    points = np.column_stack(
-        [corner[0] + (x.ravel() + 0.5) / scale, corner[1] - (y.ravel() + 0.5) / scale]
-    )
+    points = np.column_stack([corner[0] + (x.ravel() + 0.5) / scale, corner[1] - (y.ravel() + 0.5) / scale])
     back = np.floor(se2.transform(se2.inverse(map_.T_map_origin), points) / map_.resolution_m)
     at_cell = back.astype(int)
     height, width = map_.values.shape

@@ -15,7 +15,9 @@ from scripts.option_names import Verb
 from scripts.options import Overwrite, Seed, Strict
 from slam.errors import InvalidValueError, MobiliaError
 
-scene = typer.Typer(help="Make a scene of a map or a log, show it, check it.", no_args_is_help=True)
+scene = typer.Typer(
+    help="Make a scene of a map or a log, show it, check it.", no_args_is_help=True
+)
 
 Furniture = Annotated[
     str, typer.Option(help="Small things of the map: move (they can be pushed), keep, drop.")
