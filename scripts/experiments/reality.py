@@ -47,8 +47,8 @@ SLAMS = (
     "karto", "odometry",
 )  # fmt: skip
 SEEDS = (0,)
-FOLDER = Path("docs/results")
-PREDICTED, REAL = FOLDER / "reality_predicted.json", FOLDER / "reality_real.json"
+FOLDER = Path("docs/reality")
+PREDICTED, REAL = FOLDER / "predicted.json", FOLDER / "real.json"
 NEAR_M = 1.0  # SLAMs that are not lost
 DRAWS = 2000  # of the bootstrap over logs
 Errors = dict[str, dict[str, float | None]]
