@@ -47,8 +47,8 @@ SLAMS = (
     "karto", "odometry",
 )  # fmt: skip
 SEEDS = (0,)
-FOLDER = Path("docs/results")
-PREDICTED, REAL = FOLDER / "reality_predicted.json", FOLDER / "reality_real.json"
+FOLDER = Path("docs/reality")
+PREDICTED, REAL = FOLDER / "predicted.json", FOLDER / "real.json"
 NEAR_M = 1.0  # SLAMs that are not lost
 DRAWS = 2000  # of the bootstrap over logs
 Errors = dict[str, dict[str, float | None]]
@@ -151,7 +151,7 @@ def table() -> list[str]:
     lines += ["", f"Rank correlation: {mean:+.2f} (95 %: {low:+.2f} to {high:+.2f}), the mean of "
               f"{len(pairs)} logs, logs drawn again {DRAWS} times. The best on the twin is the "
               f"best on the log in {sum(best)} of {len(best)}."]  # fmt: skip
-    if kept:
+    if len(kept) > 2:
         mean, low, high = correlation(kept)
         lines += ["", f"Among SLAMs that err by less than {NEAR_M:g} m on both: {mean:+.2f} "
                   f"({low:+.2f} to {high:+.2f}), {len(kept)} logs."]  # fmt: skip

@@ -33,7 +33,9 @@ def test_the_twin_of_a_log_shows_what_the_log_shows(log: Path, tmp_path: Path) -
     assert (tmp_path / "differences.png").stat().st_size > 10_000
     ours, theirs = list(open_log(log)), list(open_log(tmp_path / "twin.log"))
     assert [f.stamp_ns for f in ours] == [f.stamp_ns for f in theirs]
-    np.testing.assert_allclose([f.truth for f in theirs], [f.truth for f in ours], atol=1e-6)
+    # a pose is put right by the walls: to the middle of a scan, as the log has no times of beams
+    moved = np.array([a.truth for a in ours]) - np.array([b.truth for b in theirs])
+    assert np.median(np.hypot(moved[:, 0], moved[:, 1])) < 0.06
     before = (tmp_path / "twin.log").read_bytes()
     told = CliRunner().invoke(app, ["twin", str(log), "--out", str(tmp_path), "--overwrite"])
     assert told.exit_code == 0, told.output

@@ -30,6 +30,8 @@ def test_a_face_moves_to_its_returns_and_the_other_stays() -> None:
     assert box[0] + box[2] == pytest.approx(3.3, abs=2e-3)
 
 
-def test_a_wall_turns_with_its_returns() -> None:
-    box = laid(np.array([[3.1, 0.0, 0.1, 5.0, 0.0]]), LASERS, _ranges(0.02), ANGLES)[0][0]
-    assert box[4] == pytest.approx(0.02, abs=4e-3)
+def test_a_wall_and_the_poses_turn_to_each_other() -> None:
+    wall = np.array([[3.1, 0.0, 0.1, 5.0, 0.0]])
+    boxes, poses = laid(wall, LASERS, _ranges(0.02), ANGLES)
+    turned = boxes[0, 4] - (poses - LASERS)[:, 2].mean()
+    assert turned == pytest.approx(0.02, abs=4e-3)
