@@ -43,6 +43,7 @@ PRIVATE = {  # both ends are ours, over a socket that nobody else has
 STARTERS = {
     "slam/guests/guarding.py": "a guard of ours; below it pipe:COMMAND, not of names from files",
     "sim/view/gl.py": "our own Python, without the working folder",
+    "scripts/benches/ros2.py": "our own Python, as the other end of a link",
     "scripts/film/encode.py": "ffmpeg",
     "scripts/result_files.py": "git, for the commit of a results file",
     "scripts/experiments/covariance_scores.py": "smfeval, as the user names it",

@@ -82,7 +82,7 @@ def test_check_names_what_is_wrong(lab, was, is_, says):
     ("was", "is_", "says"),
     [
         ('"desk"', '"dsek"', r"lab\.toml: put\[0\] must be a kind that there is .* got 'dsek'"),
-        ("start =", "strat =", r"lab\.toml: unknown key 'strat'"),
+        ("start =", "begin =", r"lab\.toml: unknown key 'begin'"),
         ("[4, 0], [4, 2]]", "[4, 0], [4, nan]]", r"walls\[1\]\[1\] must be 2 numbers"),
         ('"left"', '"up"', r"hinges\[0\] must be"),
         ("n_people = 1", "n_people = -1", r"lab\.toml: n_people must lie in 0\.\.400"),

@@ -161,6 +161,7 @@ STAY = {
     "tracker/matching/usual.py": "a guard against division by zero",
     "tracker/matching/whole_search.py": "how the work is laid out; no result depends on it",
     "tracker/standing/recent.py": "an empty array",
+    "tracker/tracking/anchors.py": "LEVER_M, what makes a length of a turn, to choose the least",
     "tracker/tracking/closures.py": "what a piece of work counts, in units of loops.work",
     "tracker/uncertainty/residuals.py": "places in an array",
 }
