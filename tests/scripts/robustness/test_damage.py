@@ -140,7 +140,7 @@ def in_other_words(change: Callable[[str], str], name: str = SUMS) -> Callable[[
     [
         (append(f"{EPISODES[0]}/{METADATA}", " "), 1, "metadata.yaml is damaged"),
         (append("dataset.json", "\n"), 1, "dataset.json: damaged"),
-        (append(SUMS, "\n"), 1, "SHA256SUMS:20: no hash"),
+        (append(SUMS, "\n"), 1, "SHA256SUMS:21: no hash"),
         (in_other_words(lambda text: text[:-1]), 1, "not as it was written"),
         (in_other_words(str.upper), 1, "no hash and file name"),
         (in_other_words(lambda text: text.replace("  a", " *a")), 1, "no hash and file name"),

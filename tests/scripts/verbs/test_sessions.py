@@ -21,7 +21,7 @@ from slam.logs.bag_topics import Bag
 REPO = Path(__file__).resolve().parents[3]
 N, CHANGE = 3, 0.4
 NAMES = [f"office-d0.3-c0.4-s0002-session{k:02d}" for k in range(N)]
-SETTINGS = {"dynamism": 0.3, "seconds": 0.6, "seed": 2, "scanner": "noise", "change": CHANGE}
+SETTINGS = {"dynamism": ["0.3"], "seconds": 0.6, "seed": 2, "scanner": "noise", "change": CHANGE}
 
 
 def sums(out: Path) -> dict[str, bytes]:
