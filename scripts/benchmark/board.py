@@ -131,8 +131,8 @@ class Board:
         over = [self._over_all(), self._place()] if self._counting else self._each_track()
         if few < LEAST_RUNS:
             where = [self._lost_where()] if self._counting else []
-            few_words = f"{LEAST_RUNS} seeds tell from which level on, track by track; these are"
-            return [*filter(None, [*over, *where]), f"{few_words} {few}."]
+            more = f"Track by track it takes `--seeds {LEAST_RUNS}` to tell from which level on."
+            return [*filter(None, [*over, *where]), more]
         return [*filter(None, over), *self._by_track(every)]
 
     def _over_all(self) -> str:

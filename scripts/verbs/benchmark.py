@@ -182,8 +182,6 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
     if places is not None:
         console.print(places)
         parts.insert(0, Part(title=f"Ranking {places.title}", table=places))
-    for line in board.said():
-        say(escape(line))
     say(f"To cite: {escape(board.cite())}")
     if board.days_page:
         _tell_days(out)

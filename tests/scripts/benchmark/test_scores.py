@@ -149,7 +149,7 @@ def test_nothing_is_claimed_of_too_few_runs():
     seen, where, more = made.said()
     assert "`mine` was lost in" in seen
     assert where == "It was lost on tour-guide-v1 at 0.5, 0.75 and 1."
-    assert more == "6 seeds tell from which level on, track by track; these are 5."
+    assert more == "Track by track it takes `--seeds 6` to tell from which level on."
     row = made.row(TRACK.name, "mine")
     assert math.isfinite(row["lost_from_low"])
     assert lost_from_words(row) == "0.46"  # no interval
