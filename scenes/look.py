@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
 
 from scenes import textures
+from scenes.marks import yaw_of
 
 WALLS = ("wall", "parapet", "glass")  # first words of the names of what walls off
 CAP_HEIGHT = 0.012
@@ -93,19 +95,24 @@ def trim_walls(spec: mujoco.MjSpec) -> None:
         if kind not in WALLS or wall.group != 0:
             continue
         (x, y, z), (a, b, c) = wall.pos, wall.size
+        quat = [math.cos(0.5 * yaw_of(wall)), 0.0, 0.0, math.sin(0.5 * yaw_of(wall))]
         top = z + c
         if kind == "glass":
             rail = [max(half, 0.03) for half in (a, b)]
             for which, height in (("rail", 0.03), ("cap", top)):
-                _trim(spec, f"{which}:{name}", (x, y, height), (*rail, 0.03), "metal_dark")
+                _trim(spec, f"{which}:{name}", (x, y, height), (*rail, 0.03), "metal_dark", quat)
             continue
         if kind == "parapet":
             pane = [min(half, 0.012) if half < 0.1 else half for half in (a, b)]
-            _trim(spec, f"pane:{name}", (x, y, top + PANE_HEIGHT), (*pane, PANE_HEIGHT), "glass")
+            _trim(
+                spec, f"pane:{name}", (x, y, top + PANE_HEIGHT), (*pane, PANE_HEIGHT), "glass", quat
+            )
             top += 2.0 * PANE_HEIGHT - 0.01
         out, half = SKIRTING
-        _trim(spec, f"cap:{name}", (x, y, top), (a + 0.006, b + 0.006, CAP_HEIGHT), "wall_cap")
-        _trim(spec, f"skirting:{name}", (x, y, half), (a + out, b + out, half), "wall_base")
+        _trim(
+            spec, f"cap:{name}", (x, y, top), (a + 0.006, b + 0.006, CAP_HEIGHT), "wall_cap", quat
+        )
+        _trim(spec, f"skirting:{name}", (x, y, half), (a + out, b + out, half), "wall_base", quat)
 
 
 def _trim(
@@ -114,12 +121,14 @@ def _trim(
     pos: tuple[float, float, float],
     size: tuple[float, float, float],
     material: str,
+    quat: Sequence[float],
 ) -> None:
     (spec.body("trim") or spec.worldbody.add_body(name="trim")).add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_BOX,
         pos=pos,
         size=size,
+        quat=quat,
         material=material,
         contype=0,
         conaffinity=0,
