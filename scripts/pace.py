@@ -38,7 +38,7 @@ def state() -> Path:
 
 def rates() -> dict[str, float]:
     """s of each amount of 1, by kind; none where there is no such file."""
-    with suppress(OSError, ValueError, RecursionError):
+    with suppress(OSError, ValueError, RecursionError, OverflowError):
         with state().open("rb") as file:
             found = json.loads(file.read(MOST_BYTES))
         if isinstance(found, dict):

@@ -279,7 +279,9 @@ def _png(path: Path, data: bytes) -> tuple[NDArray[np.uint8], NDArray[np.bool_] 
                 raise LogFormatError(path, "16 bits a pixel, expected 8")
             clear = image.has_transparency_data
             pixels = np.asarray(image.convert("RGBA" if clear else "RGB"))
-    except (Image.DecompressionBombError, UnidentifiedImageError, OSError, SyntaxError) as error:
+    except (  # ValueError: of its texts and of its lengths
+        Image.DecompressionBombError, UnidentifiedImageError, OSError, SyntaxError, ValueError
+    ) as error:  # fmt: skip
         raise LogFormatError(path, f"no PNG that can be read: {error}") from error
     gray = (pixels[..., :3].sum(axis=2, dtype=np.uint16) // 3).astype(np.uint8)
     return gray, pixels[..., 3] > 127 if clear else None

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names that may be code, and where they come from.
 
-A SLAM is ``module:Class`` or ``pipe:COMMAND``, a scene ``module:function``, beside those that are
-registered. Whoever types such a name, on the command line or in Python, runs it. A name that was
-read from a file is a ``NameFromFile``: it resolves to what is registered and to nothing else, until
-``trusted`` makes a name of it as if it had been typed. docs/trust.md has the whole rule.
+A SLAM is ``module:Class``, ``pipe:COMMAND`` or ``ros2:COMMAND``, a scene ``module:function``,
+beside those that are registered. Whoever types such a name, on the command line or in Python, runs
+it. A name that was read from a file is a ``NameFromFile``: it resolves to what is registered and to
+nothing else, until ``trusted`` makes a name of it as if it had been typed. docs/trust.md has the
+whole rule.
 """
 
 from __future__ import annotations

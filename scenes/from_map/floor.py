@@ -44,20 +44,6 @@ class Passage:
     rooms: tuple[int, int]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Floor:
-    """What was found, in the frame of the map.
-
-    rooms  (room, its rectangles)     goals  (x, y) m
-    """
-
-    start: tuple[float, float, float]
-    goals: tuple[Point, ...]
-    rooms: tuple[tuple[Rect, ...], ...]
-    passages: tuple[Passage, ...]
-    area_m2: float
-
-
 def clearance(free: Mask, cell_m: float) -> Float:
     """m from each cell to what is not free; beyond the picture nothing is."""
     padded = np.pad(free.astype(np.uint8), 1)

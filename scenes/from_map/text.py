@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -57,7 +58,7 @@ def recipe(plan: MapPlan, plan_file: str, *, furniture: str, doors: str, made_of
     one_line = "".join(c if c.isprintable() else "?" for c in made_of)
     lines = [
         f"# Made of {one_line}. Lengths in m, angles in degrees. A # before a line leaves it out.",
-        f'plan = "{plan_file}"',
+        f"plan = {json.dumps(plan_file, ensure_ascii=False)}",  # a string of TOML, too
         "",
         "# What the scene has unless it is asked for otherwise.",
         f'furniture = "{furniture}"  # of things: "move" can be pushed, "keep" stands, "drop"',

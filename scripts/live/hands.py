@@ -17,8 +17,6 @@ from slam.frames import NS_PER_S
 
 HOLD_NS = NS_PER_S  # a twist holds so long, then the robot stands: its sender may be gone
 REACH_M = 1.0  # of a click: what is farther from it was not meant
-PUSH_SPEED = 1.0  # m/s
-DOOR_S = 20.0  # that a door is held
 
 
 class Hands:

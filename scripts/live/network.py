@@ -75,10 +75,13 @@ class Network:
             self._sent = shown.number
             self._robot.send(shown.frame)
 
-    def begin(self, static_map: Raster | None) -> None:
-        """A run begins; what never moves in it goes out as /ground_truth/map."""
+    def begin(self, static_map: Raster | None, height_m: float | None = None) -> None:
+        """A run begins; what never moves in it goes out as /ground_truth/map.
+
+        height_m  of the scanner in it; None: as it was
+        """
         self._sent = -1
-        self._robot.restart(static_map)
+        self._robot.restart(static_map, height_m)
 
     def requests(self) -> Iterator[OnWorld]:
         """What others ask for, of each topic the last; what cannot be is kept for ``refused``."""

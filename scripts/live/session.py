@@ -38,6 +38,11 @@ class Session:
         """What never moves, in the world; None for a log."""
         return None if self.hands is None else self.hands.simulation.world.scene.static_map
 
+    @property
+    def scan_height_m(self) -> float | None:
+        """m, of the scanner above the floor; None for a log."""
+        return None if self.hands is None else self.hands.simulation.world.scene.scan_height_m
+
     def run(self) -> Iterator[Shown]:
         """All frames of the stream."""
         for frame in self.moments.replay.run(self.footage.stream):

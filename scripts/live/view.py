@@ -50,7 +50,7 @@ class View:
     def _begin(self, *, playing: bool, speed: float) -> None:
         """Show the session from its start."""
         if self._network is not None:
-            self._network.begin(self.session.static_map)
+            self._network.begin(self.session.static_map, self.session.scan_height_m)
         footage, scene = self.session.footage, self.served.scene
         scene.reset()
         scene.set_up_direction("+z")

@@ -177,7 +177,8 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
         note(f"{name} was submitted, as SLAM {one['slam']}: its results are the submitter's word")
     for failure in board.failures():
         note(failure)
-    parts = [Part(title="Lost from which level", note=f"{table.caption}.", table=table)]
+    unfair = f"{table.caption}." if table.caption else ""
+    parts = [Part(title="Lost from which level", note=unfair, table=table)]
     places = _places(board)
     if places is not None:
         console.print(places)

@@ -130,8 +130,8 @@ def in_the_way(world: World, x: float, y: float, radius: float | None = None) ->
         if mover.group == "robot" and radius is None:
             continue
         long = mover.group == "door" or kind_of(mover.kind).half_length_m > 0.0
-        for at, radius in _discs(mover.kind, mover.group, place, mover.radius, long):
-            if math.hypot(at[0] - x, at[1] - y) < radius + own:
+        for at, far in _discs(mover.kind, mover.group, place, mover.radius, long):
+            if math.hypot(at[0] - x, at[1] - y) < far + own:
                 return f"{mover.name} is there"
     return ""
 

@@ -16,7 +16,7 @@ from slam.logs import unpacking
 from slam.logs.bag_frames import PLANAR, planar
 from slam.ros.template import EPOCH_NS, STORE
 
-MOST_CELLS = 1 << 26  # of a map, as many as ``map.pgm`` has: a square of 400 m at 5 cm
+MOST_CELLS = 1 << 26  # of a map: a square of 400 m at 5 cm
 unpacking.bound_rosbags()
 
 

@@ -50,9 +50,13 @@ class Robot:
         self._messages: FrameMessages | None = None
         self._map: Raster | None = None
 
-    def restart(self, static_map: Raster | None = None) -> None:
-        """The next frame is the first of another drive; what never moves is /ground_truth/map."""
+    def restart(self, static_map: Raster | None = None, height_m: float | None = None) -> None:
+        """The next frame is the first of another drive; what never moves is /ground_truth/map.
+
+        height_m  of the scanner from now on; None: as it was
+        """
         self._messages, self._map = None, static_map
+        self._height_m = self._height_m if height_m is None else height_m
 
     def send(self, frame: Frame) -> None:
         """All messages of a frame; without a scan, only those about its motion."""

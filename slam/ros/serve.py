@@ -12,7 +12,8 @@ from __future__ import annotations
 import logging
 import sys
 import time
-from contextlib import closing, suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from slam.ros.template import EPOCH_NS
 from slam.system import SlamSystem, create
 
 MAP_NS = NS_PER_S  # between two maps
+MOST_WAITING = 1000  # messages of a topic, until the first scan and odometry are there
 FIRST_S = 0.1  # that the first scan waits for what comes with it
 _log = logging.getLogger(__name__)
 _SCAN = Topic(name="/scan", kind=SCAN, reliable=False, depth=100)
@@ -64,7 +66,7 @@ class Served:
         """Take what has come and answer it."""
         self._link.wait(0.5)
         for topic in _HEARD:  # scans first: what belongs to them was sent before them
-            self._waiting[topic] += self._taken(topic)
+            self._waiting[topic] = (self._waiting[topic] + self._taken(topic))[-MOST_WAITING:]
         for message in self._waiting[_STATIC]:
             for link in message.transforms:
                 self._links[(link.header.frame_id, link.child_frame_id)] = link.transform
@@ -75,7 +77,8 @@ class Served:
         now_ns = time.monotonic_ns()
         for topic in (_STEPS, _ODOM, _SCAN):
             for message in self._waiting[topic]:
-                self._assembly.take(topic.name, now_ns, message)
+                with _reading(topic):
+                    self._assembly.take(topic.name, now_ns, message)
         for waiting in self._waiting.values():
             waiting.clear()
         for frame in self._assembly.ready(now_ns):
@@ -84,10 +87,8 @@ class Served:
     def _taken(self, topic: Topic) -> list[Any]:
         found = []
         for taken in self._link.take(topic):
-            try:
+            with _reading(topic):
                 found.append(decoded(topic.kind, taken.data))
-            except MobiliaError as error:
-                _log.warning("%s: left out: %s", topic.name, error)
         return found
 
     def _begin(self) -> Assembly:
@@ -120,6 +121,15 @@ class Served:
             raster = asked_map(self._system)
             if raster is not None:
                 self._link.publish(_MAP, bytes(MapMessage(raster)(stamp_ns)))
+
+
+@contextmanager
+def _reading(topic: Topic) -> Iterator[None]:
+    """A message of strangers that cannot be used is left out."""
+    try:
+        yield
+    except MobiliaError as error:
+        _log.warning("%s: left out: %s", topic.name, error)
 
 
 def main(name: str, middleware: str = "dds") -> None:

@@ -73,6 +73,7 @@ def test_the_robot_is_carried_to_free_floor_only(world: World):
     x, y, yaw = hands.free_goal(world)
     hands.carry(world, (x, y, yaw))
     assert world.robot_pose().tolist() == pytest.approx([x, y, yaw])
+    assert not hands.in_the_way(world, x, y)  # itself is not
     in_its_place = {
         name: hands.in_the_way(world, *pose[:2].tolist())
         for name, pose in zip(world.mover_names, world.mover_poses(), strict=True)
