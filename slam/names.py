@@ -13,6 +13,7 @@ from __future__ import annotations
 import ast
 import importlib
 import os
+import re
 import sys
 from collections.abc import Iterable
 from importlib.util import find_spec
@@ -46,9 +47,14 @@ class NameFromFile(str):
         return str(self)
 
 
+NETWORK = re.compile(r"(^|\()ros2(-zenoh)?($|[{)])")  # a node of ROS 2, also inside an oracle
+
+
 def is_code(name: str) -> bool:
-    """Whether to resolve ``name`` is to run what it names: a module or a command."""
-    return ":" in name
+    """Whether to resolve ``name`` is to run what it names, a module or a command, or to open a
+    network.
+    """
+    return ":" in name or NETWORK.search(name) is not None
 
 
 def refuse_code(name: str, what: str) -> None:

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -32,8 +33,8 @@ SCAN = replace(topics()["/scan"], depth=1000)
 class _Timed(Network):
     """A network that notes when it sends."""
 
-    def begin(self, static_map: object) -> None:
-        super().begin(static_map)  # type: ignore[arg-type]
+    def __init__(self, *words: Any, **named: Any) -> None:
+        super().__init__(*words, **named)
         self.sent_ns: dict[int, int] = {}
 
     def send(self, shown: Shown) -> None:

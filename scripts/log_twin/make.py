@@ -77,6 +77,12 @@ def recorded(path: Path, slam: str) -> Recorded:
     frames = [frame for frame in stream if frame.scan is not None]
     if len(frames) < LEAST_SCANS:
         raise InvalidValueError(f"{path}: {len(frames)} scans, at least {LEAST_SCANS} are needed")
+    others = [k for k, frame in enumerate(frames) if not _alike(frames[0], frame)]
+    if others:
+        raise InvalidValueError(
+            f"{path}: scan {others[0]} has other beams, or the scanner elsewhere, than the first: "
+            "a twin has one scanner"
+        )
     if slam == REFERENCE and all(frame.truth is not None for frame in frames):
         poses = np.array([frame.truth for frame in frames])
         return Recorded(stream=stream, frames=frames, poses=poses, whose=REFERENCE)
@@ -86,6 +92,16 @@ def recorded(path: Path, slam: str) -> Recorded:
     replay.tracks[name].finish()
     track = replay.tracks[name].final() or replay.tracks[name].online()
     return Recorded(stream=stream, frames=frames, poses=np.array(track.poses), whose=name)
+
+
+def _alike(one: Frame, other: Frame) -> bool:
+    """Whether two scans are of one scanner."""
+    assert one.scan is not None
+    assert other.scan is not None
+    a, b = one.scan.spec, other.scan.spec
+    return a.angles.shape == b.angles.shape and bool(
+        np.allclose(a.angles, b.angles) and np.allclose(a.T_robot_laser, b.T_robot_laser)
+    )
 
 
 def housed(log: Recorded, folder: Path) -> tuple[Recorded, Path]:

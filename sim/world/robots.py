@@ -176,9 +176,8 @@ def with_robot(scene: Scene, robot: Robot) -> Scene:
     laser.pos = [x, y, laser.pos[2]]
     laser.quat = [math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)]
     _footprint(spec, robot, (x, y, height))
-    movers = tuple(
-        replace(m, radius=robot.radius) if m.kind == "robot" else m for m in raised.movers
-    )
+    reach = robot.radius + abs(robot.ahead_m)  # about the axle, not about the footprint's middle
+    movers = tuple(replace(m, radius=reach) if m.kind == "robot" else m for m in raised.movers)
     return replace(raised, spec=spec, movers=movers)
 
 

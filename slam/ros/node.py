@@ -104,7 +104,8 @@ class Node:
         return False
 
     def _take(self, stamp_ns: int, T_map_odom: Float) -> None:
-        """The newest statement stands."""
+        """The newest statement stands; one stamped ahead answers this frame, and no other."""
+        stamp_ns = min(stamp_ns, self._now_ns)
         if stamp_ns < self._answered_ns:
             return
         if self._T_own_map is None:
