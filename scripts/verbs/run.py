@@ -34,6 +34,7 @@ from scripts.options import (
     with_oracles,
 )
 from slam.errors import InvalidValueError
+from slam.variants import MAP_ORACLE
 
 
 def run(
@@ -98,6 +99,8 @@ def run(
     if (log is None) == (scene is None):
         raise InvalidValueError("name exactly one of --log and --scene")
     slams = list(with_oracles(named(list(slam)), oracle, set_))
+    if MAP_ORACLE in slams:
+        raise InvalidValueError("--oracle map is for compare and benchmark: they know the true map")
     check(slams, scene)
     from scripts.pace import announce, timed
 

@@ -19,6 +19,7 @@ from slam.ros.link import MOST_DOMAIN, domain_of_environment, open_to_others
 ROUTER = 7447  # port of rmw_zenohd
 _KEPT_WORDS = 2000  # bytes of what it says
 _DRAIN_S = 0.001
+LEASE_S = 15.0  # s; DDS takes an ended node for alive for 10 s, and a scan sent meanwhile is lost
 
 
 class Domain:
@@ -46,11 +47,14 @@ class Domain:
     def _held(self, number: int) -> bool:
         """Whether the number is ours now."""
         name = f"mobilia-{os.getuid()}-{self.middleware}-{number}.lock"
-        file = os.open(Path(tempfile.gettempdir(), name), os.O_RDWR | os.O_CREAT, 0o600)
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW
+        file = os.open(Path(tempfile.gettempdir(), name), flags, 0o600)
         with suppress(BlockingIOError):
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self.number, self._file = number, file
-            return True
+            used = os.fstat(file)
+            if not self.own or not used.st_size or time.time() - used.st_mtime > LEASE_S:
+                self.number, self._file = number, file
+                return True
         os.close(file)
         return False
 
@@ -70,7 +74,8 @@ class Domain:
         return {**child_environment(guest=True), **more}
 
     def free(self) -> None:
-        """Another may have it."""
+        """Another may have it, once a node that was ended here is forgotten."""
+        os.pwrite(self._file, b"used", 0)
         os.close(self._file)
 
 

@@ -13,6 +13,7 @@ from slam.errors import InvalidValueError, MissingDependencyError, SlamFailedErr
 from slam.estimate import Raster
 from slam.frames import NS_PER_S
 from slam.ros import slam as ros2
+from slam.ros.child import Domain
 from slam.ros.heard import StampedPose
 from slam.ros.link import Taken, Topic, open_link
 from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
@@ -207,3 +208,11 @@ def test_a_node_of_ours_says_what_the_same_code_says_here(middleware, monkeypatc
         np.testing.assert_allclose(a.T_map_robot, b.T_map_robot, atol=1e-12)
         np.testing.assert_allclose(a.covariance, b.covariance, atol=1e-12)
     served.close()
+
+
+def test_a_domain_rests_until_the_node_that_was_ended_there_is_forgotten() -> None:
+    first = Domain("dds", own=True, wait_s=5.0)
+    first.free()
+    second = Domain("dds", own=True, wait_s=5.0)
+    second.free()
+    assert first.number != second.number
