@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.frontend.corner_config import CornerConfig
 
 Float = NDArray[np.float64]
@@ -61,7 +61,7 @@ def draw(
                 _dot(image, widths, x, y, sigma)
 
 
-@njit
+@inner
 def _dot(image: Float, widths: Float, x: float, y: float, sigma: float) -> None:
     height, width = image.shape
     reach = CUT * sigma

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ def solve(L: Float, b: Float) -> None:
             b[i, j] /= L[i, i]
 
 
-@njit
+@inner
 def subtract_rows(out: Float, weights: Float, rows: Float) -> None:
     """out (m,) - weights (n,) times rows (n, m), in place, four rows in one pass over ``out``."""
     n = len(weights)

@@ -39,7 +39,7 @@ ITERATIONS = 6
 SETTLED = 1e-10  # squared step of xi (m^2, rad^2) below which iterating stops
 
 
-@njit
+@inner
 def arc(angle: float) -> tuple[float, float, float, float]:
     """(s, c, ds, dc) with s = sin(a)/a, c = (1 - cos(a))/a and their derivatives by a."""
     if abs(angle) < 1e-4:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.landmarks.kernels import ITERATIONS, SETTLED, look
 
 Float = NDArray[np.float64]
@@ -80,7 +80,7 @@ def spread(M: Float, H: Float) -> tuple[float, float, float]:
     return p00, p01, p11
 
 
-@njit
+@inner
 def pair_cost(pose: Float, landmark: Float, M: Float, z: Float, R: Float) -> float:
     """The cost of ``kernels.linearise`` for one pair, M (5, 5) being pose's and landmark's part.
 

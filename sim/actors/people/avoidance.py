@@ -14,7 +14,7 @@ from sim.actors.people import columns
 from sim.actors.people.right_of_way import BODY, Crowd, Int
 from sim.core.flow import Field, clearance_at
 from sim.core.state import Record, Records
-from slam._jit import njit
+from slam._jit import inner, njit
 
 _S = ACTORS.steering
 HORIZON, ACCEL, SPARE, SPARE_MPS = _S.horizon_s, _S.accel, _S.spare_m, _S.spare_mps
@@ -41,7 +41,7 @@ def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> flo
     return min(c / (b + math.sqrt(root)), HORIZON)
 
 
-@njit
+@inner
 def danger(  # noqa: PLR0913 (kernel)
     i: int, vx: float, vy: float, near: Int, discs: Records, fade: float, dense: float
 ) -> float:
@@ -75,7 +75,7 @@ def danger(  # noqa: PLR0913 (kernel)
     return cost
 
 
-@njit
+@inner
 def choose(
     i: int,
     wanted: tuple[float, float],
@@ -122,7 +122,7 @@ def choose(
     return best_x, best_y
 
 
-@njit
+@inner
 def spare_robot(
     i: int, wanted: tuple[float, float], near: Int, crowd: Crowd
 ) -> tuple[float, float]:
@@ -155,7 +155,7 @@ def spare_robot(
     return vx, vy
 
 
-@njit
+@inner
 def _spare(
     vx: float, vy: float, disc: Record, robot: Record, spare: float, brake: float
 ) -> tuple[float, float]:

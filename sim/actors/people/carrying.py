@@ -13,7 +13,7 @@ from sim.actors.people import columns
 from sim.actors.people.right_of_way import Crowd, Int
 from sim.core.flow import Field, clearance_at, time_at
 from sim.core.state import Record
-from slam._jit import njit
+from slam._jit import inner
 
 PEOPLE_STEPS = 2  # of the look ahead, in which people matter
 _H = ACTORS.holding
@@ -25,7 +25,7 @@ HURRY, HURRY_MOST = _H.hurry, _H.hurry_most
 TURN_GAIN = ACTORS.walking.turn_gain
 
 
-@njit
+@inner
 def parts_of(i: int, crowd: Crowd, parts: Int) -> int:
     """Disc rows of person ``i`` and what it pushes, into ``parts``; returns how many.
 
@@ -46,7 +46,7 @@ def parts_of(i: int, crowd: Crowd, parts: Int) -> int:
     return count
 
 
-@njit
+@inner
 def part_at(
     part: Record, pivot: Record, yaw: float, v: float, omega: float, t: float
 ) -> tuple[float, float]:
@@ -58,7 +58,7 @@ def part_at(
     return x, pivot.y + way * math.sin(along) + s * dx + c * dy
 
 
-@njit
+@inner
 def runs_into(  # noqa: PLR0913 (kernel)
     v: float,
     omega: float,
@@ -107,7 +107,7 @@ def runs_into(  # noqa: PLR0913 (kernel)
     return CLOSE * (CLOSE_M - closest)
 
 
-@njit
+@inner
 def pushes(
     i: int, wanted: tuple[float, float], near: Int, field: Field, crowd: Crowd
 ) -> tuple[float, float]:
@@ -150,7 +150,7 @@ def pushes(
     return vx, best_v * math.sin(yaw) + best_omega * (me.x - pivot.x)
 
 
-@njit
+@inner
 def keep_hold(
     i: int, velocity: tuple[float, float], crowd: Crowd, held: Held, at: Int
 ) -> tuple[float, float]:

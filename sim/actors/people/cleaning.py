@@ -12,7 +12,7 @@ from sim.actors.people.formation import in_sight, route
 from sim.actors.people.leaders import Leaders
 from sim.actors.people.right_of_way import Crowd, Float, Int
 from sim.core.flow import Field
-from slam._jit import njit
+from slam._jit import inner
 
 _C = ACTORS.cleaning
 REACH, NEAR, REST_S = _C.hand_m, _C.near_m, _C.rest_s
@@ -20,7 +20,7 @@ PACE, THERE, TRIP_S = _C.pace_mps, _C.there_m, _C.trip_s
 GIVES_UP_S = ACTORS.walking.blocked_s
 
 
-@njit
+@inner
 def next_chair(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> int:
     """Disc row of the nearest chair in sight that stands, and nobody sits on or holds; -1.
 
@@ -45,7 +45,7 @@ def next_chair(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> int:
     return found
 
 
-@njit
+@inner
 def row_place(i: int, leaders: Leaders, crowd: Crowd) -> int:
     """Row of ``lines`` that is next: the chairs go in, then out again, the last one first."""
     first, turn = crowd.task[i].first, crowd.task[i].place
@@ -53,14 +53,14 @@ def row_place(i: int, leaders: Leaders, crowd: Crowd) -> int:
     return int(first + (turn if turn < n else 2 * n - 1 - turn))
 
 
-@njit
+@inner
 def fills(i: int, leaders: Leaders, crowd: Crowd) -> bool:
     """Whether somebody's row of chairs is being filled, or else emptied."""
     n = int(leaders.lines[crowd.task[i].first].places)
     return bool(crowd.task[i].place < n)
 
 
-@njit
+@inner
 def next_turn(i: int, time: float, leaders: Leaders, crowd: Crowd) -> None:
     """The next chair, after a rest."""
     n = int(leaders.lines[crowd.task[i].first].places)
@@ -69,7 +69,7 @@ def next_turn(i: int, time: float, leaders: Leaders, crowd: Crowd) -> None:
     crowd.state[i].free_at, crowd.state[i].blocked = time + REST_S, 0.0
 
 
-@njit
+@inner
 def to_what_is_taken(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """The velocity with which person ``i`` goes to the chair to take, or takes it to its place."""
     task = crowd.task[i]
@@ -87,7 +87,7 @@ def to_what_is_taken(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tu
     return speed * dx + 0.0, speed * dy + 0.0
 
 
-@njit
+@inner
 def find_work(i: int, time: float, field: Field, leaders: Leaders, crowd: Crowd) -> None:
     """Choose the next chair; where there is none, the row is emptied, or one goes elsewhere."""
     task = crowd.task
@@ -115,7 +115,7 @@ def find_work(i: int, time: float, field: Field, leaders: Leaders, crowd: Crowd)
     crowd.state[i].blocked, crowd.state[i].best_at = 0.0, time
 
 
-@njit
+@inner
 def clean(  # noqa: PLR0913 (kernel)
     i: int,
     time: float,

@@ -15,7 +15,7 @@ from sim.actors.people.formation import in_file, in_sight, near_place, taken, th
 from sim.actors.people.leaders import MOVING, Leaders
 from sim.actors.people.right_of_way import Crowd
 from sim.core.flow import Field, clearance_at, way_at
-from slam._jit import njit
+from slam._jit import inner
 
 _F = ACTORS.following
 FASTEST, THERE, SERVED_S, GAIN = _F.fastest_mps, _F.there_m, _F.served_s, _F.gain
@@ -27,7 +27,7 @@ TURN_MOST = ACTORS.walking.turn_most
 HELD_UP_S, REST_S = _F.held_up_s, _F.rest_s
 
 
-@njit
+@inner
 def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """The velocity with which person ``i`` would like to keep its place."""
     k = crowd.task[i].leader
@@ -45,13 +45,13 @@ def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float,
     return to_place(tx - x, ty - y, u, v)
 
 
-@njit
+@inner
 def share_of(far: float) -> float:
     """Of the leader's velocity: who is far behind goes straight to the place."""
     return max(1.0 - far, 0.0)
 
 
-@njit
+@inner
 def to_place(dx: float, dy: float, u: float, v: float) -> tuple[float, float]:
     """Velocity to a place (dx, dy) m away that itself moves at (u, v)."""
     far = math.sqrt(dx * dx + dy * dy)
@@ -64,7 +64,7 @@ def to_place(dx: float, dy: float, u: float, v: float) -> tuple[float, float]:
     return wx / over + 0.0, wy / over + 0.0
 
 
-@njit
+@inner
 def wait_behind(
     i: int, wanted: tuple[float, float], field: Field, leaders: Leaders, crowd: Crowd
 ) -> tuple[float, float]:
@@ -96,7 +96,7 @@ def wait_behind(
     return most * c, most * s
 
 
-@njit
+@inner
 def make_way(
     i: int, wanted: tuple[float, float], field: Field, leaders: Leaders, crowd: Crowd
 ) -> tuple[float, float]:
@@ -120,13 +120,13 @@ def make_way(
     return along * c - side * ASIDE * s, along * s + side * ASIDE * c
 
 
-@njit
+@inner
 def is_pushing(i: int, crowd: Crowd) -> bool:
     """Whether person ``i`` has something long before it, and not lost it since."""
     return bool(crowd.task[i].held >= 0 and crowd.state[i].turn_rate < TURN_MOST)
 
 
-@njit
+@inner
 def make_room(
     i: int, wanted: tuple[float, float], field: Field, crowd: Crowd
 ) -> tuple[float, float]:
@@ -150,7 +150,7 @@ def make_room(
     return wanted
 
 
-@njit
+@inner
 def rests(i: int, time: float, leaders: Leaders, crowd: Crowd) -> bool:
     """Whether person ``i`` was held up near its place and lets it be for a while."""
     state = crowd.state[i]
@@ -162,7 +162,7 @@ def rests(i: int, time: float, leaders: Leaders, crowd: Crowd) -> bool:
     return False
 
 
-@njit
+@inner
 def stand_in_line(i: int, time: float, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Velocity to one's place in the line, which moves up by one every ``SERVED_S``."""
     place = crowd.task[i].place
@@ -174,7 +174,7 @@ def stand_in_line(i: int, time: float, leaders: Leaders, crowd: Crowd) -> tuple[
     return to_place(dx, dy, 0.0, 0.0)
 
 
-@njit
+@inner
 def faces(i: int, leaders: Leaders, crowd: Crowd) -> float:
     """Heading rad of someone who stands: towards the leader, or up the line."""
     k = crowd.task[i].leader

@@ -16,7 +16,7 @@ from sim.actors.people import columns
 from sim.actors.people.leaders import CRUMB, CRUMBS, Leaders
 from sim.actors.people.right_of_way import Crowd
 from sim.core.flow import FAR, Field, clearance_at, time_at, way_at
-from slam._jit import njit
+from slam._jit import inner
 
 _F = ACTORS.following
 GIVE_WAY_S, STEP_BACK, STEP_BACK_M = _F.give_way_s, _F.step_back, _F.step_back_m
@@ -26,7 +26,7 @@ STANDS_S, STANDS_M, NEAR_M = _F.stands_s, _F.stands_m, _F.near_m
 BEHIND = -0.5  # m; a place farther behind is one on the leader's way
 
 
-@njit
+@inner
 def in_sight(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
     """Whether the straight way between two places is free of walls."""
     dx, dy = tx - x, ty - y
@@ -38,7 +38,7 @@ def in_sight(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
     return True
 
 
-@njit
+@inner
 def through_door(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
     """Whether the straight way between two places leads through something narrow."""
     dx, dy = tx - x, ty - y
@@ -49,7 +49,7 @@ def through_door(field: Field, x: float, y: float, tx: float, ty: float) -> bool
     return False
 
 
-@njit
+@inner
 def route(i: int, tx: float, ty: float, field: Field, crowd: Crowd) -> tuple[float, float]:
     """A place in sight of person ``i`` on the way to (tx, ty): itself, or a step round the walls.
 
@@ -69,7 +69,7 @@ def route(i: int, tx: float, ty: float, field: Field, crowd: Crowd) -> tuple[flo
     return x + wx, y + wy
 
 
-@njit
+@inner
 def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Where person ``i`` would like to be, in the formation of leader ``k``."""
     course, disc = leaders.course[k], crowd.discs[leaders.rows[k]]
@@ -100,13 +100,13 @@ def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tu
     return x + reach * c, y + reach * s
 
 
-@njit
+@inner
 def _crossing(a: float, b: float, p: float, q: float) -> float:
     """By how much (m2) the ways from a to q and b to p are shorter, on one axis."""
     return (a - p) ** 2 + (b - q) ** 2 - (a - q) ** 2 - (b - p) ** 2
 
 
-@njit
+@inner
 def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
     """Where everybody's place is now; pairs who would cross take each other's."""
     state, task, discs = crowd.state, crowd.task, crowd.discs
@@ -129,7 +129,7 @@ def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
                 one.spot_y, two.spot_y = two.spot_y, one.spot_y
 
 
-@njit
+@inner
 def in_file(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Where person ``i`` goes who does not see its place: in file on the way of leader ``k``."""
     x, y = crowd.discs[i].x, crowd.discs[i].y
@@ -144,7 +144,7 @@ def in_file(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tup
     return route(i, leader.x, leader.y, field, crowd)
 
 
-@njit
+@inner
 def near_place(i: int, leaders: Leaders, crowd: Crowd) -> bool:
     """Whether person ``i`` is as good as at its place, or with its leader.
 
@@ -162,7 +162,7 @@ def near_place(i: int, leaders: Leaders, crowd: Crowd) -> bool:
     return bool(dx * dx + dy * dy < reach * reach)
 
 
-@njit
+@inner
 def taken(i: int, x: float, y: float, crowd: Crowd) -> bool:
     """Whether something else stands at a place, so that person ``i`` cannot."""
     discs = crowd.discs

@@ -8,12 +8,12 @@ import math
 from sim.actors.config import ACTORS
 from sim.actors.people import columns
 from sim.actors.people.right_of_way import Addresses, Crowd, Doors, Float, Int
-from slam._jit import njit
+from slam._jit import inner
 
 SIGHT_M = ACTORS.holding.sight_m
 
 
-@njit
+@inner
 def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) -> None:
     """Read discs, headings, door angles and the discs that stand for the leaves."""
     discs, k = crowd.discs, at.discs.shape[0]
@@ -54,7 +54,7 @@ def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) ->
         end.u, end.v = qvel[v] - qvel[v + 2] * ry, qvel[v + 1] + qvel[v + 2] * rx
 
 
-@njit
+@inner
 def nearby(i: int, crowd: Crowd, sides: Int, near: Int) -> int:
     """Rows of discs within 3 m of person ``i``, into ``near``; returns how many.
 

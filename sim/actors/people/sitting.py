@@ -19,7 +19,7 @@ from sim.actors.people import columns
 from sim.actors.people.gait import HIP, SEAT_HEIGHT
 from sim.actors.people.right_of_way import Crowd, Float, Int
 from sim.core.flow import Field, clearance_at
-from slam._jit import njit
+from slam._jit import inner, njit
 
 _S = ACTORS.sitting
 SHARE, HAND, STAY, DOWN_S = _S.share, _S.hand_m, _S.stay, _S.down_s
@@ -56,7 +56,7 @@ def dress(crowd: Crowd, hulls: Hulls) -> None:
             hulls.body_pos[look, 2] = hulls.heights[i] - sunk
 
 
-@njit
+@inner
 def free_seat(i: int, field: Field, crowd: Crowd) -> int:
     """Row of the nearest chair at hand that nobody else has and the way to which is free; -1."""
     discs, task = crowd.discs, crowd.task
@@ -80,7 +80,7 @@ def free_seat(i: int, field: Field, crowd: Crowd) -> int:
     return found
 
 
-@njit
+@inner
 def may_sit(i: int, field: Field, crowd: Crowd) -> None:
     """On arrival: perhaps go on to a chair."""
     if crowd.state[i].luck < SHARE:
@@ -90,7 +90,7 @@ def may_sit(i: int, field: Field, crowd: Crowd) -> None:
             crowd.state[i].blocked = 0.0
 
 
-@njit
+@inner
 def sit(i: int, time: float, tick: float, crowd: Crowd) -> None:
     """Come to the chair, sit down, get up; call it at every tick."""
     discs, state, task = crowd.discs, crowd.state, crowd.task
@@ -118,14 +118,14 @@ def sit(i: int, time: float, tick: float, crowd: Crowd) -> None:
             task[i].seat = -1
 
 
-@njit
+@inner
 def on_chair(i: int, crowd: Crowd) -> bool:
     """Sitting, sitting down or getting up: moves with the chair."""
     seated = crowd.task[i].walking == columns.SEATED
     return bool(seated or (crowd.task[i].walking == columns.WALKS and crowd.state[i].sit > 0.0))
 
 
-@njit
+@inner
 def to_chair(i: int, crowd: Crowd) -> tuple[float, float]:
     """Velocity to the middle of the chair."""
     discs, seat = crowd.discs, crowd.task[i].seat

@@ -13,7 +13,7 @@ from sim.actors.people.sitting import may_sit, sit
 from sim.core.draws import between, uniform, waiting
 from sim.core.flow import FAR, Field, time_at
 from sim.core.state import Records
-from slam._jit import njit
+from slam._jit import inner
 
 _W = ACTORS.walking
 STILL, DOORWAY = _W.still_mps, _W.doorway_m
@@ -24,7 +24,7 @@ GIVES_UP, CROWD_GIVES_UP = _W.blocked_s, _W.crowd_blocked_s
 PATIENT, CROWD_PATIENT = _W.patient_s, _W.crowd_patient_s
 
 
-@njit
+@inner
 def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> None:
     """Draw the next goal of person ``i`` (always five draws) and set off."""
     discs, state, task, draws = crowd.discs, crowd.state, crowd.task, crowd.draws
@@ -51,7 +51,7 @@ def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> No
     state[i].best, state[i].best_at = FAR, time
 
 
-@njit
+@inner
 def way_left(i: int, field: Field, crowd: Crowd) -> float:
     """s to the goal, of person ``i`` or whatever of the thing it pushes is nearest to it."""
     discs, goal = crowd.discs, crowd.task[i].goal
@@ -63,7 +63,7 @@ def way_left(i: int, field: Field, crowd: Crowd) -> float:
     return left
 
 
-@njit
+@inner
 def arrived(i: int, left: float, doors: Records, discs: Records, state: Records) -> bool:
     """Near enough to the goal, or held up close to it, and not standing in a doorway."""
     for d in range(doors.shape[0]):
@@ -73,7 +73,7 @@ def arrived(i: int, left: float, doors: Records, discs: Records, state: Records)
     return left < state[i].arrive or (left < NEAR_S and state[i].blocked > NEAR_BLOCKED)
 
 
-@njit
+@inner
 def plan(  # noqa: C901, PLR0913 (kernel)
     i: int, time: float, tick: float, stay: float, doors: Records, field: Field, crowd: Crowd
 ) -> None:
@@ -113,7 +113,7 @@ def plan(  # noqa: C901, PLR0913 (kernel)
         new_trip(i, time, stay, field, crowd)
 
 
-@njit
+@inner
 def patience(i: int, time: float, crowd: Crowd) -> float:
     """Respect of person ``i`` for chairs and leaves in the way: 1 at first, 0 when worn out.
 
