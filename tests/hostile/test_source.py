@@ -46,7 +46,6 @@ STARTERS = {
     "scripts/benches/ros2.py": "our own Python, as the other end of a link",
     "scripts/film/encode.py": "ffmpeg",
     "scripts/result_files.py": "git, for the commit of a results file",
-    "scripts/experiments/covariance_scores.py": "smfeval, as the user names it",
 }
 
 
