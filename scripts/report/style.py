@@ -69,11 +69,11 @@ def apart(slam: str, slams: Sequence[str], levels: Sequence[float]) -> float:
     return gap * (list(slams).index(slam) - 0.5 * (len(slams) - 1))
 
 
-def line(ax: Axes, points: Sequence[Point], color: str, mark: str) -> None:
+def line(ax: Axes, points: Sequence[Point], color: str, mark: str, label: str = "") -> None:
     """Values with their intervals; a cross at the top stands for an infinite one."""
     shown = [(x, value) for x, value, _, _ in points if math.isfinite(value)]
     ax.plot([x for x, _ in shown], [y for _, y in shown], color=color, marker=mark, ms=5.0, lw=1.6,
-            mec="white", mew=0.6, zorder=3)  # fmt: skip
+            mec="white", mew=0.6, zorder=3, label=label)  # fmt: skip
     for x, value, low, high in points:
         if math.isfinite(low) and high == math.inf:  # past the axes, which do not grow for it
             bar = Line2D([x, x], [low, 1e12], color=color, lw=3.2, alpha=0.3, zorder=2)

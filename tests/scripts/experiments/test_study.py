@@ -24,7 +24,7 @@ from slam.frames import LaserSpec, Scan
 from slam.system import create
 
 NAMES = (
-    "ablation", "accuracy", "breaking_point", "habits", "loops", "range_error", "rates",
+    "ablation", "accuracy", "breaking_point", "habits", "logs", "range_error", "rates",
     "scanners", "share_seen", "uncertainty",
 )  # fmt: skip
 STUDIES = {name: importlib.import_module(f"scripts.experiments.{name}").STUDY for name in NAMES}
