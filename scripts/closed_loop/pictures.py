@@ -14,9 +14,9 @@ from matplotlib.lines import Line2D
 
 import scenes
 from scenes.scene import Scene
+from scripts import figures
 from scripts.closed_loop.runs import Driven
 from scripts.figures import COLORS, color_of, save, styled
-from scripts.report import style
 from sim.view.draw import Picture
 from sim.view.mapview import MapView
 from sim.world.world import World
@@ -41,13 +41,13 @@ def curves(path: Path, levels: Sequence[Row], axis: str = "dynamism") -> None:
     for ax, (key, label, factor, top) in zip(figure.subplots(1, 2), panels, strict=True):
         for name in names:
             points = [
-                (row["dynamism"] + style.apart(name, names, ticks),
+                (row["dynamism"] + figures.apart(name, names, ticks),
                  *(factor * row[f"{key}{end}"] for end in ("", "_low", "_high")))
                 for row in levels
                 if row["slam"] == name and row[key] is not None
             ]  # fmt: skip
-            style.line(ax, points, color_of(name, names), style.marker(name, names), name)
-        style.level_axis(ax, ticks, axis)
+            figures.line(ax, points, color_of(name, names), figures.marker(name, names), name)
+        figures.level_axis(ax, ticks, axis)
         ax.set(ylim=(0.0, top), ylabel=label, title=f"{scene}: with 95 % intervals")
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(

@@ -18,6 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter
 
+from scripts import figures
 from scripts.comparison.recording import Recording
 from scripts.comparison.tables import number
 from scripts.experiments import shared
@@ -25,7 +26,6 @@ from scripts.experiments.shared import CM, PERCENT, Row, of
 from scripts.experiments.study import Study
 from scripts.figures import color_of, save, styled
 from scripts.options import Axis
-from scripts.report import style
 from slam.evaluation.lost import LOST_RULE
 from slam.evaluation.statistics import quantile
 from slam.frames import BeamClass
@@ -81,20 +81,20 @@ def picture(rows: Sequence[Row], path: Path) -> None:
         levels = sorted({row["level"] for row in own})
         for slam in slams:
             of_it = [row for row in own if row["slam"] == slam]
-            aside, color = style.apart(slam, slams, levels), color_of(slam, slams)
+            aside, color = figures.apart(slam, slams, levels), color_of(slam, slams)
             at = [(level, [row for row in of_it if row["level"] == level]) for level in levels]
             points = [
                 (level + aside, _shown(quantile(ates_m(found), 0.5)), math.nan, math.nan)
                 for level, found in at
             ]
-            style.line(ax, points, color, style.marker(slam, slams), slam)
+            figures.line(ax, points, color, figures.marker(slam, slams), slam)
             lost = [
                 (r["level"] + aside, _shown(m)) for r in of_it if r["lost"] for m in ates_m([r])
             ]
             ax.plot(
                 *zip(*lost, strict=True) if lost else ((), ()), "x", color=color, ms=4, alpha=0.8
             )
-        style.level_axis(ax, levels, f"{axis}, 0 to 1")
+        figures.level_axis(ax, levels, f"{axis}, 0 to 1")
         ax.set(title=scene, yscale="log", ylim=(0.8 * LEAST_CM, 1.3 * MOST_CM))
         ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
     grid[0][0].set_ylabel("position error (ATE) in cm,\nunaligned, median")

@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from scripts.experiments.measured import table
 from scripts.metrics.table import METRICS
 from scripts.result_files import load
 from slam.errors import LogFormatError
@@ -175,12 +176,6 @@ def verdict(cell: Cell, metric: str) -> int:
     if not (low > 0.0 or high < 0.0):
         return 0
     return 1 if (high < 0.0) == bool(METRICS[metric].less_is_better) else -1
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def made(data: dict[str, Any], seeds: Sequence[int]) -> str:
