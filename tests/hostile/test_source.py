@@ -33,7 +33,6 @@ IMPORTERS = {
     "scripts/live/page.py": "the same",
     "scripts/live/gate.py": "what viser's messages are read with",
     "scripts/verbs/reproduce.py": "experiments of ours",
-    "scripts/paper/runs.py": "jobs of ours",
     "scripts/experiments/study.py": "runs of ours",
 }
 PRIVATE = {  # both ends are ours, over a socket that nobody else has
