@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measured numbers into the pages: ``python -m scripts.quotes``.
 
-Fills the marked places of README and docs from the results files in ``docs/results``. With
+Fills the marked places of ``docs/comparing.md`` from ``docs/results/comparison.json``. With
 ``--check`` nothing is written, and the exit status is 1 where a page says something else.
 """
 
@@ -19,7 +19,7 @@ from scripts.result_files import RESULTS, ROOT
 from slam.errors import InvalidValueError
 from slam.files import write_text
 
-PAGES = ("README.md", "docs/comparing.md", "docs/films.md")
+PAGES = ("README.md", "docs/comparing.md")
 
 
 def quoted(text: str, told: dict[str, str], page: object) -> tuple[str, list[str]]:

@@ -56,10 +56,8 @@ class Comparison:
 
 def texts(results: Path) -> dict[str, str]:
     """By the name of the mark."""
-    full, costs = Comparison(results / "comparison.json"), load(results / "costs.json")
+    full = Comparison(results / "comparison.json")
     return {
-        "films.cost": _wrapped(film(costs)),
-        "readme.demo": f"{costs['costs']['demo']['s']:.0f} s of processor time",
         "comparing.made": _wrapped(comparing_made(full.data)),
         "comparing.errors": errors(full),
         "comparing.differences": differences(full),
@@ -135,18 +133,6 @@ def comparing_made(data: dict[str, Any]) -> str:
         f"({made(data, data['seeds'])}; all numbers: "
         "[results/comparison.json](results/comparison.json)). Median unaligned ATE in cm with its "
         "95 % interval, and the rank correlation of dynamism with the medians:"
-    )
-
-
-def film(costs: dict[str, Any]) -> str:
-    """Of a second of film."""
-    s = {name: row["s"] for name, row in costs["costs"].items()}
-    measured = made(costs, costs["costs"]["film, with 3D"]["seeds"])
-    return (
-        "A second of film at 30 fps and 1280 × 720, simulation and SLAM included, takes "
-        f"{s['film, without 3D']:.1f} s of processor time without the 3D view and "
-        f"{s['film, with 3D']:.1f} s with it, drawn without a graphics card (480 × 300, ten times "
-        f"a second); the encoder takes {s['encoder, with 3D']:.1f} s more ({measured})."
     )
 
 
