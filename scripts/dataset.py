@@ -44,7 +44,7 @@ def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | Non
         task = bar.add_task(
             "generating", total=total * length_s, completed=before, before=before, unit=""
         )
-        scans = count()
+        scans = count(1)
 
         def frame() -> None:
             """One more scan of an episode that is being made in this process."""
