@@ -56,7 +56,7 @@ def write(out: Path, name: str, lines: Sequence[str]) -> Path:
 
 
 def page(scanner: str, rows: Sequence[Row]) -> list[str]:
-    """The card of a scanner; that of the LMS-221 has pictures and notes."""
+    """The card of a scanner; that of the LMS-221 has a picture and notes."""
     usual = scanner == DEFAULT
     title, name, option = "SICK LMS-221", "LMS-221", ""
     if not usual:
@@ -88,8 +88,6 @@ def _sources(scanner: str) -> tuple[str, ...]:
 SOURCES = (
     "Sources: TD is SICK's technical description 8008970/06-2003. TL is the telegram",
     "listing 8007954/2006-08-01. STW is the ROS driver `sicktoolbox_wrapper`.",
-    "",
-    "![Card](pictures/sensor_card.png)",
 )
 NOTES = (
     "",
