@@ -10,6 +10,7 @@ from typing import NamedTuple
 from rich.markup import escape
 from rich.table import Table
 
+from scripts.marks import with_tables_apart
 from sim.sensors.lidar.registry import DEFAULT, describe
 from sim.sensors.lidar.sheet import NOT_STATED
 from slam.files import make_folder, write_text
@@ -49,9 +50,10 @@ def printed(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) 
 
 
 def write(out: Path, name: str, lines: Sequence[str]) -> Path:
-    """A page ``name``.md in the folder ``out``."""
+    """A page ``name``.md in the folder ``out``; long tables as CSV in its ``results``."""
     make_folder(out)
-    write_text(out / f"{name}.md", "\n".join(lines) + "\n")
+    text = with_tables_apart("\n".join(lines) + "\n", name, out / "results", out)
+    write_text(out / f"{name}.md", text)
     return out / f"{name}.md"
 
 

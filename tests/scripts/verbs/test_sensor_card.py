@@ -150,10 +150,9 @@ def test_a_log_beside_simulated_scans(
     sensor_card(log=[flaser(tmp_path / "robot.log")], out=tmp_path / "out")
     assert asked == ["lms221(resolution_deg=1)"]
     page = (tmp_path / "out" / "real_scanner_log.md").read_text()
-    (row,) = (
-        line for line in page.splitlines() if line.startswith("| noise of a standing robot |")
-    )
-    value = float(row.split("|")[3].split("(")[0])
+    table = (tmp_path / "out" / "results" / "real_scanner_log.csv").read_text()
+    (row,) = (line for line in table.splitlines() if line.startswith("noise of a standing robot,"))
+    value = float(row.split(",")[2].split("(")[0])
     assert value == pytest.approx((5.0**2 + 10.0**2 / 12) ** 0.5, rel=0.08)
     assert beside.DIFFERS in row
     assert "4 standing stretches (40 scans)" in page
