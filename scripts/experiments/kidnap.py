@@ -33,7 +33,7 @@ from sim.core.seeds import Seeds
 from sim.simulation import stream
 from slam import SlamSystem, create, se2
 from slam.frames import Float, Frame, Odometry, Scan
-from slam.frontend.odometry_sum import thinned
+from slam.frontend.odometry_steps import thinned
 from slam.logs import open_log
 
 FAR_M, FAR_RAD = 3.0, math.pi / 2.0

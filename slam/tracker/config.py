@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 from slam.errors import InvalidValueError
-from slam.frontend.config import FrontendConfig
+from slam.frontend.config import HEADING_BIAS, FrontendConfig
 from slam.frontend.corner_config import CornerConfig
 from slam.frontend.range_error_config import RangeErrorConfig
 from slam.landmarks.hypotheses import Gates
@@ -60,6 +60,14 @@ class TrackerConfig(Settings):
         "freeze_below": "carried_per_h",
         "tracking.freeze_below": "carried_per_h",
         "tracking.quality.give_up_s": "tracking.give_up_s",
+    }
+    constants: ClassVar[Mapping[str, str]] = {
+        "frontend.spacing_m": "slam.frontend.observations",
+        "frontend.least_weight": "slam.frontend.observations",
+        "frontend.surfaces": "slam.frontend.surfaces",
+        "frontend.view": "slam.frontend.visibility",
+        "frontend.prior": "slam.frontend.odometry_prior",
+        **{f"frontend.bias.{name}": "slam.frontend.odometry_prior" for name in HEADING_BIAS},
     }
 
     cell_m: float = number(

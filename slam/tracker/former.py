@@ -6,8 +6,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-_GROUPS = {"tracking": ("quality", "verdict")}
+from slam.frontend.config import HEADING_BIAS
+
+_GROUPS = {"tracking": ("quality", "verdict"), "frontend": ("surfaces", "view", "prior")}
 _NUMBERS: dict[str, tuple[str, ...]] = {
+    "frontend": ("spacing_m", "least_weight"),
+    "frontend.bias": HEADING_BIAS,
     "standing": (
         "better", "explains", "fallen", "fallen_s", "outvoted", "rival_gain", "rival_m",
         "rival_points", "rival_rad", "rival_s", "rival_scans", "undecided_s",
