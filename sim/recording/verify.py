@@ -14,9 +14,9 @@ from sim.core.versions import not_this_world
 from sim.recording import topics
 from sim.recording.bag import FORMAT, FORMATS, MessageHash
 from sim.recording.episode import record
-from sim.recording.rearranged import REARRANGED
 from sim.recording.recipe import RECIPE, Made, Recipe, read_recipe
 from sim.recording.sums import SUMS, Fault, check_vouched, faults, read_sums
+from sim.recording.tables import REARRANGED
 from slam.errors import LogFormatError, OutputError
 from slam.logs.bag_topics import Bag
 

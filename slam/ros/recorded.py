@@ -11,7 +11,7 @@ from slam import se2
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame
-from slam.logs.bag_odometry import PoseTrack, Stamped
+from slam.logs.bag_laser import PoseTrack, Stamped
 from slam.logs.bag_topics import INCREMENT, TRANSFORMS, Bag
 from slam.logs.text import about
 from slam.path import PosePath
