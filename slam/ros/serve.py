@@ -34,7 +34,7 @@ from slam.system import SlamSystem, create
 
 MAP_NS = NS_PER_S  # between two maps
 MOST_WAITING = 1000  # messages of a topic, until the first scan and odometry are there
-FIRST_S = 0.1  # that the first scan waits for what comes with it
+FIRST_S = 0.3  # that the first scan waits for what comes with it
 _log = logging.getLogger(__name__)
 _SCAN = Topic(name="/scan", kind=SCAN, reliable=False, depth=100)
 _TURNS = Topic(name="/scan_turn", kind=SCAN, reliable=False, depth=100)
@@ -52,7 +52,7 @@ class Served:
 
     def __init__(self, link: Link, system: SlamSystem) -> None:
         self._link, self._system = link, system
-        for topic in _HEARD:
+        for topic in reversed(_HEARD):  # who waits for a listener to scans has the others, too
             link.subscribe(topic)
         for topic in (_TF, _POSE, _MAP):
             link.advertise(topic)

@@ -20,6 +20,7 @@ from typing import Any
 
 import zenoh
 import zenoh.ext
+import zenoh.handlers
 
 from slam.errors import InvalidValueError
 from slam.ros.link import NODE, Taken, Topic, open_to_others, type_name
@@ -154,14 +155,18 @@ class ZenohLink:
                 come.append(Taken(sample.payload.to_bytes(), sender.hex()))
                 self._some.notify()
 
+        # in the thread that receives: one a topic would lose the order in which they were sent
+        handler = zenoh.handlers.Callback(heard, indirect=False)
         remote = zenoh.Locality.REMOTE
         if topic.latched:
             history = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=topic.depth)
             made = zenoh.ext.declare_advanced_subscriber(
-                self._session, self._key(topic), heard, history=history, allowed_origin=remote
+                self._session, self._key(topic), handler, history=history, allowed_origin=remote
             )
         else:
-            made = self._session.declare_subscriber(self._key(topic), heard, allowed_origin=remote)
+            made = self._session.declare_subscriber(
+                self._key(topic), handler, allowed_origin=remote
+            )
         self._subscribers[topic] = made
         self._declare("MS", topic)
 
