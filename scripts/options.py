@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
+from scenes.registry import is_file
 from scripts.console import note
 from slam.errors import InvalidValueError
 from slam.names import NameFromFile, is_code, refuse_code
@@ -162,6 +163,10 @@ class Held:
     def world(self, scene: str | None, dynamism: float, seed: int) -> dict[str, Any]:
         """The settings of a room, as ``Simulation`` takes them; what is None is not among them."""
         given = {name: value for name, value in asdict(self).items() if value is not None}
+        if scene is not None and is_file(scene):
+            from scenes.scene_file import sha256_of
+
+            given["scene_sha256"] = sha256_of(scene)
         return {"scene": scene, "dynamism": dynamism, **given, "seed": seed}
 
 

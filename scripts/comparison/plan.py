@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import scenes
 import sim
 import slam
+from scenes.registry import is_file
+from scenes.scene_file import sha256_of
 from scripts.comparison import entry, recording
 from scripts.comparison.rules import LEVEL
 from scripts.comparison.schema import LATER, settings
@@ -23,6 +25,7 @@ from sim.simulation import n_frames
 from sim.world.times_of_day import MOST_SESSIONS
 from slam.errors import InvalidValueError
 from slam.guests import Limits
+from slam.names import NameFromFile
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
@@ -97,6 +100,7 @@ class Plan(Asked):
              as the SLAM does
     sessions  of a building beside each run, in whose map SLAMs live from session to session
              (``scripts.days.buildings``); None: no buildings
+    scene_sha256  of scenes by their files; found where the names are not from a file themselves
     """
 
     scenes: tuple[str, ...]
@@ -107,8 +111,12 @@ class Plan(Asked):
     sets: tuple[Mapping[str, Any], ...] = ()
     judge_maps: bool = True
     sessions: int | None = None
+    scene_sha256: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        typed = [s for s in self.scenes if is_file(s) and not isinstance(s, NameFromFile)]
+        found = {scene: sha256_of(scene) for scene in typed if scene not in self.scene_sha256}
+        object.__setattr__(self, "scene_sha256", {**self.scene_sha256, **found})
         Limits(scan_s=self.scan_limit_s)
         self._check_axis()
         self.check_each_once("slams", "scenes", "levels", "seeds")
@@ -157,8 +165,9 @@ class Plan(Asked):
             )
 
     def settings(self) -> dict[str, Any]:
-        """For a recipe; without ``sessions`` where there are none, as it was before these."""
-        return {k: v for k, v in asdict(self).items() if k != "sessions" or v is not None}
+        """For a recipe; without what later came where there is none of it, as it was before."""
+        later = ("sessions", "scene_sha256")
+        return {k: v for k, v in asdict(self).items() if k not in later or v}
 
     def runs(self) -> list[Run]:
         """Every simulated run, scene by scene, level by level."""
@@ -180,6 +189,7 @@ class Plan(Asked):
         return Recipe(
             scene=run.scene, seed=run.seed, **own, seconds=self.seconds, scanner=self.scanner,
             odometry=self.odometry, options=options,
+            scene_sha256=self.scene_sha256.get(run.scene),
         )  # fmt: skip
 
     def recordings(self) -> dict[str, Job]:
