@@ -73,10 +73,11 @@ class Asked:
     change: float | None = None
     crowd: str | None = None
 
-    def room(self, level: float) -> dict[str, Any]:
-        """``dynamism``, ``motion`` and ``change`` at a level; errors for an axis that is none."""
+    @property
+    def levels_of(self) -> Axis:
+        """What the levels are of; errors for an axis that is none."""
         held = Held(motion=self.motion, change=self.change, crowd=self.crowd)
-        return Axis(name=self.axis, held=held).at(level)
+        return Axis(name=self.axis, held=held)
 
     def check_each_once(self, *names: str) -> None:
         """``InvalidValueError`` for a field that names nothing, or something twice."""
@@ -136,7 +137,7 @@ class Plan(Asked):
 
     def _check_axis(self) -> None:
         if self.axis != LEVEL:
-            self.room(0.0)  # complains of an axis that cannot be
+            self.levels_of.at(0.0)  # complains of an axis that cannot be
         elif (self.motion, self.change, self.crowd) != (None, None, None):
             raise InvalidValueError("Plan: with axis 'level' the levels set motion, change, crowd")
         fits = len(self.sets) == (len(self.levels) if self.axis == LEVEL else 0)
@@ -185,7 +186,8 @@ class Plan(Asked):
             own = {"dynamism": 0.0, **{k: v for k, v in given.items() if k in _OF_RECIPE}}
             options = {k: v for k, v in given.items() if k not in _OF_RECIPE}
         else:
-            own, options = self.room(run.dynamism), options_with(self.crowd)
+            axis = self.levels_of
+            own, options = axis.at(run.dynamism), options_with(axis.crowd(run.dynamism))
         return Recipe(
             scene=run.scene, seed=run.seed, **own, seconds=self.seconds, scanner=self.scanner,
             odometry=self.odometry, options=options,
