@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
-from scenes.registry import is_file
+from scenes import is_file
 from scripts.console import note
 from slam.errors import InvalidValueError
 from slam.names import NameFromFile, is_code, refuse_code
