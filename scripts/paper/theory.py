@@ -25,7 +25,7 @@ from slam import se2
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import Float, Frame
 from slam.frontend.observations import Observations, from_features, from_scan
-from slam.frontend.odometry_sum import thinned
+from slam.frontend.odometry_steps import thinned
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.featured import FeaturedShuntingSlam
 from slam.shunting.map.network import Network

@@ -37,10 +37,10 @@ IMPORTERS = {
 }
 PRIVATE = {  # both ends are ours, over a socket that nobody else has
     "slam/guests/guard.py": ["marshal"],
-    "slam/guests/guarding.py": ["marshal"],
+    "slam/guests/wire.py": ["marshal"],
 }
 STARTERS = {
-    "slam/guests/guarding.py": "a guard of ours; below it pipe:COMMAND, not of names from files",
+    "slam/guests/wire.py": "a guard of ours; below it pipe:COMMAND, not of names from files",
     "sim/view/gl.py": "our own Python, without the working folder",
     "scripts/benches/ros2.py": "our own Python, as the other end of a link",
     "scripts/film/encode.py": "ffmpeg",

@@ -12,7 +12,7 @@ import pytest
 from scripts.integrity import kidnap
 from slam import se2
 from slam.frames import Frame
-from slam.frontend.odometry_sum import thinned
+from slam.frontend.odometry_steps import thinned
 from tests.world2d import Drive, World2D, arena, frames, laser
 
 
