@@ -18,7 +18,7 @@ MARKS: dict[str, tuple[str, ...]] = {
     "docs": (
         "scripts/experiments/test_documented.py",
         "scripts/paper/test_quote.py",
-        "scripts/quotes/",
+        "scripts/test_marks.py",
         "test_bring_your_own.py",
         "test_extending.py",
         "test_readme.py",
