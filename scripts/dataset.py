@@ -4,19 +4,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
-from rich.progress import Progress
 from rich.table import Table
 
 from scripts import interrupt, workers
 from scripts.console import note, plain_table, progress
-from scripts.options import rate_hz
 from scripts.pace import Work, learn
 from sim.recording.dataset import Dataset, Plan, writing
 from sim.recording.episode import record
@@ -37,66 +34,25 @@ def carry_out(plan: Plan, out: Path, *, jobs: int = 1, cluster: str | None = Non
 
 
 def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | None) -> None:
-    """Every missing episode, with a bar: episodes, simulated seconds a second, time left."""
-    total, length_s = len(dataset.plan.jobs()), dataset.plan.recipe.seconds
-    alone = cluster is None and (jobs == 1 or len(missing) < 2)
+    """Every missing episode, with a bar."""
+    total = len(dataset.plan.jobs())
+    done = total - len(missing)
+    call = partial(_one, dataset.path)
     with progress() as bar:
-        meter = _Meter(
-            bar,
-            total=total,
-            done=total - len(missing),
-            length_s=length_s,
-            rate_hz=rate_hz(dataset.plan.recipe.scanner),
-        )
-        note_frame = meter.frame if alone else None
-        call = partial(_one, dataset.path, note_frame)
+        task = bar.add_task("generating", unit="", total=total, completed=done, before=done)
         for spent in workers.each(call, missing, jobs=jobs, cluster=cluster, shared=dataset.path):
-            meter.episode()
+            interrupt.check()
+            done += 1
+            bar.update(task, completed=done, unit=f"{done}/{total} episodes")
             if cluster is None:
                 learn([spent])
 
 
-def _one(folder: Path, note_frame: Callable[[], None] | None, recipe: Recipe) -> tuple[Work, float]:
+def _one(folder: Path, recipe: Recipe) -> tuple[Work, float]:
     """A job, here or in a worker: what it was, and s that it took."""
     started = time.perf_counter()
-    record(recipe, folder, note=note_frame or (lambda: None))
+    record(recipe, folder, note=interrupt.check)
     return Work(f"generate {recipe.scene}", recipe.seconds), time.perf_counter() - started
-
-
-class _Meter:
-    """The progress bar; counts in simulated seconds."""
-
-    def __init__(
-        self, bar: Progress, *, total: int, done: int, length_s: float, rate_hz: float
-    ) -> None:
-        self._bar, self._total, self._done, self._length_s = bar, total, done, length_s
-        self._frames, self._before, self._started = 0, done, time.perf_counter()
-        self._rate_hz = rate_hz
-        self._task = bar.add_task(
-            "generating",
-            unit="",
-            total=total * length_s,
-            completed=int(done * length_s),
-            before=int(done * length_s),
-        )
-
-    def frame(self) -> None:
-        """One more scan of the episode that is being made here."""
-        self._frames += 1
-        if self._frames % 25 == 0:
-            self._show(min(self._frames / self._rate_hz, self._length_s))
-
-    def episode(self) -> None:
-        """One more episode."""
-        self._done, self._frames = self._done + 1, 0
-        self._show(0.0)
-
-    def _show(self, begun_s: float) -> None:
-        interrupt.check()
-        seconds = (self._done - self._before) * self._length_s + begun_s
-        rate = seconds / max(time.perf_counter() - self._started, 1e-3)
-        unit = f"{self._done}/{self._total} episodes, {rate:.1f} s simulated per s"
-        self._bar.update(self._task, completed=self._before * self._length_s + seconds, unit=unit)
 
 
 def summary(dataset: Dataset, made: int, spent_s: float) -> Table:

@@ -203,26 +203,6 @@ class Axis:
         return {"dynamism": 0.0, **held, self.name: level}
 
 
-def chosen(
-    dynamism: Sequence[float], motion: Sequence[float], change: Sequence[float]
-) -> tuple[str, tuple[float, ...], dict[str, float]]:
-    """The axis, its levels, and what is held, from what was given of each; () for nothing.
-
-    The axis is the one with several levels, else dynamism, motion or change, the first given.
-    """
-    given = {"dynamism": dynamism, "motion": motion, "change": change}
-    several = [name for name, levels in given.items() if len(levels) > 1]
-    if len(several) > 1:
-        raise InvalidValueError(f"several levels of one axis only, got --{' and --'.join(several)}")
-    name = (several or [axis for axis in AXES if given[axis]] or ["dynamism"])[0]
-    if name != "dynamism" and dynamism:
-        raise InvalidValueError(
-            f"--dynamism sets both axes: with levels of --{name} give the other axis instead"
-        )
-    held = {axis: given[axis][0] for axis in ("motion", "change") if axis != name and given[axis]}
-    return name, tuple(given[name]), held
-
-
 def sweep(text: str, option: str = "--dynamism-sweep") -> tuple[float, ...]:
     """``0:1:0.25`` -> (0, 0.25, 0.5, 0.75, 1); ``InvalidValueError`` for anything else."""
     try:
@@ -242,10 +222,22 @@ def sweep(text: str, option: str = "--dynamism-sweep") -> tuple[float, ...]:
 def axis_levels(
     dynamism: list[str] | None, motion: list[str] | None, change: list[str] | None
 ) -> tuple[str, tuple[float, ...], dict[str, Any]]:
-    """The axis, its levels and what is held, from the three options; default 0 to 1 dynamism."""
-    given = {"dynamism": dynamism, "motion": motion, "change": change}
-    axis, at, held = chosen(*(levels(values or [], f"--{k}") for k, values in given.items()))
-    return axis, at or levels(["0:1:0.25"]), dict(held)
+    """The axis, its levels and what is held, from the three options; default 0 to 1 dynamism.
+
+    The axis is the one with several levels, else dynamism, motion or change, the first given.
+    """
+    words = {"dynamism": dynamism, "motion": motion, "change": change}
+    given = {name: levels(values or [], f"--{name}") for name, values in words.items()}
+    several = [name for name, values in given.items() if len(values) > 1]
+    if len(several) > 1:
+        raise InvalidValueError(f"several levels of one axis only, got --{' and --'.join(several)}")
+    name = (several or [axis for axis in AXES if given[axis]] or ["dynamism"])[0]
+    if name != "dynamism" and given["dynamism"]:
+        raise InvalidValueError(
+            f"--dynamism sets both axes: with levels of --{name} give the other axis instead"
+        )
+    held = {axis: given[axis][0] for axis in ("motion", "change") if axis != name and given[axis]}
+    return name, given[name] or levels(["0:1:0.25"]), held
 
 
 def levels(values: list[str], option: str = "--dynamism") -> tuple[float, ...]:
