@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from scripts.live.network import Network
-from scripts.live.opened import Opener
+from scripts.live.session import Opener
 from scripts.live.view import View
 from sim.view.moment import Shown
 from slam.frames import NS_PER_S
