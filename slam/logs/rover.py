@@ -217,7 +217,7 @@ SCAN = "line"
 def read_rover(path: str | Path, text_format: str | Path, *, strict: bool = False) -> Stream:
     """A text log (plain, .gz or .xz) with one scan a line, as ``text_format`` describes it.
 
-    ``text_format`` is a TOML file, see ``slam.logs.rover_format``. Empty lines and those that begin
+    ``text_format`` is a TOML file (docs/logs.md). Empty lines and those that begin
     with ``#`` are left out. Ranges of 0 are error codes, those at the maximum no return. Without
     odometry the frames have that of a robot at rest, and ``metadata.odometry`` says so.
 
