@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames and moments of the moving world: one seed, same bytes, and each says what is when it says."""
+"""Frames and moments of the moving world: one seed, same bytes; each says what is, and when."""
 
 from __future__ import annotations
 

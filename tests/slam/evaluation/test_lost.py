@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lost is far off for long enough, found again near for as long; a divergence is a rise that stays."""
+"""Lost is far off for long enough, found again near for as long; a divergence rises and stays."""
 
 from __future__ import annotations
 
