@@ -58,4 +58,4 @@ def scene_name(scene: str) -> str:
 
 def file_name(name: str) -> str:
     """A system's name as part of a file name: ``my_pkg:MySlam`` becomes ``my_pkg-MySlam``."""
-    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name).lstrip("-")
+    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name).lstrip("-.")

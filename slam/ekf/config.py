@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from slam.landmarks.hypotheses import Gates
 from slam.settings import Settings, number, word
 
-SEEDS = "training seeds 0-19, tune_ekf (docs/paper/method.md)"
+SEEDS = "training seeds 0-19 (docs/paper/method.md)"
 SENSOR = "as PointWorldConfig, the world of section 4.2"
 MOST_GATE = 1.0 - 1e-12
 

@@ -33,7 +33,6 @@ IMPORTERS = {
     "scripts/live/page.py": "the same",
     "scripts/live/gate.py": "what viser's messages are read with",
     "scripts/verbs/reproduce.py": "experiments of ours",
-    "scripts/paper/runs.py": "jobs of ours",
     "scripts/experiments/study.py": "runs of ours",
 }
 PRIVATE = {  # both ends are ours, over a socket that nobody else has
@@ -46,7 +45,6 @@ STARTERS = {
     "scripts/benches/ros2.py": "our own Python, as the other end of a link",
     "scripts/film/encode.py": "ffmpeg",
     "scripts/result_files.py": "git, for the commit of a results file",
-    "scripts/experiments/covariance_scores.py": "smfeval, as the user names it",
 }
 
 
