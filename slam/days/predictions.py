@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Will something stand there at that time? What predictors are given, how they are scored, rivals.
+"""Will something stand there at that time? What predictors are given, how they are scored, others.
 
 A ``Predictor`` sees n places session by session and gives the probability that each is taken at a
 later time. A sighting is 1 taken, 0 empty, between for what stood there part of the session, NaN
