@@ -41,9 +41,9 @@ _TURNS = Topic(name="/scan_turn", kind=SCAN, reliable=False, depth=100)
 _ODOM = Topic(name="/odom", kind=ODOMETRY, depth=100)
 _STEPS = Topic(name="/odom_increment", kind=INCREMENT, depth=100)
 _STATIC = Topic(name="/tf_static", kind=TransformMessage.KIND, latched=True)
-_TF = Topic(name="/tf", kind=TransformMessage.KIND, depth=100)
-_POSE = Topic(name="/pose", kind=INCREMENT)
-_MAP = Topic(name="/map", kind=MapMessage.KIND, latched=True, depth=1)
+_TF = Topic(name="/tf", kind=TransformMessage.KIND, depth=100, waits=True)
+_POSE = Topic(name="/pose", kind=INCREMENT, waits=True)
+_MAP = Topic(name="/map", kind=MapMessage.KIND, latched=True, depth=1, waits=True)
 _HEARD = (_SCAN, _TURNS, _ODOM, _STEPS, _STATIC)
 
 
