@@ -85,7 +85,8 @@ class Costs:
         Where frames are made between scans, as in simulation, both have the same memory.
         """
         self._lap()
-        updates_s = sum(sum(track.durations_s) for track in replay.tracks.values())
+        spent_s = (s for track in replay.tracks.values() for s in track.durations_s)
+        updates_s = sum(s for s in spent_s if math.isfinite(s))
         most = {**self._most, SLAM: max(self._most[SLAM], self._most[_SCANS])}
         spent = {**self._spent_s, SLAM: self._spent_s[SLAM] + updates_s}
         spent[REST] += max(spent.pop(_SCANS, 0.0) - updates_s, 0.0)
