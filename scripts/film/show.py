@@ -93,7 +93,7 @@ class Show:
         names = {name: name for name in self.replay.tracks}
         if self.shown is not None and self.shown.truth_map is not None and self.truth_name:
             names["truth"] = self.truth_name
-        return [(word, self.colors[name]) for name, word in names.items()]
+        return [(_short(word), self.colors[name]) for name, word in names.items()]
 
     def legend(self) -> list[tuple[str, Color]]:
         """The same for a strip, with what the colours of the beams say."""
@@ -315,6 +315,11 @@ class _Panes:
             bar, y = round(18 * unit), round(21 * unit)
             canvas[y : y + round(3 * unit), x - bar - round(6 * unit) : x - round(6 * unit)] = color
             x -= bar + round(24 * unit)
+
+
+def _short(word: str) -> str:
+    """Of a long command, its two ends."""
+    return word if len(word) <= 28 else f"{word[:12]}…{word[-15:]}"
 
 
 def _put(canvas: Picture, box: Box, picture: Picture) -> None:
