@@ -69,7 +69,10 @@ class Wanted:
             raise InvalidValueError(f"the subject {self.subject!r:.80} is none of the SLAMs")
         if self.sealed is not None:
             self.sealed.check_for(self.tracks)
-        most = min(len(self.seeds_of(track)) for track in self.tracks)
+        if len({self.seeds_of(track) for track in self.tracks}) > 1:
+            names = ", ".join(track.name for track in self.tracks)
+            raise InvalidValueError(f"tracks of one board must have the same seeds: {names}")
+        most = len(self.seeds_of(self.tracks[0]))
         if not 1 <= self.seeds <= most:
             raise InvalidValueError(f"--seeds must be 1 to {most}, got {self.seeds}")
         if self.days:

@@ -4,7 +4,8 @@
 A reader's SLAM gets a row between the others on the same recordings, without running the others.
 Each recording is named by its digest, so that nothing is compared on other scans.
 
-    python -m scripts.benchmark.published out/benchmark --commit HASH   # writes published.json
+    python -m scripts.benchmark.published out/quick out/top --commit HASH   # writes published.json
+    python -m scripts.benchmark.published out/top --run shunting --levels 1 --seeds 20
 """
 
 from __future__ import annotations
@@ -18,11 +19,13 @@ from pathlib import Path
 from typing import Any
 
 from scripts.benchmark.submission import RUN, SHA256
-from scripts.benchmark.tracks import LEVELS, TRACKS, check_known
+from scripts.benchmark.tracks import LEVELS, TRACKS, Track, check_known, chosen
 from scripts.comparison.folder import read as compared
+from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
 from scripts.comparison.recording import digest
 from scripts.comparison.rules import MAX_DEPTH, Rule, check_keys, is_shallow, number
+from scripts.console import note
 from scripts.machine import machine, versions
 from scripts.result_files import finite, load, write
 from sim.core.versions import WORLD, world_of
@@ -128,7 +131,7 @@ def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
         hashes[track.name] = track.sha256
         plan = track.plan(asked["slams"], tuple(asked["seeds"]), levels=tuple(asked["levels"]))
         for at, scans in digests(plan, folder / track.name).items():
-            own = {r["slam"]: [finite(r.get(k)) for k in COLUMNS]
+            own = {r["slam"]: [_short(r.get(k)) for k in COLUMNS]
                    for r in rows if (r["dynamism"], r["seed"]) == at}  # fmt: skip
             key = f"{track.name} {at[0]:g} {at[1]}"
             there = runs.setdefault(key, {"recording": scans, "slams": {}})
@@ -139,6 +142,20 @@ def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
     head = {"schema": SCHEMA, "what": WHAT, "world": WORLD, "made_with": made, "columns": COLUMNS}
     write(path, head, {"tracks": hashes, "runs": runs})
     return read(path)
+
+
+def _short(value: Any) -> Any:
+    """Six digits: nobody reads more, and all of this is in the package."""
+    return float(f"{value:.6g}") if isinstance(value, float) and finite(value) else finite(value)
+
+
+def run(out: Path, tracks: Sequence[Track], slams: Sequence[str], levels: Sequence[float],
+        seeds: slice) -> None:  # fmt: skip
+    """Comparisons of tracks on some of their test seeds in ``out``; what is there stays."""
+    for track in tracks:
+        plan = track.plan(slams, track.test[seeds], levels=tuple(levels))
+        note(f"{track.name}: {track.about}")
+        compare(plan, out / track.name)
 
 
 _HEAD: Mapping[str, Rule] = {
@@ -161,13 +178,24 @@ _RUN: Mapping[str, Rule] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the file."""
+    """Run what is to be published, or write the file."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folders", type=Path, nargs="+", help="of mobilia benchmark")
+    parser.add_argument("folders", type=Path, nargs="+", help="of mobilia benchmark, or --run")
     parser.add_argument("--out", type=Path, default=FILE)
-    parser.add_argument("--commit", required=True, help="of the code that ran")
+    parser.add_argument("--commit", help="of the code that ran")
+    parser.add_argument("--run", nargs="+", metavar="SLAM", help="only run these into the folder")
+    parser.add_argument("--tracks", nargs="+", help="default the newest of all")
+    parser.add_argument("--levels", type=float, nargs="+", default=list(LEVELS))
+    parser.add_argument("--first", type=int, default=0, help="of the test seeds")
+    parser.add_argument("--seeds", type=int, default=1)
     wanted = parser.parse_args(arguments)
     try:
+        if wanted.run:
+            seeds = slice(wanted.first, wanted.first + wanted.seeds)
+            run(wanted.folders[0], chosen(wanted.tracks), wanted.run, wanted.levels, seeds)
+            return 0
+        if not wanted.commit:
+            raise InvalidValueError("--commit must say of which code the runs are")
         made = write_from(wanted.folders, wanted.out, wanted.commit)
     except (MobiliaError, OSError) as error:
         print(error, file=sys.stderr)
