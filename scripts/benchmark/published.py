@@ -12,14 +12,21 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from scripts.benchmark.submission import RUN, SHA256
-from scripts.benchmark.tracks import LEVELS, TRACKS, Track, check_known, chosen
+from scripts.benchmark.tracks import (
+    LEVELS,
+    QUICK_LEVELS,
+    TRACKS,
+    Track,
+    check_known,
+    chosen,
+)
 from scripts.comparison.folder import read as compared
 from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
@@ -27,6 +34,7 @@ from scripts.comparison.recording import digest
 from scripts.comparison.rules import MAX_DEPTH, Rule, check_keys, is_shallow, number
 from scripts.console import note
 from scripts.machine import machine, versions
+from scripts.report.answer import ODOMETRY
 from scripts.result_files import finite, load, write
 from sim.core.versions import WORLD, world_of
 from slam.errors import InvalidValueError, LogFormatError, MobiliaError
@@ -56,6 +64,14 @@ class Published:
         """Whether that SLAM made all these runs."""
         own = self.runs.get(track, {})
         return all(run in own and slam in own[run][1] for run in digests)
+
+    def quick(self, tracks: Iterable[Track]) -> tuple[Track, ...]:
+        """Those that count, and whose first seed is here at the levels of a quick benchmark."""
+        return tuple(
+            track for track in tracks
+            if track.counts is not False
+            and self.has(track.name, [(at, track.test[0]) for at in QUICK_LEVELS], ODOMETRY)
+        )  # fmt: skip
 
     def rows(self, track: str, digests: Digests, without: Sequence[str]) -> list[Row]:
         """Rows as of ``runs.csv`` of the runs on these very recordings, but for some SLAMs."""
@@ -149,15 +165,6 @@ def _short(value: Any) -> Any:
     return float(f"{value:.6g}") if isinstance(value, float) and finite(value) else finite(value)
 
 
-def run(out: Path, tracks: Sequence[Track], slams: Sequence[str], levels: Sequence[float],
-        seeds: slice) -> None:  # fmt: skip
-    """Comparisons of tracks on some of their test seeds in ``out``; what is there stays."""
-    for track in tracks:
-        plan = track.plan(slams, track.test[seeds], levels=tuple(levels))
-        note(f"{track.name}: {track.about}")
-        compare(plan, out / track.name)
-
-
 _HEAD: Mapping[str, Rule] = {
     "columns": Rule(", ".join(COLUMNS), lambda value: value == list(COLUMNS)),
     "made_with": Rule(
@@ -191,8 +198,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted = parser.parse_args(arguments)
     try:
         if wanted.run:
-            seeds = slice(wanted.first, wanted.first + wanted.seeds)
-            run(wanted.folders[0], chosen(wanted.tracks), wanted.run, wanted.levels, seeds)
+            for track in chosen(wanted.tracks):
+                seeds = track.test[wanted.first : wanted.first + wanted.seeds]
+                plan = track.plan(wanted.run, seeds, levels=tuple(wanted.levels))
+                note(f"{track.name}: {track.about}")
+                compare(plan, wanted.folders[0] / track.name)
             return 0
         if not wanted.commit:
             raise InvalidValueError("--commit must say of which code the runs are")

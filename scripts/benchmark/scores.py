@@ -248,7 +248,8 @@ def _ranked(slam: str, runs: Sequence[tuple[tuple[str, float, int], Row]]) -> Ro
     low, high = lost_from_interval(levels, whole)
     errors, shares = _values([row for _, row in runs], TRACKING), np.nanmean(table, axis=0)
     return {
-        "levels": levels, "lost_shares": shares.tolist(), "slam": slam, "runs": len(runs), "lost_runs": int(np.nansum(table)),
+        "levels": levels, "lost_shares": shares.tolist(), "slam": slam,
+        "runs": len(runs), "lost_runs": int(np.nansum(table)),
         "lost_from": lost_from(levels, shares), "lost_from_low": low, "lost_from_high": high,
         TRACKING: quantile(errors, 0.5) if errors else None, f"{TRACKING}_runs": len(errors),
     }  # fmt: skip

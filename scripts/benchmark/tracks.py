@@ -24,6 +24,7 @@ from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.variants import MAP_ORACLE
 
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of every track, from nothing to all that it has
+QUICK_LEVELS = (0.0, 0.5, 1.0)
 TRAIN = tuple(range(20))  # seeds to tune on; those that the SLAMs here were tuned on
 TEST = tuple(range(720, 740))  # seeds that count, of the first versions
 FRESH = tuple(range(900, 920))  # of what came after: nothing was run on them before it was frozen
