@@ -24,7 +24,8 @@ _OPEN = {"open": True, "shut": False}
 
 
 def _drive(message: Any) -> OnWorld:
-    return Drive(v=float(message.linear.x), omega=float(message.angular.z))
+    twist = message.linear
+    return Drive(v=float(twist.x), omega=float(message.angular.z), side=float(twist.y))
 
 
 def _carry(message: Any) -> OnWorld:
