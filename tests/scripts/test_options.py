@@ -84,6 +84,9 @@ def test_the_axis_is_what_has_several_levels():
     assert chosen((), (0.0, 1.0), ()) == ("motion", (0.0, 1.0), {})
     assert chosen((), (0.3,), (0.0, 1.0)) == ("change", (0.0, 1.0), {"motion": 0.3})
     assert chosen((), (), (0.4,)) == ("change", (0.4,), {})
+    assert chosen((), (0.8,), (), (0.0, 4.0)) == ("people", (0.0, 4.0), {"motion": 0.8})
+    assert Axis(name="people").at(4.0) == {"dynamism": 0.0, "motion": 0.5, "change": None}
+    assert Axis(name="people").crowd(4.0) == "escorts:4"
     with pytest.raises(InvalidValueError, match="--motion and --change"):
         chosen((), (0.0, 1.0), (0.0, 1.0))
     with pytest.raises(InvalidValueError, match="--dynamism sets both"):
