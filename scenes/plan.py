@@ -19,8 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes import look
-from scenes.assembly import Assembly, check_materials, moved, ours, parsed, part_marks, quaternion
-from scenes.kinds import KINDS
+from scenes.assembly import (
+    Assembly,
+    check_materials,
+    file_of,
+    moved,
+    ours,
+    parsed,
+    part_marks,
+    quaternion,
+)
+from scenes.kinds import KINDS, PUSHED
 from scenes.marks import Mark, check_marks, check_written, marks, yaw_of
 from scenes.scene import Pose
 from slam.errors import InvalidValueError
@@ -92,10 +101,12 @@ class Plan:
     def __init__(self, source: str, *, floors: Sequence[str] = ()) -> None:
         """``source``: name of one of our plans or path of an MJCF file; ``floors``: materials that
         will be used beside those of the file."""
-        spec, self.marks = _parsed(source, tuple(floors))
+        written = file_of("plans", source).stat().st_mtime_ns
+        spec, self.marks = _parsed(source, tuple(floors), written)
         self.spec = spec.copy()
         self._source = Path(source).name
         self.seats: list[Mark] = list(self.find("seat"))
+        self.put: list[tuple[str, Pose]] = []
         self._furniture: list[list[float]] = []
         self._boxes: NDArray[np.float64] | None = None
         self._counts: Counter[str] = Counter()
@@ -168,11 +179,26 @@ class Plan:
         )
 
     def furnish_marks(self, parts: Sequence[str]) -> None:
-        """Put each of these parts wherever a mark starts with its name."""
-        for part in parts:
-            self._kinds.add(Path(part).stem)
-            for mark in self.find(Path(part).stem):
+        """Put each of these parts wherever a mark starts with its name, or says ``put`` and it.
+
+        What can move, and is put so, becomes part of ``put``: a kind and its pose.
+        """
+        stands = {Path(part).stem: part for part in parts}
+        self._kinds |= set(stands)
+        for kind, part in stands.items():
+            for mark in self.find(kind):
                 self.furnish(part, mark.pose)
+        moves = [kind for kind, row in KINDS.items() if row.group in PUSHED]
+        for mark in self.find("put"):
+            if mark.words[1] in stands:
+                self.furnish(stands[mark.words[1]], mark.pose)
+            elif mark.words[1] in moves:
+                self.put.append((mark.words[1], mark.pose))
+            else:
+                raise InvalidValueError(
+                    f"plan '{self._source}': mark '{':'.join(mark.words)}' has the unknown kind "
+                    f"'{mark.words[1]}'. There are: {', '.join(sorted((*stands, *moves)))}"
+                )
 
     def frame_doors(self) -> None:
         """Jambs and threshold at each ``door:ROOM:left|right`` mark."""
@@ -254,7 +280,9 @@ def furniture() -> tuple[str, ...]:
 
 
 @cache
-def _parsed(source: str, floors: tuple[str, ...]) -> tuple[mujoco.MjSpec, tuple[Mark, ...]]:
+def _parsed(
+    source: str, floors: tuple[str, ...], _written: int
+) -> tuple[mujoco.MjSpec, tuple[Mark, ...]]:
     """The file without its marks, floors painted, all clothes in the wardrobe; copy before use."""
     spec = parsed("plans", source)
     found = marks(spec)

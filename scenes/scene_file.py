@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scenes.kinds import KINDS
+from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
 from scenes.recipe import DOORS, choice, count, switch
 from scenes.scene import Pose
@@ -29,7 +29,6 @@ LISTS = ("walls", "rooms", "goals", "put", "things", "hinges")
 OPTIONS = ("furniture", "doors", "seats", "n_chairs", "n_people")
 MORE = ("event", "robot")  # read by others (``sim``)
 KEYS = ("plan", "wall_m", "start", *LISTS, *OPTIONS, *MORE)
-PUSHED = ("chair", "bin", "load")  # groups of movers that a file may put
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -62,7 +62,8 @@ RobotOption = Annotated[
     str | None,
     typer.Option(
         "--robot",
-        help="Another robot than the scene's: turtlebot3, pioneer3dx, f1tenth, or a TOML file.",
+        help="Another robot than the scene's: f1tenth, hunter2, pioneer3dx, rosbot_xl, "
+        "turtlebot3, or a TOML file.",
     ),
 ]
 MotionLevels = Annotated[

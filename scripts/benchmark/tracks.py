@@ -278,19 +278,6 @@ _ALL = (
     ),
 )  # fmt: skip
 
-TRACKS: dict[str, Track] = {}
-
-
-def register(*tracks: Track) -> None:
-    """Declare tracks; ``InvalidValueError`` for a name that another one has."""
-    for track in tracks:
-        if TRACKS.setdefault(track.name, track) != track:
-            raise InvalidValueError(
-                f"track {track.name} is there already and never changes; a new version of it is "
-                f"TRACKS['{track.name}'].later(...)"
-            )
-
-
 # Since then, their tops found by scripts.benchmark.search on training seeds.
 _HALF_TURN = ((1, 1), (2, 2), (4, 3), (5, 4))  # boards, and people who walk with the robot
 _HARD = (

@@ -52,10 +52,11 @@ class _Checked:
 
 @dataclass(frozen=True, kw_only=True)
 class Drive(_Checked):
-    """Twist for the robot, m/s and rad/s."""
+    """Twist for the robot, m/s, rad/s, and m/s to the left."""
 
     v: float = _number(-MOST_TWIST, MOST_TWIST)
     omega: float = _number(-MOST_TWIST, MOST_TWIST)
+    side: float = _number(-MOST_TWIST, MOST_TWIST, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,7 +23,7 @@ from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 
 FOLDER = Path(__file__).parents[1] / "robots"
 MOST_BYTES = 1 << 14
-KINDS = ("differential", "car")
+KINDS = ("differential", "car", "omnidirectional")
 MASS_KG = 22.0  # of the scenes' robot, to which its tyres' stiffness and grip belong
 # table -> field -> (least, most), and what is so where it is not said; None: it must be said
 _FIELDS: dict[str, dict[str, tuple[float, float, float | None]]] = {
@@ -127,7 +127,7 @@ def robot_of(given: str | Mapping[str, Any] | Robot) -> Robot:
         drive=DriveConfig(
             v_max=drive["v_max_mps"], omega_max=drive["omega_max_radps"],
             accel=drive["accel_mps2"], alpha=drive["alpha_radps2"], track=drive["track_m"],
-            turn_radius=drive["turn_radius_m"],
+            turn_radius=drive["turn_radius_m"], sideways=kind == "omnidirectional",
         ),
         scanner=(place["x_m"], place["y_m"], math.radians(place["yaw_deg"]), place["height_m"]),
     )  # fmt: skip

@@ -92,7 +92,7 @@ class Watch(NamedTuple):
 
     marks    (n,) whether the scanner notes all poses
     scanner  where to, a plain ``sim.sensors.lidar.windows.Noted``
-    path     (n, 3) pose of the robot; travel (n, 2) m rolled by the wheels
+    path     (n, 3) pose of the robot; travel (n, 3) m rolled by the wheels, and to the left
     """
 
     marks: NDArray[np.bool_]
@@ -204,6 +204,7 @@ def _advance(  # noqa: C901, PLR0913 (kernel)
                 ramp(drive, robot.limits)
                 physics.ctrl[robot.tyres[0]] = drive.left
                 physics.ctrl[robot.tyres[1]] = drive.right
+                physics.ctrl[robot.tyres[2]] = drive.side
             call(engine.step2, engine.model, engine.data)
             clock[0] += 1
             roll(drive, step)
@@ -228,6 +229,7 @@ def _advance(  # noqa: C901, PLR0913 (kernel)
             watch.path[row + 1, k] = physics.qpos[robot.at[0] + k]
         watch.travel[row + 1, 0] = drive.rolled_left
         watch.travel[row + 1, 1] = drive.rolled_right
+        watch.travel[row + 1, 2] = drive.rolled_side
         if watch.marks[row + 1]:
             note(watch.scanner)
     return last

@@ -245,9 +245,9 @@ class World:
 
     # -- the robot --------------------------------------------------------------------------
 
-    def set_command(self, v: float, omega: float) -> None:
+    def set_command(self, v: float, omega: float, side: float = 0.0) -> None:
         """Ask the robot for a twist, m/s and rad/s; it is clipped and ramped (``DriveConfig``)."""
-        self._drive.command(v, omega)
+        self._drive.command(v, omega, side)
 
     def carry(self, pose: Sequence[float] | Float) -> None:
         """Put the robot at (x m, y m, heading rad), at rest; its wheels roll nothing on the way."""
@@ -269,12 +269,12 @@ class World:
         return self.bodies.robot_pose(self.data)
 
     def read_robot(self, pose: Float, travel: Float) -> None:
-        """``robot_pose`` and ``wheel_angles`` into (3,) and (2,) arrays."""
+        """``robot_pose`` and ``wheel_angles`` and the way to the left into (3,) arrays."""
         self.bodies.read_robot(self.data, self._drive.state, pose, travel)
 
     def wheel_angles(self) -> Float:
         """(2,) m truly rolled by the left and the right wheel since the start."""
-        return self._drive.travel_m
+        return self._drive.travel_m[:2]
 
     def take_contacts(self) -> list[Contact]:
         """What the robot has touched since the last call, hardest first (``Contact.hard``)."""
