@@ -50,7 +50,7 @@ def njit(function: Callable[P, R]) -> Callable[P, R]:
             _cache_is_writable = False
             _log.warning(
                 "no folder for compiled code can be written (set NUMBA_CACHE_DIR to one that can): "
-                "compiling anew, which takes some seconds in every process"
+                "compiling again, which takes some seconds in every process"
             )
     compiled: Callable[P, R] = numba.njit(**_OPTIONS)(function)
     return compiled

@@ -24,9 +24,8 @@ from scenes.scene import Pose
 from sim.actors.rearranging import Rearrangement, is_out
 from slam import se2
 from slam.bounded import text_of
-from slam.csv_cells import cell_of, word_of
 from slam.errors import LogFormatError
-from slam.files import write_text
+from slam.files import cell_of, word_of, write_text
 from slam.frames import NS_PER_S
 from slam.trajectory import Trajectory
 

@@ -81,7 +81,7 @@ def listed_in(folder: Path) -> tuple[dict[str, str], list[Fault]]:
 def check_hashes(folder: Path, planned: Recipe | None = None) -> Finding:
     """Every file against SHA256SUMS, and the recipe against itself and the one that is ``planned``.
 
-    A bag of other bytes but the very messages of the recipe was packed anew, not damaged: then all
+    A bag of other bytes but the very messages of the recipe was packed again, not damaged: then all
     else must be what it was, metadata.yaml too.
     """
     if folder.is_symlink() or not folder.is_dir():

@@ -280,10 +280,6 @@ class World:
         """What the robot has touched since the last call, hardest first (``Contact.hard``)."""
         return self._contacts.take()
 
-    def robot_clearance(self) -> float:
-        """m from the robot's rim to the nearest static obstacle or floor edge; < 0: inside."""
-        return self.bodies.clearance(self.data)
-
     # -- everything that moves --------------------------------------------------------------
 
     @property
@@ -315,11 +311,6 @@ class World:
         moving = self.mover_speeds() > MOVING_SPEED
         moving[self._people_rows] |= self.people.swinging()
         return moving
-
-    def moving_bodies(self) -> NDArray[np.bool_]:
-        """(nbody,) True for each body of the model that belongs to a moving mover."""
-        moving = np.append(self.movers_moving(), False)
-        return moving[self.bodies.mover_of_body]
 
     # -- state ------------------------------------------------------------------------------
 

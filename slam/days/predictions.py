@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Will something stand there at that time? What predictors are given, how they are scored, rivals.
+"""Will something stand there at that time? What predictors are given, how they are scored, others.
 
 A ``Predictor`` sees n places session by session and gives the probability that each is taken at a
 later time. A sighting is 1 taken, 0 empty, between for what stood there part of the session, NaN
@@ -77,9 +77,9 @@ def brier(probabilities: Float, taken: Float) -> Float:
     return np.asarray((probabilities - taken) ** 2)
 
 
-def log_score(probabilities: Float, taken: Float, least: float = LEAST) -> Float:
-    """-log of the probability of what came, nats, none nearer to 0 or 1 than ``least``."""
-    p = np.clip(probabilities, least, 1.0 - least)
+def log_score(probabilities: Float, taken: Float) -> Float:
+    """-log of the probability of what came, nats, none nearer to 0 or 1 than ``LEAST``."""
+    p = np.clip(probabilities, LEAST, 1.0 - LEAST)
     return np.asarray(-np.log(np.where(taken > 0.5, p, 1.0 - p)))
 
 
@@ -134,7 +134,7 @@ class PersistenceFilter(Sightings):
     """The exact posterior that what stood there has not gone, once for each thing that came.
 
     missed, false  probabilities of not seeing what stands there, and of seeing what does not
-    shortest_s, longest_s  of standing, by the prior
+    by the prior a place stands from an hour to 30 days
 
     What has gone does not come back in the filter. So a place where it says "gone" and something
     is seen again begins again; one where nothing was seen so far has the share of such places.
@@ -146,12 +146,9 @@ class PersistenceFilter(Sightings):
         *,
         missed: float = 0.05,
         false: float = 0.05,
-        shortest_s: float = HOUR_S,
-        longest_s: float = 30.0 * DAY_S,
     ) -> None:
         super().__init__(n)
         self.missed, self.false = missed, false
-        self.prior = (shortest_s, longest_s)
         self.born = np.full(n, np.nan)
         self.standing, self.gone = np.ones(n), np.zeros(n)  # likelihoods of the sightings
         self.survived = np.ones(n)  # prior at the last sighting
@@ -166,7 +163,7 @@ class PersistenceFilter(Sightings):
         self.born[anew] = time_s
         self.standing[anew], self.gone[anew], self.survived[anew] = 1.0, 0.0, 1.0
         alive = known & ~np.isnan(self.born)
-        now = np.where(alive, lasting(time_s - self.born, *self.prior), self.survived)
+        now = np.where(alive, lasting(time_s - self.born, HOUR_S, 30.0 * DAY_S), self.survived)
         now = np.where(anew, 1.0, now)
         if_gone = np.where(taken, self.false, 1.0 - self.false)
         if_standing = np.where(taken, 1.0 - self.missed, self.missed)
@@ -180,7 +177,9 @@ class PersistenceFilter(Sightings):
     def probability(self, time_s: float) -> Float:
         """Of standing still, for what stood there last."""
         born = ~np.isnan(self.born)
-        later = np.where(born, lasting(time_s - np.where(born, self.born, 0.0), *self.prior), 1.0)
+        later = np.where(
+            born, lasting(time_s - np.where(born, self.born, 0.0), HOUR_S, 30.0 * DAY_S), 1.0
+        )
         later = np.minimum(later, self.survived)
         evidence = self.gone + self.standing * self.survived
         found = self.standing * later / np.maximum(evidence, 1e-300)
@@ -192,19 +191,17 @@ class PersistenceFilter(Sightings):
 class FreMEn(Sightings):
     """A mean and a few periodic terms, those of the largest amplitude.
 
-    periods_s  that are tried
-    most       terms of a place; how many it has is what predicts the last third of its sightings
-               best from the others
+    A place has up to three: as many as predict the last third of its sightings best from the
+    others.
     """
 
     PERIODS_S: ClassVar[tuple[float, ...]] = (
         *(DAY_S / k for k in (1, 2, 3, 4)), 7.0 * DAY_S, 3.5 * DAY_S, 2.0 * DAY_S,
     )  # fmt: skip
 
-    def __init__(self, n: int, periods_s: tuple[float, ...] = PERIODS_S, most: int = 3) -> None:
+    def __init__(self, n: int) -> None:
         super().__init__(n)
-        self.omegas = math.tau / np.array(periods_s)
-        self.most = most
+        self.omegas = math.tau / np.array(self.PERIODS_S)
         self._terms_of: list[tuple[float, NDArray[np.complex128], int]] = []
 
     def see(self, time_s: float, values: Float) -> None:
@@ -234,7 +231,7 @@ class FreMEn(Sightings):
         mean, gammas = self.spectrum(values[:cut], times_s[:cut])
         errors = [
             float(((self.told(mean, gammas, k, times_s[cut:]) - values[cut:]) ** 2).mean())
-            for k in range(self.most + 1)
+            for k in range(4)
         ]
         return int(np.argmin(errors))
 

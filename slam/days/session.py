@@ -179,8 +179,8 @@ class Session:
         ended = self._state in _TRACKED and not self._gave_up
         agreement = self.agreement()
         known = agreement.known >= KNOWN
-        denied = known and agreement.disagrees > SPOILS
-        fits = self._search is None and ended and share >= FITS and not denied
+        rejected = known and agreement.disagrees > SPOILS
+        fits = self._search is None and ended and share >= FITS and not rejected
         return SessionState(
             found_after_s=self._found_after_s,
             merged=self._merged,
@@ -260,4 +260,4 @@ def keep(session: Session, path: Path) -> Path:
         if not apart.exists():
             session.save(apart)
             return apart
-    raise InvalidValueError(f"{path}: 999 sessions lie apart from it already")
+    raise InvalidValueError(f"{path}: 999 sessions are kept separately beside it already")

@@ -19,7 +19,7 @@ from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, LaserSpec, Scan
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.deskew import deskewed
-from slam.frontend.surfaces import NEAR_CELLS, face, join, unveiled
+from slam.frontend.surfaces import NEAR_CELLS, face, join, unmixed
 from slam.frontend.visibility import SILENT_M, View, view_of_beams, view_of_features
 
 SPACING_M = 0.1  # m; beams closer than this share one weight; set by hand
@@ -157,7 +157,7 @@ def _cleared(
 ) -> int:
     """Move the hits that are no mixed pixel to the front; how many there are."""
     clear = np.empty(len(points), np.bool_)
-    count = unveiled(points, beams, origin, joined, clear)
+    count = unmixed(points, beams, origin, joined, clear)
     if count < len(points):
         m = 0
         for k in range(len(points)):

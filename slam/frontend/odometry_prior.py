@@ -28,7 +28,7 @@ PLACE_INFORMATION = 1e-3  # 1/m^2, of the position where it is unknown: 30 m
 # The prior; set by hand.
 FLOOR_M, FLOOR_RAD = 0.002, 0.0015  # least deviation after FLOOR_S; grows with the root of time
 FLOOR_S, FLOOR_MOST_S = 0.2, 1.0  # s; the floors grow no further than over the latter
-LEAST_SCALE = 2.25  # least factor on a stated variance: else the map slips unnoticed
+LEAST_SCALE = 2.25  # least factor on a stated variance: else the map drifts unnoticed
 LEAST_M, LEAST_RAD = 0.004, 0.003  # least deviation for the matcher, after FLOOR_S
 # deviations where none is stated: m/m, m/rad, rad/sqrt(m), rad/rad
 ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15

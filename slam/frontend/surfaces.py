@@ -152,7 +152,7 @@ def _apart(points: NDArray[np.float64], j: int, k: int) -> float:
 
 
 @inner
-def unveiled(
+def unmixed(
     points: NDArray[np.float64],
     beams: NDArray[np.int64],
     origin: NDArray[np.float64],

@@ -180,7 +180,7 @@ class Guest(ABC):
 
     @abstractmethod
     def begin(self, spec: LaserSpec) -> None:
-        """Make the guest anew, for the scanner of the first frame."""
+        """Make the guest again, for the scanner of the first frame."""
 
     @abstractmethod
     def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:

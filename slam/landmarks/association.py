@@ -9,7 +9,7 @@ pairs, and among those for the least joint cost, and differ in how they judge on
   test of a pair at depth k costs O(k^2);
 - ``ipjc`` (Li and Olson 2012): each accepted pair updates the state, and the posterior judges the
   next, linearised where the pairs before have moved it. Any test costs O(1), an acceptance O(c^2)
-  for c candidate landmarks. After each, all pairs that are left are tested anew: the posterior
+  for c candidate landmarks. After each, all pairs that are left are tested again: the posterior
   shows which points no landmark can explain any more, and hypotheses that leave out good pairs are
   cut at once.
 

@@ -7,7 +7,6 @@ docs/logs.md has its keys; ``read_format`` refuses others. Columns count from 1.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from slam import se2
-from slam.bounded import text_of
+from slam.bounded import toml_of
 from slam.errors import LogFormatError
 from slam.frames import NS_PER_S, Float, Stream
 from slam.logs.repairs import FINE_DIGITS, Repairs
@@ -88,10 +87,7 @@ def read_format(path: str | Path) -> RoverFormat:
     that are not known are refused.
     """
     path = Path(path)
-    try:
-        tables = tomllib.loads(text_of(path, MAX_TOML_BYTES))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise LogFormatError(path, f"is no TOML: {error}") from error
+    tables = toml_of(path, MAX_TOML_BYTES)
     whole = _Table(path, "", tables)
     separator = whole.word("separator", " ")
     if len(separator) != 1 or separator.isalnum() or separator in ".-+":
@@ -217,7 +213,7 @@ SCAN = "line"
 def read_rover(path: str | Path, text_format: str | Path, *, strict: bool = False) -> Stream:
     """A text log (plain, .gz or .xz) with one scan a line, as ``text_format`` describes it.
 
-    ``text_format`` is a TOML file, see ``slam.logs.rover_format``. Empty lines and those that begin
+    ``text_format`` is a TOML file (docs/logs.md). Empty lines and those that begin
     with ``#`` are left out. Ranges of 0 are error codes, those at the maximum no return. Without
     odometry the frames have that of a robot at rest, and ``metadata.odometry`` says so.
 
