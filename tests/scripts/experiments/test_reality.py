@@ -26,7 +26,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Path]:
 def test_nothing_is_predicted_once_it_is_known(files: tuple[Path, Path], tmp_path: Path) -> None:
     with pytest.raises(InvalidValueError, match="predict first"):
         reality.real(tmp_path, ("intel",), ("odometry",))
-    files[1].write_text("{}")
+    files[1].write_text('{"intel": {}}')
     with pytest.raises(InvalidValueError, match="a prediction comes before"):
         reality.predict(tmp_path, ("intel",), ("odometry",))
 
