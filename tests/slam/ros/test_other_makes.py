@@ -5,12 +5,7 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
-import subprocess
-import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,49 +13,22 @@ import numpy as np
 import pytest
 
 from scripts.live.network import Network
-from scripts.live.opened import Opener
+from scripts.live.session import Opener
 from slam import se2
 from slam.ros import slam as ros2
-from slam.ros.child import Domain
-from slam.ros.link import MIDDLEWARES, Link, Topic, open_link
+from slam.ros.link import Topic
 from slam.ros.node import TF, Node
 from slam.ros.robot import Robot
 from slam.ros.template import said_ns
 from slam.system import create
+from tests.slam.ros.clients import PREFIXES, on, started
 from tests.slam.ros.frames import SPEC, driven
-from tests.slam.ros.idl import idl_of
 
-HERE = Path(__file__).parent
-KINDS = ("sensor_msgs/msg/LaserScan", "geometry_msgs/msg/TwistStamped", "tf2_msgs/msg/TFMessage")
 CMD_VEL = Topic(name="/cmd_vel", kind="geometry_msgs/msg/Twist", depth=1000)
 ANSWERS = replace(TF, depth=1000)
 SCANS = 1000
 EPOCH_S = 1_700_000_000
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def node(tmp_path_factory) -> Path:
-    """The C++ node, built."""
-    pytest.importorskip("cyclonedds", reason="needs the extra ros2")
-    if not shutil.which("fastddsgen") or not shutil.which("g++"):
-        pytest.skip("needs fastddsgen, libfastrtps-dev and g++ (Debian has them)")
-    folder = tmp_path_factory.mktemp("node")
-    (folder / "ros.idl").write_text(idl_of(KINDS))
-    words = ["g++", "-std=c++17", "-O0", "-w", "-I.", str(HERE / "node.cpp"), "ros.cxx"]
-    libraries = ["rosPubSubTypes.cxx", "-lfastrtps", "-lfastcdr", "-o", "node"]
-    for command in (["fastddsgen", "-replace", "ros.idl"], [*words, *libraries]):
-        subprocess.run(command, cwd=folder, check=True, capture_output=True, timeout=300)
-    return folder / "node"
-
-
-@pytest.fixture(params=MIDDLEWARES)
-def client(request) -> tuple[str, list[object]]:
-    """A middleware and the words that start a client of another make on it."""
-    if request.param == "dds":
-        return "dds", [request.getfixturevalue("node")]
-    pytest.importorskip("zenoh_ros2_sdk", reason="needs zenoh-ros2-sdk")
-    return "zenoh", [sys.executable, HERE / "zenoh_client.py"]
 
 
 def read(path: Path) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray, bytes]]:
@@ -75,29 +43,6 @@ def read(path: Path) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray, byte
         found.append((stamp_ns, numbers, ranges, more, data[at + 4 * (n + m) : end]))
         at = end + 9
     return found
-
-
-@contextmanager
-def started(words: Sequence[object], domain: Domain) -> Iterator[subprocess.Popen[str]]:
-    """A client that listens, until it is let go."""
-    out = {"stdout": subprocess.PIPE, "text": True}
-    child = subprocess.Popen([*map(str, words)], env={**os.environ, **domain.environment()}, **out)
-    with child:
-        assert child.stdout.readline() == "ready\n"
-        try:
-            yield child
-        finally:
-            child.kill()
-
-
-@contextmanager
-def on(middleware: str) -> Iterator[tuple[Domain, Link]]:
-    """A link in a domain of its own."""
-    domain = Domain(middleware, own=True, wait_s=10.0)
-    link = open_link(middleware, domain=domain.number, router=domain.router)
-    yield domain, link
-    link.close()
-    domain.free()
 
 
 def test_one_gets_every_field_and_drives_while_another_is_scored(client, tmp_path):
@@ -159,8 +104,7 @@ def test_their_stamped_twists_move_the_robot(client):
 def test_another_make_is_a_slam(client, monkeypatch):
     middleware, words = client
     monkeypatch.setattr(ros2, "ANSWER_S", 20.0)  # a busy machine
-    prefix = {"dds": "ros2", "zenoh": "ros2-zenoh"}[middleware]
-    slam, frames = create(f"{prefix}:{shlex.join(map(str, words))}"), driven(100)
+    slam, frames = create(f"{PREFIXES[middleware]}:{shlex.join(map(str, words))}"), driven(100)
     answered = 0
     for frame in frames:
         estimate = slam.update(frame)
