@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scripts.options import MOST_PEOPLE, PEOPLE
 from slam.checked import is_number, is_whole
 from slam.csv_cells import word_of
 from slam.errors import LogFormatError
@@ -141,6 +142,8 @@ LEVEL = "level"  # the axis of ``scripts.comparison.plan.Plan.sets``
 
 def level_of(axis: str) -> Rule:
     """What a level of that axis may be."""
+    if axis == PEOPLE:
+        return number(most=MOST_PEOPLE)
     return number(least=-1e6, most=1e6) if axis == LEVEL else SHARE
 
 

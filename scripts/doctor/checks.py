@@ -28,7 +28,7 @@ LEAST_FREE_GB = 1.0  # in the working folder: a dataset of an hour, or the films
 EXTRAS = {  # what each is for; how to get them follows from their names
     "guests": "SLAMs of others to compare with",
     "yag": "YAG SLAM",
-    "rl": "scripts.experiments.train_policy",
+    "rl": "training policies (sim.gym.learning)",
     "ros2": "nodes of ROS 2 over DDS and Zenoh",
     "cluster": "--cluster",
 }

@@ -10,20 +10,21 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FormatStrFormatter, NullLocator
+from matplotlib.ticker import FormatStrFormatter
 
+from scripts import figures
 from scripts.comparison.recording import Recording
 from scripts.comparison.tables import number
 from scripts.experiments import shared
 from scripts.experiments.shared import CM, PERCENT, Row, of
 from scripts.experiments.study import Study
-from scripts.figures import save, styled
+from scripts.figures import color_of, save, styled
 from scripts.options import Axis
 from slam.evaluation.lost import LOST_RULE
 from slam.evaluation.statistics import quantile
@@ -32,11 +33,7 @@ from slam.frames import BeamClass
 SLAMS = ("kiss-icp", "karto", "occupancy", "ekf", "shunting", "oracle(shunting)")
 SCENES = ("arena", "office", "gallery", "station")
 ATE, MOVING = "ate_unaligned_m", "moving_share_of_returns"
-LEAST_CM, MOST_CM = 0.2, 1000.0  # of the picture; a SLAM that failed is at the top
-_COLORS = ("#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f", "#ce2c3c", "#202020", "#de6e18", "#5f9e3f")
-_MARKERS = "osD^vP*X"
-_TICKS_CM = (0.3, 1, 3, 10, 30, 100, 300, 1000)
-_ASIDE = 0.012
+LEAST_CM, MOST_CM = 0.2, 1000.0  # of the picture
 
 
 def run(case: Row, drive: Recording) -> Row:
@@ -79,13 +76,28 @@ def picture(rows: Sequence[Row], path: Path) -> None:
     )
     figure = Figure(figsize=(max(3.6 * len(rooms), 6.4), 3.1 * len(axes) + 1.0))
     grid: Any = figure.subplots(len(axes), len(rooms), sharey=True, squeeze=False)
-    for i, axis in enumerate(axes):
-        for j, scene in enumerate(rooms):
-            own = [row for row in rows if (row["axis"], row["scene"]) == (axis, scene)]
-            for k, slam in enumerate(slams):
-                _curve(grid[i][j], [row for row in own if row["slam"] == slam], k, len(slams))
-            _finish(grid[i][j], axis, scene, sorted({row["level"] for row in own}))
-        grid[i][0].set_ylabel("position error (ATE) in cm,\nunaligned, median")
+    for ax, (axis, scene) in zip(grid.flat, product(axes, rooms), strict=True):
+        own = [row for row in rows if (row["axis"], row["scene"]) == (axis, scene)]
+        levels = sorted({row["level"] for row in own})
+        for slam in slams:
+            of_it = [row for row in own if row["slam"] == slam]
+            aside, color = figures.apart(slam, slams, levels), color_of(slam, slams)
+            at = [(level, [row for row in of_it if row["level"] == level]) for level in levels]
+            points = [
+                (level + aside, _shown(quantile(ates_m(found), 0.5)), math.nan, math.nan)
+                for level, found in at
+            ]
+            figures.line(ax, points, color, figures.marker(slam, slams), slam)
+            lost = [
+                (r["level"] + aside, _shown(m)) for r in of_it if r["lost"] for m in ates_m([r])
+            ]
+            ax.plot(
+                *zip(*lost, strict=True) if lost else ((), ()), "x", color=color, ms=4, alpha=0.8
+            )
+        figures.level_axis(ax, levels, f"{axis}, 0 to 1")
+        ax.set(title=scene, yscale="log", ylim=(0.8 * LEAST_CM, 1.3 * MOST_CM))
+        ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+    grid[0][0].set_ylabel("position error (ATE) in cm,\nunaligned, median")
     handles, labels = grid[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False)
     figure.supxlabel(f"x: a lost run; lost: {LOST_RULE}", fontsize=8)
@@ -93,34 +105,9 @@ def picture(rows: Sequence[Row], path: Path) -> None:
     save(figure, path)
 
 
-def _curve(ax: Axes, rows: Sequence[Row], k: int, of_them: int) -> None:
-    """The medians, and a cross for each lost run; side by side, so that all are seen."""
-    color, aside = _COLORS[k % len(_COLORS)], _ASIDE * (k - 0.5 * (of_them - 1))
-    levels, slam = sorted({row["level"] for row in rows}), rows[0]["slam"]
-    at = [[row for row in rows if row["level"] == level] for level in levels]
-    ax.plot(
-        np.add(levels, aside), [_shown(quantile(ates_m(own), 0.5)) for own in at],
-        "--" if slam.startswith("oracle(") else "-", color=color, label=slam,
-        marker=_MARKERS[k % len(_MARKERS)], ms=4.5, mec="white", mew=0.5, lw=1.4,
-    )  # fmt: skip
-    lost = [row for row in rows if row["lost"]]
-    errors = [_shown(ate) for row in lost for ate in ates_m([row])]
-    ax.plot([row["level"] + aside for row in lost], errors, "x", color=color, ms=4.0, alpha=0.8)
-
-
 def _shown(error_m: float) -> float:
-    """cm, within the picture."""
+    """cm, within the picture; a SLAM that failed is at the top."""
     return min(max(CM * error_m, LEAST_CM), MOST_CM)
-
-
-def _finish(ax: Axes, axis: str, scene: str, levels: Sequence[float]) -> None:
-    ax.set(
-        title=scene, yscale="log", xlabel=f"{axis}, 0 to 1", ylim=(0.8 * LEAST_CM, 1.3 * MOST_CM)
-    )
-    ax.set_xticks(levels)
-    ax.yaxis.set_major_locator(FixedLocator(_TICKS_CM))
-    ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
-    ax.yaxis.set_minor_locator(NullLocator())
 
 
 STUDY = Study(

@@ -45,9 +45,9 @@ class Session:
         return None if self.hands is None else self.hands.simulation.world.scene.static_map
 
     @property
-    def scan_height_m(self) -> float | None:
-        """m, of the scanner above the floor; None for a log."""
-        return None if self.hands is None else self.hands.simulation.world.scene.scan_height_m
+    def scan_height_m(self) -> float:
+        """m, of the scanner above the floor; 0 for a log, which does not say."""
+        return 0.0 if self.hands is None else self.hands.simulation.world.scene.scan_height_m
 
     def run(self) -> Iterator[Shown]:
         """All frames of the stream."""

@@ -83,17 +83,6 @@ def demo(folder: Path, repeats: int) -> Costs:
     return {"demo": _row(spent, "mobilia demo", [0], repeats)}
 
 
-def compared(folder: Path, repeats: int) -> Costs:
-    """Of a run of a comparison with the four SLAMs of ``docs/comparing.md``."""
-    words = [
-        "compare", "--slam", "shunting", "ekf", "occupancy", "odometry", "--scene", "arena",
-        "office", "--dynamism", str(DYNAMISM), "--seeds", "2", "--out",
-    ]  # fmt: skip
-    spent = min(sum(called([*words, str(folder / f"compare{k}")])) for k in range(repeats))
-    told = "a run of a minute with its four SLAMs: arena and office, two seeds, by 4"
-    return {"comparison": _row(spent / 4.0, told, [SEED, SEED + 1], repeats)}
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and write."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -110,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     }
     rows: Costs = {}
     with tempfile.TemporaryDirectory() as folder:
-        for measure in (film, demo, compared):
+        for measure in (film, demo):
             rows |= measure(Path(folder), wanted.repeats)
     write(wanted.out, head, {"costs": rows})
     for name, row in rows.items():

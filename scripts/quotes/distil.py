@@ -9,16 +9,18 @@ did not make them.
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from scipy.stats import spearmanr
+
 from scripts.comparison.csv_files import Row
 from scripts.comparison.folder import Compared, read
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.tables import by_seed
-from scripts.experiments.dynamism_curve import Curve
 from scripts.experiments.measured import ended
 from scripts.metrics.table import METRICS
 from scripts.result_files import RESULTS, SCHEMA, commit, write
@@ -34,6 +36,7 @@ QUOTED = (
 )  # fmt: skip
 OTHER = ("moving_share_of_returns",)
 CORRELATED = ("ate_unaligned_m", "ate_se2_m", "lost", "moving_share_of_returns")
+LEAST_LEVELS = 3  # of a rank correlation
 HEAD = ("scenes", "slams", "levels", "seeds", "seconds", "every", "scanner")
 COLUMN_OF = {"levels": "dynamism"}
 PLANNED = ("slams", "scenes", "levels", "seeds", "seconds", "every", "scanner", "scan_limit_s")
@@ -129,13 +132,20 @@ def _cell(differences: list[float], less: bool) -> list[Any] | None:
 
 
 def _correlations(compared: Compared) -> dict[str, float]:
-    settings = compared.recipe["settings"]
-    return {
-        f"{scene} {slam} {metric}": Curve(compared, scene, slam, metric).correlation()
-        for scene in settings["scenes"]
-        for slam in settings["slams"]
-        for metric in CORRELATED
-    }
+    """Spearman's rho of level and value; NaN of fewer than three, or where all are the same."""
+    found: dict[tuple[str, ...], list[tuple[float, float]]] = {}
+    for row in compared.levels:
+        if row["metric"] in CORRELATED:
+            key = row["scene"], row["slam"], row["metric"]
+            found.setdefault(key, []).append((row["dynamism"], row["value"]))
+    return {" ".join(key): _spearman(pairs) for key, pairs in found.items()}
+
+
+def _spearman(pairs: list[tuple[float, float]]) -> float:
+    levels, values = zip(*pairs, strict=True)
+    if len(pairs) < LEAST_LEVELS or len(set(values)) == 1:
+        return math.nan
+    return float(spearmanr(levels, values).statistic)
 
 
 def refuse_of_other_code(compared: Compared) -> None:

@@ -104,6 +104,8 @@ class Plan:
             (level,) = self.dynamisms
             return [replace(self.recipe, dynamism=level, session=k) for k in range(self.sessions)]
         first, twin = asdict(self.recipe), "dynamic" if self.twins else ""
+        if self.scenes:
+            first["scene_sha256"] = None  # each finds its own
         return [
             Recipe(
                 **{**first, "scene": s, "dynamism": d, "seed": self.recipe.seed + k, "twin": twin}

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from scenes.assembly import hull_radius
-from scenes.scene_file import tables
+from scenes.scene_file import changed, tables
 from sim.core.checks import FAR_M, within, word
 from sim.world import hands
 from sim.world.populated import VISITOR
@@ -80,12 +80,20 @@ def read_events(path: str | Path) -> list[dict[str, Any]]:
     return rows
 
 
-def of_file(scene: object) -> dict[str, Any]:
-    """``events`` and ``robot`` that a scene's own TOML file holds; nothing for other scenes."""
+def of_file(scene: object, sha256: str | None = None) -> dict[str, Any]:
+    """``events`` and ``robot`` that a scene's own TOML file holds; nothing for other scenes.
+
+    Raises ``LogFormatError`` for a scene whose files have another hash than that.
+    """
+    if isinstance(scene, str) and (why := changed(scene, sha256)):
+        raise LogFormatError(scene, why)
     if not (isinstance(scene, str) and scene.endswith(".toml")):
         return {}
     own = tables(Path(scene))
-    return {name: own[key] for key, name in (("event", "events"), ("robot", "robot")) if key in own}
+    found = {new: own[key] for key, new in (("event", "events"), ("robot", "robot")) if key in own}
+    if isinstance(own.get("robot"), str) and own["robot"].endswith(".toml"):
+        found["robot"] = str(Path(scene).parent / own["robot"])
+    return found
 
 
 def cues_of(rows: Sequence[Mapping[str, Any]]) -> tuple[Cue, ...]:

@@ -9,7 +9,7 @@ import logging
 import numba
 import pytest
 
-from slam.compiling import announced
+from slam._jit import announced
 
 
 def test_compiling_is_said_once_and_a_run_without_it_not(caplog: pytest.LogCaptureFixture) -> None:
@@ -17,7 +17,7 @@ def test_compiling_is_said_once_and_a_run_without_it_not(caplog: pytest.LogCaptu
     def twice(x: int) -> int:
         return 2 * x
 
-    with caplog.at_level(logging.INFO, logger="slam.compiling"):
+    with caplog.at_level(logging.INFO, logger="slam._jit"):
         with announced("the test's kernel"):
             assert not gc.isenabled()
             assert twice(2) == 4

@@ -19,7 +19,7 @@ from scripts.debugger.recording import Checkpoint, Tape, record
 from scripts.debugger.words import as_json, headline
 from sim.twins.absence import Change
 from slam.errors import LogFormatError, SlamFailedError, UnknownNameError
-from slam.evaluation.divergence import Divergence
+from slam.evaluation.lost import Divergence
 
 SKITTISH = """
 import numpy as np

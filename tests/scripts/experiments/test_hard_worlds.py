@@ -8,15 +8,13 @@ import math
 from pathlib import Path
 from types import SimpleNamespace
 
-import mujoco
 import numpy as np
 import pytest
 
 from scripts.comparison.plan import Plan
-from scripts.experiments import breaking_point, penetration, share_seen
+from scripts.experiments import breaking_point, share_seen
 from scripts.options import Axis
 from sim.core.dynamism import Dynamism
-from sim.simulation import Simulation
 from slam import system
 from slam.errors import InvalidValueError
 from slam.estimate import Estimate
@@ -102,22 +100,6 @@ def test_what_is_seen_grows_in_a_line_with_the_motion(scene: str):
         assert np.mean([row["blocked"] for row in rows]) < 0.15
     assert seen[1] > 0.3
     assert abs(seen[0] - 0.5 * seen[1]) < 0.2 * seen[1]
-
-
-def test_who_stands_in_whom_is_named_with_the_depth():
-    simulation = Simulation("arena", seed=1, dynamism=0.0, crowd="escorts:2", n_chairs=0)
-    world, depths = simulation.world, penetration.Depths(simulation)
-    depths.look()
-    assert depths.worst == {}
-    (one, two), _ = world.bodies.addresses(["escort0", "escort1"])
-    world.data.qpos[one : one + 2] = world.data.qpos[two : two + 2]
-    world.data.qpos[one] += 0.4
-    mujoco.mj_forward(world.model, world.data)
-    depths.look()
-    ((pair, (depth, at_s, *names)),) = depths.worst.items()
-    assert pair == ("person_coat", "person_coat")
-    assert depth == pytest.approx(0.1, abs=1e-6)  # two hulls of 0.25 m, 0.4 m apart
-    assert (at_s, sorted(names)) == (0.0, ["escort0", "escort1"])
 
 
 class Sure(OdometrySlam):

@@ -24,10 +24,8 @@ from slam.frames import LaserSpec, Scan
 from slam.system import create
 
 NAMES = (
-    "ablation", "accuracy", "association_effort", "breaking_point", "change_share",
-    "corner_recall", "covariance_scores", "habits", "honesty", "kidnap", "log_defects", "loops",
-    "penetration", "pushes", "range_error", "rates", "scanners", "share_seen",
-    "trust_in_returns", "tune_ekf", "uncertainty", "verdict_tracks",
+    "ablation", "accuracy", "breaking_point", "habits", "logs", "range_error", "rates",
+    "scanners", "share_seen", "uncertainty",
 )  # fmt: skip
 STUDIES = {name: importlib.import_module(f"scripts.experiments.{name}").STUDY for name in NAMES}
 

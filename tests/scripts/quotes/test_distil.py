@@ -12,7 +12,7 @@ from scripts.comparison.folder import Compared, write_table
 from scripts.comparison.schema import LEVELS, RUNS
 from scripts.comparison.tables import levels
 from scripts.quotes.distil import distil, main
-from scripts.quotes.results import Comparison, Pair
+from scripts.quotes.texts import Comparison
 from scripts.result_files import write
 from slam.errors import InvalidValueError
 
@@ -55,20 +55,15 @@ def test_what_a_results_file_holds(compared: Compared, tmp_path: Path, monkeypat
     assert (head["commit"], head["seeds"], head["scanner"]) == ("c" * 40, SEEDS, "full")
     write(tmp_path / "r.json", head, tables)
     found = Comparison(tmp_path / "r.json")
-    medians = [level.value for level in found.levels("arena", "occupancy", "ate_unaligned_m")]
-    assert medians == pytest.approx([0.03, 0.04, 0.05])
-    assert [pair.value for pair in found.pairs("arena", "occupancy", "ate_unaligned_m")] == (
-        pytest.approx([-0.01, -0.02, -0.03])
-    )
-    assert found.pairs("arena", "occupancy", "ghost_rate")[:2] == [None, None]
-    over = found.over_levels("arena", "occupancy", "ate_unaligned_m")
-    assert isinstance(over, Pair)
-    assert over.value == pytest.approx(-0.02)  # of seeds 100 and 101, 102: its median is a tie
-    assert (over.wins, over.ties, over.losses) == (2, 1, 0)
-    assert [level.value for level in found.levels("arena", "occupancy", "lost")][-1] == (
-        pytest.approx(1 / 3)
-    )
-    assert found.rank_correlation("arena", "occupancy", "ate_unaligned_m") == 1.0
+    grid = "arena", "occupancy"
+    assert found.medians(*grid) == pytest.approx([0.03, 0.04, 0.05])
+    assert [pair[0] for pair in found.row("paired", *grid)] == pytest.approx([-0.01, -0.02, -0.03])
+    assert found.row("paired", *grid, "ghost_rate")[:2] == [None, None]
+    over = found.row("over_levels", *grid)
+    assert over[0] == pytest.approx(-0.02)  # of seeds 100 and 101, 102: its median is a tie
+    assert over[3:] == [2, 1, 0]
+    assert found.medians(*grid, "lost")[-1] == pytest.approx(1 / 3, rel=1e-5)
+    assert found.row("rank_correlation", *grid) == 1.0
 
 
 def test_a_folder_that_other_code_made_is_refused(compared: Compared, tmp_path: Path):

@@ -6,13 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from slam.days.agreement import Agreement, Past
-from slam.days.config import DaysConfig
 from slam.days.evidence import Snapshot
 from slam.days.history import History
+from slam.days.search import KNOWN, SPOILS, Agreement, Past
 
 CELL = 0.1
-CONFIG = DaysConfig().agreement
 
 
 def building(*things, shift=(0.0, 0.0), wall_x=3.0):
@@ -43,15 +41,15 @@ def test_chairs_may_move_and_edges_may_be_off_by_a_little():
     known = past(building(*chairs), building(*chairs))
     same = known.agreement(building(*chairs))
     assert same.disagrees == 0.0
-    assert same.known > CONFIG.known
+    assert same.known > KNOWN
     assert known.agreement(building(*chairs, shift=(0.2, -0.1))).disagrees == 0.0
-    assert 0.0 < known.agreement(building(*others)).disagrees < CONFIG.spoils
+    assert 0.0 < known.agreement(building(*others)).disagrees < SPOILS
 
 
 def test_walls_may_not():
     known = past(building())
-    assert known.agreement(building(wall_x=5.0)).disagrees > CONFIG.spoils
-    assert known.agreement(building(shift=(1.0, 0.6))).disagrees > CONFIG.spoils
+    assert known.agreement(building(wall_x=5.0)).disagrees > SPOILS
+    assert known.agreement(building(shift=(1.0, 0.6))).disagrees > SPOILS
 
 
 def test_what_moves_in_the_days_before_has_no_say():

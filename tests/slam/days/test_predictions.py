@@ -12,8 +12,16 @@ from scipy import integrate
 
 from slam.days.habits import TEMPOS, Habits, near_hours, relaxed
 from slam.days.history import DAY_S
-from slam.days.predictions import HOUR_S, brier, log_score
-from slam.days.rivals import FreMEn, LastSeen, Mean, PersistenceFilter, lasting
+from slam.days.predictions import (
+    HOUR_S,
+    FreMEn,
+    LastSeen,
+    Mean,
+    PersistenceFilter,
+    brier,
+    lasting,
+    log_score,
+)
 from slam.errors import InvalidValueError
 
 ALL = (Habits, LastSeen, Mean, PersistenceFilter, FreMEn)

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from slam import se2
-from slam.days.agreement import Past
-from slam.days.config import DaysConfig
 from slam.days.history import History
-from slam.days.search import StartSearch
+from slam.days.search import Past, StartSearch
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from tests.world2d import Drive, World2D, frames, laser, rectangle, wander
 
@@ -32,7 +30,7 @@ def mapped(*parts) -> ShuntingSlam:
 
 def searched(known, world, drive):
     """The search after all scans of a drive, where it was found, and the true start."""
-    search = StartSearch(known, DaysConfig(), Past(History(cell_m=0.1)))
+    search = StartSearch(known, Past(History(cell_m=0.1)))
     stream = frames(World2D(np.vstack(world)), drive, rate_hz=5.0, spec=laser(181), seed=9)
     found = None
     for frame in stream:

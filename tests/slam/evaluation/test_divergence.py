@@ -10,7 +10,7 @@ import pytest
 
 from slam import se2
 from slam.errors import InvalidValueError
-from slam.evaluation.divergence import (
+from slam.evaluation.lost import (
     Rule,
     error_m,
     errors_since_m,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from slam.frontend.odometry_bias import HeadingBias
+from slam.frontend.odometry_prior import HeadingBias
 
 SAID = math.radians(0.3)  # per step, by odometry
 WELL = np.diag([1e4, 1e4, 1e6])

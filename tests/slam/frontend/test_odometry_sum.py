@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from slam.frames import Features, Frame, Odometry
-from slam.frontend.odometry_sum import MotionSum
+from slam.frontend.odometry_steps import MotionSum
 
 STATED = np.diag([1e-4, 2e-4, 3e-4])
 

@@ -8,7 +8,7 @@ import os
 
 import pytest
 
-from slam.guests.quiet import quiet
+from slam.guests.genz import quiet
 
 
 def test_what_is_written_within_is_dropped_and_nothing_else(capfd: pytest.CaptureFixture[str]):

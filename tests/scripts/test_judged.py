@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What counts as admitted in time, and which streams are looked at."""
+"""What counts as admitted in time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scripts.experiments import honesty, pushes
 from scripts.metrics.judged import DUE_S, Judged
 from slam.errors import InvalidValueError
 from slam.estimate import Estimate
@@ -55,20 +54,3 @@ def test_it_is_told_by_the_covariance_or_by_not_being_converged() -> None:
     assert run(0.15, 10, 30, 0.01, converged=False).is_told().all()
     with pytest.raises(InvalidValueError, match="covariances"):
         replace(silent, covariances=None).is_told()
-
-
-def test_streams_are_of_train_seeds_each_used_once_in_a_scene() -> None:
-    for one in (honesty.STUDY, pushes.STUDY):
-        cases = one.cases(one._parser().parse_args([]))
-        drives = {(case["scene"], case["motion"], case["seed"]) for case in cases}
-        assert len(drives) == 20 * len(honesty.SCENES)
-        assert {seed for *_, seed in drives} == set(range(20))
-
-
-def test_a_push_is_as_far_as_it_says_and_comes_to_an_end() -> None:
-    rng = np.random.default_rng(0)
-    far, turned = (pushes.push(kind, rng) for kind in pushes.KINDS)
-    assert np.hypot(*far[:2]) == pytest.approx(pushes.PUSH_M)
-    assert abs(np.degrees(turned[2])) == pytest.approx(pushes.PUSH_DEG)
-    rows = [{"back_s": back} for back in (0.5, 2.0, 4.0, None)]
-    assert pushes.quick(rows) == "2 of 4"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the table of kidnaps counts, on streams made by hand."""
+"""A carried robot and a pushed SLAM, on streams made by hand."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scripts.experiments import kidnap
-from slam import Estimate, Raster, Trajectory, se2
+from scripts.integrity import kidnap
+from slam import se2
 from slam.frames import Frame
-from slam.frontend.odometry_sum import thinned
+from slam.frontend.odometry_steps import thinned
 from tests.world2d import Drive, World2D, arena, frames, laser
 
 
@@ -52,41 +52,7 @@ def test_a_kidnap_is_far_near_the_map_and_unknown_to_the_odometry(stream):
         before = frame
 
 
-class Told:
-    """Says of each frame whether it trusts itself, and how far along x it is."""
-
-    def __init__(self, *words: tuple[bool, float]) -> None:
-        self.words = list(words)
-
-    def reset(self) -> None: ...
-
-    def update(self, frame: Frame) -> Estimate:
-        trusted, off = self.words.pop(0)
-        return Estimate(
-            stamp_ns=frame.stamp_ns,
-            T_map_robot=np.array([off, 0.0, 0.0]),
-            covariance=np.eye(3),
-            converged=trusted,
-        )
-
-    def map(self) -> Raster | None:
-        return None
-
-    def trajectory(self) -> Trajectory:
-        raise NotImplementedError
-
-
-@pytest.mark.parametrize(
-    ("words", "detected", "recovered_s", "right", "wrong"),
-    [
-        ([(True, 5.0), (False, 5.0), (False, 5.0), (True, 0.1)], 2, 0.3, True, False),
-        ([(False, 5.0), (True, 5.0), (False, 5.0), (True, 0.1)], 1, 0.1, True, True),
-        ([(False, 5.0)] * 4, 1, None, False, False),
-        ([(True, 5.0)] * 4, None, None, False, True),
-    ],
-)
-def test_what_a_kidnap_counts(stream, words, detected, recovered_s, right, wrong):
-    still = [replace(f, truth=np.zeros(3)) for f in stream[:4]]
-    outcome = kidnap.follow(Told(*words), still, np.zeros(3), 3.0, 1)
-    assert (outcome.detected, outcome.right, outcome.wrong) == (detected, right, wrong)
-    assert outcome.recovered_s == (None if recovered_s is None else pytest.approx(recovered_s))
+def test_a_push_is_as_far_as_it_says():
+    far, turned = (kidnap.push(kind, np.random.default_rng(0)) for kind in kidnap.KINDS)
+    assert np.hypot(*far[:2]) == pytest.approx(kidnap.PUSH_M)
+    assert abs(np.degrees(turned[2])) == pytest.approx(kidnap.PUSH_DEG)
