@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scripts.live.opened import Opener
 
 from scripts.live.network import Network
+from scripts.live.session import Opener
 from slam import se2
 from slam.ros import slam as ros2
 from slam.ros.child import Domain
