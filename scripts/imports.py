@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from scenes import registry
+from scenes import is_file
 from slam.names import join_folders, loaded
 from slam.variants import COMMANDS, inside
 
@@ -114,7 +114,7 @@ def source_of(slam: str) -> tuple[Path, ...]:
 def source_of_scene(scene: str) -> tuple[Path, ...]:
     """The files of a scene's own module as ``source_of`` has them, and the plans and parts (MJCF)
     in their folders; or all files of a scene by its file."""
-    if registry.is_file(scene):
+    if is_file(scene):
         from scenes.scene_file import files
 
         return files(Path(scene))

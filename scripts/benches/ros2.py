@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from scripts.live.network import Network
-from scripts.live.opened import Opener
+from scripts.live.session import Opener
 from scripts.live.view import View
 from sim.view.moment import Shown
 from slam.frames import NS_PER_S

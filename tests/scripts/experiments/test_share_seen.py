@@ -1,25 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scripts that measure what is seen of a level, and at which level SLAMs break."""
+"""What is seen of a level."""
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from scripts.comparison.plan import Plan
-from scripts.experiments import breaking_point, share_seen
+from scripts.experiments import share_seen
 from scripts.options import Axis
 from sim.core.dynamism import Dynamism
-from slam import system
 from slam.errors import InvalidValueError
-from slam.estimate import Estimate
-from slam.frames import BeamClass, Frame
-from slam.odometry import OdometrySlam
+from slam.frames import BeamClass
 
 N, S, SEMI, M = (int(kind) for kind in BeamClass)
 
@@ -100,48 +95,3 @@ def test_what_is_seen_grows_in_a_line_with_the_motion(scene: str):
         assert np.mean([row["blocked"] for row in rows]) < 0.15
     assert seen[1] > 0.3
     assert abs(seen[0] - 0.5 * seen[1]) < 0.2 * seen[1]
-
-
-class Sure(OdometrySlam):
-    """Odometry that claims 1 cm in x and in y, always."""
-
-    def update(self, frame: Frame) -> Estimate:
-        pose = super().update(frame).T_map_robot
-        return Estimate(
-            stamp_ns=frame.stamp_ns, T_map_robot=pose, covariance=np.diag([1e-4, 1e-4, 0.0])
-        )
-
-
-class Raises(OdometrySlam):
-    """Fails at once."""
-
-    def update(self, frame: Frame) -> Estimate:
-        raise RuntimeError("enough")
-
-
-def test_the_breaking_point_of_a_tiny_plan(tmp_path: Path, capsys, monkeypatch):
-    for name, kind in (("sure", Sure), ("raises", Raises)):
-        monkeypatch.setitem(system._registry, name, kind)
-    words = ["--slam", "sure", "raises", "oracle(odometry)", "--scene", "arena"]
-    words += ["--axis", "dynamism", "--level", "0", "1", "--seeds", "1", "--seconds", "1.6"]
-    for option in ("folder", "results", "picture.png"):
-        words += [f"--{option.partition('.')[0]}", str(tmp_path / option)]
-    assert breaking_point.STUDY.main([*words, "--no-page"]) == 0
-    printed = capsys.readouterr().out
-    assert "| dynamism | arena | 0 |" in printed
-    assert "failed (1)" in printed
-    assert (tmp_path / "picture.png").stat().st_size > 10_000
-    runs = json.loads((tmp_path / "results").read_text())["runs"]
-    assert len(runs) == 6
-    sure, raises = (runs[f"dynamism arena 0.0 noise {slam} 500"] for slam in ("sure", "raises"))
-    assert sure["claimed_m"] == pytest.approx(math.sqrt(2e-4), rel=1e-5)
-    assert sure["off_m"] == sure["ate_unaligned_m"]
-    assert (sure["lost"], raises["lost"]) == (0, 1)
-    assert "claimed_m" not in raises
-
-
-def test_what_cannot_be_planned_is_one_line(tmp_path: Path, capsys):
-    words = ["--scene", "arenna", "--axis", "dynamism", "--no-page", "--folder", str(tmp_path)]
-    words += ["--results", str(tmp_path / "r.json")]
-    assert breaking_point.STUDY.main(words) == 1
-    assert "arenna" in capsys.readouterr().err
