@@ -21,7 +21,7 @@ from sim.actors.people.crowd import People, decide
 from sim.actors.people.gait import walk
 from sim.actors.people.leaders import Leaders
 from sim.actors.people.right_of_way import Addresses, Crowd, Doors
-from sim.actors.people.sitting import Hulls, dress
+from sim.actors.people.trips import Hulls, dress
 from sim.actors.robot import ramp, roll
 from sim.actors.rolling import Rolled
 from sim.actors.rolling import roll as roll_chairs

@@ -4,7 +4,7 @@
 Each person stays somewhere, walks to the next goal down its flow field (``sim.core.flow``) or
 follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that
 hits nothing soon (``sim.actors.people.avoidance``). A person whose way is blocked by a chair loses
-patience and pushes it; now and then one sits down (``sim.actors.people.sitting``).
+patience and pushes it; now and then one sits down (``sim.actors.people.trips``).
 """
 
 from __future__ import annotations
@@ -44,8 +44,7 @@ from sim.actors.people.right_of_way import (
     round_leaf,
     wait_beside,
 )
-from sim.actors.people.sitting import Hulls, on_chair, to_chair
-from sim.actors.people.trips import patience, plan
+from sim.actors.people.trips import Hulls, on_chair, patience, plan, to_chair
 from sim.core.flow import Field, clearance_at, time_at, way_at
 from sim.core.state import Records
 from slam._jit import njit
