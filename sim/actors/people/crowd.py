@@ -47,7 +47,7 @@ from sim.actors.people.right_of_way import (
 from sim.actors.people.trips import Hulls, on_chair, patience, plan, to_chair
 from sim.core.flow import Field, clearance_at, time_at, way_at
 from sim.core.state import Records
-from slam._jit import njit
+from slam._jit import inner
 
 _W = ACTORS.walking
 _S = ACTORS.steering
@@ -89,7 +89,7 @@ class People(NamedTuple):
     weights: Float
 
 
-@njit
+@inner
 def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[float, float]:
     """The velocity person ``i`` would like to have, other movers aside."""
     discs, state, task = crowd.discs, crowd.state, crowd.task
@@ -107,7 +107,7 @@ def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[
     return at_doors(i, (wx, wy), ways, field, discs)
 
 
-@njit
+@inner
 def at_doors(
     i: int, wanted: tuple[float, float], ways: Doors, field: Field, discs: Records
 ) -> tuple[float, float]:
@@ -124,7 +124,7 @@ def at_doors(
     return wx, wy
 
 
-@njit
+@inner
 def keep_right(i: int, wx: float, wy: float, field: Field, discs: Records) -> tuple[float, float]:
     """The wanted velocity of one of a stream, which keeps to the right side of a corridor."""
     x, y = discs[i].x, discs[i].y
@@ -137,13 +137,13 @@ def keep_right(i: int, wx: float, wy: float, field: Field, discs: Records) -> tu
     return wx + LANE * speed * rx, wy + LANE * speed * ry
 
 
-@njit
+@inner
 def wrap(angle: float) -> float:
     """The same angle in [-pi, pi)."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@njit
+@inner
 def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -> None:
     """Change towards (vx, vy) as fast as legs allow and face the way; servo targets to ``out``."""
     state, yaw = crowd.state, crowd.yaws[i]
@@ -163,7 +163,7 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
     out[2] = min(max(TURN_GAIN * wrap(heading - yaw), -most), most)
 
 
-@njit
+@inner
 def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float]:
     """The velocity person ``i`` would like to have, whatever it does; keeps account of the way."""
     crowd, field = people.crowd, people.field
@@ -198,7 +198,7 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
     return wx, wy
 
 
-@njit
+@inner
 def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], people: People) -> None:
     """One tick of all people, from positions to the set points of their servos.
 

@@ -23,7 +23,7 @@ from sim.actors.people.right_of_way import Crowd, Float, Int
 from sim.core.draws import between, uniform, waiting
 from sim.core.flow import FAR, Field, clearance_at, time_at
 from sim.core.state import Records
-from slam._jit import njit
+from slam._jit import inner
 
 _S = ACTORS.sitting
 SHARE, HAND, STAY, DOWN_S = _S.share, _S.hand_m, _S.stay, _S.down_s
@@ -60,7 +60,7 @@ def dress(crowd: Crowd, hulls: Hulls) -> None:
             hulls.body_pos[look, 2] = hulls.heights[i] - sunk
 
 
-@njit
+@inner
 def free_seat(i: int, field: Field, crowd: Crowd) -> int:
     """Row of the nearest chair at hand that nobody else has and the way to which is free; -1."""
     discs, task = crowd.discs, crowd.task
@@ -84,7 +84,7 @@ def free_seat(i: int, field: Field, crowd: Crowd) -> int:
     return found
 
 
-@njit
+@inner
 def may_sit(i: int, field: Field, crowd: Crowd) -> None:
     """On arrival: perhaps go on to a chair."""
     if crowd.state[i].luck < SHARE:
@@ -94,7 +94,7 @@ def may_sit(i: int, field: Field, crowd: Crowd) -> None:
             crowd.state[i].blocked = 0.0
 
 
-@njit
+@inner
 def sit(i: int, time: float, tick: float, crowd: Crowd) -> None:
     """Come to the chair, sit down, get up; call it at every tick."""
     discs, state, task = crowd.discs, crowd.state, crowd.task
@@ -122,14 +122,14 @@ def sit(i: int, time: float, tick: float, crowd: Crowd) -> None:
             task[i].seat = -1
 
 
-@njit
+@inner
 def on_chair(i: int, crowd: Crowd) -> bool:
     """Sitting, sitting down or getting up: moves with the chair."""
     seated = crowd.task[i].walking == columns.SEATED
     return bool(seated or (crowd.task[i].walking == columns.WALKS and crowd.state[i].sit > 0.0))
 
 
-@njit
+@inner
 def to_chair(i: int, crowd: Crowd) -> tuple[float, float]:
     """Velocity to the middle of the chair."""
     discs, seat = crowd.discs, crowd.task[i].seat
@@ -148,7 +148,7 @@ GIVES_UP, CROWD_GIVES_UP = _W.blocked_s, _W.crowd_blocked_s
 PATIENT, CROWD_PATIENT = _W.patient_s, _W.crowd_patient_s
 
 
-@njit
+@inner
 def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> None:
     """Draw the next goal of person ``i`` (always five draws) and set off."""
     discs, state, task, draws = crowd.discs, crowd.state, crowd.task, crowd.draws
@@ -175,7 +175,7 @@ def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> No
     state[i].best, state[i].best_at = FAR, time
 
 
-@njit
+@inner
 def way_left(i: int, field: Field, crowd: Crowd) -> float:
     """s to the goal, of person ``i`` or whatever of the thing it pushes is nearest to it."""
     discs, goal = crowd.discs, crowd.task[i].goal
@@ -187,7 +187,7 @@ def way_left(i: int, field: Field, crowd: Crowd) -> float:
     return left
 
 
-@njit
+@inner
 def arrived(i: int, left: float, doors: Records, discs: Records, state: Records) -> bool:
     """Near enough to the goal, or held up close to it, and not standing in a doorway."""
     for d in range(doors.shape[0]):
@@ -197,7 +197,7 @@ def arrived(i: int, left: float, doors: Records, discs: Records, state: Records)
     return left < state[i].arrive or (left < NEAR_S and state[i].blocked > NEAR_BLOCKED)
 
 
-@njit
+@inner
 def plan(  # noqa: C901, PLR0913 (kernel)
     i: int, time: float, tick: float, stay: float, doors: Records, field: Field, crowd: Crowd
 ) -> None:
@@ -237,7 +237,7 @@ def plan(  # noqa: C901, PLR0913 (kernel)
         new_trip(i, time, stay, field, crowd)
 
 
-@njit
+@inner
 def patience(i: int, time: float, crowd: Crowd) -> float:
     """Respect of person ``i`` for chairs and leaves in the way: 1 at first, 0 when worn out.
 
