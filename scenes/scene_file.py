@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scenes import is_file
 from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
 from scenes.recipe import DOORS, choice, count, switch
-from scenes.registry import is_file
 from scenes.scene import Pose
 from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
-from scenes.registry import is_file
+from scenes import is_file
 from scripts.console import note
 from slam.errors import InvalidValueError
 from slam.names import NameFromFile, is_code, refuse_code
@@ -225,33 +225,6 @@ class Axis:
         return f"escorts:{level:g}" if self.name == PEOPLE else self.held.crowd
 
 
-def chosen(
-    dynamism: Sequence[float],
-    motion: Sequence[float],
-    change: Sequence[float],
-    people: Sequence[float] = (),
-) -> tuple[str, tuple[float, ...], dict[str, float]]:
-    """The axis, its levels, and what is held, from what was given of each; () for nothing.
-
-    The axis is the one with several levels, else people, dynamism, motion or change, the first
-    given.
-    """
-    given = dict(zip(AXES, (dynamism, motion, change, people), strict=True))
-    several = [name for name, levels in given.items() if len(levels) > 1]
-    if len(several) > 1:
-        raise InvalidValueError(f"several levels of one axis only, got --{' and --'.join(several)}")
-    if people and several not in ([], [PEOPLE]):
-        raise InvalidValueError(f"--people are levels, and cannot be held beside --{several[0]}")
-    order = (PEOPLE, *AXES)
-    name = (several or [axis for axis in order if given[axis]] or ["dynamism"])[0]
-    if name != "dynamism" and dynamism:
-        raise InvalidValueError(
-            f"--dynamism sets both axes: with levels of --{name} give the other axis instead"
-        )
-    held = {axis: given[axis][0] for axis in ("motion", "change") if axis != name and given[axis]}
-    return name, tuple(given[name]), held
-
-
 def sweep(text: str, option: str = "--dynamism-sweep", most: float = 1.0) -> tuple[float, ...]:
     """``0:1:0.25`` -> (0, 0.25, 0.5, 0.75, 1); ``InvalidValueError`` for anything else."""
     try:
@@ -274,10 +247,25 @@ def axis_levels(
     change: list[str] | None,
     people: list[str] | None = None,
 ) -> tuple[str, tuple[float, ...], dict[str, Any]]:
-    """The axis, its levels and what is held, from the options; default 0 to 1 dynamism."""
-    given = dict(zip(AXES, (dynamism, motion, change, people), strict=True))
-    axis, at, held = chosen(*(levels(values or [], f"--{k}") for k, values in given.items()))
-    return axis, at or levels(["0:1:0.25"]), dict(held)
+    """The axis, its levels and what is held, from the options; default 0 to 1 dynamism.
+
+    The axis is the one with several levels, else people, dynamism, motion or change, the first
+    given.
+    """
+    words = dict(zip(AXES, (dynamism, motion, change, people), strict=True))
+    given = {name: levels(values or [], f"--{name}") for name, values in words.items()}
+    several = [name for name, values in given.items() if len(values) > 1]
+    if len(several) > 1:
+        raise InvalidValueError(f"several levels of one axis only, got --{' and --'.join(several)}")
+    if given[PEOPLE] and several not in ([], [PEOPLE]):
+        raise InvalidValueError(f"--people are levels, and cannot be held beside --{several[0]}")
+    name = (several or [axis for axis in (PEOPLE, *AXES) if given[axis]] or ["dynamism"])[0]
+    if name != "dynamism" and given["dynamism"]:
+        raise InvalidValueError(
+            f"--dynamism sets both axes: with levels of --{name} give the other axis instead"
+        )
+    held = {axis: given[axis][0] for axis in ("motion", "change") if axis != name and given[axis]}
+    return name, given[name] or levels(["0:1:0.25"]), held
 
 
 def levels(values: list[str], option: str = "--dynamism") -> tuple[float, ...]:

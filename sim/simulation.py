@@ -74,7 +74,7 @@ class Simulation:
     drive      limits of the robot
     start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted; a crowd
                is put around it
-    chairs     their physics: "planar" or "free" (``sim.actors.castors``)
+    chairs     their physics: "planar" or "free" (``sim.actors.chairs``)
     tags       "truth", or "camera": beside the truth, ``tag_reading`` is what a ceiling camera
                would know of the robot by now (``sim.sensors.tag_cameras``)
     labels     whether frames carry truth per beam

@@ -11,7 +11,7 @@ from typing import Any
 import scenes
 import sim
 import slam
-from scenes.registry import is_file
+from scenes import is_file
 from scenes.scene_file import sha256_of
 from scripts.comparison import entry, recording
 from scripts.comparison.rules import LEVEL

@@ -16,8 +16,8 @@ from typing import Any
 
 from scripts.options import MOST_PEOPLE, PEOPLE
 from slam.checked import is_number, is_whole
-from slam.csv_cells import word_of
 from slam.errors import LogFormatError
+from slam.files import word_of
 
 MOST = 1e100  # of a finite number, either way: its squares and their sums are finite too
 MAX_WORD = 2000  # letters of a name: what is longer is the name of no file

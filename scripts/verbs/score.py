@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -48,15 +49,12 @@ def score(
     from slam.frames import EPOCH
     from slam.logs.bag import read_bag
     from slam.ros.recorded import RecordedSlam, read_statements
-    from slam.ros.template import EPOCH_NS
     from slam.system import register
 
     log = bag if on is None else on
     epoch_ns = int(read_bag(log).metadata.extra.get(EPOCH, 0))
     statements = read_statements(bag, pose=pose, frames=(map_frame, odom_frame))
-    offset_s = clock_offset + (EPOCH_NS - epoch_ns) / 1e9
-    register(NAME)(
-        lambda: RecordedSlam(statements, poses=pose is not None, clock_offset_s=offset_s)
-    )
+    made = partial(RecordedSlam, statements, poses=pose is not None, epoch_ns=epoch_ns)
+    register(NAME)(partial(made, clock_offset_s=clock_offset))
     folder = out or Path("out") / f"score-{run_name(bag)}"
     on_log([NAME], Log(path=log), folder, overwrite=overwrite, film=film)

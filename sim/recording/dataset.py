@@ -251,7 +251,7 @@ def check_dataset(path: Path) -> list[Finding]:
     files = (*files, PAGE) if PAGE in listed else files
     for name in files:
         if name != PLAN and not os.path.lexists(path / name):
-            why = f"{path / name} is missing: 'mobilia generate' as before writes it again"
+            why = f"{path / name} is missing: 'mobilia generate' as before adds it"
             found.append(Fault(kind="incomplete", name=name, why=why))
     episodes = [check_hashes(path / name, recipe) for name, recipe in planned.items()]
     if listed:
@@ -273,7 +273,7 @@ def _against(
     found = []
     for name in sorted(listed.keys() | sums.keys()):
         if name not in listed:
-            why = f"{path / SUMS} does not list {name}: 'mobilia generate' as before writes it anew"
+            why = f"{path / SUMS} does not list {name}: 'mobilia generate' as before adds it"
         elif name not in sums:
             why = f"{path / SUMS} lists {name}, which no episode has"
         elif sums[name] != listed[name]:

@@ -15,9 +15,9 @@ from sim.core.versions import not_this_world
 from sim.recording import topics
 from sim.recording.bag import FORMAT, FORMATS, MessageHash
 from sim.recording.episode import record
-from sim.recording.rearranged import REARRANGED
 from sim.recording.recipe import RECIPE, Made, Recipe, read_recipe
 from sim.recording.sums import SUMS, Fault, check_vouched, faults, read_sums
+from sim.recording.tables import REARRANGED
 from slam.errors import LogFormatError, OutputError
 from slam.logs.bag_topics import Bag
 
@@ -81,7 +81,7 @@ def listed_in(folder: Path) -> tuple[dict[str, str], list[Fault]]:
 def check_hashes(folder: Path, planned: Recipe | None = None) -> Finding:
     """Every file against SHA256SUMS, and the recipe against itself and the one that is ``planned``.
 
-    A bag of other bytes but the very messages of the recipe was packed anew, not damaged: then all
+    A bag of other bytes but the very messages of the recipe was packed again, not damaged: then all
     else must be what it was, metadata.yaml too.
     """
     if folder.is_symlink() or not folder.is_dir():

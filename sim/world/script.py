@@ -14,7 +14,6 @@ people enter, as soon as the place is free.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +28,7 @@ from sim.world import hands
 from sim.world.populated import VISITOR
 from sim.world.requests import Kidnap, MoveDoor, Push, carry_out
 from sim.world.world import World
-from slam.bounded import text_of
+from slam.bounded import toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.frames import NS_PER_S
 
@@ -64,10 +63,7 @@ def read_events(path: str | Path) -> list[dict[str, Any]]:
     Raises ``LogFormatError`` that names the file, the event and its field.
     """
     path = Path(path)
-    try:
-        tables = tomllib.loads(text_of(path, MOST_BYTES))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise LogFormatError(path, f"is no TOML: {error}") from error
+    tables = toml_of(path, MOST_BYTES)
     rows = tables.get("event")
     if set(tables) != {"event"} or not isinstance(rows, list) or not rows:
         raise LogFormatError(

@@ -27,7 +27,7 @@ class Topic:
     """A topic and its quality of service.
 
     name   as ROS has it: "/scan"; a namespace comes before it, but for names of ROS itself
-    kind   "sensor_msgs/msg/LaserScan"
+    kind   "sensor_msgs/msg/LaserScan"; of two kinds under one name each is a topic of its own
     reliable  sent again until it is received, else best effort
     latched   the last message is kept for who comes later (transient local)
     depth     messages that are kept for a slow reader
