@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scenes import is_file
 from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
 from scenes.recipe import DOORS, choice, count, switch
