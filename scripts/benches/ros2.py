@@ -16,11 +16,11 @@ from dataclasses import replace
 import numpy as np
 
 from scripts.live.network import Network
-from scripts.live.opened import Opener
+from scripts.live.session import Opener
 from scripts.live.view import View
 from sim.view.moment import Shown
 from slam.frames import NS_PER_S
-from slam.logs.bag_frames import stamp_of
+from slam.logs.bag import stamp_of
 from slam.ros.child import Domain
 from slam.ros.heard import decoded
 from slam.ros.link import Link, open_link

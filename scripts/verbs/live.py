@@ -30,7 +30,7 @@ from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
     from scripts.live.network import Network
-    from scripts.live.opened import Opener
+    from scripts.live.session import Opener
 
 PORT = 8765
 
@@ -88,13 +88,13 @@ def live(
         raise InvalidValueError(f"--speed must lie in [{SLOWEST:g}, {FASTEST:g}], got {speed:g}")
     slams = list(with_set(slam or ["shunting"], set_ or []))
     check(slams, scene)
-    from scripts.live import gate, opened, served
+    from scripts.live import gate, served, session
 
     allowed = [gate.origin_of(text) for text in allow_origin or []]
     served.require()
     held = Held(motion=motion, change=change, crowd=crowd)
     world = {**held.world(scene, dynamism, seed), "laser": scanner, **staged(events, robot)}
-    opener = opened.Opener(
+    opener = session.Opener(
         slams=slams, path=path, settings=world if path is None else {}, seconds=seconds
     )
     network = None if ros2 is None else _network(ros2, is_log=path is not None)

@@ -54,7 +54,7 @@ class Rendering:
         return lambda now: camera.render(now.world.data, self._view)
 
     def close(self) -> None:
-        """Free what draws; the next picture makes it anew, of whatever simulation then."""
+        """Free what draws; the next picture makes it again, of whatever simulation then."""
         if self._camera is not None:
             self._camera.close()
         self._picture = self._camera = None

@@ -7,7 +7,6 @@ A robot is a name of ``sim/robots`` or the tables of such a file (``docs/robots.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from scenes import SCAN_HEIGHT
 from scenes.scene import Scene, at_scan_height
 from sim.actors.robot import DriveConfig
 from sim.core.checks import within, word
-from slam.bounded import text_of
+from slam.bounded import toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 
 FOLDER = Path(__file__).parents[1] / "robots"
@@ -85,11 +84,9 @@ def read_robot(name: str) -> dict[str, Any]:
         raise UnknownNameError(
             f"no robot is called {name!r:.80}. Known: {', '.join(names())}; or a .toml file."
         )
+    tables = toml_of(path, MOST_BYTES)
     try:
-        tables = tomllib.loads(text_of(path, MOST_BYTES))
         robot_of(tables)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise LogFormatError(path, f"is no TOML: {error}") from error
     except InvalidValueError as error:
         raise LogFormatError(path, str(error)) from error
     return tables

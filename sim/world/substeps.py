@@ -91,12 +91,12 @@ class Watch(NamedTuple):
     """What is written down after each substep k: row k of all, longer than a scan where need be.
 
     marks    (n,) whether the scanner notes all poses
-    scanner  where to
+    scanner  where to, a plain ``sim.sensors.lidar.windows.Noted``
     path     (n, 3) pose of the robot; travel (n, 2) m rolled by the wheels
     """
 
     marks: NDArray[np.bool_]
-    scanner: Noted
+    scanner: tuple[Any, ...]
     path: Float
     travel: Float
 
@@ -174,7 +174,7 @@ def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:
     marks, scanner, path, travel = watch
     return _advance(
         first, last, resumed, clock, Engine(*engine), _robot(robot), Physics(*physics),
-        _actors(actors), Watch(marks, Noted(*scanner), path, travel),
+        _actors(actors), Watch(marks, scanner, path, travel),
     )  # fmt: skip
 
 
@@ -241,8 +241,9 @@ def loose() -> Pinned:
 
 def unseen(rows: int) -> Any:
     """A ``plain`` watch over ``rows`` rows that notes the robot alone."""
-    none = np.zeros(0, dtype=np.int64)
-    flat = np.zeros((0, 3)), np.zeros((0, 9))
-    scanner = Noted(none, none, *flat, *flat, -1, np.zeros((0, 0, 12)), np.zeros((0, 3)), none)
+    none, flat = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    runs, poses = np.zeros((0, 4), dtype=np.int64), np.zeros((0, 0, 12))
+    where = (flat, flat, flat, flat, flat, flat, flat)
+    scanner = Noted(none, runs, *where, -1, poses, flat, none)
     marks = np.zeros(rows, dtype=np.bool_)
     return plain(Watch(marks, scanner, np.zeros((rows, 3)), np.zeros((rows, 2))))

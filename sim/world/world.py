@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.scene import Scene
-from sim.actors.castors import checked_level, stand_on_castors
-from sim.actors.chairs import Shoves, pushers, tables
+from sim.actors.chairs import Shoves, checked_level, pushers, stand_on_castors, tables
 from sim.actors.doors import Doors
 from sim.actors.people.people import People
 from sim.actors.rearranging import Rearrangement, Rearranging
@@ -58,7 +57,7 @@ class World:
     drive     limits of the robot
     start     (x m, y m, heading rad) of the robot instead of the scene's; a crowd that is put into
               the scene is put around it, one that is in a built ``Scene`` stays where it is
-    chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.castors``)
+    chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.chairs``)
     robot     another than the scene's (``sim.world.robots``), by its name or from its tables
     visitors  people who are outside until ``admit`` lets them in
     options   passed on to ``scenes.build`` when the scene is given by name, e.g. ``n_chairs=10``;
@@ -281,10 +280,6 @@ class World:
         """What the robot has touched since the last call, hardest first (``Contact.hard``)."""
         return self._contacts.take()
 
-    def robot_clearance(self) -> float:
-        """m from the robot's rim to the nearest static obstacle or floor edge; < 0: inside."""
-        return self.bodies.clearance(self.data)
-
     # -- everything that moves --------------------------------------------------------------
 
     @property
@@ -316,11 +311,6 @@ class World:
         moving = self.mover_speeds() > MOVING_SPEED
         moving[self._people_rows] |= self.people.swinging()
         return moving
-
-    def moving_bodies(self) -> NDArray[np.bool_]:
-        """(nbody,) True for each body of the model that belongs to a moving mover."""
-        moving = np.append(self.movers_moving(), False)
-        return moving[self.bodies.mover_of_body]
 
     # -- state ------------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ from slam.errors import InvalidValueError, MobiliaError
 from slam.estimate import Raster
 from slam.frames import Float
 from slam.logs import unpacking
-from slam.logs.bag_frames import PLANAR, planar, stamp_of
+from slam.logs.bag import PLANAR, planar, stamp_of
 from slam.ros.template import STORE
 
 MOST_CELLS = 1 << 26  # of a map: a square of 400 m at 5 cm

@@ -13,7 +13,7 @@ from slam import se2
 from slam.errors import MobiliaError
 from slam.estimate import Estimate, Raster
 from slam.frames import NS_PER_S, Float, Odometry
-from slam.logs.bag_odometry import PoseTrack, Stamped
+from slam.logs.bag_laser import PoseTrack, Stamped
 from slam.ros.heard import StampedPose, decoded, pose_of, raster_of, transform_of
 from slam.ros.link import Link, Topic
 from slam.ros.messages import MAP, ODOM, TransformMessage

@@ -23,7 +23,7 @@ from slam import se2
 from slam.answers import asked, asked_map
 from slam.errors import MobiliaError
 from slam.frames import NS_PER_S, Frame
-from slam.logs.bag_frames import Assembly, stamp_of
+from slam.logs.bag import Assembly, stamp_of
 from slam.logs.bag_laser import Laser, mounting
 from slam.logs.bag_topics import Topics
 from slam.ros.heard import decoded
@@ -48,7 +48,7 @@ _HEARD = (_SCAN, _TURNS, _ODOM, _STEPS, _STATIC)
 
 
 class Served:
-    """One SLAM on a link; frames are put together as out of a bag (``slam.logs.bag_frames``)."""
+    """One SLAM on a link; frames are put together as out of a bag (``slam.logs.bag``)."""
 
     def __init__(self, link: Link, system: SlamSystem) -> None:
         self._link, self._system = link, system

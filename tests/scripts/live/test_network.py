@@ -14,8 +14,8 @@ import pytest
 
 from scripts.live.hands import Hands
 from scripts.live.network import TAKES, Network
-from scripts.live.opened import Opener
 from scripts.live.requests import Drive, Kidnap, MoveDoor, Push
+from scripts.live.session import Opener
 from sim.moments import Moment
 from sim.recording.bag import BagWriter
 from sim.simulation import Simulation

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from scripts.live.network import Network
-from scripts.live.opened import Opener
+from scripts.live.session import Opener
 from slam import se2
 from slam.ros import slam as ros2
 from slam.ros.link import Topic
