@@ -133,7 +133,7 @@ def inertia_of(model: mujoco.MjModel, names: Sequence[str]) -> tuple[NDArray[np.
         first = int(body.geomadr[0])
         own = range(first, first + int(body.geomnum[0]))
         feet = [g for g in own if model.geom(g).name.startswith(f"{name}/foot")]
-        if feet:  # its friction is under its castors, not in its joints (``sim.actors.castors``)
+        if feet:  # its friction is under its castors, not in its joints (``sim.actors.chairs``)
             grip = float(model.geom_friction[feet[0], 0]) * float(body.mass[0]) * 9.81
             reach = float(np.hypot(*model.geom_pos[feet[0], :2]))
             bodies[i, 2:] = 0.75 * grip, 0.75 * grip * reach

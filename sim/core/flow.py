@@ -230,13 +230,15 @@ def way_at(field: Field, goal: int, x: float, y: float) -> tuple[float, float]:
     return dx / norm, dy / norm
 
 
+WALKER_M = 0.27  # m, that a walker needs around its centre
+
+
 class FlowMap:
     """Clearance of a floor and the ways to a set of goals.
 
     bounds     xmin, ymin, xmax, ymax, m; outside is wall
     obstacles  (n, 5) boxes: centre x, y, half sizes m, yaw rad
     goals      (k, 2) m
-    radius     m a walker needs around its centre
     leaves     (m, 5) boxes that ways go around but that are no wall: doors that stand open
     """
 
@@ -246,7 +248,6 @@ class FlowMap:
         obstacles: Float,
         goals: Float,
         *,
-        radius: float = 0.27,
         cell: float = 0.1,
         leaves: Float | None = None,
     ) -> None:
@@ -254,11 +255,11 @@ class FlowMap:
         xmin, ymin, xmax, ymax = (float(b) for b in bounds)
         floor = (xmin, ymin, xmax, ymax)
         self.clearance: Float = clearance_field(boxes, floor, cell, 1.0)
-        slow = slowness(self.clearance, radius)
+        slow = slowness(self.clearance, WALKER_M)
         if leaves is not None and len(leaves) > 0:
             beside = clearance_field(np.ascontiguousarray(leaves), floor, cell, 1.0)
             slow = np.where(
-                slow < FAR, np.maximum(slow, slowness(np.maximum(beside, WALL), radius)), slow
+                slow < FAR, np.maximum(slow, slowness(np.maximum(beside, WALL), WALKER_M)), slow
             )
         shape = (len(goals), *self.clearance.shape)
         self.time: Float = np.zeros(shape)

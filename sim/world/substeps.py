@@ -21,7 +21,7 @@ from sim.actors.people.crowd import People, decide
 from sim.actors.people.gait import walk
 from sim.actors.people.leaders import Leaders
 from sim.actors.people.right_of_way import Addresses, Crowd, Doors
-from sim.actors.people.sitting import Hulls, dress
+from sim.actors.people.trips import Hulls, dress
 from sim.actors.robot import ramp, roll
 from sim.actors.rolling import Rolled
 from sim.actors.rolling import roll as roll_chairs
@@ -92,7 +92,7 @@ class Watch(NamedTuple):
 
     marks    (n,) whether the scanner notes all poses
     scanner  where to, a plain ``sim.sensors.lidar.windows.Noted``
-    path     (n, 3) pose of the robot; travel (n, 2) m rolled by the wheels
+    path     (n, 3) pose of the robot; travel (n, 3) m rolled by the wheels, and to the left
     """
 
     marks: NDArray[np.bool_]
@@ -181,6 +181,7 @@ def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:
                 ramp(drive, robot.limits)
                 physics.ctrl[robot.tyres[0]] = drive.left
                 physics.ctrl[robot.tyres[1]] = drive.right
+                physics.ctrl[robot.tyres[2]] = drive.side
             call(engine.step2, engine.model, engine.data)
             clock[0] += 1
             roll(drive, step)
@@ -205,6 +206,7 @@ def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:
             path[row + 1, k] = physics.qpos[robot.at[0] + k]
         travel[row + 1, 0] = drive.rolled_left
         travel[row + 1, 1] = drive.rolled_right
+        travel[row + 1, 2] = drive.rolled_side
         if marks[row + 1]:
             note(scanner)
     return last
@@ -223,4 +225,4 @@ def unseen(rows: int) -> Any:
     where = (flat, flat, flat, flat, flat, flat, flat)
     scanner = Noted(none, runs, *where, -1, poses, flat, none)
     marks = np.zeros(rows, dtype=np.bool_)
-    return plain(Watch(marks, scanner, np.zeros((rows, 3)), np.zeros((rows, 2))))
+    return plain(Watch(marks, scanner, np.zeros((rows, 3)), np.zeros((rows, 3))))

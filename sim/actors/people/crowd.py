@@ -4,7 +4,7 @@
 Each person stays somewhere, walks to the next goal down its flow field (``sim.core.flow``) or
 follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that
 hits nothing soon (``sim.actors.people.avoidance``). A person whose way is blocked by a chair loses
-patience and pushes it; now and then one sits down (``sim.actors.people.sitting``).
+patience and pushes it; now and then one sits down (``sim.actors.people.trips``).
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ import numpy as np
 from sim.actors.config import ACTORS
 from sim.actors.holding import Held
 from sim.actors.people import columns
-from sim.actors.people.avoidance import ACCEL, choose, spare_robot
-from sim.actors.people.carrying import keep_hold, pushes
-from sim.actors.people.cleaning import clean, to_what_is_taken
+from sim.actors.people.avoidance import ACCEL, choose, nearby, sense, spare_robot
+from sim.actors.people.carrying import clean, keep_hold, pushes, to_what_is_taken
 from sim.actors.people.following import (
     faces,
     follow,
     is_pushing,
     make_room,
     make_way,
+    near_place,
     rests,
+    spread_out,
     stand_in_line,
     wait_behind,
 )
-from sim.actors.people.formation import near_place, spread_out
 from sim.actors.people.leaders import Leaders, note_ways
 from sim.actors.people.right_of_way import (
     OPEN,
@@ -44,9 +44,7 @@ from sim.actors.people.right_of_way import (
     round_leaf,
     wait_beside,
 )
-from sim.actors.people.sensing import nearby, sense
-from sim.actors.people.sitting import Hulls, on_chair, to_chair
-from sim.actors.people.trips import patience, plan
+from sim.actors.people.trips import Hulls, on_chair, patience, plan, to_chair
 from sim.core.flow import Field, clearance_at, time_at, way_at
 from sim.core.state import Records
 from slam._jit import inner
