@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scenes import is_file
 from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
 from scenes.recipe import DOORS, choice, count, switch
@@ -21,7 +22,6 @@ from slam.errors import InvalidValueError
 Box = tuple[float, float, float, float, float]
 Point = tuple[float, float]
 
-ENDINGS = (".toml", ".xml")  # as ``scenes.registry.is_file``, which imports what imports this
 MAX_BYTES, MAX_PLAN_BYTES = 1 << 22, 1 << 26
 MAX_ROWS = 5000  # walls, things, doors or pieces of furniture
 FURNITURE = ("move", "keep", "drop")
@@ -111,12 +111,12 @@ def files(path: Path) -> tuple[Path, ...]:
     """A scene's file, and those beside it that it names: its plan and its robot."""
     own = tables(path) if path.suffix == ".toml" else {}
     named = [name for name in (own.get("plan"), own.get("robot")) if isinstance(name, str)]
-    return path, *(path.parent / name for name in named if name.endswith(ENDINGS))
+    return path, *(path.parent / name for name in named if is_file(name))
 
 
 def sha256_of(scene: str) -> str | None:
     """Of all ``files`` of a scene by its file; None for another."""
-    if not scene.endswith(ENDINGS):
+    if not is_file(scene):
         return None
     each = [hashlib.sha256(bytes_of(f, MAX_PLAN_BYTES)).digest() for f in files(Path(scene))]
     return hashlib.sha256(b"".join(each)).hexdigest()

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.sensors.lidar import columns as col
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
@@ -103,7 +103,7 @@ def _changes_height(model: mujoco.MjModel, data: mujoco.MjData) -> Bool:
     return np.array(out, dtype=np.bool_)
 
 
-@njit
+@inner
 def _half_height(kind: int, size: Float, mat: Float) -> float:
     """Half the vertical extent of a primitive with the given orientation, m."""
     x, y, z = abs(mat[6]), abs(mat[7]), abs(mat[8])  # world z of the geom's own axes

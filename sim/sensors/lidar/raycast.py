@@ -16,13 +16,13 @@ from sim.sensors.lidar import columns as col
 from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3, lay_fans, ray_wedge
 from sim.sensors.lidar.ray_shapes import Pose, face_normal, meet
 from sim.sensors.lidar.windows import enclose, find_windows, nearest_first
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Ray = tuple[Vec3, Vec3]
 AWAY = 1e-6  # m from a mirror at which what it shows begins, so that it does not show itself
 
 
-@njit
+@inner
 def _pose(poses: Float, slot: int, j: int) -> Pose:
     """Pose of geom j in a slot."""
     return (
@@ -32,12 +32,12 @@ def _pose(poses: Float, slot: int, j: int) -> Pose:
     )  # fmt: skip
 
 
-@njit
+@inner
 def _size(table: Float, j: int) -> Vec3:
     return table[j, col.SIZE_X], table[j, col.SIZE_Y], table[j, col.SIZE_Z]
 
 
-@njit
+@inner
 def _between(a: Pose, b: Pose, t: float) -> Pose:
     """Pose on the way from a to b, ``t`` 0..1.
 
@@ -52,7 +52,7 @@ def _between(a: Pose, b: Pose, t: float) -> Pose:
     )  # fmt: skip
 
 
-@njit
+@inner
 def _pose_at(poses: Float, bounds: Float, j: int, slot: int, part: float) -> Pose:
     """Pose of geom j a ``part`` of the way from one slot to the next."""
     if bounds[j, col.MOVED] == 0.0:
@@ -60,7 +60,7 @@ def _pose_at(poses: Float, bounds: Float, j: int, slot: int, part: float) -> Pos
     return _between(_pose(poses, slot, j), _pose(poses, slot + 1, j), part)
 
 
-@njit
+@inner
 def _ray(c: float, s: float, x: float, y: float, z: float, lever: Vec3, way: Vec3) -> Ray:  # noqa: PLR0913 (kernel)
     """Origin and unit direction in the world of a ray of the beam that leaves (x, y, z).
 
@@ -71,7 +71,7 @@ def _ray(c: float, s: float, x: float, y: float, z: float, lever: Vec3, way: Vec
     return origin, (c * way[0] - s * way[1], s * way[0] + c * way[1], way[2])
 
 
-@njit
+@inner
 def _cast_windows(  # noqa: PLR0913, PLR0915 (kernel)
     table: Float,
     poses: Float,
@@ -191,7 +191,7 @@ def sweep(  # noqa: PLR0913 (kernel)
     _cast_windows(table, poses, bounds, ends, beams, rays, optics, work, found, out)
 
 
-@njit
+@inner
 def cast_one(  # noqa: PLR0913 (kernel)
     table: Float, poses: Float, bounds: Float, fan: Float, i: int, origin: Vec3, vec: Vec3
 ) -> tuple[float, int, float]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from sim.sensors.lidar import columns as col
 from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3
-from slam._jit import njit
+from slam._jit import inner, njit
 
 BUCKETS = 64
 
@@ -89,7 +89,7 @@ def note(noted: tuple[Any, ...]) -> None:
         lasers[slot, col.LASER_YAW] = math.atan2(site_xmat[site, 3], site_xmat[site, 0])
 
 
-@njit
+@inner
 def _horizontal_bound(table: Float, j: int, poses: Float, slot: int) -> float:
     """Radius of a vertical cylinder about the geom's centre that contains it."""
     kind = int(table[j, col.KIND])
@@ -134,7 +134,7 @@ def enclose(table: Float, runs: Int, poses: Float, slots: int, bounds: Float) ->
             bounds[j, col.MOVED] = 1.0 if moves else 0.0
 
 
-@njit
+@inner
 def _azimuth(y: float, x: float) -> float:
     """atan2 to 1.2e-5 rad (Abramowitz and Stegun 4.4.49), four times faster; only for bounds."""
     ax, ay = abs(x), abs(y)
@@ -148,7 +148,7 @@ def _azimuth(y: float, x: float) -> float:
     return angle if y >= 0.0 else -angle
 
 
-@njit
+@inner
 def _half_angle(radius: float, distance: float) -> float:
     """Half the angle a disc fills from ``distance`` > ``radius``, or a little more."""
     ratio = radius / distance
@@ -157,7 +157,7 @@ def _half_angle(radius: float, distance: float) -> float:
     return _azimuth(radius, math.sqrt((distance - radius) * (distance + radius)))
 
 
-@njit
+@inner
 def _box_extent(table: Float, poses: Float, j: int, dx: float, dy: float, spread: float) -> Vec3:
     """(nearest distance, lowest, highest azimuth) of an upright box whose centre is at (dx, dy).
 
@@ -193,7 +193,7 @@ def _box_extent(table: Float, poses: Float, j: int, dx: float, dy: float, spread
     return clear - spread, low - widen, high + widen
 
 
-@njit
+@inner
 def _origins(fan: Float) -> Vec3:
     """(mid x, mid y, largest distance of any beam's origin from there)."""
     last, spread = fan.shape[0] - 1, 0.0
@@ -205,7 +205,7 @@ def _origins(fan: Float) -> Vec3:
     return mid_x, mid_y, math.sqrt(spread)
 
 
-@njit
+@inner
 def find_windows(  # noqa: PLR0913 (kernel)
     table: Float,
     poses: Float,
@@ -264,7 +264,7 @@ def find_windows(  # noqa: PLR0913 (kernel)
     return found
 
 
-@njit
+@inner
 def nearest_first(windows: Float, found: int, order: Int) -> None:
     """Order of the first ``found`` windows by distance, to 0.25 m: enough, and three times faster
     than a sort."""
