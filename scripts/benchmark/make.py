@@ -111,11 +111,11 @@ class Wanted:
 
     def head(self) -> dict[str, Any]:
         """What a leaderboard says of how it was made."""
-        seeds = sorted({k for track in self.tracks for k in self.seeds_of(track)[: self.seeds]})
+        every = (k for track in self.tracks for k in self.seeds_of(track)[: self.seeds])
         return {
             "tracks_run": [track.name for track in self.tracks],
             "seeds_of": submission.SEALED if self.sealed else submission.SETS[self.train],
-            "seeds": seeds,
+            "seeds": list(dict.fromkeys(every)),  # in the order of a sealed file
             "levels_run": list(self.levels),
             "quick": self.quick,
             "seconds": self.seconds,
@@ -158,10 +158,7 @@ def carry_out(
     Raises ``InvalidValueError`` for a submission that ran on other scans.
     """
     shared = shared if wanted.public else None
-    plans = {  # all, before any is made
-        track.name: wanted.plan(track, shared is None or not _has_oracles(shared, wanted, track))
-        for track in wanted.tracks
-    }
+    plans = plans_of(wanted, shared)  # all, before any is made
     _check_alike(merge, wanted, {name for plan in plans.values() for name in plan.slams})
     out = out.absolute()
     settings = {**wanted.head(), "machine": machine()}
@@ -190,6 +187,15 @@ def carry_out(
             if own is not None:
                 submission.write(staged / submission.file_of(own.name), own)
     return made
+
+
+def plans_of(wanted: Wanted, shared: Published | None) -> dict[str, Plan]:
+    """The comparison of each track by name, without the oracles whose runs ``shared`` has."""
+    shared = shared if wanted.public else None
+    return {
+        track.name: wanted.plan(track, shared is None or not _has_oracles(shared, wanted, track))
+        for track in wanted.tracks
+    }
 
 
 def _has_oracles(shared: Published, wanted: Wanted, track: Track) -> bool:

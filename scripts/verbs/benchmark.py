@@ -100,7 +100,7 @@ def benchmark(
     check((*slams, *([subject] if subject else [])))
     from scripts import pace, workers
     from scripts.benchmark import published, submission
-    from scripts.benchmark.make import QUICK_SEEDS, SEEDS, carry_out, wanted_of
+    from scripts.benchmark.make import QUICK_SEEDS, SEEDS, carry_out, plans_of, wanted_of
     from scripts.benchmark.tracks import chosen
     from scripts.comparison.plan import ahead
 
@@ -122,9 +122,9 @@ def benchmark(
         train=train, sealed=drawn, seeds=count, quick=quick, seconds=seconds, submit=submit,
         days=days,
     )  # fmt: skip
-    parts = [ahead(wanted.plan(track), out / track.name) for track in wanted.tracks]
+    parts = [ahead(plan, out / name) for name, plan in plans_of(wanted, ship).items()]
     works = [job.work() for missing, _ in parts for job in missing]
-    what = f"{len(works)} of {sum(count for _, count in parts)} jobs on {len(parts)} tracks"
+    what = f"{len(works)} of {sum(count for _, count in parts)} jobs, tracks: {len(parts)}"
     pace.announce(what + (", buildings over days besides" if days else ""), works, jobs)
     if plan_only:
         return

@@ -155,3 +155,14 @@ def test_a_processor_is_named_once_however_often_runs_are_added(
         monkeypatch.setattr(published, "machine", lambda name=name: {"processor": name})
         made = published.write_from([], path, "abc")
     assert made.made_with["machine"]["processor"] == "A, B"
+
+
+def test_what_is_ahead_is_what_runs():
+    """Oracles that ship are not among it; of training seeds none ship."""
+    counts, hard = TRACKS[OTHER], TRACKS["slow-boards-v1"]
+    wanted = make.wanted_of((counts, hard), ["kiss-icp"], None, seeds=1, quick=True)
+    plans = make.plans_of(wanted, SHIPPED)
+    assert plans[OTHER].slams == ("kiss-icp", "odometry")
+    assert plans[hard.name].slams == ("kiss-icp", *hard.controls)
+    trained = make.wanted_of((counts,), ["kiss-icp"], None, seeds=1, quick=True, train=True)
+    assert make.plans_of(trained, SHIPPED)[OTHER].slams == ("kiss-icp", *counts.controls)
