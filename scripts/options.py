@@ -221,8 +221,14 @@ class Axis:
         return {"dynamism": 0.0, **held, self.name: level}
 
     def crowd(self, level: float) -> str | None:
-        """Who is there at a level, as ``Held.crowd``."""
-        return f"escorts:{level:g}" if self.name == PEOPLE else self.held.crowd
+        """Who is there at a level, as ``Held.crowd``; ``InvalidValueError`` for half a person."""
+        if self.name != PEOPLE:
+            return self.held.crowd
+        if level not in range(MOST_PEOPLE + 1):
+            raise InvalidValueError(
+                f"--people must be whole numbers in 0..{MOST_PEOPLE}, got {level:g}"
+            )
+        return f"escorts:{level:g}"
 
 
 def sweep(text: str, option: str = "--dynamism-sweep", most: float = 1.0) -> tuple[float, ...]:

@@ -156,8 +156,8 @@ def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
                 raise InvalidValueError(f"{folder}: {key}: other scans than in another folder")
             there["slams"] |= own
     made: Row = {"commit": commit, "versions": versions(), "machine": machine()}
-    on = {of["machine"]["processor"]: None for of in (before.get("made_with", made), made)}
-    made["machine"]["processor"] = ", ".join(on)
+    told = [of["machine"]["processor"] for of in (before.get("made_with", made), made)]
+    made["machine"]["processor"] = ", ".join(dict.fromkeys(", ".join(told).split(", ")))
     head = {"schema": SCHEMA, "what": WHAT, "world": WORLD, "made_with": made, "columns": COLUMNS}
     write(path, head, {"tracks": hashes, "runs": runs})
     return read(path)

@@ -87,6 +87,9 @@ def test_the_axis_is_what_has_several_levels():
     assert axis_levels(None, ["0.8"], None, ["0", "4"]) == ("people", (0.0, 4.0), {"motion": 0.8})
     assert Axis(name="people").at(4.0) == {"dynamism": 0.0, "motion": 0.5, "change": None}
     assert Axis(name="people").crowd(4.0) == "escorts:4"
+    for level in (1.5, -1.0, 81.0):
+        with pytest.raises(InvalidValueError, match=f"--people must be .*0..80, got {level:g}"):
+            Axis(name="people").crowd(level)
     with pytest.raises(InvalidValueError, match="--motion and --change"):
         axis_levels(None, ["0", "1"], ["0", "1"])
     with pytest.raises(InvalidValueError, match="--dynamism sets both"):

@@ -145,3 +145,13 @@ def test_a_readers_row_stands_between_the_others_and_no_oracle_runs_again(
     assert {row["slam"] for row in board.ranking} == {"odometry", "shunting"}
     printed = capsys.readouterr()
     assert "6 of 6 recordings are others here" in " ".join((printed.out + printed.err).split())
+
+
+def test_a_processor_is_named_once_however_often_runs_are_added(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    path = tmp_path / "published.json"
+    for name in ("A", "B", "B", "A"):
+        monkeypatch.setattr(published, "machine", lambda name=name: {"processor": name})
+        made = published.write_from([], path, "abc")
+    assert made.made_with["machine"]["processor"] == "A, B"

@@ -13,8 +13,6 @@ from sim.core.dynamism import Dynamism
 from sim.core.flow import clearance_at
 from sim.world.world import SUBSTEPS_PER_S, World
 
-QUARTER_MINUTE = 15
-
 
 @pytest.fixture(scope="module")
 def walk() -> dict[str, np.ndarray | World]:
