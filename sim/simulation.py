@@ -68,6 +68,7 @@ class Simulation:
                own file says
     robot      another than the scene's, by name or from its tables (``sim.world.robots``);
                None: what the scene's own file says
+    scene_sha256  that the files of a scene by its file must have (``scenes.scene_file``); None: any
     laser      a scanner by name ("utm30lx", "lms221:noise"; ``sim.sensors.lidar.registry``), a
                ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"

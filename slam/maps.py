@@ -283,6 +283,8 @@ def _png(path: Path, data: bytes) -> tuple[NDArray[np.uint8], NDArray[np.bool_] 
         with image:
             if image.mode.startswith("I"):
                 raise LogFormatError(path, "16 bits a pixel, expected 8")
+            if image.mode == "P" and image.palette is None:
+                raise LogFormatError(path, "no PNG that can be read: its palette is missing")
             clear = image.has_transparency_data
             pixels = np.asarray(image.convert("RGBA" if clear else "RGB"))
     except (  # ValueError: of its texts and of its lengths

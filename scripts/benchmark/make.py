@@ -111,11 +111,12 @@ class Wanted:
 
     def head(self) -> dict[str, Any]:
         """What a leaderboard says of how it was made."""
-        every = (k for track in self.tracks for k in self.seeds_of(track)[: self.seeds])
+        each = (k for track in self.tracks for k in self.seeds_of(track)[: self.seeds])
+        seeds = list(dict.fromkeys(each))
         return {
             "tracks_run": [track.name for track in self.tracks],
             "seeds_of": submission.SEALED if self.sealed else submission.SETS[self.train],
-            "seeds": list(dict.fromkeys(every)),  # in the order of a sealed file
+            "seeds": seeds,
             "levels_run": list(self.levels),
             "quick": self.quick,
             "seconds": self.seconds,

@@ -37,7 +37,7 @@ class DriveConfig:
     accel, alpha      m/s2, rad/s2 of the ramp
     track             m between the wheels
     turn_radius       m, of the tightest turn of a car; 0: it turns on the spot
-    sideways          whether its wheels roll sideways too (mecanum), as fast as ahead
+    sideways          whether its wheels roll sideways too (mecanum); v_max holds in any direction
     """
 
     v_max: float = 1.0
@@ -109,8 +109,11 @@ class Drive:
         )
 
     def command(self, v: float, omega: float, side: float = 0.0) -> None:
-        """Ask for a twist, m/s, rad/s and m/s to the left; clipped to the limits, reached by the
-        ramp. ``InvalidValueError`` for ``side`` where the wheels do not roll sideways."""
+        """Ask for a twist, m/s, rad/s and m/s to the left; clipped to the limits (oblique motion in
+        its direction), reached by the ramp.
+
+        ``InvalidValueError`` for ``side`` where the wheels do not roll sideways.
+        """
         if not (math.isfinite(v) and math.isfinite(omega) and math.isfinite(side)):
             raise InvalidValueError(
                 f"the drive command must be finite, got v={v}, omega={omega}, side={side}"
@@ -118,7 +121,10 @@ class Drive:
         c = self.config
         if side != 0.0 and not c.sideways:
             raise InvalidValueError(f"this robot cannot drive sideways, asked for {side:g} m/s")
-        self.state["asked_side"] = min(max(side, -c.v_max), c.v_max)
+        if side != 0.0:
+            part = min(c.v_max / math.hypot(v, side), 1.0)
+            v, side = part * v, part * side
+        self.state["asked_side"] = side
         self.state["asked_v"] = min(max(v, -c.v_max), c.v_max)
         self.state["asked_omega"] = min(max(omega, -c.omega_max), c.omega_max)
 

@@ -80,7 +80,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     m, or None; `is_success`, whether the goal is reached.
 
     ### Reward
-    0 without a goal, else by ``goals`` (``sim.gym.goals``):
+    0 without a goal, else by ``reward`` (``sim.gym.goals``):
     "progress": m by which the straight line to the goal got shorter during the step;
     "sparse": 1 in the step that reaches the goal, else 0;
     "shaped": m by which the way to it on the static layout got shorter (near walls counted up to
@@ -99,7 +99,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     it is a ``SlamFailedError``. Reward and the end of an episode go by the truth in any case;
     ``goal``: None; "random", in each episode another one on floor that the robot can reach
     (``sim.gym.goals``), from the stream "goals" of the seed; or (x, y) m in the world;
-    ``goals`` "progress", "sparse" or "shaped"; ``frame_skip`` scans to a step under one command;
+    ``reward`` "progress", "sparse" or "shaped"; ``frame_skip`` scans to a step under one command;
     ``scans`` "all", or "last" for a step that takes only its last scan, which is twice as fast with
     four: a SLAM as ``pose_source`` gets no other, and of what may change only what it saw does;
     ``render_mode`` "rgb_array" (3D, needs OpenGL), "map" (2D, needs nothing) or None; ``view``

@@ -13,6 +13,7 @@ from slam import se2
 from slam.errors import MobiliaError
 from slam.estimate import Estimate, Raster
 from slam.frames import NS_PER_S, Float, Odometry
+from slam.frontend.odometry_prior import turned
 from slam.logs.bag_laser import PoseTrack, Stamped
 from slam.ros.heard import StampedPose, decoded, pose_of, raster_of, transform_of
 from slam.ros.link import Link, Topic
@@ -60,9 +61,7 @@ class Statements:
         if then is not None:
             self._take(found.stamp_ns, se2.compose(found.pose, se2.inverse(then.pose)))
         if found.covariance is not None and self.T_own_map is not None:
-            c, s = np.cos(self.T_own_map[2]), np.sin(self.T_own_map[2])
-            turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-            self._covariance = turn @ found.covariance @ turn.T
+            self._covariance = turned(found.covariance, float(self.T_own_map[2]))
 
     def _take(self, stamp_ns: int, T_map_odom: Float) -> None:
         stamp_ns = min(stamp_ns, self._now_ns)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import zlib
 
 import cv2
 import numpy as np
@@ -216,13 +217,28 @@ def test_a_map_server_file_with_a_png_means_what_its_mode_says(tmp_path, mode, m
     assert read.T_map_origin[2] == 0.3
 
 
-def test_a_png_is_refused_by_its_size_before_it_is_unpacked(tmp_path):
-    header = b"\x89PNG\r\n\x1a\n\x00\x00\x00\x0dIHDR" + (14000).to_bytes(4, "big") * 2
-    (tmp_path / "map.png").write_bytes(header)
+def _png_of(edge, colour, image):
+    def chunk(kind, data):
+        crc = zlib.crc32(kind + data).to_bytes(4, "big")
+        return len(data).to_bytes(4, "big") + kind + data + crc
+
+    header = chunk(b"IHDR", edge.to_bytes(4, "big") * 2 + bytes((8, colour, 0, 0, 0)))
+    return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(image))
+
+
+@pytest.mark.parametrize(
+    ("png", "said"),
+    [
+        (_png_of(14000, 0, b""), "14000 x 14000 pixels, at most 178956970"),  # not unpacked
+        (_png_of(2, 3, bytes(6)), "its palette is missing"),
+    ],
+)
+def test_a_png_that_cannot_be_read_is_refused(tmp_path, png, said):
+    (tmp_path / "map.png").write_bytes(png)
     yaml = tmp_path / "map.yaml"
     yaml.write_text(
         "image: map.png\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n"
         "occupied_thresh: 0.6\nfree_thresh: 0.2\n"
     )
-    with pytest.raises(LogFormatError, match="14000 x 14000 pixels, at most 178956970"):
+    with pytest.raises(LogFormatError, match=said):
         maps.read_map(yaml, saved=True)

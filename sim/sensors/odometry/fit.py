@@ -120,7 +120,8 @@ def _sizes(steps: Float) -> Float:
 
 def _sigmas(steps: Float, variances: Float) -> Float:
     """(n, 3) deviations of x, y, heading."""
-    sigmas = np.sqrt(np.maximum(_sizes(steps) @ variances.T, FLOOR**2))
+    grown = (_sizes(steps)[:, None, :] * variances).sum(axis=2)
+    sigmas = np.sqrt(np.maximum(grown, FLOOR**2))
     out: Float = sigmas[:, [0, 0, 1]]
     return out
 

@@ -47,6 +47,16 @@ def _chain(pose: Float, bx: float, by: float, angle: float) -> None:
 
 
 @inner
+def _way(distance: float, side: float) -> Vec3:
+    """Length of a motion ahead and to the left, and its direction: the error of the length lies
+    along the way."""
+    if side == 0.0:
+        return abs(distance), 1.0, 0.0
+    length = math.sqrt(distance * distance + side * side)
+    return length, distance / length, side / length
+
+
+@inner
 def _accumulate(
     increment: Float, random: Float, systematic: Float, step: Vec3, variances: Vec3, track: float
 ) -> None:
@@ -55,7 +65,7 @@ def _accumulate(
     increment   (3,) x, y, theta in the frame of the increment's start
     random      (3, 3) covariance of those three numbers by the random part
     systematic  (3, 3) their derivatives by Es - 1, Eb - 1, Ed - 1
-    step        distance m, side m, angle rad; ``variances`` of these three
+    step        distance m, side m, angle rad; ``variances`` of its length, side and angle
 
     First order, as ``se2.propagate``: F P F' + G Q G' with the Jacobians of composition.
     """
@@ -72,16 +82,21 @@ def _accumulate(
     fresh[0, 1], fresh[1, 1] = -s, c
     fresh[0, 2], fresh[1, 2] = c * bx_angle - s * by_angle, s * bx_angle + c * by_angle
     fresh[2, 2] = 1.0
+    _, ahead, aside = _way(distance, side)
+    erring = fresh.copy()  # the same for length, side, angle
+    for i in range(2):
+        erring[i, 0] = ahead * fresh[i, 0] + aside * fresh[i, 1]
     # Rows distance, side, angle; columns Es, Eb, Ed (first order about 1).
     by_parameter = np.zeros((3, 3))
     by_parameter[0, 0], by_parameter[0, 2] = -distance, -0.25 * track * angle
+    by_parameter[1, 0] = -side
     by_parameter[2, 0], by_parameter[2, 1], by_parameter[2, 2] = -angle, angle, -distance / track
     old_random, old_systematic = random.copy(), systematic.copy()
     for i in range(3):
         for j in range(3):
             variance, derivative = 0.0, 0.0
             for k in range(3):
-                variance += fresh[i, k] * variances[k] * fresh[j, k]
+                variance += erring[i, k] * variances[k] * erring[j, k]
                 derivative += fresh[i, k] * by_parameter[k, j] + carry[i, k] * old_systematic[k, j]
                 for m in range(3):
                     variance += carry[i, k] * old_random[k, m] * carry[j, m]
@@ -133,10 +148,7 @@ def update(  # noqa: PLR0913 (kernel)
     dl, dr = travel[0] - wheels[TRUE, 0], travel[1] - wheels[TRUE, 1]
     side = travel[2] - wheels[TRUE, 2]
     distance, angle = 0.5 * (dl + dr), (dr - dl) / p[TRACK]
-    length, ahead, aside = abs(distance), 1.0, 0.0
-    if side != 0.0:  # the error of the length lies along the way
-        length = math.sqrt(distance * distance + side * side)
-        ahead, aside = distance / length, side / length
+    length, ahead, aside = _way(distance, side)
     variances, noise = _draw(length, abs(angle), contact, p, normals, uniforms)
     half, counted = 0.5 * p[NOMINAL] * noise[2], np.empty(3)
     rims = (

@@ -110,9 +110,10 @@ def test_the_errors_of_100_runs_are_as_large_as_their_covariance_says(
     assert standard_error < 0.15
 
 
-def test_covariance_matches_sampling_of_both_parts() -> None:
+@pytest.mark.parametrize("twist", [(0.5, 0.3), (0.1, 0.3, -0.5)])  # the latter mostly sideways
+def test_covariance_matches_sampling_of_both_parts(twist: tuple[float, ...]) -> None:
     """One long increment on an arc, where the systematic part is the larger one."""
-    travel, poses = drive(np.tile((0.5, 0.3), (300, 1)))
+    travel, poses = drive(np.tile(twist, (300, 1)))
     ends, claimed = [], np.zeros((3, 3))
     for seed in range(1000):
         odometry = WheelOdometry("pioneer3dx", np.random.default_rng(seed), track=TRACK)

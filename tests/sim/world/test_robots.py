@@ -62,6 +62,13 @@ def test_wheels_that_roll_sideways_go_where_they_are_asked_to() -> None:
     assert not np.allclose(start, simulation.world.robot_pose())
 
 
+def test_obliquely_the_limit_is_the_same_and_so_is_the_direction() -> None:
+    world = Simulation("arena", seed=4, dynamism=0.0, robot="rosbot_xl").world
+    world.set_command(3.0, 0.0, -4.0)
+    asked = world._drive.state[0]
+    assert (asked["asked_v"], asked["asked_side"]) == pytest.approx((0.6 * 0.8, -0.8 * 0.8))
+
+
 def test_a_robot_that_cannot_drive_sideways_says_so() -> None:
     with pytest.raises(InvalidValueError, match="cannot drive sideways"):
         Simulation("arena", seed=4, dynamism=0.0).world.set_command(0.1, 0.0, 0.2)
