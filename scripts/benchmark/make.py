@@ -68,11 +68,6 @@ class Wanted:
             raise InvalidValueError(f"the subject {self.subject!r:.80} is none of the SLAMs")
         if self.sealed is not None:
             self.sealed.check_for(self.tracks)
-        if self.submit and len({self.seeds_of(track) for track in self.tracks}) > 1:
-            raise InvalidValueError(
-                "the tracks of a submission must have the same seeds: name them with --tracks, "
-                f"got {', '.join(track.name for track in self.tracks)}"
-            )
         most = min(len(self.seeds_of(track)) for track in self.tracks)
         if not 1 <= self.seeds <= most:
             raise InvalidValueError(f"--seeds must be 1 to {most}, got {self.seeds}")

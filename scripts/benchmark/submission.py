@@ -205,7 +205,11 @@ def _submission(path: Path, data: Row) -> Submission:
     check_known(path, world_of(path, data), {name: own["sha256"] for name, own in tracks.items()})
     runs = {}
     for name, own in tracks.items():
-        runs[name] = _runs(path, name, own["runs"], {(a, b) for a in levels for b in seeds})
+        public = (*TRACKS[name].train, *TRACKS[name].test)  # a track may have seeds of its own
+        of = seeds if data["seeds_of"] == SEALED else [b for b in seeds if b in public]
+        if not of:
+            raise LogFormatError(path, f"{name}: none of its seeds")
+        runs[name] = _runs(path, name, own["runs"], {(a, b) for a in levels for b in of})
     return Submission(
         name=data["name"], slam=data["slam"], seeds_of=data["seeds_of"], seeds=tuple(seeds),
         levels=tuple(levels), seconds=data["seconds"], runs=runs, made_with=data["made_with"],

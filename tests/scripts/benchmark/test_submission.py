@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,21 @@ def test_it_comes_back(file: Path):
     assert found.rows("no-walls-v1") == []
     assert found.origin()["slam"] == "my_slam:MySlam"
     assert "mujoco" in found.origin()["made_with"]
+
+
+def test_tracks_of_other_seeds_are_in_one_file(tmp_path: Path):
+    """Each with the runs of its own seeds, no fewer."""
+    other, path = newest()["moving-boards"].name, tmp_path / submission.file_of("mine")
+    one, whole = made(), {**made().runs}
+    whole[other] = [{**run, "seed": run["seed"] + 186} for run in whole[TRACK]]  # from 906 on
+    submission.write(path, replace(one, seeds=(720, 721, 906, 907), runs=whole))
+    assert submission.read(path).runs == whole
+    submission.write(path, replace(one, seeds=(720, 721, 906, 907), runs={**whole, other: []}))
+    with pytest.raises(LogFormatError, match=f"{other}: expected 10 runs"):
+        submission.read(path)
+    submission.write(path, replace(one, runs={**whole, other: []}))
+    with pytest.raises(LogFormatError, match=f"{other}: none of its seeds"):
+        submission.read(path)
 
 
 def first_run(data: dict[str, Any], **values: Any) -> None:
