@@ -7,6 +7,7 @@ and notes when. Latency is from the moment at which a scan is due to its recepti
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
@@ -99,7 +100,8 @@ if __name__ == "__main__":
     if "listen" in sys.argv:
         listen(sys.argv[1], int(sys.argv[3]), int(sys.argv[4]))
     else:
-        measure(
-            sys.argv[1] if len(sys.argv) > 1 else "dds",
-            float(sys.argv[2]) if len(sys.argv) > 2 else 30.0,
-        )
+        parser = argparse.ArgumentParser(description=__doc__)
+        parser.add_argument("middleware", nargs="?", choices=("dds", "zenoh"), default="dds")
+        parser.add_argument("seconds", nargs="?", type=float, default=30.0)
+        asked = parser.parse_args()
+        measure(asked.middleware, asked.seconds)

@@ -82,7 +82,7 @@ def run(case: Row) -> Row:
 
 STUDY = Study(
     name="logs",
-    axes={"log": LOGS, "data": ("../shared/data",), "slam": ("shunting",), "every": (1,),
+    axes={"log": LOGS, "data": ("data",), "slam": ("shunting",), "every": (1,),
           "way": ("forwards",)},
     run=run, data=lambda case: [file_of(case)], lines=("log", "slam", "every", "way"),
     columns={
