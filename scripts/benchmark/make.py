@@ -13,7 +13,7 @@ from scripts.benchmark.board import Board
 from scripts.benchmark.published import Published
 from scripts.benchmark.sealed import SealedSeeds
 from scripts.benchmark.submission import Submission
-from scripts.benchmark.tracks import LEVELS, TEST, TRACKS, TRAIN, Track
+from scripts.benchmark.tracks import LEVELS, QUICK_LEVELS, TEST, TRACKS, TRAIN, Track
 from scripts.comparison.folder import Compared
 from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import Plan
@@ -29,7 +29,6 @@ from slam.errors import InvalidValueError, MissingDependencyError
 
 COMMAND = "benchmark"
 SEEDS, QUICK_SEEDS = 6, 1
-QUICK_LEVELS = (0.0, 0.5, 1.0)
 _ALIKE = ("seeds", "levels", "seconds")
 Digests = dict[str, dict[tuple[float, int], str]]  # of recordings, by track, level and seed
 Runs = dict[str, list[dict[str, Any]]]  # rows of runs.csv by track
@@ -69,7 +68,10 @@ class Wanted:
             raise InvalidValueError(f"the subject {self.subject!r:.80} is none of the SLAMs")
         if self.sealed is not None:
             self.sealed.check_for(self.tracks)
-        most = min(len(self.seeds_of(track)) for track in self.tracks)
+        if len({self.seeds_of(track) for track in self.tracks}) > 1:
+            names = ", ".join(track.name for track in self.tracks)
+            raise InvalidValueError(f"tracks of one board must have the same seeds: {names}")
+        most = len(self.seeds_of(self.tracks[0]))
         if not 1 <= self.seeds <= most:
             raise InvalidValueError(f"--seeds must be 1 to {most}, got {self.seeds}")
         if self.days:

@@ -25,8 +25,7 @@ _OPEN = {"open": True, "shut": False}
 
 def _drive(message: Any) -> OnWorld:
     twist = getattr(message, "twist", message)  # of a TwistStamped
-    ahead, side = float(twist.linear.x), float(twist.linear.y)
-    return Drive(v=ahead, omega=float(twist.angular.z), side=side)
+    return Drive(v=float(twist.linear.x), omega=float(twist.angular.z), side=float(twist.linear.y))
 
 
 def _carry(message: Any) -> OnWorld:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import resource
 import sys
@@ -138,7 +139,8 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
 
 def _cost(replay: Replay, spent_s: float) -> dict[str, Any]:
     """For ``results.json``: s of processor time of all updates and of all else, and MB."""
-    slam_s = sum(sum(track.durations_s) for track in replay.tracks.values())
+    updates_s = (s for track in replay.tracks.values() for s in track.durations_s)
+    slam_s = sum(s for s in updates_s if math.isfinite(s))
     most_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _RSS_BYTES / 1e6
     rest_s = max(spent_s - slam_s, 0.0)
     return {"slam_s": round(slam_s, 1), "rest_s": round(rest_s, 1), "memory_mb": round(most_mb)}

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sim.core.checks import check_types
 from sim.core.state import Record, record
-from slam._jit import njit
+from slam._jit import inner
 from slam.errors import InvalidValueError
 
 # Twist that is asked for and that the ramp has reached, m/s, rad/s; m rolled by each wheel; their
@@ -58,13 +58,13 @@ class DriveConfig:
             raise InvalidValueError(f"DriveConfig.turn_radius must be >= 0, got {self.turn_radius}")
 
 
-@njit
+@inner
 def toward(value: float, target: float, step: float) -> float:
     """``value`` moved by at most ``step`` towards ``target``."""
     return value + min(max(target - value, -step), step)
 
 
-@njit
+@inner
 def steered(v: float, omega: float, turn_radius: float) -> float:
     """``omega`` as far as wheels that steer no tighter than ``turn_radius`` m can turn; 0: all."""
     if turn_radius <= 0.0:
@@ -72,7 +72,7 @@ def steered(v: float, omega: float, turn_radius: float) -> float:
     return min(max(omega, -abs(v) / turn_radius), abs(v) / turn_radius)
 
 
-@njit
+@inner
 def ramp(drive: Record, limits: NDArray[np.float64]) -> None:
     """One tick of the ramp, and the wheel speeds that follow; ``limits`` as ``Drive.limits``."""
     speed_step, turn_step, half, turn_radius = limits
@@ -82,7 +82,7 @@ def ramp(drive: Record, limits: NDArray[np.float64]) -> None:
     drive.left, drive.right = drive.v - half * drive.omega, drive.v + half * drive.omega
 
 
-@njit
+@inner
 def roll(drive: Record, duration: float) -> None:
     """Let the wheels turn at their present speed."""
     drive.rolled_left += drive.left * duration

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from sim.actors.config import ACTORS
 from sim.core.draws import between, uniform
 from sim.core.state import Records, flat, record
-from slam._jit import njit
+from slam._jit import inner
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Rolled(NamedTuple):
     dofs: NDArray[np.int64]
 
 
-@njit
+@inner
 def roll(time: float, tick: float, rolled: Rolled, qvel: Float, qfrc: Float) -> None:
     """Write the generalised forces on all chairs at ``time`` s into ``qfrc``."""
     share, ranks, counters, state, bodies, dofs = rolled

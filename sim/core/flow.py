@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
 FAR = 1e6  # s/(m/s), travel time of a node with no way to the goal
@@ -84,7 +84,7 @@ def slowness(clearance: Float, radius: float) -> Float:
     return out
 
 
-@njit
+@inner
 def _node_time(a: float, b: float, step: float) -> float:
     """Upwind solution at a node whose least neighbours along the axes are ``a`` and ``b``."""
     if a > b:
@@ -124,7 +124,7 @@ def travel_time(slow: Float, cell: float, gi: float, gj: float) -> Float:  # noq
     return T
 
 
-@njit
+@inner
 def _slope(before: float, here: float, after: float) -> float:
     """Upwind difference: towards the lower neighbour, 0 at a minimum."""
     if before >= here and after >= here:

@@ -122,7 +122,7 @@ class World:
         self._pinned = substeps.loose()
         self._room = self._tables()
         self._unseen = substeps.unseen(2)
-        substeps.decide_first(self._room)
+        substeps.advance(0, -1, False, self._room, self._unseen)  # decide, and no more
         mujoco.mj_step1(self.model, self.data)
 
     def _doors_and_people(self) -> tuple[Doors, People]:

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.frames import Features, Float, Scan
 from slam.frontend.deskew import end_points
 
@@ -82,7 +82,7 @@ def draw(
                 _dot(image, widths, x, y, sigma)
 
 
-@njit
+@inner
 def _dot(image: Float, widths: Float, x: float, y: float, sigma: float) -> None:
     height, width = image.shape
     reach = CUT * sigma

@@ -90,7 +90,7 @@ def spread(M: Float, H: Float) -> tuple[float, float, float]:
     return p00, p01, p11
 
 
-@njit
+@inner
 def pair_cost(pose: Float, landmark: Float, M: Float, z: Float, R: Float) -> float:
     """The cost of ``kernels.linearise`` for one pair, M (5, 5) being pose's and landmark's part.
 

@@ -57,7 +57,7 @@ def solve(L: Float, b: Float) -> None:
             b[i, j] /= L[i, i]
 
 
-@njit
+@inner
 def subtract_rows(out: Float, weights: Float, rows: Float) -> None:
     """out (m,) - weights (n,) times rows (n, m), in place, four rows in one pass over ``out``."""
     n = len(weights)
@@ -141,7 +141,7 @@ ITERATIONS = 6
 SETTLED = 1e-10  # squared step of xi (m^2, rad^2) below which iterating stops
 
 
-@njit
+@inner
 def arc(angle: float) -> tuple[float, float, float, float]:
     """(s, c, ds, dc) with s = sin(a)/a, c = (1 - cos(a))/a and their derivatives by a."""
     if abs(angle) < 1e-4:

@@ -31,6 +31,7 @@ class Topic:
     reliable  sent again until it is received, else best effort
     latched   the last message is kept for who comes later (transient local)
     depth     messages that are kept for a slow reader
+    waits     whether publishing over Zenoh may wait for seconds where the network is busy or cut
     """
 
     name: str
@@ -38,6 +39,7 @@ class Topic:
     reliable: bool = True
     latched: bool = False
     depth: int = 10
+    waits: bool = False
 
     def within(self, namespace: str) -> str:
         """Its full name; clock and transforms are the same for all robots."""

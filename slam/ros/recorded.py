@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
-from slam.errors import InvalidValueError, LogFormatError
+from slam.errors import LogFormatError
 from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Frame
 from slam.logs.bag_topics import INCREMENT, TRANSFORMS, Bag
@@ -48,24 +49,38 @@ def read_statements(
     return [found[stamp_ns] for stamp_ns in sorted(found)]
 
 
+def aligned(
+    path: Path, statements: list[StampedPose], first_ns: int, *, offset_s: float, epoch_ns: int
+) -> list[StampedPose]:
+    """The statements of the bag at ``path`` by the clock of the frames, the first at ``first_ns``.
+
+    offset_s  to be added to their stamps;   epoch_ns  what the bag of the frames has more
+
+    Raises ``LogFormatError`` for clocks that are apart.
+    """
+    offset_ns = round(offset_s * NS_PER_S) - epoch_ns
+    moved = [said._replace(stamp_ns=said.stamp_ns + offset_ns) for said in statements]
+    off_s = (moved[0].stamp_ns - first_ns) / NS_PER_S
+    over_s = (first_ns - moved[-1].stamp_ns) / NS_PER_S
+    if off_s > APART_S or over_s > APART_S:
+        raise LogFormatError(
+            path, f"its first stamp is {abs(off_s):.3f} s {'after' if off_s > 0 else 'before'} "
+            f"the first scan's: two clocks? Then --clock-offset {offset_s - off_s:.3f}",
+        )  # fmt: skip
+    return moved
+
+
 class RecordedSlam:
     """A stack's statements as estimates of the frames that it saw, as if it said them now.
 
-    statements  of ``read_statements``
+    statements  by the clock of the frames
     poses       whether they are poses in the map, else map -> odom
-    clock_offset_s  to be added to their stamps
-    epoch_ns    time of their clock at second 0 of the frames
 
     Before the first, odometry stands and nothing converged.
     """
 
-    def __init__(
-        self, statements: list[StampedPose], *, poses: bool = False, clock_offset_s: float = 0.0,
-        epoch_ns: int = 0,
-    ) -> None:  # fmt: skip
-        self._offset_s, offset_ns = clock_offset_s, round(clock_offset_s * NS_PER_S) - epoch_ns
-        self._all = [said._replace(stamp_ns=said.stamp_ns + offset_ns) for said in statements]
-        self._poses = poses
+    def __init__(self, statements: list[StampedPose], *, poses: bool = False) -> None:
+        self._all, self._poses = statements, poses
         self.reset()
 
     def reset(self) -> None:
@@ -73,14 +88,9 @@ class RecordedSlam:
         self._path, self._said, self._next = PosePath(), Statements(), 0
 
     def update(self, frame: Frame) -> Estimate:
-        """The newest statement that is not later than this frame.
-
-        Raises ``InvalidValueError`` at the first frame where the clocks are apart.
-        """
+        """The newest statement that is not later than this frame."""
         now_ns = frame.stamp_ns
         self._path.check_order(now_ns)
-        if not len(self._path):
-            self._check_clock(now_ns)
         self._said.sent(frame.odometry, now_ns)
         take = self._said.pose if self._poses else self._said.transform
         while self._next < len(self._all) and self._all[self._next].stamp_ns <= now_ns:
@@ -90,14 +100,9 @@ class RecordedSlam:
         self._path.add(now_ns, estimate.T_map_robot)
         return estimate
 
-    def _check_clock(self, first_ns: int) -> None:
-        off_s = (self._all[0].stamp_ns - first_ns) / NS_PER_S
-        over_s = (first_ns - self._all[-1].stamp_ns) / NS_PER_S
-        if off_s > APART_S or over_s > APART_S:
-            raise InvalidValueError(
-                f"the stack's first stamp is {off_s:.3f} s after the first scan's: two clocks? "
-                f"Then --clock-offset {self._offset_s - off_s:.3f}"
-            )
+    def processor_s(self) -> float:
+        """Not a number: a bag does not say what the stack needed."""
+        return math.nan
 
     def map(self) -> None:
         """None: it is not read from the bag."""

@@ -28,6 +28,7 @@ def topics(*, paced: bool = False) -> dict[str, Topic]:
             name=_RENAMED.get(name, name),
             kind=kind,
             reliable=paced or name not in _LOSSY,
+            waits=paced,
             latched=latched,
             depth=1 if latched else _DEPTHS.get(name, 10),
         )

@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,11 +25,13 @@ from slam.errors import MobiliaError
 from slam.frames import NS_PER_S, Frame
 from slam.logs.bag import Assembly, stamp_of
 from slam.logs.bag_laser import Laser, mounting
-from slam.logs.bag_topics import INCREMENT, ODOMETRY, SCAN, Topics
+from slam.logs.bag_topics import Topics
 from slam.ros.heard import decoded
 from slam.ros.link import Link, Topic, open_link
 from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
 from slam.ros.navigation_messages import MapMessage
+from slam.ros.node import GRID, POSES, TF
+from slam.ros.robot import topics
 from slam.ros.template import EPOCH_NS
 from slam.system import SlamSystem, create
 
@@ -36,14 +39,11 @@ MAP_NS = NS_PER_S  # between two maps
 MOST_WAITING = 1000  # messages of a topic, until the first scan and odometry are there
 FIRST_S = 0.3  # that the first scan waits for what comes with it
 _log = logging.getLogger(__name__)
-_SCAN = Topic(name="/scan", kind=SCAN, reliable=False, depth=100)
-_TURNS = Topic(name="/scan_turn", kind=SCAN, reliable=False, depth=100)
-_ODOM = Topic(name="/odom", kind=ODOMETRY, depth=100)
-_STEPS = Topic(name="/odom_increment", kind=INCREMENT, depth=100)
-_STATIC = Topic(name="/tf_static", kind=TransformMessage.KIND, latched=True)
-_TF = Topic(name="/tf", kind=TransformMessage.KIND, depth=100)
-_POSE = Topic(name="/pose", kind=INCREMENT)
-_MAP = Topic(name="/map", kind=MapMessage.KIND, latched=True, depth=1)
+_SCAN, _TURNS, _ODOM, _STEPS, _STATIC = (
+    replace(topics()[name], depth=100)
+    for name in ("/scan", "/scan_turn", "/odom", "/odom_increment", "/tf_static")
+)
+_TF, _POSE, _MAP = (replace(topic, waits=True) for topic in (TF, POSES[0], GRID))
 _HEARD = (_SCAN, _TURNS, _ODOM, _STEPS, _STATIC)
 
 
@@ -103,11 +103,11 @@ class Served:
         mount = mounting(self._links, odometry.child_frame_id, first.header.frame_id)
         laser = Laser(first, turns, (np.zeros(3), False) if mount is None else mount)
         steps = _STEPS.name if self._waiting[_STEPS] else None
-        topics = Topics(
+        known = Topics(
             scan=_SCAN.name, odometry=_ODOM.name, truth=None, turns=None, increment=steps,
             labels=None, transforms=(),
         )  # fmt: skip
-        return Assembly(topics, laser, EPOCH_NS if began_ns >= EPOCH_NS else 0)
+        return Assembly(known, laser, EPOCH_NS if began_ns >= EPOCH_NS else 0)
 
     def _answer(self, frame: Frame) -> None:
         estimate = asked(self._system, frame)

@@ -112,7 +112,7 @@ class ZenohLink:
         if topic not in self._publishers:
             control = zenoh.CongestionControl
             options: dict[str, Any] = {
-                "congestion_control": control.BLOCK if topic.reliable else control.DROP
+                "congestion_control": control.BLOCK if topic.waits else control.DROP
             }
             if topic.latched:
                 options |= {

@@ -28,6 +28,7 @@ IMPORTERS = {
     "scripts/cli.py": "verbs of ours, by constants",
     "scripts/option_names.py": "names to complete, by constants",
     "slam/ros/link.py": "the two middlewares, by constants",
+    "slam/settings.py": "homes of constants, by constants",
     "scripts/live/served.py": "viser, by a constant",
     "scripts/live/replay.py": "the same",
     "scripts/live/page.py": "the same",

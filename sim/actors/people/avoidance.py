@@ -14,12 +14,12 @@ from sim.actors.people import columns
 from sim.actors.people.right_of_way import BODY, Addresses, Crowd, Doors, Float, Int
 from sim.core.flow import Field, clearance_at
 from sim.core.state import Record, Records
-from slam._jit import njit
+from slam._jit import inner, njit
 
 SIGHT_M = ACTORS.holding.sight_m
 
 
-@njit
+@inner
 def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) -> None:
     """Read discs, headings, door angles and the discs that stand for the leaves."""
     discs, k = crowd.discs, at.discs.shape[0]
@@ -60,7 +60,7 @@ def sense(at: Addresses, qpos: Float, qvel: Float, ways: Doors, crowd: Crowd) ->
         end.u, end.v = qvel[v] - qvel[v + 2] * ry, qvel[v + 1] + qvel[v + 2] * rx
 
 
-@njit
+@inner
 def nearby(i: int, crowd: Crowd, sides: Int, near: Int) -> int:
     """Rows of discs within 3 m of person ``i``, into ``near``; returns how many.
 
@@ -110,7 +110,7 @@ def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> flo
     return min(c / (b + math.sqrt(root)), HORIZON)
 
 
-@njit
+@inner
 def danger(  # noqa: PLR0913 (kernel)
     i: int, vx: float, vy: float, near: Int, discs: Records, fade: float, dense: float
 ) -> float:
@@ -144,7 +144,7 @@ def danger(  # noqa: PLR0913 (kernel)
     return cost
 
 
-@njit
+@inner
 def choose(
     i: int,
     wanted: tuple[float, float],
@@ -191,7 +191,7 @@ def choose(
     return best_x, best_y
 
 
-@njit
+@inner
 def spare_robot(
     i: int, wanted: tuple[float, float], near: Int, crowd: Crowd
 ) -> tuple[float, float]:
@@ -224,7 +224,7 @@ def spare_robot(
     return vx, vy
 
 
-@njit
+@inner
 def _spare(
     vx: float, vy: float, disc: Record, robot: Record, spare: float, brake: float
 ) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from sim.actors.people.leaders import Leaders
 from sim.actors.people.right_of_way import Crowd, Float, Int
 from sim.core.flow import Field, clearance_at, time_at
 from sim.core.state import Record
-from slam._jit import njit
+from slam._jit import inner
 
 PEOPLE_STEPS = 2  # of the look ahead, in which people matter
 _H = ACTORS.holding
@@ -30,7 +30,7 @@ HURRY, HURRY_MOST = _H.hurry, _H.hurry_most
 TURN_GAIN = ACTORS.walking.turn_gain
 
 
-@njit
+@inner
 def parts_of(i: int, crowd: Crowd, parts: Int) -> int:
     """Disc rows of person ``i`` and what it pushes, into ``parts``; returns how many.
 
@@ -51,7 +51,7 @@ def parts_of(i: int, crowd: Crowd, parts: Int) -> int:
     return count
 
 
-@njit
+@inner
 def part_at(
     part: Record, pivot: Record, yaw: float, v: float, omega: float, t: float
 ) -> tuple[float, float]:
@@ -63,7 +63,7 @@ def part_at(
     return x, pivot.y + way * math.sin(along) + s * dx + c * dy
 
 
-@njit
+@inner
 def runs_into(  # noqa: PLR0913 (kernel)
     v: float,
     omega: float,
@@ -112,7 +112,7 @@ def runs_into(  # noqa: PLR0913 (kernel)
     return CLOSE * (CLOSE_M - closest)
 
 
-@njit
+@inner
 def pushes(
     i: int, wanted: tuple[float, float], near: Int, field: Field, crowd: Crowd
 ) -> tuple[float, float]:
@@ -155,7 +155,7 @@ def pushes(
     return vx, best_v * math.sin(yaw) + best_omega * (me.x - pivot.x)
 
 
-@njit
+@inner
 def keep_hold(
     i: int, velocity: tuple[float, float], crowd: Crowd, held: Held, at: Int
 ) -> tuple[float, float]:
@@ -189,7 +189,7 @@ PACE, THERE, TRIP_S = _C.pace_mps, _C.there_m, _C.trip_s
 GIVES_UP_S = ACTORS.walking.blocked_s
 
 
-@njit
+@inner
 def next_chair(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> int:
     """Disc row of the nearest chair in sight that stands, and nobody sits on or holds; -1.
 
@@ -214,7 +214,7 @@ def next_chair(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> int:
     return found
 
 
-@njit
+@inner
 def row_place(i: int, leaders: Leaders, crowd: Crowd) -> int:
     """Row of ``lines`` that is next: the chairs go in, then out again, the last one first."""
     first, turn = crowd.task[i].first, crowd.task[i].place
@@ -222,14 +222,14 @@ def row_place(i: int, leaders: Leaders, crowd: Crowd) -> int:
     return int(first + (turn if turn < n else 2 * n - 1 - turn))
 
 
-@njit
+@inner
 def fills(i: int, leaders: Leaders, crowd: Crowd) -> bool:
     """Whether somebody's row of chairs is being filled, or else emptied."""
     n = int(leaders.lines[crowd.task[i].first].places)
     return bool(crowd.task[i].place < n)
 
 
-@njit
+@inner
 def next_turn(i: int, time: float, leaders: Leaders, crowd: Crowd) -> None:
     """The next chair, after a rest."""
     n = int(leaders.lines[crowd.task[i].first].places)
@@ -238,7 +238,7 @@ def next_turn(i: int, time: float, leaders: Leaders, crowd: Crowd) -> None:
     crowd.state[i].free_at, crowd.state[i].blocked = time + REST_S, 0.0
 
 
-@njit
+@inner
 def to_what_is_taken(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """The velocity with which person ``i`` goes to the chair to take, or takes it to its place."""
     task = crowd.task[i]
@@ -256,7 +256,7 @@ def to_what_is_taken(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tu
     return speed * dx + 0.0, speed * dy + 0.0
 
 
-@njit
+@inner
 def find_work(i: int, time: float, field: Field, leaders: Leaders, crowd: Crowd) -> None:
     """Choose the next chair; where there is none, the row is emptied, or one goes elsewhere."""
     task = crowd.task
@@ -284,7 +284,7 @@ def find_work(i: int, time: float, field: Field, leaders: Leaders, crowd: Crowd)
     crowd.state[i].blocked, crowd.state[i].best_at = 0.0, time
 
 
-@njit
+@inner
 def clean(  # noqa: PLR0913 (kernel)
     i: int,
     time: float,

@@ -4,7 +4,7 @@
 Each person stays somewhere, walks to the next goal down its flow field (``sim.core.flow``) or
 follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that
 hits nothing soon (``sim.actors.people.avoidance``). A person whose way is blocked by a chair loses
-patience and pushes it; now and then one sits down (``sim.actors.people.sitting``).
+patience and pushes it; now and then one sits down (``sim.actors.people.trips``).
 """
 
 from __future__ import annotations
@@ -44,11 +44,10 @@ from sim.actors.people.right_of_way import (
     round_leaf,
     wait_beside,
 )
-from sim.actors.people.sitting import Hulls, on_chair, to_chair
-from sim.actors.people.trips import patience, plan
+from sim.actors.people.trips import Hulls, on_chair, patience, plan, to_chair
 from sim.core.flow import Field, clearance_at, time_at, way_at
 from sim.core.state import Records
-from slam._jit import njit
+from slam._jit import inner
 
 _W = ACTORS.walking
 _S = ACTORS.steering
@@ -90,7 +89,7 @@ class People(NamedTuple):
     weights: Float
 
 
-@njit
+@inner
 def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[float, float]:
     """The velocity person ``i`` would like to have, other movers aside."""
     discs, state, task = crowd.discs, crowd.state, crowd.task
@@ -108,7 +107,7 @@ def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[
     return at_doors(i, (wx, wy), ways, field, discs)
 
 
-@njit
+@inner
 def at_doors(
     i: int, wanted: tuple[float, float], ways: Doors, field: Field, discs: Records
 ) -> tuple[float, float]:
@@ -125,7 +124,7 @@ def at_doors(
     return wx, wy
 
 
-@njit
+@inner
 def keep_right(i: int, wx: float, wy: float, field: Field, discs: Records) -> tuple[float, float]:
     """The wanted velocity of one of a stream, which keeps to the right side of a corridor."""
     x, y = discs[i].x, discs[i].y
@@ -138,13 +137,13 @@ def keep_right(i: int, wx: float, wy: float, field: Field, discs: Records) -> tu
     return wx + LANE * speed * rx, wy + LANE * speed * ry
 
 
-@njit
+@inner
 def wrap(angle: float) -> float:
     """The same angle in [-pi, pi)."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@njit
+@inner
 def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -> None:
     """Change towards (vx, vy) as fast as legs allow and face the way; servo targets to ``out``."""
     state, yaw = crowd.state, crowd.yaws[i]
@@ -164,7 +163,7 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
     out[2] = min(max(TURN_GAIN * wrap(heading - yaw), -most), most)
 
 
-@njit
+@inner
 def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float]:
     """The velocity person ``i`` would like to have, whatever it does; keeps account of the way."""
     crowd, field = people.crowd, people.field
@@ -199,7 +198,7 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
     return wx, wy
 
 
-@njit
+@inner
 def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], people: People) -> None:
     """One tick of all people, from positions to the set points of their servos.
 

@@ -17,7 +17,7 @@ from sim.actors.people import columns
 from sim.actors.people.leaders import CRUMB, CRUMBS, MOVING, Leaders
 from sim.actors.people.right_of_way import Crowd
 from sim.core.flow import FAR, Field, clearance_at, time_at, way_at
-from slam._jit import njit
+from slam._jit import inner
 
 _F = ACTORS.following
 GIVE_WAY_S, STEP_BACK, STEP_BACK_M = _F.give_way_s, _F.step_back, _F.step_back_m
@@ -27,7 +27,7 @@ STANDS_S, STANDS_M, NEAR_M = _F.stands_s, _F.stands_m, _F.near_m
 BEHIND = -0.5  # m; a place farther behind is one on the leader's way
 
 
-@njit
+@inner
 def in_sight(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
     """Whether the straight way between two places is free of walls."""
     dx, dy = tx - x, ty - y
@@ -39,7 +39,7 @@ def in_sight(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
     return True
 
 
-@njit
+@inner
 def through_door(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
     """Whether the straight way between two places leads through something narrow."""
     dx, dy = tx - x, ty - y
@@ -50,7 +50,7 @@ def through_door(field: Field, x: float, y: float, tx: float, ty: float) -> bool
     return False
 
 
-@njit
+@inner
 def route(i: int, tx: float, ty: float, field: Field, crowd: Crowd) -> tuple[float, float]:
     """A place in sight of person ``i`` on the way to (tx, ty): itself, or a step round the walls.
 
@@ -70,7 +70,7 @@ def route(i: int, tx: float, ty: float, field: Field, crowd: Crowd) -> tuple[flo
     return x + wx, y + wy
 
 
-@njit
+@inner
 def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Where person ``i`` would like to be, in the formation of leader ``k``."""
     course, disc = leaders.course[k], crowd.discs[leaders.rows[k]]
@@ -101,13 +101,13 @@ def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tu
     return x + reach * c, y + reach * s
 
 
-@njit
+@inner
 def _crossing(a: float, b: float, p: float, q: float) -> float:
     """By how much (m2) the ways from a to q and b to p are shorter, on one axis."""
     return (a - p) ** 2 + (b - q) ** 2 - (a - q) ** 2 - (b - p) ** 2
 
 
-@njit
+@inner
 def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
     """Where everybody's place is now; pairs who would cross take each other's."""
     state, task, discs = crowd.state, crowd.task, crowd.discs
@@ -130,7 +130,7 @@ def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
                 one.spot_y, two.spot_y = two.spot_y, one.spot_y
 
 
-@njit
+@inner
 def in_file(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Where person ``i`` goes who does not see its place: in file on the way of leader ``k``."""
     x, y = crowd.discs[i].x, crowd.discs[i].y
@@ -145,7 +145,7 @@ def in_file(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tup
     return route(i, leader.x, leader.y, field, crowd)
 
 
-@njit
+@inner
 def near_place(i: int, leaders: Leaders, crowd: Crowd) -> bool:
     """Whether person ``i`` is as good as at its place, or with its leader.
 
@@ -163,7 +163,7 @@ def near_place(i: int, leaders: Leaders, crowd: Crowd) -> bool:
     return bool(dx * dx + dy * dy < reach * reach)
 
 
-@njit
+@inner
 def taken(i: int, x: float, y: float, crowd: Crowd) -> bool:
     """Whether something else stands at a place, so that person ``i`` cannot."""
     discs = crowd.discs
@@ -184,7 +184,7 @@ TURN_MOST = ACTORS.walking.turn_most
 HELD_UP_S, REST_S = _F.held_up_s, _F.rest_s
 
 
-@njit
+@inner
 def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """The velocity with which person ``i`` would like to keep its place."""
     k = crowd.task[i].leader
@@ -202,13 +202,13 @@ def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float,
     return to_place(tx - x, ty - y, u, v)
 
 
-@njit
+@inner
 def share_of(far: float) -> float:
     """Of the leader's velocity: who is far behind goes straight to the place."""
     return max(1.0 - far, 0.0)
 
 
-@njit
+@inner
 def to_place(dx: float, dy: float, u: float, v: float) -> tuple[float, float]:
     """Velocity to a place (dx, dy) m away that itself moves at (u, v)."""
     far = math.sqrt(dx * dx + dy * dy)
@@ -221,7 +221,7 @@ def to_place(dx: float, dy: float, u: float, v: float) -> tuple[float, float]:
     return wx / over + 0.0, wy / over + 0.0
 
 
-@njit
+@inner
 def wait_behind(
     i: int, wanted: tuple[float, float], field: Field, leaders: Leaders, crowd: Crowd
 ) -> tuple[float, float]:
@@ -253,7 +253,7 @@ def wait_behind(
     return most * c, most * s
 
 
-@njit
+@inner
 def make_way(
     i: int, wanted: tuple[float, float], field: Field, leaders: Leaders, crowd: Crowd
 ) -> tuple[float, float]:
@@ -277,13 +277,13 @@ def make_way(
     return along * c - side * ASIDE * s, along * s + side * ASIDE * c
 
 
-@njit
+@inner
 def is_pushing(i: int, crowd: Crowd) -> bool:
     """Whether person ``i`` has something long before it, and not lost it since."""
     return bool(crowd.task[i].held >= 0 and crowd.state[i].turn_rate < TURN_MOST)
 
 
-@njit
+@inner
 def make_room(
     i: int, wanted: tuple[float, float], field: Field, crowd: Crowd
 ) -> tuple[float, float]:
@@ -307,7 +307,7 @@ def make_room(
     return wanted
 
 
-@njit
+@inner
 def rests(i: int, time: float, leaders: Leaders, crowd: Crowd) -> bool:
     """Whether person ``i`` was held up near its place and lets it be for a while."""
     state = crowd.state[i]
@@ -319,7 +319,7 @@ def rests(i: int, time: float, leaders: Leaders, crowd: Crowd) -> bool:
     return False
 
 
-@njit
+@inner
 def stand_in_line(i: int, time: float, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Velocity to one's place in the line, which moves up by one every ``SERVED_S``."""
     place = crowd.task[i].place
@@ -331,7 +331,7 @@ def stand_in_line(i: int, time: float, leaders: Leaders, crowd: Crowd) -> tuple[
     return to_place(dx, dy, 0.0, 0.0)
 
 
-@njit
+@inner
 def faces(i: int, leaders: Leaders, crowd: Crowd) -> float:
     """Heading rad of someone who stands: towards the leader, or up the line."""
     k = crowd.task[i].leader

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
 Vec3 = tuple[float, float, float]
@@ -27,7 +27,7 @@ REPORTED, COUNTED, TRUE = 0, 1, 2  # rows of the wheels
 NOW, AT_STAMP, INCREMENT = 0, 1, 2  # rows of the poses
 
 
-@njit
+@inner
 def _turned(distance: float, angle: float) -> tuple[float, float, float, float]:
     """(dx, dy) of an arc of that length and angle, and d(dx)/d(angle), d(dy)/d(angle)."""
     if abs(angle) < 1e-4:
@@ -38,7 +38,7 @@ def _turned(distance: float, angle: float) -> tuple[float, float, float, float]:
     return dx, dy, (distance * c - dx) / angle, (distance * s - dy) / angle
 
 
-@njit
+@inner
 def _chain(pose: Float, bx: float, by: float, angle: float) -> None:
     c, s = math.cos(pose[2]), math.sin(pose[2])
     pose[0] += c * bx - s * by
@@ -46,7 +46,7 @@ def _chain(pose: Float, bx: float, by: float, angle: float) -> None:
     pose[2] += angle
 
 
-@njit
+@inner
 def _accumulate(
     increment: Float, random: Float, systematic: Float, step: Vec3, variances: Vec3, track: float
 ) -> None:
@@ -90,7 +90,7 @@ def _accumulate(
     _chain(increment, bx, by + side, angle)
 
 
-@njit
+@inner
 def _draw(
     distance: float, angle: float, contact: bool, p: Float, normals: Float, uniforms: Float
 ) -> tuple[Vec3, Vec3]:
@@ -160,7 +160,7 @@ def update(  # noqa: PLR0913 (kernel)
     )
 
 
-@njit
+@inner
 def close(poses: Float, spread: Float, variances: Vec3) -> None:
     """End the increment here: its covariance, then nothing moved.
 
@@ -178,14 +178,14 @@ def close(poses: Float, spread: Float, variances: Vec3) -> None:
     poses[INCREMENT], spread[:2] = 0.0, 0.0
 
 
-@njit
+@inner
 def _step_pose(pose: Float, rolled: tuple[float, float], slid: float, angle: float) -> None:
     bx, by, _, _ = _turned(rolled[0], angle)
     left, back, _, _ = _turned(rolled[1], angle)  # the same arc, begun to the left
     _chain(pose, bx - back, by + left + slid, angle)
 
 
-@njit
+@inner
 def _at(travel: Float, step: float) -> Vec3:
     """Between the rows of ``travel`` (steps + 1, 3)."""
     k = min(int(step), len(travel) - 2)

@@ -27,15 +27,17 @@ int main(int argc, char** argv)
 {
     const int wanted = argc > 2 ? std::atoi(argv[2]) : 0;
     const char* domain = std::getenv("ROS_DOMAIN_ID");
+    const char* own_ip = std::getenv("NODE_IP");  // and that of the robot, where they are not the loopback's
+    const char* robot_ip = std::getenv("ROBOT_IP");
     DomainParticipantQos own;
     {   // as rmw_fastrtps does for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
         auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-        udp->interfaceWhiteList.push_back("127.0.0.1");
+        udp->interfaceWhiteList.push_back(own_ip ? own_ip : "127.0.0.1");
         udp->maxInitialPeersRange = 32;
         own.transport().use_builtin_transports = false;
         own.transport().user_transports.push_back(udp);
         eprosima::fastrtps::rtps::Locator_t peer;
-        eprosima::fastrtps::rtps::IPLocator::setIPv4(peer, "127.0.0.1");
+        eprosima::fastrtps::rtps::IPLocator::setIPv4(peer, robot_ip ? robot_ip : "127.0.0.1");
         own.wire_protocol().builtin.initialPeersList.push_back(peer);
     }
     auto* participant = DomainParticipantFactory::get_instance()->create_participant(

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from slam import se2
-from slam.errors import InvalidValueError, MissingDependencyError, SlamFailedError
+from slam.errors import InvalidValueError, LogFormatError, MissingDependencyError, SlamFailedError
 from slam.estimate import Raster
 from slam.frames import NS_PER_S
 from slam.ros import slam as ros2
@@ -19,7 +20,7 @@ from slam.ros.link import Taken, Topic, open_link
 from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
 from slam.ros.navigation_messages import ClockMessage, MapMessage
 from slam.ros.node import GRID, POSES, TF, Node
-from slam.ros.recorded import RecordedSlam
+from slam.ros.recorded import RecordedSlam, aligned
 from slam.ros.robot import Robot
 from slam.ros.template import said_ns
 from slam.system import create
@@ -139,10 +140,10 @@ def test_of_a_recorded_stack_the_newest_transform_stands():
     np.testing.assert_allclose([e.T_map_robot for e in estimates], wanted, atol=1e-12)
     hour_ns = 3600 * NS_PER_S
     late = [s._replace(stamp_ns=s.stamp_ns + hour_ns) for s in said]
-    with pytest.raises(InvalidValueError, match="--clock-offset -3600"):
-        RecordedSlam(late).update(frames[0])
-    aligned = RecordedSlam(late, clock_offset_s=-3600.0)
-    assert aligned.update(frames[0]).converged
+    bag, first_ns = Path("bag"), frames[0].stamp_ns
+    with pytest.raises(LogFormatError, match=r"bag: .* 3600\.000 s after .* --clock-offset -3600"):
+        aligned(bag, late, first_ns, offset_s=0.0, epoch_ns=0)
+    assert aligned(bag, late, first_ns, offset_s=-3600.0, epoch_ns=0) == said
 
 
 def test_recorded_poses_are_carried_on_by_odometry():

@@ -20,7 +20,7 @@ from rosbags.typesys import Stores, get_typestore
 from zenoh_ros2_sdk import ROS2Publisher, ROS2Subscriber
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
-PORT = int(re.findall(r":(\d+)", os.environ["ZENOH_CONFIG_OVERRIDE"])[0])
+((HOST, PORT),) = re.findall(r"tcp/([\d.]+):(\d+)", os.environ["ZENOH_CONFIG_OVERRIDE"])
 FIELDS = (
     "angle_min",
     "angle_max",
@@ -36,7 +36,7 @@ def of(kind: str) -> dict[str, Any]:
     """Options of a topic of that type."""
     return {
         "msg_type": kind, "msg_definition": STORE.generate_msgdef(kind)[0],
-        "type_hash": STORE.hash_rihs01(kind), "router_port": PORT,
+        "type_hash": STORE.hash_rihs01(kind), "router_ip": HOST, "router_port": int(PORT),
     }  # fmt: skip
 
 
