@@ -70,6 +70,8 @@ def measure(middleware: str, seconds: float) -> None:
     )
     opener = Opener(slams=["shunting"], settings={"scene": "office"}, seconds=WARM_S + seconds + 60)
     view = View(opener, ("127.0.0.1", 0), network=network)
+    while not link.listeners(topics()["/scan"]):
+        time.sleep(0.1)
     while view.playback.present is None or view.playback.present.seconds < WARM_S:
         view.turn()
     first_ns, began_s, spent_s = (

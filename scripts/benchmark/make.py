@@ -68,10 +68,12 @@ class Wanted:
             raise InvalidValueError(f"the subject {self.subject!r:.80} is none of the SLAMs")
         if self.sealed is not None:
             self.sealed.check_for(self.tracks)
-        if len({self.seeds_of(track) for track in self.tracks}) > 1:
-            names = ", ".join(track.name for track in self.tracks)
-            raise InvalidValueError(f"tracks of one board must have the same seeds: {names}")
-        most = len(self.seeds_of(self.tracks[0]))
+        if self.submit and len({self.seeds_of(track) for track in self.tracks}) > 1:
+            raise InvalidValueError(
+                "the tracks of a submission must have the same seeds: name them with --tracks, "
+                f"got {', '.join(track.name for track in self.tracks)}"
+            )
+        most = min(len(self.seeds_of(track)) for track in self.tracks)
         if not 1 <= self.seeds <= most:
             raise InvalidValueError(f"--seeds must be 1 to {most}, got {self.seeds}")
         if self.days:
@@ -109,11 +111,11 @@ class Wanted:
 
     def head(self) -> dict[str, Any]:
         """What a leaderboard says of how it was made."""
-        seeds = self.seeds_of(self.tracks[0])[: self.seeds]
+        seeds = sorted({k for track in self.tracks for k in self.seeds_of(track)[: self.seeds]})
         return {
             "tracks_run": [track.name for track in self.tracks],
             "seeds_of": submission.SEALED if self.sealed else submission.SETS[self.train],
-            "seeds": list(seeds),
+            "seeds": seeds,
             "levels_run": list(self.levels),
             "quick": self.quick,
             "seconds": self.seconds,

@@ -17,8 +17,8 @@ from typing import Any
 
 from scripts.benchmark import days, picture, published
 from scripts.benchmark.board import RANKED_HEADS, Board, markdown_table
-from scripts.benchmark.published import Published
-from scripts.benchmark.tracks import LEVELS, TRACKS, Track
+from scripts.benchmark.published import Published, Row
+from scripts.benchmark.tracks import LEVELS, Track, newest
 from scripts.comparison.csv_files import write_csv
 from scripts.days.scores import LEVEL_COLUMNS, levels
 from scripts.marks import fill_page
@@ -27,12 +27,13 @@ from slam.errors import MobiliaError
 from slam.files import write_text
 
 DOCS = ROOT / "docs"
+_COUNTS = {True: "yes", False: "no", None: "open"}
 PAGE, BOARD = "benchmark.md", "leaderboard.md"
 
 
 def tracks_of(of: Published) -> list[Track]:
-    """Those that it has runs of, in the order of their declaration."""
-    return [track for track in TRACKS.values() if track.name in of.runs]
+    """The newest version of each that it has runs of."""
+    return [track for track in newest().values() if track.name in of.runs]
 
 
 def tracks_table(tracks: Sequence[Track]) -> str:
@@ -41,7 +42,7 @@ def tracks_table(tracks: Sequence[Track]) -> str:
     for track in tracks:
         says = f"{track.axis}: {', '.join(word.split(' ', 1)[0] for word in track.says)}"
         words = [f"`{track.name}`", track.about, says, track.scene, f"{track.seconds:g}"]
-        table.append([*words, "yes" if track.counts else "no"])
+        table.append([*words, _COUNTS[track.counts]])
     heads = ("track", "what happens", f"level {_list(LEVELS)}", "scene", "s", "counts")
     return markdown_table(heads, table, left=4)
 
@@ -66,25 +67,25 @@ def shipped(of: Published) -> str:
 
 
 def _ranked_runs(board: Board) -> str:
-    one, counting = board.ranking[0], sum(bool(track.counts) for track in board.tracks)
+    one, counting = board.ranking[0], len(published.read().quick(board.tracks))
     return f"{one['runs']} runs: {counting} tracks that count, levels {_list(one['levels'])}"
 
 
 def at_the_top(of: Published) -> str:
     """Runs lost at level 1, of how many: a row for each track, a column for each SLAM."""
     board = board_of(of)
-    there = [row["slam"] for rows in board.runs.values() for row in rows]
+    rows = {track.name: board.one_oracle(track, track.oracle) for track in board.tracks}
+    there = [row["slam"] for own in rows.values() for row in own]
     slams = list(dict.fromkeys([*(row["slam"] for row in board.ranking), *there]))
     lines = [
-        [track.name, "yes" if track.counts else "no", *(_lost(board, track, s) for s in slams)]
+        [track.name, _COUNTS[track.counts], *(_lost(rows[track.name], s) for s in slams)]
         for track in board.tracks
     ]
     return markdown_table(["track", "counts", *slams], lines, left=2)
 
 
-def _lost(board: Board, track: Track, slam: str) -> str:
-    wanted = (slam, LEVELS[-1])
-    own = [r["lost"] for r in board.runs[track.name] if (r["slam"], r["dynamism"]) == wanted]
+def _lost(rows: Sequence[Row], slam: str) -> str:
+    own = [row["lost"] for row in rows if (row["slam"], row["dynamism"]) == (slam, LEVELS[-1])]
     return f"{sum(own)} of {len(own)}" if own else "–"
 
 
@@ -101,7 +102,7 @@ def publish(docs: Path, results: Path, aged: Path | None, commit: str) -> None:
     board = board_of(of)
     picture.overall(board.ranking, _ranked_runs(board), docs / "pictures" / "benchmark.png")
     for page, mark, told in (
-        (PAGE, "tracks", tracks_table(board.tracks)),
+        (PAGE, "tracks", tracks_table(list(newest().values()))),
         (PAGE, "shipped", shipped(of)),
         (BOARD, "top", at_the_top(of)),
     ):

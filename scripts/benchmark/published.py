@@ -134,11 +134,12 @@ def digests(plan: Plan, folder: Path) -> dict[tuple[float, int], str]:
 
 
 def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
-    """Of folders of ``mobilia benchmark``, all tracks that are whole in them.
+    """Of folders of ``mobilia benchmark``, all tracks that are whole in them, beside what is there.
 
     Raises ``InvalidValueError`` for two folders whose recordings differ.
     """
-    runs, hashes = dict[str, Row](), dict[str, str]()
+    before: dict[str, Any] = load(path, WHAT, SCHEMA) if path.exists() else {}
+    runs, hashes = dict[str, Row](before.get("runs", {})), dict[str, str](before.get("tracks", {}))
     for folder, track in product(folders, TRACKS.values()):
         if not (folder / track.name / "recipe.json").exists():
             continue
@@ -154,7 +155,9 @@ def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
             if there["recording"] != scans:
                 raise InvalidValueError(f"{folder}: {key}: other scans than in another folder")
             there["slams"] |= own
-    made = {"commit": commit, "versions": versions(), "machine": machine()}
+    made: Row = {"commit": commit, "versions": versions(), "machine": machine()}
+    on = {of["machine"]["processor"]: None for of in (before.get("made_with", made), made)}
+    made["machine"]["processor"] = ", ".join(on)
     head = {"schema": SCHEMA, "what": WHAT, "world": WORLD, "made_with": made, "columns": COLUMNS}
     write(path, head, {"tracks": hashes, "runs": runs})
     return read(path)

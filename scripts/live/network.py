@@ -25,7 +25,8 @@ _OPEN = {"open": True, "shut": False}
 
 def _drive(message: Any) -> OnWorld:
     twist = getattr(message, "twist", message)  # of a TwistStamped
-    return Drive(v=float(twist.linear.x), omega=float(twist.angular.z), side=float(twist.linear.y))
+    ahead, side = float(twist.linear.x), float(twist.linear.y)
+    return Drive(v=ahead, omega=float(twist.angular.z), side=side)
 
 
 def _carry(message: Any) -> OnWorld:

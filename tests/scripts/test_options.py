@@ -84,8 +84,7 @@ def test_the_axis_is_what_has_several_levels():
     assert axis_levels(None, ["0:1:1"], None) == ("motion", (0.0, 1.0), {})
     assert axis_levels(None, ["0.3"], ["0", "1"]) == ("change", (0.0, 1.0), {"motion": 0.3})
     assert axis_levels(None, None, ["0.4"]) == ("change", (0.4,), {})
-    held = axis_levels(None, ["0.8"], None, ["0", "4"])
-    assert held == ("people", (0.0, 4.0), {"motion": 0.8})
+    assert axis_levels(None, ["0.8"], None, ["0", "4"]) == ("people", (0.0, 4.0), {"motion": 0.8})
     assert Axis(name="people").at(4.0) == {"dynamism": 0.0, "motion": 0.5, "change": None}
     assert Axis(name="people").crowd(4.0) == "escorts:4"
     with pytest.raises(InvalidValueError, match="--motion and --change"):

@@ -23,7 +23,7 @@ from sim.actors.people.right_of_way import Crowd, Float, Int
 from sim.core.draws import between, uniform, waiting
 from sim.core.flow import FAR, Field, clearance_at, time_at
 from sim.core.state import Records
-from slam._jit import inner
+from slam._jit import inner, njit
 
 _S = ACTORS.sitting
 SHARE, HAND, STAY, DOWN_S = _S.share, _S.hand_m, _S.stay, _S.down_s

@@ -9,17 +9,15 @@ import numpy as np
 
 from scripts.benchmark import picture, publish, published
 from scripts.benchmark.scores import ranking
-from tests.scripts.benchmark.test_scores import run
+from scripts.benchmark.tracks import LEVELS
+from tests.scripts.benchmark.test_scores import runs
 
 SHIPPED = published.read()
 
 
 def test_the_shares_of_a_line_are_of_the_runs_that_rank():
-    lost = {0.0: (0, 0), 1.0: (1, 0)}
-    rows = [run("mine", level, k, lost=bool(is_lost))
-            for level, each in lost.items() for k, is_lost in enumerate(each)]  # fmt: skip
-    (row,) = ranking({"a-v1": rows}, "mine")
-    assert (row["levels"], row["lost_shares"]) == ([0.0, 1.0], [0.0, 0.5])
+    (row,) = ranking({"a-v1": runs("mine", [[0, 0, 0, 0, 1], [0, 0, 0, 1, 1]])}, "mine")
+    assert (row["levels"], row["lost_shares"]) == (list(LEVELS), [0.0, 0.0, 0.0, 0.5, 1.0])
 
 
 def test_names_at_the_ends_of_lines_never_overlap():
