@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scripts.live.opened import Opener
 
 from scripts.live.hands import Hands
 from scripts.live.network import TAKES, Network
