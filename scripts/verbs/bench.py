@@ -22,6 +22,13 @@ def bench(
     out: Annotated[
         Path | None, typer.Option("--json", help="Also write the figures to this JSON file.")
     ] = None,
+    against: Annotated[
+        bool, typer.Option("--against", help="Only ratios to others that are installed, in turn.")
+    ] = False,
+    page: Annotated[
+        Path | None,
+        typer.Option(help="With --against: fill the place `speed` of this page of Markdown."),
+    ] = None,
 ) -> None:
     """Measure the speed of simulation, scanner, environment and SLAM on this machine.
 
@@ -34,8 +41,10 @@ def bench(
         raise InvalidValueError(f"--seconds must lie in [1, 3600] s, got {seconds}")
     from scripts.benches import crowds, dataset, world
     from scripts.benches import slam as bench_slam
-    from scripts.machine import machine, versions
+    from scripts.machine import machine
 
+    if page is not None and not against:
+        raise InvalidValueError("--page needs --against: its table is of ratios to others")
     measures: tuple[Callable[[float], Iterable[dict[str, Any]]], ...] = (
         world.simulation,
         world.scanner,
@@ -50,6 +59,9 @@ def bench(
         partial(dataset.rows, seed=world.SEED, dynamism=world.DYNAMISM),
     )
 
+    if against:
+        _against(seconds, page, out)
+        return
     rows: list[dict[str, Any]] = []
     table = Table(title="Speed", title_justify="left", caption=str(machine()["processor"]))
     for heading in ("what", "figure", "unit", "target", "how"):
@@ -63,6 +75,27 @@ def bench(
             shown = f"{figure:.0f}" if figure >= 100.0 else f"{figure:.3g}"
             table.add_row(row["what"], shown, row["unit"], row["target"], row["how"])
     console.print(table)
+    _saved(out, rows)
+
+
+def _against(seconds: float, page: Path | None, out: Path | None) -> None:
+    """The table of ratios to others, on the console and where else it is wanted."""
+    from scripts import marks
+    from scripts.benches import against
+    from scripts.machine import machine
+
+    with working("measuring ours and others in turn"):
+        rows = list(against.rows(seconds))
+    told = against.table(rows, machine())
+    console.print(told, markup=False, soft_wrap=True)
+    if page is not None:
+        marks.fill_page(page, "speed", told)
+    _saved(out, rows)
+
+
+def _saved(out: Path | None, rows: list[dict[str, Any]]) -> None:
+    from scripts.machine import machine, versions
+
     if out is not None:
         report = {"schema": 1, "machine": machine(), "versions": versions(), "rows": rows}
         write_text(out, json.dumps(report, indent=2) + "\n")

@@ -225,4 +225,4 @@ def unseen(rows: int) -> Any:
     where = (flat, flat, flat, flat, flat, flat, flat)
     scanner = Noted(none, runs, *where, -1, poses, flat, none)
     marks = np.zeros(rows, dtype=np.bool_)
-    return plain(Watch(marks, scanner, np.zeros((rows, 3)), np.zeros((rows, 2))))
+    return plain(Watch(marks, scanner, np.zeros((rows, 3)), np.zeros((rows, 3))))

@@ -94,9 +94,10 @@ def test_what_is_no_section_is_refused(tmp_path, text):
 
 
 def test_it_is_published_alone_and_in_place_of_an_older_one(tmp_path):
-    docs, board = tmp_path / "docs", "# Leaderboard\n\n## tour-guide-v1\n\n| a |\n"
-    docs.mkdir()
-    (docs / "leaderboard.md").write_text(board)
+    docs = tmp_path / "docs"
+    (docs / "pictures").mkdir(parents=True)
+    for page, marks in (("leaderboard.md", ("top",)), ("benchmark.md", ("tracks", "shipped"))):
+        (docs / page).write_text("".join(f"<!-- {m} -->\n<!-- /{m} -->\n" for m in marks))
     (tmp_path / "out").mkdir()
     told = {"schema": 1, "slams": ["shunting"], "seeds": [720, 721]}
     days.write(tmp_path / "out", told, rows())
@@ -104,7 +105,7 @@ def test_it_is_published_alone_and_in_place_of_an_older_one(tmp_path):
     for _ in range(2):
         assert publish.main(words) == 0
     page = (docs / "leaderboard.md").read_text()
-    assert page.startswith(f"{board}\n{days.section(rows(), tables=False)}\n")
+    assert page.count(f"<!-- /top -->\n\n{days.section(rows(), tables=False)}\n") == 1
     assert (docs / "days.csv").read_text().startswith("scene,motion,change,slam,metric,")
     copied = json.loads((docs / "days.json").read_text())
     command = "python -m scripts.benchmark.days out/days --slam shunting --seeds 2"

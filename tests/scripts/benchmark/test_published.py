@@ -53,7 +53,7 @@ def test_one_oracle_holds_in_every_run_of_a_track_that_counts():
     for name in SHIPPED.runs:
         track, rows = TRACKS[name], SHIPPED.rows(name, digests(name), ())
         lost = [sum(r["lost"] for r in rows if r["slam"] == o) for o in track.oracles]
-        assert (min(lost) == 0) == track.counts, (name, lost)
+        assert track.counts in (None, min(lost) == 0), (name, lost)
 
 
 def test_rows_are_taken_on_the_same_recordings_alone():
