@@ -41,12 +41,14 @@ class FromMap:
                  is room, else the widest floor
     path         (n, 2) m where a robot has driven: other floor is that near to it; None: anywhere
     things       whether small things apart from walls are taken out of the walls
+    few          whether boxes on one line become one: fewer, a little farther from their cells
     """
 
     tolerance_m: float = 0.05
     start: Pose | None = None
     path: Float | None = None
     things: bool = True
+    few: bool = True
 
     def __post_init__(self) -> None:
         if not 0.01 <= self.tolerance_m <= 0.5:
@@ -105,7 +107,7 @@ def plan(map_: Raster, options: FromMap | None = None, *, source: str = "map") -
     occupied, free = map_.values > OCCUPIED, map_.values < FREE
     _check(occupied, free, cell, source)
     things, solid = things_of(occupied, cell) if options.things else ([], occupied)
-    walls = boxes_of(solid, cell, options.tolerance_m)
+    walls = boxes_of(solid, cell, options.tolerance_m, few=options.few)
     if 2.0 * walls[:, 2].sum() > MAX_WALL_M:
         raise InvalidValueError(
             f"{source}: {2.0 * walls[:, 2].sum():.0f} m of walls in {len(walls)} pieces; at most "

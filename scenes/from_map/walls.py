@@ -24,7 +24,10 @@ DOTS, ROW_M, GAP_M = 6, 0.6, 0.35  # cells of a dotted wall, its least length, i
 DENSE = 0.75  # share of a dotted wall that is within ROW_REACH_M of its cells
 ROW_REACH_M = 0.05  # as REACH_M, of a dotted wall
 COVER_M = 0.05  # a cell so near to a box is built
-ENOUGH = 0.97  # share of the cells that is
+ENOUGH, FEW_ENOUGH = 0.97, 0.96  # share of the cells that is, at least; and with few boxes
+JOINS = 2  # rounds in which boxes of one line become one
+ASIDE_M = 0.10  # an end of a box so far off the line of another is on it
+BARE = 1  # cells with nothing occupied beside them that a joined box may add
 BRIDGE_M = 0.13  # gaps up to that, in a wall seen now and then, are closed
 
 
@@ -48,11 +51,12 @@ def skin(occupied: Mask, cell_m: float) -> Mask:
     return np.asarray(occupied & (deep * cell_m <= max(SHELL_M, 1.5 * cell_m)))
 
 
-def boxes_of(occupied: Mask, cell_m: float, tolerance_m: float) -> Float:
+def boxes_of(occupied: Mask, cell_m: float, tolerance_m: float, *, few: bool) -> Float:
     """(n, 5) boxes cx, cy, half length, half thickness m, yaw rad, in the frame of the cells.
 
     The middle lines of walls, straightened until they would be off by ``tolerance_m``; each box
-    then takes the place and the thickness of the cells beside it.
+    then takes the place and the thickness of the cells beside it. With ``few``, boxes that lie on
+    one line and touch become one, where it is no barer than they are.
     """
     hollow, occupied = skin(bridged(occupied, cell_m), cell_m), skin(occupied, cell_m)
     around = _Around(occupied, cell_m)
@@ -69,11 +73,49 @@ def boxes_of(occupied: Mask, cell_m: float, tolerance_m: float) -> Float:
                 if box is not None:
                     found.append(box)
     drawn = np.array(found, dtype=np.float64).reshape(-1, 5)
-    dotted = _dotted(drawn, around, occupied, cell_m)
-    return _needed(np.vstack([drawn, dotted]), occupied, cell_m)
+    near = cv2.dilate(occupied.astype(np.uint8), disc(2.0 * ROW_REACH_M, cell_m))
+    pool: Float = np.vstack([drawn, _dotted(drawn, around, occupied, near, cell_m)])
+    if not few:
+        return _needed(pool, occupied, cell_m, ENOUGH)
+    for _ in range(JOINS):
+        kept = _needed(pool, occupied, cell_m, FEW_ENOUGH)
+        pool = np.vstack([kept, _joined(kept, around, near, cell_m)])
+    return _needed(pool, occupied, cell_m, FEW_ENOUGH)
 
 
-def _dotted(boxes: Float, around: _Around, occupied: Mask, cell_m: float) -> Float:
+def _joined(boxes: Float, around: _Around, near: NDArray[np.uint8], cell_m: float) -> Float:
+    """Boxes for two that lie on one line and touch; ``near``: cells beside what is occupied."""
+    ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])])
+    ends = boxes[:, None, :2] + boxes[:, 2, None, None] * ahead[:, None] * [[-1.0], [1.0]]
+    bare = np.array([_bare(box, near, cell_m) for box in boxes])
+    found = []
+    for k, box in enumerate(boxes):
+        off = ends - box[:2]
+        u = off[..., 0] * ahead[k, 0] + off[..., 1] * ahead[k, 1]
+        v = off[..., 1] * ahead[k, 0] - off[..., 0] * ahead[k, 1]
+        low, high, half = u.min(axis=1), u.max(axis=1), box[2]
+        touches = (low <= half + BRIDGE_M) & (high >= -half - BRIDGE_M)
+        longer = (low < -half) | (high > half)
+        on = (abs(v).max(axis=1) <= ASIDE_M) & touches & longer & (boxes[:, 2] <= half)
+        for other in np.flatnonzero(on).tolist():
+            both, along = np.vstack([ends[k], ends[other]]), np.hstack([u[k], u[other]])
+            new = around.box(both[along.argmin()], both[along.argmax()])
+            if new is None:
+                continue
+            if _bare(np.array(new), near, cell_m) <= bare[k] + bare[other] + BARE:
+                found.append(new)
+    return np.array(found, dtype=np.float64).reshape(-1, 5)
+
+
+def _bare(box: Float, near: NDArray[np.uint8], cell_m: float) -> int:
+    """Cells of a box with nothing occupied beside them."""
+    window, inside = footprint(box, near.shape, cell_m)
+    return int((inside & (1 - near[window])).sum())
+
+
+def _dotted(
+    boxes: Float, around: _Around, occupied: Mask, near: NDArray[np.uint8], cell_m: float
+) -> Float:
     """Boxes along straight rows of cells, with gaps, that no long box covers."""
     left = occupied.astype(np.uint8)
     for box in boxes[2.0 * boxes[:, 2] > LONG_M]:
@@ -85,7 +127,6 @@ def _dotted(boxes: Float, around: _Around, occupied: Mask, cell_m: float) -> Flo
     if lines is None:
         return np.zeros((0, 5))
     ends = (np.asarray(lines, dtype=np.float64).reshape(-1, 2, 2) + 0.5) * cell_m
-    near = cv2.dilate(occupied.astype(np.uint8), disc(2.0 * ROW_REACH_M, cell_m))
     rows = []
     for a, b in ends:
         box = around.box(a, b, ROW_REACH_M)
@@ -97,8 +138,8 @@ def _dotted(boxes: Float, around: _Around, occupied: Mask, cell_m: float) -> Flo
     return np.array(rows).reshape(-1, 5)
 
 
-def _needed(boxes: Float, occupied: Mask, cell_m: float) -> Float:
-    """Few of those boxes, the best first: all long ones, and ``ENOUGH`` of the cells."""
+def _needed(boxes: Float, occupied: Mask, cell_m: float, enough: float) -> Float:
+    """Few of those boxes, the best first: all long ones, and ``enough`` of the cells."""
     number = np.full(occupied.shape, -1)
     number[occupied] = np.arange(int(occupied.sum()))
     cells, covered = [], np.zeros(int(occupied.sum()), dtype=bool)
@@ -116,7 +157,7 @@ def _needed(boxes: Float, occupied: Mask, cell_m: float) -> Float:
             if gain:
                 heapq.heappush(queue, (-gain, k))
             continue
-        if gain * cell_m < LONG_M and covered.sum() >= ENOUGH * len(covered):
+        if gain * cell_m < LONG_M and covered.sum() >= enough * len(covered):
             break
         covered[cells[k]] = True
         kept.append(k)

@@ -30,7 +30,7 @@ def written_building(
     ranges = np.array([np.where(scan.valid, scan.ranges, np.nan) for scan in scans])
     for _ in range(PASSES):
         raster = evidence_of(scans, poses).raster()
-        drawn = plan(raster, FromMap(path=poses[:, :2], things=False), source=log)
+        drawn = plan(raster, FromMap(path=poses[:, :2], things=False, few=False), source=log)
         lasers = np.array([se2.compose(pose, mount) for pose in poses])
         walls, lasers = laid(drawn.walls, lasers, ranges.astype(np.float64), angles)
         poses = np.array([se2.compose(laser, se2.inverse(mount)) for laser in lasers])

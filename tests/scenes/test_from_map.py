@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -47,6 +48,22 @@ def test_walls_cover_the_cells_and_nothing_else(yaw):
     assert made.figures.walls + made.figures.pieces <= made.figures.wall_m
     length = 2 * (WIDE + HIGH) + HIGH - GAP
     assert made.figures.wall_m == pytest.approx(length, rel=0.05)
+
+
+def test_pieces_of_one_line_become_one_box_but_not_over_a_gap():
+    raster = two_rooms()
+    values = raster.values.copy()
+    wall = values[20:22, 20:260]
+    wall[:, 100:120] = 0.0  # 1 m
+    for k, column in enumerate(range(10, 90, 8)):  # a wall of steps of one cell
+        wall[k % 2, column : column + 8] = 0.0
+    raster = replace(raster, values=values)
+    few, many = (plan(raster, FromMap(few=few, things=False)) for few in (True, False))
+    y = se2.transform(se2.inverse(raster.T_map_origin), few.walls[:, :2])[:, 1]
+    lowest = few.walls[(abs(y - 1.05) < 0.1) & (abs(np.sin(few.walls[:, 4])) < 0.1)]
+    assert sorted(2.0 * lowest[:, 2]) == pytest.approx([5.0, 6.0], abs=0.2)
+    assert len(few.walls) <= len(many.walls)
+    assert min(few.figures.cells_near, few.figures.walls_near) > 0.95
 
 
 def test_a_gap_is_a_door_and_a_small_box_a_thing():
