@@ -75,12 +75,6 @@ class Agreement:
         nats = min(1.5 * (self.ratio - self._config.disagreed), 50.0)  # of 3 numbers: 3 / 2
         return (1.0 - vote) / (1.0 + math.exp(-nats))
 
-    def undragged(self, T_map_robot: Float) -> Float:
-        """(3,) the pose without what matches corrected: where odometry leads."""
-        pose: Float = T_map_robot - np.array(self._sums[self._worst])
-        pose[2] = se2.wrap(float(pose[2]))
-        return pose
-
     def covariance(self, dragged: float) -> Float:
         """(3, 3) of the pose if that is its probability: the pose is right, or off by S.
 
@@ -94,8 +88,3 @@ class Agreement:
         """(3, 3) the part of that which the window is about to forget: the map's from now on."""
         keep = math.exp(-self._elapsed_s / self._windows[self._worst])
         return (1.0 - keep * keep) * self.covariance(dragged)
-
-    def off_m(self, dragged: float) -> float:
-        """m, deviation of the position by that."""
-        x, y, _ = self._sums[self._worst]
-        return math.sqrt(dragged) * math.hypot(x, y)
